@@ -1,0 +1,45 @@
+# Every target sets up what it needs. `make help` lists them.
+SHELL := /bin/bash
+.DEFAULT_GOAL := demo
+.NOTPARALLEL:
+
+# The interpreter to use, 3.10 to 3.13, and the ROS 2 wheels to install where no ROS is sourced:
+# jazzy (if left empty) or kilted.
+PYTHON ?= python3
+DISTRO ?=
+DEMO_ARGS ?=
+
+SET_UP := command -v "$(PYTHON)" >/dev/null \
+    || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
+    venv=$$("$(PYTHON)" scripts/set_up.py "$(DISTRO)")
+UNDERLAY := $(SET_UP) && . "$$venv/local_setup.sh"
+OVERLAY := $(SET_UP) && . "$$venv/env.sh"
+
+# A simulation must not reach other machines, nor a vehicle on them.
+LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+
+.PHONY: help demo test build lint lock clean distclean
+
+help: ## say what each target does
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+
+demo: build ## fly one simulated flight with the real nodes
+	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo $(DEMO_ARGS)
+
+test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
+	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
+
+build: ## build both packages
+	@$(UNDERLAY) && exec scripts/build.sh
+
+lint: ## ruff, mypy and the import rule
+	@$(UNDERLAY) && exec scripts/lint.sh
+
+lock: ## refresh requirements/*.lock
+	@$(UNDERLAY) && exec scripts/lock.sh
+
+clean: ## remove what was built
+	rm -rf build-* install-* log-*
+
+distclean: clean ## remove the environments as well
+	rm -rf .venv-*

@@ -1,0 +1,28 @@
+"""Every error that a caller of ours can cause, in one small tree.
+
+What comes from a wire never raises: it is counted, reported and dropped by the decoders.
+"""
+
+
+class ChuteError(Exception):
+    """Root of all errors of this package."""
+
+
+class ParameterError(ChuteError, ValueError):
+    """A parameter has a value that is not allowed. The text names it, the value and the fix."""
+
+
+class MessageError(ChuteError, ValueError):
+    """A message to be sent holds a value that its field cannot carry."""
+
+
+class TransitionError(ChuteError):
+    """A state machine was given an event that its table does not list for its state."""
+
+
+class SigningKeyError(ChuteError, ValueError):
+    """A signing key cannot be used. The text names the file and the fix."""
+
+
+class NotBuiltError(ChuteError, ImportError):
+    """A generated part is missing. The text says which command makes it."""

@@ -1,0 +1,132 @@
+"""Is a device alive? Never seen, ok, stale and lost are four different things.
+
+The table is the whole truth: a pair that it does not list raises.
+
+    NEVER_SEEN --heard--> OK --stale limit--> STALE --lost limit--> LOST
+                          ^ ^------heard--------'                     |
+                          '--------------heard (regained)-------------'
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.model import LinkState
+
+
+class Stimulus(enum.Enum):
+    """What can happen to a link."""
+
+    HEARD = "heard"
+    STALE_LIMIT = "stale limit passed"
+    LOST_LIMIT = "lost limit passed"
+
+
+TRANSITIONS: dict[tuple[LinkState, Stimulus], LinkState] = {
+    (LinkState.NEVER_SEEN, Stimulus.HEARD): LinkState.OK,
+    (LinkState.OK, Stimulus.HEARD): LinkState.OK,
+    (LinkState.OK, Stimulus.STALE_LIMIT): LinkState.STALE,
+    (LinkState.STALE, Stimulus.HEARD): LinkState.OK,
+    (LinkState.STALE, Stimulus.LOST_LIMIT): LinkState.LOST,
+    (LinkState.LOST, Stimulus.HEARD): LinkState.OK,
+}
+
+
+def next_state(state: LinkState, stimulus: Stimulus) -> LinkState:
+    """The state after stimulus; TransitionError for a pair that the table does not list."""
+    try:
+        return TRANSITIONS[state, stimulus]
+    except KeyError:
+        raise TransitionError(f"a link that is {state.name} cannot take '{stimulus.value}'") from None
+
+
+@dataclass(frozen=True)
+class LivenessLimits:
+    """Seconds of silence after which a link is stale, and lost."""
+
+    stale_after: float
+    lost_after: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.stale_after < self.lost_after < math.inf:
+            raise ParameterError(
+                f"stale_after {self.stale_after} s and lost_after {self.lost_after} s: "
+                "need 0 < stale_after < lost_after"
+            )
+
+
+@dataclass(frozen=True)
+class LinkChange:
+    """A link changed its state at monotonic time at (s), after silence seconds of silence."""
+
+    before: LinkState
+    after: LinkState
+    at: float
+    silence: float
+
+    @property
+    def regained(self) -> bool:
+        """The link was lost and is back."""
+        return self.before is LinkState.LOST and self.after is LinkState.OK
+
+
+class Liveness:
+    """Follows one link. All times are monotonic seconds; NaN: has not happened."""
+
+    def __init__(self, limits: LivenessLimits) -> None:
+        self.limits = limits
+        self.state = LinkState.NEVER_SEEN
+        self.since = math.nan
+        self.last_heard = math.nan
+        self.first_heard = math.nan
+        self.lost_at = math.nan
+        self.regained_at = math.nan
+        self.lost_count = 0
+
+    def heard(self, now: float) -> list[LinkChange]:
+        """The device was heard at now; returns what changed, the passing of limits before included."""
+        changes = self.update(now)
+        silence = self.age(now)
+        before = self.state
+        changes += self._take(Stimulus.HEARD, now, silence)
+        self.last_heard = now
+        if before is LinkState.NEVER_SEEN:
+            self.first_heard = now
+        elif before is LinkState.LOST:
+            self.regained_at = now
+        return changes
+
+    def update(self, now: float) -> list[LinkChange]:
+        """Look at the clock; returns the limits that were passed, each at the time it was passed."""
+        changes: list[LinkChange] = []
+        silence = self.age(now)
+        if self.state is LinkState.OK and silence >= self.limits.stale_after:
+            changes += self._take(Stimulus.STALE_LIMIT, now, silence)
+        if self.state is LinkState.STALE and silence >= self.limits.lost_after:
+            changes += self._take(Stimulus.LOST_LIMIT, now, silence)
+            self.lost_at = now
+            self.lost_count += 1
+        return changes
+
+    def age(self, now: float) -> float:
+        """Seconds since the device was last heard; NaN: never."""
+        return now - self.last_heard
+
+    def next_deadline(self) -> float:
+        """When update has something to say if nothing is heard; infinity: never."""
+        if self.state is LinkState.OK:
+            return self.last_heard + self.limits.stale_after
+        if self.state is LinkState.STALE:
+            return self.last_heard + self.limits.lost_after
+        return math.inf
+
+    def _take(self, stimulus: Stimulus, now: float, silence: float) -> list[LinkChange]:
+        before = self.state
+        self.state = next_state(before, stimulus)
+        if self.state is before:
+            return []
+        self.since = now
+        return [LinkChange(before, self.state, now, silence)]

@@ -1,0 +1,1 @@
+"""The MAVLink parachute protocol, seen from the vehicle's companion computer."""

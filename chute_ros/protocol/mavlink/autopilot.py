@@ -1,0 +1,237 @@
+"""What the autopilot on the same network says of the vehicle.
+
+Source: MAVLink common.xml: HEARTBEAT, EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, LOCAL_POSITION_NED,
+ALTITUDE, ATTITUDE, ATTITUDE_QUATERNION, SCALED_IMU, HIGHRES_IMU, SYS_STATUS, SYSTEM_TIME.
+A value that is not finite, or that the message marks as unknown, is not taken over: the reading
+before it goes on ageing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from chute_ros.model import Armed, LandedState, Reading, VehicleState
+from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.dialect import dialect
+
+STANDARD_GRAVITY = 9.80665  # m/s^2
+#: A device clock that runs back by more than this (ms) has restarted; less is reordering.
+REBOOT_JUMP_MS = 1000
+_WRAP_MS = 2**32
+_WRAP_MARGIN_MS = 60_000
+
+#: Ask for the stream when a part is older than this (s), and again after the interval (s).
+STREAM_SILENCE = 2.5
+STREAM_ASK_INTERVAL = 5.0
+
+#: The messages to ask for, and read here.
+STREAMED_MESSAGES: tuple[int, ...] = (
+    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    dialect.MAVLINK_MSG_ID_ATTITUDE,
+    dialect.MAVLINK_MSG_ID_SCALED_IMU,
+    dialect.MAVLINK_MSG_ID_SYS_STATUS,
+)
+
+
+def is_autopilot(heartbeat: Any) -> bool:
+    """A flight controller sends this heartbeat: not a ground station, radio, or other component."""
+    return bool(
+        heartbeat.autopilot != dialect.MAV_AUTOPILOT_INVALID
+        and heartbeat.type not in (dialect.MAV_TYPE_GCS, dialect.MAV_TYPE_PARACHUTE)
+    )
+
+
+class AutopilotTracker:
+    """Follows one autopilot."""
+
+    def __init__(self, system_id: int, component_id: int, limits: LivenessLimits) -> None:
+        self.system_id = system_id
+        self.component_id = component_id
+        self.liveness = Liveness(limits)
+        self.reboot_count = 0
+        self.rebooted_in_flight = False
+        self._readings: dict[str, Reading] = {}
+        self._system_status = 0
+        self._asked_at = -math.inf
+        self._boot_ms: int | None = None
+        self._readers: dict[str, Callable[[Any, float], None]] = {
+            "EXTENDED_SYS_STATE": self._extended_sys_state,
+            "GLOBAL_POSITION_INT": self._global_position_int,
+            "LOCAL_POSITION_NED": self._local_position_ned,
+            "ALTITUDE": self._altitude,
+            "ATTITUDE": self._attitude,
+            "ATTITUDE_QUATERNION": self._attitude_quaternion,
+            "SCALED_IMU": self._scaled_imu,
+            "HIGHRES_IMU": self._highres_imu,
+            "SYS_STATUS": self._sys_status,
+        }
+
+    @property
+    def device(self) -> str:
+        """"system/component"."""
+        return f"{self.system_id}/{self.component_id}"
+
+    @property
+    def armed(self) -> Armed:
+        """By the newest heartbeat."""
+        reading = self._readings.get("armed")
+        return Armed.UNKNOWN if reading is None else Armed(int(reading.value))
+
+    @property
+    def landed_state(self) -> LandedState:
+        """By the newest EXTENDED_SYS_STATE."""
+        reading = self._readings.get("landed_state")
+        return LandedState.UNKNOWN if reading is None else LandedState(int(reading.value))
+
+    @property
+    def motors_off(self) -> bool:
+        """The autopilot's own state shows that the motors do not turn any more."""
+        terminated = self._system_status == dialect.MAV_STATE_FLIGHT_TERMINATION
+        return self.armed is Armed.DISARMED or terminated
+
+    def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
+        """A HEARTBEAT of the autopilot."""
+        armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        self._set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
+        self._system_status = message.system_status
+        return self.liveness.heard(now)
+
+    def wants_stream(self, now: float) -> bool:
+        """A part of the picture is missing or old, and asking for it is not just done."""
+        parts = ("landed_state", "height", "tilt", "acceleration", "battery_voltage")
+        readings = [self._readings.get(part, Reading()) for part in parts]
+        if all(reading.age(now) < STREAM_SILENCE for reading in readings):
+            return False
+        if now - self._asked_at < STREAM_ASK_INTERVAL:
+            return False
+        self._asked_at = now
+        return True
+
+    def message(self, message: Any, now: float) -> bool:
+        """Any other message of the autopilot; True: the vehicle's picture changed."""
+        boot_ms = getattr(message, "time_boot_ms", None)
+        if boot_ms:
+            self._watch_clock(boot_ms)
+        reader = self._readers.get(message.get_type())
+        if reader is None:
+            return False
+        reader(message, now)
+        return True
+
+    def vehicle_state(self, now: float) -> VehicleState:
+        """The picture at now, each part with its age."""
+
+        def value(name: str) -> float:
+            return self._readings.get(name, Reading()).value
+
+        def age(name: str) -> float:
+            return self._readings.get(name, Reading()).age(now)
+
+        return VehicleState(
+            source=self.device,
+            link_state=self.liveness.state,
+            armed=self.armed,
+            armed_age=age("armed"),
+            landed_state=self.landed_state,
+            landed_state_age=age("landed_state"),
+            height=value("height"),
+            height_age=age("height"),
+            vertical_speed=value("vertical_speed"),
+            vertical_speed_age=age("vertical_speed"),
+            roll=value("roll"),
+            pitch=value("pitch"),
+            yaw=value("yaw"),
+            tilt=value("tilt"),
+            attitude_age=age("tilt"),
+            acceleration=value("acceleration"),
+            acceleration_age=age("acceleration"),
+            latitude=value("latitude"),
+            longitude=value("longitude"),
+            position_age=age("latitude"),
+            battery_voltage=value("battery_voltage"),
+            battery_remaining=value("battery_remaining"),
+            battery_age=age("battery_voltage"),
+            system_status=self._system_status,
+            uptime=math.nan if self._boot_ms is None else self._boot_ms / 1000.0,
+            reboot_count=self.reboot_count,
+            rebooted_in_flight=self.rebooted_in_flight,
+        )
+
+    def _set(self, name: str, value: float, now: float) -> None:
+        if math.isfinite(value):
+            self._readings[name] = Reading(float(value), now)
+
+    def _watch_clock(self, boot_ms: int) -> None:
+        last = self._boot_ms
+        if last is None or boot_ms >= last:
+            self._boot_ms = boot_ms
+            return
+        if last - boot_ms <= REBOOT_JUMP_MS:
+            return
+        self._boot_ms = boot_ms
+        if last > _WRAP_MS - _WRAP_MARGIN_MS and boot_ms < _WRAP_MARGIN_MS:
+            return
+        self.reboot_count += 1
+        in_air = self.landed_state not in (LandedState.UNKNOWN, LandedState.ON_GROUND)
+        self.rebooted_in_flight = in_air or self.armed is Armed.ARMED
+        self._asked_at = -math.inf
+        # What the autopilot said before its restart describes a vehicle that it no longer knows.
+        for name in ("armed", "landed_state"):
+            self._readings.pop(name, None)
+
+    def _extended_sys_state(self, message: Any, now: float) -> None:
+        if message.landed_state in set(LandedState) - {LandedState.UNKNOWN}:
+            self._set("landed_state", message.landed_state, now)
+
+    def _global_position_int(self, message: Any, now: float) -> None:
+        self._set("height", message.relative_alt / 1000.0, now)
+        self._set("vertical_speed", -message.vz / 100.0, now)
+        self._set("latitude", message.lat / 1e7, now)
+        self._set("longitude", message.lon / 1e7, now)
+
+    def _local_position_ned(self, message: Any, now: float) -> None:
+        # Its origin may not be the take-off point, so that only the speed is taken from it.
+        self._set("vertical_speed", -message.vz, now)
+
+    def _altitude(self, message: Any, now: float) -> None:
+        self._set("height", message.altitude_relative, now)
+
+    def _attitude(self, message: Any, now: float) -> None:
+        if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
+            return
+        self._set("roll", message.roll, now)
+        self._set("pitch", message.pitch, now)
+        self._set("yaw", message.yaw, now)
+        upright = math.cos(message.roll) * math.cos(message.pitch)
+        self._set("tilt", math.acos(max(-1.0, min(1.0, upright))), now)
+
+    def _attitude_quaternion(self, message: Any, now: float) -> None:
+        w, x, y, z = message.q1, message.q2, message.q3, message.q4
+        length = math.sqrt(w * w + x * x + y * y + z * z)
+        if not 0.5 < length < 2.0:
+            return
+        w, x, y, z = w / length, x / length, y / length, z / length
+        self._set("roll", math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), now)
+        self._set("pitch", math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))), now)
+        self._set("yaw", math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)), now)
+        self._set("tilt", math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y)))), now)
+
+    def _scaled_imu(self, message: Any, now: float) -> None:
+        length = math.sqrt(message.xacc**2 + message.yacc**2 + message.zacc**2)
+        self._set("acceleration", length * STANDARD_GRAVITY / 1000.0, now)
+
+    def _highres_imu(self, message: Any, now: float) -> None:
+        parts = (message.xacc, message.yacc, message.zacc)
+        if all(map(math.isfinite, parts)):
+            self._set("acceleration", math.hypot(*parts), now)
+
+    def _sys_status(self, message: Any, now: float) -> None:
+        if message.voltage_battery != 0xFFFF:
+            self._set("battery_voltage", message.voltage_battery / 1000.0, now)
+        if message.battery_remaining >= 0:
+            self._set("battery_remaining", message.battery_remaining / 100.0, now)
+
+

@@ -1,0 +1,45 @@
+"""What one MAVLink link can be told to do differently. Times in s; ids 1 to 255, 0: any."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+from chute_ros.model import TriggerFlags
+from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.protocol.mavlink.commands import CommandLimits
+from chute_ros.protocol.mavlink.effect import EffectLimits
+from chute_ros.protocol.mavlink.parachute import StatusLimits
+
+
+class KillMethod(enum.Enum):
+    """How the autopilot is told to stop the motors."""
+
+    #: MAV_CMD_DO_FLIGHTTERMINATION (185), param1 = 1.
+    FLIGHT_TERMINATION = "flight_termination"
+    #: MAV_CMD_COMPONENT_ARM_DISARM (400), param1 = 0, param2 = 21196.
+    FORCED_DISARM = "forced_disarm"
+
+
+@dataclass(frozen=True)
+class MavlinkConfig:
+    """Settings of a MavlinkLink."""
+
+    system_id: int = 1
+    component_id: int = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+    parachute_system_id: int = 0
+    parachute_component_id: int = 0
+    autopilot_system_id: int = 0
+    autopilot_component_id: int = 1  # MAV_COMP_ID_AUTOPILOT1
+    parachute_liveness: LivenessLimits = field(default=LivenessLimits(2.5, 5.0))
+    autopilot_liveness: LivenessLimits = field(default=LivenessLimits(2.5, 5.0))
+    status: StatusLimits = field(default=StatusLimits())
+    commands: CommandLimits = field(default=CommandLimits())
+    effect: EffectLimits = field(default=EffectLimits())
+    default_triggers: TriggerFlags = TriggerFlags.FC | TriggerFlags.OFFBOARD
+    kill_method: KillMethod = KillMethod.FLIGHT_TERMINATION
+    #: Rate to ask of the autopilot for each message that vehicle/state needs, Hz; 0: do not ask.
+    autopilot_message_rate: float = 10.0
+    #: Undo arming on the ground while flight is blocked.
+    disarm_when_blocked: bool = True
+    heartbeat_interval: float = 1.0

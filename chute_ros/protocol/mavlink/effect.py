@@ -1,0 +1,268 @@
+"""A command with its effect: acknowledged is not done; done is what the device's own status shows.
+
+One closed loop serves release, kill, arming and requests: send (as a transaction), wait for the
+acknowledgement, then for the effect; try again while that can help; give up in time and say which
+of the two did not come. Nothing more is sent once the effect is there.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.model import Outcome
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.commands import Command, CommandFinished
+
+
+class Phase(enum.Enum):
+    """Where the loop is."""
+
+    WAIT_ACKNOWLEDGEMENT = "waiting for the acknowledgement"
+    WAIT_EFFECT = "waiting for the effect"
+    WAIT_RETRY = "waiting to try again"
+    CONFIRMED = "confirmed"
+    FAILED = "failed"
+
+
+class Happening(enum.Enum):
+    """What can happen to it."""
+
+    ACCEPTED = "accepted"
+    NOT_NOW = "refused or unanswered, worth another try"
+    REFUSED = "refused for good"
+    EFFECT_SHOWN = "effect shown"
+    EFFECT_LATE = "effect overdue"
+    RETRY_DUE = "time to try again"
+    GIVE_UP = "time is up"
+
+
+TRANSITIONS: dict[tuple[Phase, Happening], Phase] = {
+    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.ACCEPTED): Phase.WAIT_EFFECT,
+    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.NOT_NOW): Phase.WAIT_RETRY,
+    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.REFUSED): Phase.FAILED,
+    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.EFFECT_SHOWN): Phase.CONFIRMED,
+    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.GIVE_UP): Phase.FAILED,
+    (Phase.WAIT_EFFECT, Happening.EFFECT_SHOWN): Phase.CONFIRMED,
+    (Phase.WAIT_EFFECT, Happening.EFFECT_LATE): Phase.WAIT_RETRY,
+    (Phase.WAIT_EFFECT, Happening.GIVE_UP): Phase.FAILED,
+    (Phase.WAIT_RETRY, Happening.RETRY_DUE): Phase.WAIT_ACKNOWLEDGEMENT,
+    (Phase.WAIT_RETRY, Happening.EFFECT_SHOWN): Phase.CONFIRMED,
+    (Phase.WAIT_RETRY, Happening.GIVE_UP): Phase.FAILED,
+}
+
+_ENDED = (Phase.CONFIRMED, Phase.FAILED)
+
+
+@dataclass(frozen=True)
+class EffectLimits:
+    """Seconds: from acknowledgement to effect, between tries, and for all tries together."""
+
+    effect_timeout: float = 1.5
+    retry_interval: float = 0.25
+    give_up_after: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("effect_timeout", "retry_interval", "give_up_after"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"{name} is {value}: need a time above 0 s")
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What to send and how to see that it worked.
+
+    commands: sent in this order; the last one's acknowledgement counts, those before prepare it.
+    shown: True once the device's own status shows the effect; None: the acknowledgement is all
+    that there is to see. refresh: asks the device for the status that shows it.
+    insist: no refusal but time ends the tries. urgent: does not queue behind another command.
+    """
+
+    name: str
+    commands: tuple[Command, ...]
+    effect: str
+    shown: Callable[[], bool] | None = None
+    refresh: Command | None = None
+    insist: bool = False
+    urgent: bool = False
+
+
+@dataclass(frozen=True)
+class Report:
+    """A step that the loop reached."""
+
+    token: int
+    outcome: Outcome
+    detail: str
+
+
+@dataclass(frozen=True)
+class EffectFinished:
+    """The end of a loop. result: MAV_RESULT of the newest answer, or NO_ACKNOWLEDGEMENT."""
+
+    token: int
+    success: bool
+    accepted: bool
+    result: int
+    message: str
+
+
+class EffectLoop:
+    """One goal on its way. The owner sends what take_commands gives and feeds back what comes."""
+
+    def __init__(self, token: int, goal: Goal, limits: EffectLimits, now: float) -> None:
+        self.token = token
+        self.goal = goal
+        self.phase = Phase.WAIT_ACKNOWLEDGEMENT
+        self.finished: EffectFinished | None = None
+        self._limits = limits
+        self._started = now
+        self._deadline = math.inf  # of the present phase
+        self._refresh_at = math.inf
+        self._accepted_after = math.nan
+        self._sends = 0
+        self._result = results.NO_ACKNOWLEDGEMENT
+        self._answer = ""
+        self._commands: list[Command] = []
+        self._refreshes: list[Command] = []
+        self._reports: list[Report] = []
+        if goal.shown is not None and goal.shown():
+            self.phase = Phase.CONFIRMED
+            self._end(True, f"{goal.effect} already; nothing was sent")
+            return
+        self._send()
+        self._reports.append(Report(token, Outcome.SENT, f"{goal.name} sent"))
+
+    @property
+    def ended(self) -> bool:
+        """Nothing more will come of it."""
+        return self.phase in _ENDED
+
+    def command_finished(self, finished: CommandFinished, now: float) -> None:
+        """The transaction of the goal's last command ended."""
+        if self.phase is not Phase.WAIT_ACKNOWLEDGEMENT:
+            return
+        self._sends += finished.sends
+        self._answer = finished.text()
+        if finished.result != results.NO_ACKNOWLEDGEMENT:
+            self._result = finished.result
+        if finished.accepted:
+            self._take(Happening.ACCEPTED, now)
+            self._accepted_after = now - self._started
+            detail = f"{self.goal.name} acknowledged after {self._accepted_after:.2f} s"
+            self._reports.append(Report(self.token, Outcome.ACCEPTED, detail))
+            self._deadline = now + self._limits.effect_timeout
+            self._refresh(now)
+            self.effect_may_show(now)
+        elif finished.superseded or not self._worth_another_try(finished.result):
+            self._take(Happening.REFUSED, now)
+            self._end(False, f"{self.goal.name} {self._answer}")
+        else:
+            self._take(Happening.NOT_NOW, now)
+            self._deadline = now + self._limits.retry_interval
+
+    def effect_may_show(self, now: float) -> None:
+        """The device said something: look whether it shows the effect."""
+        if self.ended:
+            return
+        shown = self.goal.shown
+        if shown is None:
+            if math.isnan(self._accepted_after):
+                return
+        elif not shown():
+            return
+        self._take(Happening.EFFECT_SHOWN, now)
+        seconds = now - self._started
+        acknowledged = (
+            "not acknowledged"
+            if math.isnan(self._accepted_after)
+            else f"acknowledged after {self._accepted_after:.2f} s"
+        )
+        if shown is None:
+            self._end(True, f"{self.goal.name} {acknowledged}")
+        else:
+            self._end(True, f"{self.goal.effect} after {seconds:.2f} s; {acknowledged}")
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        if self.ended:
+            return
+        if now - self._started >= self._limits.give_up_after:
+            self._take(Happening.GIVE_UP, now)
+            self._end(False, self._what_did_not_come(now))
+            return
+        if self.phase is Phase.WAIT_EFFECT and now >= self._refresh_at:
+            self._refresh(now)
+        if now < self._deadline:
+            return
+        if self.phase is Phase.WAIT_EFFECT:
+            self._take(Happening.EFFECT_LATE, now)
+        if self.phase is Phase.WAIT_RETRY:
+            self._take(Happening.RETRY_DUE, now)
+            self._send()
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        if self.ended:
+            return math.inf
+        return min(self._started + self._limits.give_up_after, self._deadline, self._refresh_at)
+
+    def take_commands(self) -> list[Command]:
+        """Commands to start now, each as a transaction of its own; each is handed out once."""
+        commands, self._commands = self._commands, []
+        return commands
+
+    def take_refreshes(self) -> list[Command]:
+        """Commands to send once now, whose acknowledgement does not matter."""
+        refreshes, self._refreshes = self._refreshes, []
+        return refreshes
+
+    def take_reports(self) -> list[Report]:
+        """Steps reached since the last call."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    def _send(self) -> None:
+        self._commands += self.goal.commands
+        self._deadline = math.inf
+        self._refresh_at = math.inf
+
+    def _refresh(self, now: float) -> None:
+        if self.goal.refresh is not None:
+            self._refreshes.append(self.goal.refresh)
+            self._refresh_at = now + self._limits.retry_interval
+
+    def _worth_another_try(self, result: int) -> bool:
+        not_now = (results.TEMPORARILY_REJECTED, results.NO_ACKNOWLEDGEMENT)
+        return self.goal.insist or result in not_now
+
+    def _what_did_not_come(self, now: float) -> str:
+        text = f"{self.goal.name} given up after {now - self._started:.1f} s: "
+        if not math.isnan(self._accepted_after):
+            return text + (
+                f"acknowledged after {self._accepted_after:.2f} s, "
+                f"but the device's own status never showed: {self.goal.effect}"
+            )
+        answer = self._answer or "no acknowledgement came"
+        if self.goal.shown is None:
+            return text + answer
+        return f"{text}{answer}, and the device's own status never showed: {self.goal.effect}"
+
+    def _take(self, happening: Happening, now: float) -> None:
+        try:
+            self.phase = TRANSITIONS[self.phase, happening]
+        except KeyError:
+            raise TransitionError(
+                f"{self.goal.name} at {now:.3f} s: '{happening.value}' while {self.phase.value}"
+            ) from None
+
+    def _end(self, success: bool, message: str) -> None:
+        outcome = Outcome.CONFIRMED if success else Outcome.FAILED
+        self._reports.append(Report(self.token, outcome, message))
+        accepted = not math.isnan(self._accepted_after)
+        result = results.ACCEPTED if accepted else self._result
+        self.finished = EffectFinished(self.token, success, accepted, result, message)

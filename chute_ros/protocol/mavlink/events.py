@@ -1,0 +1,74 @@
+"""What a MavlinkLink tells its owner. Times are monotonic seconds."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.model import ParachuteStatus, VehicleState
+from chute_ros.protocol.liveness import LinkChange
+from chute_ros.protocol.mavlink.effect import EffectFinished, Report
+
+
+class Severity(enum.IntEnum):
+    """How much a notice matters."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
+@dataclass(frozen=True)
+class ParachuteChanged:
+    """A parachute of ours said something, or its silence grew too long."""
+
+    status: ParachuteStatus
+
+
+@dataclass(frozen=True)
+class VehicleChanged:
+    """The autopilot said something, or its silence grew too long."""
+
+    state: VehicleState
+
+
+@dataclass(frozen=True)
+class DeviceLinkChanged:
+    """A device ("parachute 1/161") was first heard, fell silent, or came back."""
+
+    name: str
+    change: LinkChange
+
+
+@dataclass(frozen=True)
+class RequestReport:
+    """A request got a step further."""
+
+    report: Report
+
+
+@dataclass(frozen=True)
+class RequestFinished:
+    """A request ended. data: what was asked for (a message of the dialect, a number), or None."""
+
+    finished: EffectFinished
+    data: Any = None
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something that a person should read."""
+
+    severity: Severity
+    text: str
+
+
+Event = (
+    ParachuteChanged
+    | VehicleChanged
+    | DeviceLinkChanged
+    | RequestReport
+    | RequestFinished
+    | Notice
+)

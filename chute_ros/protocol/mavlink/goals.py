@@ -1,0 +1,185 @@
+"""The goals that the MAVLink parachute protocol knows: which commands, and what shows their effect.
+
+Sources: Parachute Protocol (MAV_CMD_SET_PARACHUTE_ARM, PARACHUTE_STATUS), MAVLink common.xml
+(MAV_CMD_DO_PARACHUTE, MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_COMPONENT_ARM_DISARM,
+MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.model import TriggerFlags, flag_names
+from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
+from chute_ros.protocol.mavlink.commands import Command
+from chute_ros.protocol.mavlink.config import KillMethod
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.effect import Goal
+from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+
+#: param2 of MAV_CMD_COMPONENT_ARM_DISARM that makes the autopilot disarm in flight.
+FORCE_DISARM = 21196.0
+
+
+#: Name of the goal that fires.
+RELEASE = "release"
+
+
+def _params(*values: float) -> tuple[float, float, float, float, float, float, float]:
+    p1, p2, p3, p4, p5, p6, p7 = (*values, *(0.0,) * (7 - len(values)))
+    return (p1, p2, p3, p4, p5, p6, p7)
+
+
+def command(device: ParachuteTracker | AutopilotTracker, number: int, *params: float) -> Command:
+    """A command for device; the params that are not given are 0."""
+    return Command(device.system_id, device.component_id, number, _params(*params))
+
+
+def set_triggers(
+    parachute: ParachuteTracker, arm: TriggerFlags, select: TriggerFlags, now: float
+) -> Goal:
+    """Arm the selected trigger sources that are set in arm, disarm the other selected ones."""
+
+    def shown() -> bool:
+        fresh = parachute.status_received > now
+        return fresh and parachute.armed_triggers & select == arm & select
+
+    changed = ", ".join(
+        f"{name} {'armed' if int(arm) & int(TriggerFlags[name]) else 'disarmed'}"
+        for name in flag_names(select)
+    )
+    return Goal(
+        "MAV_CMD_SET_PARACHUTE_ARM",
+        (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, float(arm), float(select)),),
+        f"PARACHUTE_STATUS says {changed}",
+        shown,
+        request_status(parachute),
+    )
+
+
+def release(parachute: ParachuteTracker, force: bool) -> Goal:
+    """Release the parachute; with force its flight-controller trigger is armed on the way."""
+    commands: tuple[Command, ...] = (
+        command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(dialect.PARACHUTE_RELEASE)),
+    )
+    if force:
+        sources = float(TriggerFlags.FC | TriggerFlags.OFFBOARD)
+        arm = command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, sources, sources)
+        commands = (arm, *commands)
+    return Goal(
+        RELEASE,
+        commands,
+        "PARACHUTE_STATUS says deployed",
+        lambda: parachute.deployed,
+        request_status(parachute),
+        insist=force,
+        urgent=True,
+    )
+
+
+def parachute_action(parachute: ParachuteTracker, action: int) -> Goal:
+    """MAV_CMD_DO_PARACHUTE disable or enable; the status has no field that shows it."""
+    names = {dialect.PARACHUTE_DISABLE: "disable", dialect.PARACHUTE_ENABLE: "enable"}
+    return Goal(
+        f"MAV_CMD_DO_PARACHUTE {names[action]}",
+        (command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(action)),),
+        "acknowledged",
+    )
+
+
+def kill(autopilot: AutopilotTracker, method: KillMethod, now: float) -> Goal:
+    """Stop the motors. Always sent: a heartbeat from before the order proves nothing."""
+    if method is KillMethod.FLIGHT_TERMINATION:
+        order = command(autopilot, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)
+    else:
+        order = command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
+    return Goal(
+        f"kill ({method.value})",
+        (order,),
+        "the autopilot's heartbeat says motors off",
+        lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
+        command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT),
+        insist=True,
+        urgent=True,
+    )
+
+
+def disarm_on_ground(autopilot: AutopilotTracker, now: float) -> Goal:
+    """A plain disarm, which an autopilot refuses in flight."""
+    return Goal(
+        "disarm on the ground",
+        (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0),),
+        "the autopilot's heartbeat says disarmed",
+        lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
+        command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT),
+    )
+
+
+def request_status(parachute: ParachuteTracker) -> Command:
+    """Ask for one PARACHUTE_STATUS."""
+    message_id = float(dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS)
+    return command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
+
+
+@dataclass
+class Watch:
+    """Waits for one message of one device; field, if given, must hold value."""
+
+    system_id: int
+    component_id: int
+    message_id: int
+    field: str = ""
+    value: int = 0
+    message: Any = None
+
+    def offer(self, system_id: int, component_id: int, message: Any) -> None:
+        """A message came: keep it if it is the one."""
+        if (system_id, component_id) != (self.system_id, self.component_id):
+            return
+        if message.get_msgId() != self.message_id:
+            return
+        if not self.field or getattr(message, self.field) == self.value:
+            self.message = message
+
+    def seen(self) -> bool:
+        """It came."""
+        return self.message is not None
+
+
+def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Goal, Watch]:
+    """Ask for one message (MAV_CMD_REQUEST_MESSAGE)."""
+    watch = Watch(parachute.system_id, parachute.component_id, message_id)
+    kind = dialect.mavlink_map.get(message_id)
+    name = kind.msgname if kind is not None else f"message {message_id}"
+    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
+    return Goal(f"request of {name}", (ask,), f"{name} came", watch.seen), watch
+
+
+def set_message_interval(
+    parachute: ParachuteTracker, message_id: int, interval_us: int
+) -> Goal:
+    """Set the interval of a message (MAV_CMD_SET_MESSAGE_INTERVAL), microseconds."""
+    order = command(
+        parachute,
+        dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+        float(message_id),
+        float(interval_us),
+    )
+    return Goal(f"interval of message {message_id}", (order,), "acknowledged")
+
+
+def read_message_interval(parachute: ParachuteTracker, message_id: int) -> tuple[Goal, Watch]:
+    """Ask how often a message is sent (MESSAGE_INTERVAL, asked for with MAV_CMD_REQUEST_MESSAGE)."""
+    watch = Watch(
+        parachute.system_id,
+        parachute.component_id,
+        dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL,
+        "message_id",
+        message_id,
+    )
+    wanted = float(dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL)
+    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, float(message_id))
+    return Goal("request of MESSAGE_INTERVAL", (ask,), "MESSAGE_INTERVAL came", watch.seen), watch
+
+

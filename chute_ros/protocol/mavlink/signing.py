@@ -1,0 +1,107 @@
+"""MAVLink 2 message signing: who may speak.
+
+Source: MAVLink developer guide, "Message signing": SHA-256 over key, frame and time stamp, cut to
+48 bits; time stamps in units of 10 microseconds since 2015-01-01, rising in each stream (system, component,
+link id); a new stream may lag at most one minute.
+
+A stream's time stamp is stored only after its signature was found right, so that a forged frame
+with a high time stamp does not shut out the true sender.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+
+from chute_ros.errors import SigningKeyError
+
+KEY_BYTES = 32
+#: Unix time (s) of time stamp 0.
+EPOCH_2015 = 1420070400
+UNITS_PER_SECOND = 100_000
+NEW_STREAM_LAG = 60 * UNITS_PER_SECOND
+
+UNSIGNED = "frame without a signature"
+WRONG_SIGNATURE = "frame with a wrong signature"
+REPLAYED = "frame with an old signature time (replayed)"
+
+#: RADIO_STATUS comes from the radios themselves, which hold no key.
+UNSIGNED_ALLOWED = frozenset({109})
+
+_TIMESTAMP = slice(-12, -6)
+_LINK_ID = -13
+
+
+def key_from_text(text: bytes, name: str) -> bytes:
+    """The 32 key bytes in text: raw, or 64 hexadecimal digits. name is for the error's text."""
+    if len(text) == KEY_BYTES:
+        return text
+    stripped = text.strip()
+    if len(stripped) == 2 * KEY_BYTES:
+        try:
+            return bytes.fromhex(stripped.decode("ascii"))
+        except ValueError:
+            pass
+    raise SigningKeyError(
+        f"{name} holds {len(text)} bytes that are no key: need 32 raw bytes or 64 hexadecimal "
+        "digits (make one with: head -c 32 /dev/urandom > FILE; chmod 600 FILE)"
+    )
+
+
+class SigningClock:
+    """Signing time from monotonic time, so that a step of the wall clock does not stop the link.
+
+    unix_minus_monotonic: Unix time less monotonic time, s, taken once at the start.
+    """
+
+    def __init__(self, unix_minus_monotonic: float) -> None:
+        self._offset = unix_minus_monotonic - EPOCH_2015
+        self._ahead = 0
+
+    def at(self, now: float) -> int:
+        """The time stamp at now; at least as high as any that was heard."""
+        return max(int((now + self._offset) * UNITS_PER_SECOND), self._ahead)
+
+    def heard(self, timestamp: int) -> None:
+        """A valid signature bore this time stamp: the clock follows those that are ahead."""
+        self._ahead = max(self._ahead, timestamp)
+
+
+class Signer:
+    """Gives out rising time stamps for the frames that we send with key on link_id."""
+
+    def __init__(self, key: bytes, clock: SigningClock, link_id: int = 0) -> None:
+        self.key = key
+        self.link_id = link_id
+        self._clock = clock
+        self._last = 0
+
+    def next_timestamp(self, now: float) -> int:
+        """A time stamp higher than any given out before."""
+        self._last = max(self._clock.at(now), self._last + 1)
+        return self._last
+
+
+class Verifier:
+    """Checks the frames that we receive against key."""
+
+    def __init__(self, key: bytes, clock: SigningClock) -> None:
+        self._key = key
+        self._clock = clock
+        self._streams: dict[tuple[int, int, int], int] = {}
+
+    def refusal(self, raw: bytes, signed: bool, message_id: int, now: float) -> str:
+        """Why the frame in raw is refused; empty: it is good."""
+        if not signed:
+            return "" if message_id in UNSIGNED_ALLOWED else UNSIGNED
+        digest = hashlib.sha256(self._key + raw[:-6]).digest()[:6]
+        if not hmac.compare_digest(digest, raw[-6:]):
+            return WRONG_SIGNATURE
+        timestamp = int.from_bytes(raw[_TIMESTAMP], "little")
+        stream = (raw[5], raw[6], raw[_LINK_ID])
+        last = self._streams.get(stream, self._clock.at(now) - NEW_STREAM_LAG)
+        if timestamp <= last:
+            return REPLAYED
+        self._streams[stream] = timestamp
+        self._clock.heard(timestamp)
+        return ""

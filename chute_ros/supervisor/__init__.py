@@ -1,0 +1,1 @@
+"""Decides when to block flight, kill and deploy: pure, from inputs and a time to decisions."""

@@ -1,0 +1,49 @@
+"""The one gate through which a decision of the supervisor reaches a device. Default is deny."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from chute_ros.model import Decision
+
+
+class Verdict(enum.Enum):
+    """What a device node does with a decision."""
+
+    ACT = "acts on it"
+    NOT_ADDRESSED = "addressed to others"
+    SHADOW = "shadow: only said, not done"
+    REPEATED = "the same as one already acted on"
+    OLDER = "older than one already seen"
+    TOO_LATE = "came too late"
+
+
+@dataclass
+class DecisionGate:
+    """Lets a decision through if it is addressed, not shadow, newer than any seen, and young.
+
+    max_decision_age: s. Clocks of two hosts may differ by this much before that becomes a fault.
+    """
+
+    link: str
+    max_decision_age: float
+    newest_epoch: int = 0
+    newest_id: int = 0
+
+    def judge(self, decision: Decision, age: float) -> Verdict:
+        """What to do with decision, which is age seconds old. Only ACT is remembered as seen."""
+        if self.link not in decision.targets:
+            return Verdict.NOT_ADDRESSED
+        if decision.shadow:
+            return Verdict.SHADOW
+        order = (decision.epoch, decision.id)
+        newest = (self.newest_epoch, self.newest_id)
+        if order == newest:
+            return Verdict.REPEATED
+        if order < newest:
+            return Verdict.OLDER
+        if not -self.max_decision_age <= age <= self.max_decision_age:
+            return Verdict.TOO_LATE
+        self.newest_epoch, self.newest_id = order
+        return Verdict.ACT

@@ -1,0 +1,164 @@
+"""What goes into the supervisor's core and what comes out. All of it can be recorded and replayed."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from chute_ros.model import Action, Decision, LinkState, Outcome, VehicleState
+
+
+class Mode(enum.IntEnum):
+    """Mode of the supervisor; numbers of chute_msgs/SafetyState."""
+
+    ACTIVE = 0
+    SHADOW = 1
+    INHIBITED = 2
+
+
+@dataclass(frozen=True)
+class LinkHeartbeat:
+    """A device node is alive and says this of its device."""
+
+    link: str
+    link_state: LinkState
+    device_healthy: bool
+    seq: int
+
+
+@dataclass(frozen=True)
+class ParachuteReport:
+    """What matters of a ParachuteStatus."""
+
+    link: str
+    device: str
+    deployed: bool
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class VehicleReport:
+    """A VehicleState came."""
+
+    state: VehicleState
+
+
+@dataclass(frozen=True)
+class ActionReport:
+    """A device node got this far with a decision."""
+
+    epoch: int
+    id: int
+    link: str
+    outcome: Outcome
+    detail: str
+    newest_epoch: int = 0
+
+
+@dataclass(frozen=True)
+class ArmRequest:
+    """A person wants the parachutes armed or disarmed."""
+
+    token: int
+    arm: bool
+    triggers: int
+
+
+@dataclass(frozen=True)
+class ArmDone:
+    """What came of ArmDevices."""
+
+    token: int
+    arm: bool
+    success: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class KillRequest:
+    """A person (token not 0) or a device (token 0) wants the motors off."""
+
+    token: int
+    by: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class DeployRequest:
+    """A person wants the parachute out."""
+
+    token: int
+    force: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class ResetRequest:
+    """A person wants to begin again, after landing or a test."""
+
+    token: int
+
+
+@dataclass(frozen=True)
+class ModeRequest:
+    """A person wants another mode."""
+
+    token: int
+    mode: Mode
+    force: bool
+
+
+Input = (
+    LinkHeartbeat
+    | ParachuteReport
+    | VehicleReport
+    | ActionReport
+    | ArmRequest
+    | ArmDone
+    | KillRequest
+    | DeployRequest
+    | ResetRequest
+    | ModeRequest
+)
+
+
+@dataclass(frozen=True)
+class Decide:
+    """Publish this decision: a new one, or one again that nobody has reported on."""
+
+    decision: Decision
+    again: bool = False
+
+
+@dataclass(frozen=True)
+class ArmDevices:
+    """Call the arm service of these links and come back with ArmDone."""
+
+    token: int
+    arm: bool
+    triggers: int
+    links: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Finish:
+    """Answer the request with this token."""
+
+    token: int
+    success: bool
+    accepted: bool
+    message: str
+
+
+@dataclass(frozen=True)
+class Say:
+    """One line for the log."""
+
+    text: str
+    alarm: bool = False
+
+
+Output = Decide | ArmDevices | Finish | Say
+
+#: Actions that a person sees the effect of; the block ones are renewed without a word.
+FIRING = (Action.KILL, Action.DEPLOY)

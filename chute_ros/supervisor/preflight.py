@@ -1,0 +1,44 @@
+"""Why flight is blocked: every reason, each with its value and its limit, in words."""
+
+from __future__ import annotations
+
+import math
+
+from chute_ros.model import LinkState
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.state import LinkEvidence, State
+
+
+def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, now: float) -> str:
+    """What is wrong with one link; empty: nothing. Missing, stale, lost and unhealthy differ."""
+    state = evidence.state(config, now)
+    if state is LinkState.NEVER_SEEN:
+        who = "node" if math.isnan(evidence.heard) else "device"
+        return f"{link}: its {who} was never heard"
+    if state in (LinkState.STALE, LinkState.LOST):
+        if now - evidence.heard >= config.heartbeat.stale_after:
+            limit = config.heartbeat.stale_after
+            return (
+                f"{link}: {state.name}, heartbeat of its node "
+                f"{now - evidence.heard:.2f} s old (limit {limit:g} s)"
+            )
+        return f"{link}: its device is {state.name}" + _faults(evidence)
+    if not evidence.device_healthy:
+        return f"{link}: its device is not healthy" + _faults(evidence)
+    return ""
+
+
+def _faults(evidence: LinkEvidence) -> str:
+    return f" ({'; '.join(evidence.faults)})" if evidence.faults else ""
+
+
+def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
+    """Every reason against taking off now; empty: none."""
+    problems = [
+        link_problem(config, link, state.links.get(link, LinkEvidence()), now)
+        for link in config.required_links
+    ]
+    if state.mode is not Mode.ACTIVE:
+        problems.append(f"supervisor mode is {state.mode.name} (need ACTIVE)")
+    return tuple(problem for problem in problems if problem)

@@ -1,0 +1,55 @@
+"""Where a byte wire is, in one string.
+
+    udpin:HOST:PORT                        listen; answer everyone who was heard there
+    udpout:HOST:PORT                       send there; listen to what comes back
+    udppair:HOST:PORT:HOST:PORT            two one-way sockets: listen on the first, send to the second
+    tcp:HOST:PORT    tcpin:HOST:PORT       connect; accept connections
+    serial:PATH[:BAUD]                     a serial port, 57600 baud if not said
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chute_ros.errors import ParameterError
+
+FORMS = (
+    "udpin:HOST:PORT, udpout:HOST:PORT, udppair:HOST:PORT:HOST:PORT, tcp:HOST:PORT, "
+    "tcpin:HOST:PORT or serial:PATH[:BAUD]"
+)
+DEFAULT_BAUD = 57600
+_PARTS = {"udpin": 2, "udpout": 2, "udppair": 4, "tcp": 2, "tcpin": 2}
+
+
+@dataclass(frozen=True)
+class Address:
+    """A parsed connection string. For serial: host is the path and port the baud rate."""
+
+    kind: str
+    host: str
+    port: int
+    send_host: str = ""
+    send_port: int = 0
+
+
+def _port(text: str, whole: str) -> int:
+    if text.isascii() and text.isdigit() and 0 <= int(text) <= 65535:
+        return int(text)
+    raise ParameterError(f"connection {whole!r}: port {text!r} is no number from 0 to 65535")
+
+
+def parse_address(text: str) -> Address:
+    """The address in text; ParameterError with the allowed forms if it is none."""
+    kind, colon, rest = text.partition(":")
+    if kind == "serial" and rest:
+        path, colon, baud = rest.rpartition(":")
+        if colon and baud.isascii() and baud.isdigit() and int(baud) > 0:
+            return Address(kind, path, int(baud))
+        return Address(kind, rest, DEFAULT_BAUD)
+    parts = rest.split(":") if colon else []
+    if kind not in _PARTS or len(parts) != _PARTS[kind] or not all(parts):
+        raise ParameterError(f"connection {text!r} is not understood: need {FORMS}")
+    if kind == "udppair":
+        host, port, send_host, send_port = parts
+        return Address(kind, host, _port(port, text), send_host, _port(send_port, text))
+    return Address(kind, parts[0], _port(parts[1], text))

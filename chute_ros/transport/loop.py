@@ -1,0 +1,192 @@
+"""The loop between a wire and a protocol: one thread, one descriptor to wake it, no polling.
+
+The protocol (a ProtocolLink) is touched by this thread alone; others hand in calls.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+from chute_ros.transport.wire import Wire
+
+REOPEN_INTERVAL = 0.5  # s
+#: The loop runs at least this often (s), so that a hung one can be told from an idle one.
+LONGEST_WAIT = 0.2
+
+
+class ProtocolLink(Protocol):
+    """A pure protocol: bytes and time in, bytes and events out."""
+
+    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+        """Bytes came in."""
+
+    def stream_ended(self, stream: Hashable) -> None:
+        """A stream was closed; None: all of them."""
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+
+    def next_deadline(self) -> float:
+        """When update has something to do."""
+
+    def take_output(self) -> list[bytes]:
+        """Frames to send."""
+
+    def take_events(self) -> list[Any]:
+        """What happened."""
+
+
+LinkT = TypeVar("LinkT", bound=ProtocolLink)
+
+
+@dataclass(frozen=True)
+class WireChange:
+    """The wire was opened, was closed, or cannot be opened."""
+
+    is_open: bool
+    text: str
+
+
+@dataclass(frozen=True)
+class LoopFault:
+    """An exception inside the protocol: a mistake of ours, reported and survived."""
+
+    text: str
+
+
+class WireLoop(Generic[LinkT]):
+    """Runs link over wire. deliver gets the events in this loop's thread and must not block."""
+
+    def __init__(self, link: LinkT, wire: Wire, deliver: Callable[[list[Any]], None]) -> None:
+        self.link = link
+        self.wire = wire
+        self.send_errors = 0
+        self.last_run = time.monotonic()
+        self._deliver = deliver
+        self._calls: deque[Callable[[LinkT, float], None]] = deque()
+        self._wake_in, self._wake_out = socket.socketpair()
+        self._wake_in.setblocking(False)
+        self._wake_out.setblocking(False)
+        self._stopping = False
+        self._reopen_at = 0.0
+        self._last_failure = ""
+        self._thread = threading.Thread(target=self._run, name=f"link {wire.describe()}")
+
+    def start(self) -> None:
+        """Open the wire, if it can be, and start the thread."""
+        self._reopen(time.monotonic())
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and close the wire. May be called once."""
+        self._stopping = True
+        self._wake()
+        if self._thread.is_alive():
+            self._thread.join()
+        self.wire.close()
+        self._wake_in.close()
+        self._wake_out.close()
+
+    def call(self, function: Callable[[LinkT, float], None]) -> None:
+        """Have function(link, now) called in the loop's thread, soon, in order."""
+        self._calls.append(function)
+        self._wake()
+
+    def _wake(self) -> None:
+        try:
+            self._wake_out.send(b"w")
+        except BlockingIOError:
+            pass  # enough wake-ups are on their way
+
+    def _run(self) -> None:
+        while not self._stopping:
+            try:
+                self._turn()
+            except Exception:
+                # The node must outlive a mistake of ours; the report makes it visible.
+                self._deliver([LoopFault(traceback.format_exc())])
+                # A mistake that repeats each turn must not take the whole processor.
+                time.sleep(0.01)
+
+    def _turn(self) -> None:
+        now = time.monotonic()
+        self.last_run = now
+        if not self.wire.is_open and now >= self._reopen_at:
+            self._reopen(now)
+        ready = self._wait(now)
+        now = time.monotonic()
+        for file in ready:
+            if file == self._wake_in.fileno():
+                self._wake_in.recv(4096)
+            else:
+                self._read(file, now)
+        while self._calls:
+            self._calls.popleft()(self.link, now)
+        self.link.update(now)
+        for frame in self.link.take_output():
+            self._write(frame)
+        events = self.link.take_events()
+        if events:
+            self._deliver(events)
+
+    def _wait(self, now: float) -> list[int]:
+        poll = select.poll()
+        poll.register(self._wake_in, select.POLLIN)
+        for file in self.wire.files():
+            poll.register(file, select.POLLIN)
+        wait = min(self.link.next_deadline() - now, LONGEST_WAIT)
+        # Rounded up: a wait that ends before its deadline would only have to be repeated.
+        return [file for file, _ in poll.poll(max(0, int(wait * 1000.0 + 0.999)))]
+
+    def _read(self, file: int, now: float) -> None:
+        try:
+            chunks = self.wire.read(file)
+        except OSError as error:
+            self._lost(f"{self.wire.describe()}: {error}", now)
+            return
+        for data, stream in chunks:
+            if data or stream is None:
+                self.link.receive(data, now, stream)
+            else:
+                self.link.stream_ended(stream)
+
+    def _write(self, frame: bytes) -> None:
+        if not self.wire.is_open:
+            self.send_errors += 1
+            return
+        try:
+            self.wire.write(frame)
+        except BlockingIOError:
+            self.send_errors += 1
+        except (ConnectionError, ValueError) as error:
+            self.send_errors += 1
+            self._lost(f"{self.wire.describe()}: {error}", time.monotonic())
+        except OSError:
+            # No route, no buffer: the next frame may pass.
+            self.send_errors += 1
+
+    def _reopen(self, now: float) -> None:
+        self._reopen_at = now + REOPEN_INTERVAL
+        try:
+            self.wire.open()
+        except (OSError, ValueError) as error:
+            self._lost(f"{self.wire.describe()} cannot be opened: {error}", now)
+            return
+        self._last_failure = ""
+        self._deliver([WireChange(True, f"{self.wire.describe()} is open")])
+
+    def _lost(self, text: str, now: float) -> None:
+        self.wire.close()
+        self.link.stream_ended(None)
+        self._reopen_at = now + REOPEN_INTERVAL
+        if text != self._last_failure:
+            self._last_failure = text
+            self._deliver([WireChange(False, f"{text}; trying again each {REOPEN_INTERVAL} s")])

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# Pin every dependency exactly, with hashes: requirements/*.in -> requirements/*.lock.
+# Run by `make lock`, inside an environment made by set_up.py (which has uv).
+set -euo pipefail
+cd "$(dirname "$0")/../requirements"
+
+# One lock serves every supported Python, so it is resolved for the oldest of them. The header
+# and the index are left out: they would name paths and hosts of the machine that made the lock.
+pin() {
+    local lock=$1
+    shift
+    echo "requirements/$lock"
+    UV_PYTHON_DOWNLOADS=never uv pip compile --quiet --upgrade --universal --python-version 3.10 \
+        --generate-hashes --no-header --no-emit-index-url --no-annotate "$@" --output-file "$lock"
+}
+
+for distro in jazzy kilted; do
+    sed "s/@DISTRO@/$distro/" ros-wheels.in | pin "$distro.lock" - runtime.in dev.in
+done
+pin sourced.lock runtime.in dev.in
+pin installer.lock installer.in

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Lint, run the tests of both packages through colcon, print the totals. Needs env.sh sourced
+# after a build.
+set -uo pipefail
+cd "$(dirname "$0")/.."
+name=$CHUTE_ROS_ENV
+unset MAKEFLAGS MAKELEVEL MFLAGS
+
+# Two runs in one clone would overwrite each other's results. Processes left over by a test must
+# not hold the lock, hence 9>&- below.
+exec 9>"log-$name.lock"
+flock 9
+
+failed=()
+scripts/lint.sh 9>&- || failed+=("linters")
+
+# Results of tests that are no more would be counted.
+colcon test-result --test-result-base "build-$name" --delete-yes >/dev/null
+colcon --log-base "log-$name" test --build-base "build-$name" --install-base "install-$name" \
+    --executor sequential --return-code-on-test-failure \
+    --event-handlers console_direct+ status- desktop_notification- 9>&- || failed+=("colcon test")
+echo
+colcon test-result --test-result-base "build-$name" --verbose | tail -n 200
+if [ "${#failed[@]}" -gt 0 ]; then
+    printf 'failed: %s\n' "${failed[@]}"
+fi
+# The totals come last, for people and for machines that read the end of a log.
+python3 scripts/test_totals.py "build-$name" $(colcon list --names-only) || failed+=("totals")
+exit $((${#failed[@]} > 0))

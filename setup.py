@@ -1,0 +1,36 @@
+"""Installs the ROS package chute_ros; its dependencies are in package.xml."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "chute_ros"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Supervises and fires a drone's parachute over MAVLink, DroneCAN or serial",
+    maintainer="chute_ros maintainers",
+    maintainer_email="maintainers@chute-ros.org",
+    license="Apache-2.0",
+    packages=find_packages(include=[NAME, NAME + ".*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
+        ("share/" + NAME, ["package.xml"]),
+        ("share/" + NAME + "/launch", glob("launch/*.py")),
+        ("share/" + NAME + "/config", glob("config/*.yaml")),
+    ],
+    zip_safe=False,
+    install_requires=["setuptools"],
+    # colcon looks here to know that the tests are run with pytest.
+    extras_require={"test": ["pytest"]},
+    entry_points={
+        "console_scripts": [
+            "mavlink_parachute = chute_ros.nodes.mavlink_parachute:main",
+            "safety_supervisor = chute_ros.nodes.safety_supervisor:main",
+            "sim_mavlink_parachute = chute_ros.sim.sim_mavlink_parachute:main",
+            "sim_autopilot = chute_ros.sim.sim_autopilot:main",
+            "demo = chute_ros.tools.demo:main",
+        ],
+    },
+)

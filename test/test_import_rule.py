@@ -1,0 +1,69 @@
+"""The rule that the pure packages stay pure holds, and it bites."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package and the rule, free to be broken."""
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "chute_ros", tmp_path / "chute_ros", ignore=ignore)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def lint(folder):
+    return subprocess.run(
+        ["lint-imports", "--no-cache"], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def test_the_rule_holds(copy):
+    result = lint(copy)
+    assert result.returncode == 0, result.stdout
+    assert "0 broken" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("package", "line", "named"),
+    [
+        ("protocol", "import socket", "socket"),
+        ("protocol", "from time import monotonic", "time"),
+        ("protocol", "import os.path", "os"),
+        ("protocol", "def late():\n    import rclpy.node", "rclpy"),
+        ("supervisor", "from threading import Lock", "threading"),
+        ("supervisor", "import serial", "serial"),
+        ("protocol", "from chute_ros.nodes import offender", "chute_ros.nodes"),
+        ("supervisor", "from chute_ros.transport import offender", "chute_ros.transport"),
+        ("sim", "from chute_ros.nodes import offender", "chute_ros.nodes"),
+    ],
+)
+def test_the_rule_names_an_offender(copy, package, line, named):
+    for layer in ("nodes", "transport"):
+        (copy / "chute_ros" / layer / "offender.py").touch()
+    (copy / "chute_ros" / package / "offending.py").write_text(line + "\n")
+    result = lint(copy)
+    assert result.returncode == 1
+    assert f"chute_ros.{package}.offending -> {named}" in result.stdout
+
+
+def test_a_shared_type_may_import_nothing_of_ours(copy):
+    with (copy / "chute_ros" / "model.py").open("a") as file:
+        file.write("\nimport chute_ros.errors\n")
+    result = lint(copy)
+    assert result.returncode == 1
+    assert "chute_ros.model -> chute_ros.errors" in result.stdout
+
+
+def test_io_behind_a_shared_module_is_found_too(copy):
+    with (copy / "chute_ros" / "errors.py").open("a") as file:
+        file.write("\nimport subprocess\n")
+    result = lint(copy)
+    assert result.returncode == 1
+    assert "chute_ros.errors -> subprocess" in result.stdout
