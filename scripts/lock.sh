@@ -14,8 +14,10 @@ pin() {
         --generate-hashes --no-header --no-emit-index-url --no-annotate "$@" --output-file "$lock"
 }
 
-for distro in jazzy kilted; do
-    sed "s/@DISTRO@/$distro/" ros-wheels.in | pin "$distro.lock" - runtime.in dev.in
-done
+pin_distro() {
+    sed -e "s/@DISTRO@/$1/" -e "/^ros-$2-/d" ros-wheels.in | pin "$1.lock" - runtime.in dev.in
+}
+pin_distro jazzy kilted
+pin_distro kilted jazzy
 pin sourced.lock runtime.in dev.in
 pin installer.lock installer.in

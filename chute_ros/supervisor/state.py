@@ -43,7 +43,7 @@ class Pending:
     decision: Decision
     decided_at: float
     sent_at: float
-    reached: MappingProxyType[str, Outcome] = field(default=MappingProxyType({}))
+    reached: MappingProxyType[str, Outcome] = field(default_factory=lambda: MappingProxyType({}))
     details: tuple[str, ...] = ()
 
     def furthest(self) -> Outcome:
@@ -70,7 +70,7 @@ class State:
     stage_since: float = math.nan
     mode: Mode = Mode.ACTIVE
     next_id: int = 1
-    links: MappingProxyType[str, LinkEvidence] = field(default=MappingProxyType({}))
+    links: MappingProxyType[str, LinkEvidence] = field(default_factory=lambda: MappingProxyType({}))
     vehicle: VehicleState = field(default=VehicleState())
     vehicle_received: float = math.nan
     block: Pending | None = None

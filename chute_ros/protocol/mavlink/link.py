@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Hashable
+from dataclasses import replace
 from typing import Any
 
 from chute_ros.model import Armed, LandedState, LinkState, TriggerFlags, VehicleState
@@ -202,6 +203,14 @@ class MavlinkLink:
         self._blocked = reason
         self._undo_arming(now)
 
+    def set_autopilot_message_rate(self, rate: float, now: float) -> None:
+        """Ask the autopilot for its messages at this rate from now on, Hz; 0: do not ask."""
+        self.config = replace(self.config, autopilot_message_rate=rate)
+        autopilot = self._autopilot()
+        if autopilot is not None:
+            self._ask_for_stream(autopilot, now, anew=True)
+            self._drive(now)
+
     # -- what the node may look at -------------------------------------------------------------
 
     def chosen_parachute(self) -> ParachuteTracker | None:
@@ -326,8 +335,12 @@ class MavlinkLink:
             self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
             self._begin(self._disarming, goals.disarm_on_ground(autopilot, now), now)
 
-    def _ask_for_stream(self, autopilot: AutopilotTracker, now: float) -> None:
-        if self.config.autopilot_message_rate <= 0 or not autopilot.wants_stream(now):
+    def _ask_for_stream(
+        self, autopilot: AutopilotTracker, now: float, anew: bool = False
+    ) -> None:
+        if self.config.autopilot_message_rate <= 0:
+            return
+        if not anew and not autopilot.wants_stream(now):
             return
         interval_us = 1e6 / self.config.autopilot_message_rate
         for message_id in STREAMED_MESSAGES:

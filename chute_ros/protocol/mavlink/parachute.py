@@ -74,6 +74,25 @@ def packed_date(text: str) -> tuple[str, str]:
     return text, ""
 
 
+def component_information(message: Any) -> ComponentInformation:
+    """What a COMPONENT_INFORMATION_BASIC says."""
+    manufactured = ""
+    if message.time_manufacture_s:
+        epoch = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
+        when = epoch + datetime.timedelta(seconds=message.time_manufacture_s)
+        manufactured = when.date().isoformat()
+    return ComponentInformation(
+        message.vendor_name,
+        message.model_name,
+        message.software_version,
+        message.hardware_version,
+        message.serial_number,
+        manufactured,
+        message.capabilities,
+        message.time_boot_ms / 1000.0,
+    )
+
+
 class ParachuteTracker:
     """Follows one parachute, told apart from others by its system and component id."""
 
@@ -123,21 +142,7 @@ class ParachuteTracker:
 
     def component_information(self, message: Any) -> None:
         """A COMPONENT_INFORMATION_BASIC of the device."""
-        manufactured = ""
-        if message.time_manufacture_s:
-            epoch = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
-            when = epoch + datetime.timedelta(seconds=message.time_manufacture_s)
-            manufactured = when.date().isoformat()
-        self.information = ComponentInformation(
-            message.vendor_name,
-            message.model_name,
-            message.software_version,
-            message.hardware_version,
-            message.serial_number,
-            manufactured,
-            message.capabilities,
-            message.time_boot_ms / 1000.0,
-        )
+        self.information = component_information(message)
 
     def status_overdue(self, now: float) -> bool:
         """The status stream stopped: the newest is older than the limit, though the link may live."""

@@ -1,0 +1,339 @@
+"""What every device node does: its link's thread, heartbeats, decisions, reports, diagnostics.
+
+The link's thread hands its events to the executor through an inbox and a guard condition. The
+heartbeat makes one round: the executor's timer asks the link's thread, which answers with a
+summary, which the executor publishes. A hang of either is silence.
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision, SafetyRequest
+from chute_msgs.srv import Arm, Deploy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+
+from chute_ros import model
+from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.parameters import Parameter, declare
+from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
+from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
+
+COMMON_PARAMETERS = (
+    Parameter(
+        "max_decision_age",
+        0.5,
+        "a decision of the supervisor that is older is not acted on, s",
+        0.05,
+        10.0,
+    ),
+    Parameter("heartbeat_rate", 10.0, "rate of safety/heartbeat, Hz", 1.0, 100.0),
+)
+#: Our own link's heartbeat stops when the executor was silent for this long, s.
+OWNER_SILENCE = 1.0
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The answer of the link's thread to the executor's heartbeat."""
+
+    link_state: model.LinkState
+    device_healthy: bool
+    age: float
+    details: Any
+
+
+class DeviceNode(Node, ABC):
+    """Base of the nodes that speak to a device. The subclass makes self.loop and calls begin."""
+
+    def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
+        super().__init__(name, **options)
+        self.loop: WireLoop[Any] | None = None
+        self.values = declare(self, (*COMMON_PARAMETERS, *parameters))
+        self.add_on_set_parameters_callback(self._parameters_set)
+        # The wall clock stamps, whatever use_sim_time says; decisions are as old as it tells.
+        self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
+        self.gate = DecisionGate(name, self.values["max_decision_age"])
+        self.wire_text = "not opened yet"
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._inbox: deque[Any] = deque()
+        self._guard = self.create_guard_condition(self._drain)
+        self._tokens = count(1)
+        self._waiting: dict[int, Future] = {}
+        self._decisions: dict[int, model.Decision] = {}
+        self._last_report: ActionReport | None = None
+        self._seq = count()
+        self._verdicts: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
+        self._loop_faults = 0
+        self._summary: Summary | None = None
+        self._supervisor_heard = float("nan")
+        self._supervisor_delay = float("nan")
+        self._status_publisher = self.create_publisher(
+            ParachuteStatus, "parachute/status", qos.STATUS
+        )
+        self._heartbeat_publisher = self.create_publisher(
+            LinkHeartbeat, "safety/heartbeat", qos.STATUS
+        )
+        self._request_publisher = self.create_publisher(
+            SafetyRequest, "safety/request", qos.STATUS
+        )
+        self._report_publisher = self.create_publisher(
+            ActionReport, "safety/action", qos.DECISION
+        )
+        self._diagnostics_publisher = self.create_publisher(
+            DiagnosticArray, "/diagnostics", qos.STATUS
+        )
+
+    def begin(self) -> None:
+        """Start the link's thread and everything that reacts to it."""
+        assert self.loop is not None
+        self.create_subscription(
+            SafetyDecision, "safety/decision", self._decision, qos.DECISION
+        )
+        self.create_subscription(
+            LinkHeartbeat, "safety/heartbeat", self._heartbeat_heard, qos.STATUS
+        )
+        self.create_service(Arm, "~/arm", self._arm)
+        self.create_service(Deploy, "~/deploy", self._deploy)
+        period = 1.0 / self.values["heartbeat_rate"]
+        self.create_timer(period, self._beat, clock=self._steady)
+        self.create_timer(1.0, self._diagnose, clock=self._steady)
+        self.loop.start()
+
+    def destroy_node(self) -> None:
+        """End the link's thread first: it must not call into a node that is gone."""
+        if self.loop is not None:
+            self.loop.stop()
+            self.loop = None
+        super().destroy_node()
+
+    # -- for the subclass to fill ------------------------------------------------------------------
+
+    @abstractmethod
+    def summarise(self, link: Any, now: float) -> Summary:
+        """In the link's thread: how the device is."""
+
+    @abstractmethod
+    def event(self, event: Any) -> None:
+        """In the executor: one event of the link."""
+
+    @abstractmethod
+    def carry_out(self, decision: model.Decision) -> None:
+        """In the executor: do what the gate let through."""
+
+    @abstractmethod
+    def arm_link(self, link: Any, token: int, request: Arm.Request, now: float) -> None:
+        """In the link's thread: begin the arm request."""
+
+    @abstractmethod
+    def deploy_link(self, link: Any, token: int, request: Deploy.Request, now: float) -> None:
+        """In the link's thread: begin the deploy request."""
+
+    @abstractmethod
+    def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
+        """The tasks of the device."""
+
+    def parameter_changed(self, name: str, value: Any) -> None:
+        """A changeable parameter has a new value."""
+
+    # -- requests to the link ----------------------------------------------------------------------
+
+    def request(self, begin: Callable[[Any, int, float], None]) -> Future:
+        """Have begin(link, token, now) called in the link's thread; the future is its end."""
+        token = next(self._tokens)
+        self._waiting[token] = future = Future()
+        self._call(token, begin)
+        return future
+
+    def request_for(
+        self, decision: model.Decision, begin: Callable[[Any, int, float], None]
+    ) -> None:
+        """The same on behalf of a decision: its steps are reported on safety/action."""
+        token = next(self._tokens)
+        self._decisions[token] = decision
+        self._call(token, begin)
+
+    def _call(self, token: int, begin: Callable[[Any, int, float], None]) -> None:
+        assert self.loop is not None
+        self.loop.call(lambda link, now: begin(link, token, now))
+
+    def finished(self, token: int, end: Any) -> None:
+        """A request ended: its caller gets end."""
+        self._decisions.pop(token, None)
+        future = self._waiting.pop(token, None)
+        if future is not None:
+            future.set_result(end)
+
+    def report(self, token: int, outcome: model.Outcome, detail: str) -> None:
+        """A request got a step further; if a decision stands behind it, the supervisor is told."""
+        decision = self._decisions.get(token)
+        if decision is not None:
+            self.report_on(decision, outcome, detail)
+
+    def report_on(self, decision: model.Decision, outcome: model.Outcome, detail: str) -> None:
+        """Tell the supervisor how far a decision got."""
+        message = ActionReport()
+        message.header.stamp = self.stamp()
+        message.epoch, message.id = decision.epoch, decision.id
+        message.action, message.outcome = int(decision.action), int(outcome)
+        message.link, message.detail = self.get_name(), detail
+        message.newest_epoch = self.gate.newest_epoch
+        self._report_publisher.publish(message)
+        self._last_report = message
+        self.get_logger().info(
+            f"decision {decision.epoch}.{decision.id} {decision.action.name}: "
+            f"{outcome.name}: {detail}"
+        )
+
+    def publish_status(self, status: model.ParachuteStatus) -> None:
+        """On parachute/status."""
+        message = messages.parachute_status(status, self.get_name(), self.stamp())
+        self._status_publisher.publish(message)
+
+    def ask_supervisor(self, request: int, device: str, reason: str) -> None:
+        """On safety/request, on a device's behalf."""
+        message = SafetyRequest(
+            link=self.get_name(), device=device, request=request, reason=reason
+        )
+        message.header.stamp = self.stamp()
+        self._request_publisher.publish(message)
+
+    def stamp(self) -> Any:
+        """The wall clock, for headers."""
+        return self.wall.now().to_msg()
+
+    # -- inside --------------------------------------------------------------------------------------
+
+    def deliver(self, events: list[Any]) -> None:
+        """In the link's thread: hand events to the executor."""
+        self._inbox.extend(events)
+        self._guard.trigger()
+
+    def _drain(self) -> None:
+        while self._inbox:
+            event = self._inbox.popleft()
+            if isinstance(event, Summary):
+                self._publish_heartbeat(event)
+            elif isinstance(event, WireChange):
+                self.wire_text = event.text
+                log = self.get_logger()
+                log.info(event.text) if event.is_open else log.warning(event.text)
+            elif isinstance(event, LoopFault):
+                self._loop_faults += 1
+                self.get_logger().error(event.text, throttle_duration_sec=1.0)
+            else:
+                self.event(event)
+
+    def _beat(self) -> None:
+        assert self.loop is not None
+
+        def answer(link: Any, now: float) -> None:
+            link.owner_alive(now + OWNER_SILENCE)
+            self.deliver([self.summarise(link, now)])
+
+        self.loop.call(answer)
+
+    def _publish_heartbeat(self, summary: Summary) -> None:
+        self._summary = summary
+        message = LinkHeartbeat(
+            link=self.get_name(),
+            link_state=int(summary.link_state),
+            seq=next(self._seq) % 2**32,
+            device_healthy=summary.device_healthy,
+            age=summary.age,
+        )
+        message.header.stamp = self.stamp()
+        self._heartbeat_publisher.publish(message)
+
+    def _heartbeat_heard(self, message: LinkHeartbeat) -> None:
+        if message.supervisor:
+            self._supervisor_heard = time.monotonic()
+            sent = messages.seconds(message.header.stamp)
+            self._supervisor_delay = messages.seconds(self.stamp()) - sent
+
+    def _decision(self, message: SafetyDecision) -> None:
+        decision = messages.decision_from(message)
+        age = messages.seconds(self.stamp()) - messages.seconds(message.header.stamp)
+        verdict = self.gate.judge(decision, age)
+        self._verdicts[verdict] += 1
+        if verdict is Verdict.ACT:
+            self.get_logger().warning(
+                f"decision {decision.epoch}.{decision.id} {decision.action.name} "
+                f"({decision.rule}): {'; '.join(decision.reasons)}"
+            )
+            self.carry_out(decision)
+        elif verdict is Verdict.REPEATED:
+            # The supervisor has not heard our report, perhaps because it was not there yet.
+            if self._last_report is not None and self._last_report.id == decision.id:
+                self._report_publisher.publish(self._last_report)
+        elif verdict is Verdict.OLDER:
+            self.report_on(decision, model.Outcome.FAILED, Verdict.OLDER.value)
+        elif verdict is Verdict.TOO_LATE:
+            limit = self.values["max_decision_age"]
+            self.get_logger().error(
+                f"decision {decision.epoch}.{decision.id} {decision.action.name} is {age:.3f} s "
+                f"old (limit {limit:g} s): not acted on; do the clocks of the hosts agree?"
+            )
+
+    async def _arm(self, request: Arm.Request, response: Arm.Response) -> Arm.Response:
+        end = await self.request(lambda link, token, now: self.arm_link(link, token, request, now))
+        response.success, response.message = end.finished.success, end.finished.message
+        return response
+
+    async def _deploy(self, request: Deploy.Request, response: Deploy.Response) -> Deploy.Response:
+        self.get_logger().warning(f"~/deploy called (force={request.force}): {request.reason!r}")
+        end = await self.request(
+            lambda link, token, now: self.deploy_link(link, token, request, now)
+        )
+        finished = end.finished
+        response.success, response.accepted = finished.success, finished.accepted
+        response.message = finished.message
+        return response
+
+    def _parameters_set(self, parameters: list[Any]) -> Any:
+        for parameter in parameters:
+            self.parameter_changed(parameter.name, parameter.value)
+        return SetParametersResult(successful=True)
+
+    def _diagnose(self) -> None:
+        name = self.get_name()
+        summary = self._summary
+        assert self.loop is not None
+        silent = time.monotonic() - self.loop.last_run
+        statuses = []
+        if summary is None or silent > OWNER_SILENCE:
+            text = f"the link's thread has not run for {silent:.1f} s"
+            statuses.append(diagnostics.status(name, "link", diagnostics.ERROR, text, {}, ""))
+        if summary is not None:
+            statuses += self.diagnose(summary)
+        statuses.append(self._diagnose_supervisor())
+        self._diagnostics_publisher.publish(diagnostics.array(self.stamp(), statuses))
+
+    def _diagnose_supervisor(self) -> DiagnosticStatus:
+        age = time.monotonic() - self._supervisor_heard
+        limit = self.values["max_decision_age"]
+        level, text = diagnostics.OK, "heard"
+        if age != age:
+            level, text = diagnostics.STALE, "never heard"
+        elif age > OWNER_SILENCE:
+            level, text = diagnostics.ERROR, f"silent for {age:.1f} s"
+        elif abs(self._supervisor_delay) > limit / 2:
+            level = diagnostics.ERROR
+            text = f"clocks differ: its heartbeat seems {self._supervisor_delay:.3f} s old"
+        values = {
+            "heartbeat age (s)": age,
+            "newest decision": f"{self.gate.newest_epoch}.{self.gate.newest_id}",
+            "exceptions in the link's thread": self._loop_faults,
+        }
+        values |= {f"decisions: {verdict.value}": n for verdict, n in self._verdicts.items()}
+        return diagnostics.status(self.get_name(), "supervisor", level, text, values, "")

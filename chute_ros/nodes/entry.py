@@ -1,0 +1,50 @@
+"""Starting a node from the command line: one clear line for every mistake that a user can make."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from chute_ros.errors import ChuteError
+
+_NOT_BUILT = (
+    "chute_msgs cannot be imported: build both packages and source the result:\n"
+    "  colcon build --base-paths src src/chute_ros/msg_defs   (in your workspace)\n"
+    "  colcon build                                           (in the repository's root)\n"
+    "  source install/setup.bash"
+)
+
+
+def run(module: str, class_name: str) -> None:
+    """Make the node class_name of module and spin it until the end; exits with 2 on a mistake."""
+    try:
+        node_class = getattr(importlib.import_module(module), class_name)
+    except ImportError as error:
+        missing = getattr(error, "name", None) or ""
+        if missing.startswith("chute_msgs") or isinstance(error, ChuteError):
+            sys.exit(f"{_NOT_BUILT}\n({error})")
+        if missing:
+            sys.exit(
+                f"{missing} is not installed: `rosdep install --from-paths src` and "
+                "`pip install -r requirements/runtime.in` bring all that is needed"
+            )
+        raise
+    import rclpy
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+
+    rclpy.init()
+    node = None
+    try:
+        node = node_class()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass  # the usual ways to end a node
+    except ChuteError as error:
+        print(f"{class_name}: {error}", file=sys.stderr)
+        sys.exit(2)
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()

@@ -1,0 +1,12 @@
+"""Executable mavlink_parachute: a parachute on a MAVLink network."""
+
+from chute_ros.nodes.entry import run
+
+
+def main() -> None:
+    """Run the node."""
+    run("chute_ros.nodes.mavlink_parachute_node", "MavlinkParachuteNode")
+
+
+if __name__ == "__main__":
+    main()

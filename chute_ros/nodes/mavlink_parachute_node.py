@@ -1,0 +1,331 @@
+"""A parachute on a MAVLink network, and the autopilot beside it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from chute_msgs.msg import VehicleState
+from chute_msgs.srv import (
+    GetInfo,
+    ParachuteAction,
+    RequestMessage,
+    SetMessageInterval,
+    SetTriggers,
+)
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from chute_ros import model
+from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.device_node import DeviceNode, Summary
+from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from, signing_from
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.events import (
+    DeviceLinkChanged,
+    Notice,
+    ParachuteChanged,
+    RequestFinished,
+    RequestReport,
+    Severity,
+    VehicleChanged,
+)
+from chute_ros.protocol.mavlink.link import MavlinkLink
+from chute_ros.protocol.mavlink.parachute import component_information
+from chute_ros.transport.address import parse_address
+from chute_ros.transport.loop import WireLoop
+from chute_ros.transport.wire import make_wire
+
+#: COMPONENT_INFORMATION_BASIC.
+_INFORMATION: int = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
+
+
+@dataclass(frozen=True)
+class Details:
+    """What diagnostics say beside the summary."""
+
+    parachutes: tuple[tuple[model.ParachuteStatus, float, float], ...]
+    vehicle: model.VehicleState
+    doubts: tuple[str, ...]
+    received: int
+    sent: int
+    dropped: Counter[str]
+    late_acknowledgements: int
+
+
+class MavlinkParachuteNode(DeviceNode):
+    """The node mavlink_parachute."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("mavlink_parachute", PARAMETERS, **options)
+        address = parse_address(self.values["connection"])
+        link = MavlinkLink(config_from(self.values), *signing_from(self.values))
+        self.loop = WireLoop(link, make_wire(address), self.deliver)
+        self._statuses: dict[str, model.ParachuteStatus] = {}
+        self._rates: dict[str, tuple[int, float]] = {}
+        self._vehicle_publisher = self.create_publisher(
+            VehicleState, "vehicle/state", qos.STATUS
+        )
+        self.create_service(SetTriggers, "~/set_triggers", self._set_triggers)
+        self.create_service(ParachuteAction, "~/parachute_action", self._parachute_action)
+        self.create_service(RequestMessage, "~/request_message", self._request_message)
+        self.create_service(SetMessageInterval, "~/set_message_interval", self._set_interval)
+        self.create_service(GetInfo, "~/get_info", self._get_info)
+        self.begin()
+
+    # -- what DeviceNode asks for ---------------------------------------------------------------------
+
+    def summarise(self, link: MavlinkLink, now: float) -> Summary:
+        chosen = link.chosen_parachute()
+        vehicle = link.vehicle_state(now)
+        doubts = tuple(link.doubts())
+        details = Details(
+            tuple((p.status(now), p.status_interval, p.liveness.age(now))
+                  for p in link.parachutes.all()),
+            vehicle,
+            doubts,
+            link.received_count,
+            link.sent_count,
+            Counter(link.counts),
+            link.requests.commands.late_count,
+        )
+        if chosen is None:
+            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
+        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
+        flying = vehicle.armed is model.Armed.ARMED
+        healthy = chosen.status(now).healthy and (flying or not doubts)
+        return Summary(chosen.liveness.state, healthy, chosen.liveness.age(now), details)
+
+    def event(self, event: Any) -> None:
+        if isinstance(event, ParachuteChanged):
+            self._statuses[event.status.device] = event.status
+            self.publish_status(event.status)
+        elif isinstance(event, VehicleChanged):
+            self._vehicle_publisher.publish(messages.vehicle_state(event.state, self.stamp()))
+        elif isinstance(event, RequestReport):
+            self.report(event.report.token, event.report.outcome, event.report.detail)
+        elif isinstance(event, RequestFinished):
+            self.finished(event.finished.token, event)
+        elif isinstance(event, DeviceLinkChanged):
+            self._log_link_change(event)
+        elif isinstance(event, Notice):
+            log = self.get_logger()
+            {
+                Severity.INFO: log.info,
+                Severity.WARNING: log.warning,
+                Severity.ERROR: log.error,
+            }[event.severity](event.text)
+
+    def carry_out(self, decision: model.Decision) -> None:
+        force = self.values["deploy_arms_trigger"]
+        if decision.action is model.Action.KILL:
+            self.request_for(decision, lambda link, token, now: link.kill(token, now))
+        elif decision.action is model.Action.DEPLOY:
+            self.request_for(decision, lambda link, token, now: link.deploy(token, force, now))
+        elif decision.action is not model.Action.NONE:
+            blocked = decision.action is model.Action.FLIGHT_BLOCK
+            reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""
+            assert self.loop is not None
+            self.loop.call(lambda link, now: link.flight_block(reason, now))
+            text = "arming on the ground is undone" if blocked else "arming is left alone"
+            self.report_on(decision, model.Outcome.CONFIRMED, text)
+
+    def arm_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
+        link.arm(token, request.arm, request.triggers, now)
+
+    def deploy_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
+        link.deploy(token, request.force, now)
+
+    def parameter_changed(self, name: str, value: Any) -> None:
+        if name == "autopilot_message_rate" and self.loop is not None:
+            self.loop.call(lambda link, now: link.set_autopilot_message_rate(value, now))
+
+    def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
+        details: Details = summary.details
+        return [
+            self._diagnose_link(details),
+            *self._diagnose_parachutes(details),
+            self._diagnose_autopilot(details.vehicle),
+        ]
+
+    # -- services -------------------------------------------------------------------------------------
+
+    async def _set_triggers(self, request: Any, response: Any) -> Any:
+        if not 1 <= request.select <= 255 or request.arm > 255:
+            response.result = dialect.MAV_RESULT_DENIED
+            response.message = (
+                f"arm {request.arm}, select {request.select}: arm is a mask from 0 to 255, "
+                "select from 1 to 255 (ParachuteStatus.TRIGGER_*); nothing was sent"
+            )
+            return response
+        end = await self.request(
+            lambda link, token, now: link.set_triggers(
+                token, request.arm, request.select, request.device, now
+            )
+        )
+        response.armed_triggers = self._armed_triggers(request.device)
+        return _fill(response, end)
+
+    async def _parachute_action(self, request: Any, response: Any) -> Any:
+        if request.action > dialect.PARACHUTE_RELEASE:
+            response.result = dialect.MAV_RESULT_DENIED
+            response.message = f"action {request.action}: need DISABLE 0, ENABLE 1 or RELEASE 2"
+            return response
+        self.get_logger().warning(
+            f"~/parachute_action {request.action} called: {request.reason!r}"
+        )
+        end = await self.request(
+            lambda link, token, now: link.parachute_action(
+                token, request.action, request.device, now
+            )
+        )
+        return _fill(response, end)
+
+    async def _request_message(self, request: Any, response: Any) -> Any:
+        end = await self._message(request.message_id, request.device)
+        if end.data is not None:
+            fields = end.data.to_dict().items()
+            response.json = json.dumps({name: messages.json_value(v) for name, v in fields})
+        return _fill(response, end)
+
+    async def _set_interval(self, request: Any, response: Any) -> Any:
+        if request.interval_us < -1:
+            response.result = dialect.MAV_RESULT_DENIED
+            response.message = (
+                f"interval_us {request.interval_us}: need microseconds, -1 (off) or 0 (default)"
+            )
+            return response
+        end = await self.request(
+            lambda link, token, now: link.set_message_interval(
+                token, request.message_id, request.interval_us, request.device, now
+            )
+        )
+        if end.data is not None:
+            response.reported_interval_us = end.data.interval_us
+        return _fill(response, end)
+
+    async def _get_info(self, request: Any, response: Any) -> Any:
+        end = await self._message(_INFORMATION, request.device)
+        response.success, response.message = end.finished.success, end.finished.message
+        response.uptime = model.NAN
+        if end.data is not None:
+            information = component_information(end.data)
+            response.vendor_name = information.vendor_name
+            response.model_name = information.model_name
+            response.software_version = information.software_version
+            response.hardware_version = information.hardware_version
+            response.serial_number = information.serial_number
+            response.manufacture_date = information.manufacture_date
+            response.capabilities = information.capabilities
+            response.uptime = information.uptime
+        return response
+
+    def _message(self, message_id: int, device: str) -> Any:
+        return self.request(
+            lambda link, token, now: link.request_message(token, message_id, device, now)
+        )
+
+    # -- inside ---------------------------------------------------------------------------------------
+
+    def _armed_triggers(self, device: str) -> int:
+        """By the newest status that was published."""
+        statuses = [self._statuses[device]] if device in self._statuses else []
+        statuses += [] if device else list(self._statuses.values())
+        return next((int(status.armed_triggers) for status in statuses), 0)
+
+    def _log_link_change(self, event: DeviceLinkChanged) -> None:
+        change, log = event.change, self.get_logger()
+        if change.before is model.LinkState.NEVER_SEEN:
+            log.info(f"{event.name} heard for the first time")
+        elif change.regained:
+            log.warning(f"{event.name} regained after {change.silence:.1f} s of silence")
+        elif change.after is model.LinkState.OK:
+            log.info(f"{event.name} is OK again after {change.silence:.1f} s of silence")
+        else:
+            log.warning(f"{event.name} is {change.after.name}: silent for {change.silence:.1f} s")
+
+    def _diagnose_link(self, details: Details) -> DiagnosticStatus:
+        assert self.loop is not None
+        open_, dropped = self.loop.wire.is_open, details.dropped
+        level = diagnostics.OK if open_ else diagnostics.ERROR
+        text = self.wire_text
+        if details.doubts:
+            level, text = diagnostics.ERROR, "; ".join(details.doubts)
+        elif open_ and not details.received:
+            level, text = diagnostics.WARN, f"{text}, nothing received yet"
+        values = {
+            "frames received": details.received,
+            "frames received per s": self._rate("received", details.received),
+            "frames sent": details.sent,
+            "send errors": self.loop.send_errors,
+            "acknowledgements that came late": details.late_acknowledgements,
+        }
+        values |= {f"dropped: {reason}": n for reason, n in sorted(dropped.items())}
+        return diagnostics.status(
+            self.get_name(), "link", level, text, values, self.values["connection"]
+        )
+
+    def _diagnose_parachutes(self, details: Details) -> list[DiagnosticStatus]:
+        if not details.parachutes:
+            return [
+                diagnostics.status(
+                    self.get_name(), "parachute", diagnostics.STALE, "never heard", {}, ""
+                )
+            ]
+        return [
+            diagnostics.status(
+                self.get_name(),
+                f"parachute {status.device}",
+                diagnostics.OK if status.healthy else diagnostics.ERROR,
+                "; ".join(status.faults) or status.state.name,
+                {
+                    "link": status.link_state.name,
+                    "state": status.state.name,
+                    "heartbeat age (s)": age,
+                    "PARACHUTE_STATUS interval (s)": interval,
+                    "armed triggers": ", ".join(model.flag_names(status.armed_triggers)),
+                    "errors": ", ".join(model.flag_names(status.error_flags)),
+                    "safety": ", ".join(model.flag_names(status.safety_flags)),
+                    "packed date": status.packed_date,
+                    "uptime (s)": status.uptime,
+                },
+                status.device,
+            )
+            for status, interval, age in details.parachutes
+        ]
+
+    def _diagnose_autopilot(self, vehicle: model.VehicleState) -> DiagnosticStatus:
+        level, text = diagnostics.OK, f"{vehicle.armed.name}, {vehicle.landed_state.name}"
+        if vehicle.link_state is model.LinkState.NEVER_SEEN:
+            level, text = diagnostics.STALE, "never heard"
+        elif vehicle.link_state is not model.LinkState.OK:
+            level, text = diagnostics.ERROR, f"heartbeat {vehicle.link_state.name}"
+        elif vehicle.rebooted_in_flight:
+            level, text = diagnostics.ERROR, "restarted in flight"
+        values = {
+            "heartbeat age (s)": vehicle.armed_age,
+            "height (m)": vehicle.height,
+            "height age (s)": vehicle.height_age,
+            "attitude age (s)": vehicle.attitude_age,
+            "landed state age (s)": vehicle.landed_state_age,
+            "battery (V)": vehicle.battery_voltage,
+            "restarts": vehicle.reboot_count,
+        }
+        return diagnostics.status(
+            self.get_name(), "autopilot", level, text, values, vehicle.source
+        )
+
+    def _rate(self, name: str, value: int) -> float:
+        now = self._steady.now().nanoseconds * 1e-9
+        before, when = self._rates.get(name, (value, now))
+        self._rates[name] = (value, now)
+        return (value - before) / (now - when) if now > when else 0.0
+
+
+def _fill(response: Any, end: RequestFinished) -> Any:
+    """The fields that all answers to a command share."""
+    response.success = end.finished.success
+    response.result = end.finished.result
+    response.message = end.finished.message
+    return response

@@ -1,0 +1,155 @@
+"""The parameters of mavlink_parachute and what they become."""
+
+from __future__ import annotations
+
+import stat
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from chute_ros.errors import SigningKeyError
+from chute_ros.model import ErrorFlags, TriggerFlags
+from chute_ros.nodes.parameters import Parameter
+from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.protocol.mavlink.commands import CommandLimits
+from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
+from chute_ros.protocol.mavlink.effect import EffectLimits
+from chute_ros.protocol.mavlink.parachute import StatusLimits
+from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier, key_from_text
+from chute_ros.transport.address import FORMS
+
+PARAMETERS = (
+    Parameter(
+        "connection",
+        "udppair:127.0.0.1:14541:127.0.0.1:14540",
+        f"where the MAVLink network is: {FORMS}",
+    ),
+    Parameter("system_id", 1, "our own MAVLink system id: the vehicle's", 1, 255),
+    Parameter("component_id", 191, "our own MAVLink component id", 1, 255),
+    Parameter(
+        "parachute_system_id", 0, "system id of our parachutes; 0: of the first one heard", 0, 255
+    ),
+    Parameter("parachute_component_id", 0, "component id of our parachute; 0: any", 0, 255),
+    Parameter(
+        "autopilot_system_id", 0, "system id of our autopilot; 0: of the first one heard", 0, 255
+    ),
+    Parameter("autopilot_component_id", 1, "component id of our autopilot; 0: any", 0, 255),
+    Parameter(
+        "parachute_stale_after", 2.5, "parachute silent for this long is STALE, s", 0.1, 600.0
+    ),
+    Parameter("parachute_lost_after", 5.0, "parachute silent for this long is LOST, s", 0.1, 600.0),
+    Parameter(
+        "autopilot_stale_after", 2.5, "autopilot silent for this long is STALE, s", 0.1, 600.0
+    ),
+    Parameter("autopilot_lost_after", 5.0, "autopilot silent for this long is LOST, s", 0.1, 600.0),
+    Parameter(
+        "status_timeout", 3.5, "PARACHUTE_STATUS older than this is a fault, s", 0.1, 600.0
+    ),
+    Parameter(
+        "ignored_error_flags",
+        0,
+        "mask of PARACHUTE_ERROR_FLAGS that are no fault of this product",
+        0,
+        2**32 - 1,
+    ),
+    Parameter("ack_timeout", 0.5, "wait for an acknowledgement before sending again, s", 0.02, 60.0),
+    Parameter("ack_tries", 3, "how often a command is sent at most", 1, 100),
+    Parameter("in_progress_timeout", 5.0, "wait after an answer IN_PROGRESS, s", 0.1, 600.0),
+    Parameter("late_ack_window", 5.0, "how long a late acknowledgement may still come, s", 0.1, 60.0),
+    Parameter(
+        "effect_timeout",
+        1.5,
+        "from acknowledgement to effect, then the command is tried again, s",
+        0.05,
+        60.0,
+    ),
+    Parameter("retry_interval", 0.25, "between two tries, and between two looks, s", 0.02, 60.0),
+    Parameter("give_up_after", 5.0, "for all tries of a command together, s", 0.1, 600.0),
+    Parameter(
+        "default_triggers",
+        int(TriggerFlags.FC | TriggerFlags.OFFBOARD),
+        "trigger sources that ~/arm means with 0: mask of PARACHUTE_TRIGGER_FLAGS",
+        1,
+        255,
+    ),
+    Parameter(
+        "deploy_arms_trigger",
+        True,
+        "a deploy that the supervisor decided arms the flight-controller trigger on its way",
+    ),
+    Parameter(
+        "kill_method",
+        "flight_termination",
+        "how the autopilot is told to stop the motors",
+        choices=tuple(method.value for method in KillMethod),
+    ),
+    Parameter(
+        "disarm_when_blocked", True, "undo arming on the ground while flight is blocked"
+    ),
+    Parameter(
+        "autopilot_message_rate",
+        10.0,
+        "rate to ask of the autopilot for vehicle/state, Hz; 0: do not ask",
+        0.0,
+        100.0,
+        changeable=True,
+    ),
+    Parameter(
+        "signing_key_file",
+        "",
+        "file with the MAVLink signing key (32 bytes, or 64 hexadecimal digits); empty: no signing",
+    ),
+    Parameter("signing_link_id", 0, "link id in our signatures", 0, 255),
+)
+
+
+def config_from(values: Mapping[str, Any]) -> MavlinkConfig:
+    """The settings of the protocol; ParameterError where two parameters contradict each other."""
+    return MavlinkConfig(
+        system_id=values["system_id"],
+        component_id=values["component_id"],
+        parachute_system_id=values["parachute_system_id"],
+        parachute_component_id=values["parachute_component_id"],
+        autopilot_system_id=values["autopilot_system_id"],
+        autopilot_component_id=values["autopilot_component_id"],
+        parachute_liveness=LivenessLimits(
+            values["parachute_stale_after"], values["parachute_lost_after"]
+        ),
+        autopilot_liveness=LivenessLimits(
+            values["autopilot_stale_after"], values["autopilot_lost_after"]
+        ),
+        status=StatusLimits(values["status_timeout"], ErrorFlags(values["ignored_error_flags"])),
+        commands=CommandLimits(
+            values["ack_timeout"],
+            values["ack_tries"],
+            values["in_progress_timeout"],
+            values["late_ack_window"],
+        ),
+        effect=EffectLimits(
+            values["effect_timeout"], values["retry_interval"], values["give_up_after"]
+        ),
+        default_triggers=TriggerFlags(values["default_triggers"]),
+        kill_method=KillMethod(values["kill_method"]),
+        autopilot_message_rate=values["autopilot_message_rate"],
+        disarm_when_blocked=values["disarm_when_blocked"],
+    )
+
+
+def signing_from(values: Mapping[str, Any]) -> tuple[Signer | None, Verifier | None]:
+    """Signer and verifier for the key file, or neither; SigningKeyError if it cannot be used."""
+    name = values["signing_key_file"]
+    if not name:
+        return None, None
+    path = Path(name)
+    try:
+        text, mode = path.read_bytes(), path.stat().st_mode
+    except OSError as error:
+        raise SigningKeyError(f"parameter signing_key_file: {name}: {error.strerror}") from None
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise SigningKeyError(
+            f"parameter signing_key_file: {name} may be read by others: chmod 600 {name}"
+        )
+    key = key_from_text(text, f"parameter signing_key_file: {name}")
+    clock = SigningClock(time.time() - time.monotonic())
+    return Signer(key, clock, values["signing_link_id"]), Verifier(key, clock)

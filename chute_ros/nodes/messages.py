@@ -1,0 +1,106 @@
+"""Between the frozen types of chute_ros.model and the messages of chute_msgs."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import math
+
+from builtin_interfaces.msg import Time
+from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision, VehicleState
+
+from chute_ros import model
+
+
+def seconds(stamp: Time) -> float:
+    """A stamp as Unix seconds."""
+    return float(stamp.sec) + stamp.nanosec * 1e-9
+
+
+def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> ParachuteStatus:
+    """As it is published on parachute/status."""
+    message = ParachuteStatus()
+    message.header.stamp = stamp
+    message.link = link
+    message.device = status.device
+    message.link_state = int(status.link_state)
+    message.state = int(status.state)
+    message.armed = status.armed
+    message.deployed = status.deployed
+    message.deployment_trigger = status.deployment_trigger
+    message.armed_triggers = int(status.armed_triggers)
+    message.error_flags = int(status.error_flags)
+    message.safety_flags = int(status.safety_flags)
+    message.ats_arm_altitude = status.ats_arm_altitude
+    message.height = status.height
+    message.backup_voltage = status.backup_voltage
+    message.uptime = status.uptime
+    message.packed_date = status.packed_date
+    message.faults = list(status.faults)
+    return message
+
+
+def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
+    """As it is published on vehicle/state."""
+    message = VehicleState()
+    message.header.stamp = stamp
+    for field in dataclasses.fields(state):
+        value = getattr(state, field.name)
+        setattr(message, field.name, int(value) if isinstance(value, enum.Enum) else value)
+    return message
+
+
+def vehicle_state_from(message: VehicleState) -> model.VehicleState:
+    """What somebody published on vehicle/state; numbers that no enumeration has read as unknown."""
+    values = {f.name: getattr(message, f.name) for f in dataclasses.fields(model.VehicleState)}
+    values["link_state"] = _known(model.LinkState, values["link_state"])
+    values["armed"] = _known(model.Armed, values["armed"])
+    values["landed_state"] = _known(model.LandedState, values["landed_state"])
+    return model.VehicleState(**values)
+
+
+def link_state(message: LinkHeartbeat) -> model.LinkState:
+    """The link's state, by a heartbeat."""
+    return _known(model.LinkState, message.link_state)
+
+
+def outcome(message: ActionReport) -> model.Outcome:
+    """How far a device node got, by its report; an unknown number reads as NONE."""
+    return _known(model.Outcome, message.outcome)
+
+
+def decision(one: model.Decision, stamp: Time) -> SafetyDecision:
+    """As it is published on safety/decision."""
+    message = SafetyDecision()
+    message.header.stamp = stamp
+    message.epoch, message.id, message.action = one.epoch, one.id, int(one.action)
+    message.rule, message.shadow = one.rule, one.shadow
+    message.reasons, message.targets = list(one.reasons), list(one.targets)
+    return message
+
+
+def decision_from(message: SafetyDecision) -> model.Decision:
+    """What somebody published on safety/decision; an unknown action reads as NONE."""
+    return model.Decision(
+        message.epoch,
+        message.id,
+        _known(model.Action, message.action),
+        message.rule,
+        tuple(message.reasons),
+        tuple(message.targets),
+        message.shadow,
+    )
+
+
+def json_value(value: object) -> object:
+    """A MAVLink field's value as JSON can hold it: NaN and infinity become text."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, (list, tuple)):
+        return [json_value(one) for one in value]
+    return value
+
+
+def _known(kind, number):  # type: ignore[no-untyped-def]
+    """The member of kind with this number, or its member 0."""
+    return kind(number) if number in kind._value2member_map_ else kind(0)

@@ -1,0 +1,97 @@
+"""Parameters as one table a node: name, default, what it means, what is allowed.
+
+A value that is not allowed stops the start with the parameter's name, the value and what is
+allowed. Parameters are read-only unless a change in flight cannot be dangerous.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    ParameterUninitializedException,
+)
+from rclpy.node import Node
+
+from chute_ros.errors import ParameterError
+
+Value = bool | int | float | str | list[str]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter. minimum and maximum are inclusive; choices are for text."""
+
+    name: str
+    default: Value
+    description: str
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[str, ...] = ()
+    changeable: bool = False
+
+    def allowed(self) -> str:
+        """What may be given, in words."""
+        kind = {bool: "true or false", str: "text", list: "a list of texts"}.get(
+            type(self.default), "a whole number" if isinstance(self.default, int) else "a number"
+        )
+        if self.choices:
+            return "one of " + ", ".join(self.choices)
+        if self.minimum is None or self.maximum is None:
+            return kind
+        return f"{kind} from {self.minimum:g} to {self.maximum:g}"
+
+    def descriptor(self) -> ParameterDescriptor:
+        """The same for ROS."""
+        descriptor = ParameterDescriptor(
+            description=self.description,
+            additional_constraints=self.allowed(),
+            read_only=not self.changeable,
+        )
+        if self.minimum is None or self.maximum is None:
+            return descriptor
+        if isinstance(self.default, float):
+            span = FloatingPointRange(from_value=self.minimum, to_value=self.maximum)
+            descriptor.floating_point_range.append(span)
+        else:
+            whole = IntegerRange(from_value=int(self.minimum), to_value=int(self.maximum))
+            descriptor.integer_range.append(whole)
+        return descriptor
+
+
+def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
+    """Declare all on node and return name -> value; ParameterError for a value not allowed."""
+    values: dict[str, Any] = {}
+    for parameter in parameters:
+        try:
+            value = node.declare_parameter(
+                parameter.name, parameter.default, parameter.descriptor()
+            ).value
+        except (
+            InvalidParameterTypeException,
+            InvalidParameterValueException,
+            ParameterUninitializedException,
+        ):
+            raise _not_allowed(node, parameter, _given(node, parameter)) from None
+        if parameter.choices and value not in parameter.choices:
+            raise _not_allowed(node, parameter, value)
+        values[parameter.name] = value
+    return values
+
+
+def _given(node: Node, parameter: Parameter) -> object:
+    # The value was refused before it was stored; what the user gave is among the overrides.
+    overrides = node._parameter_overrides
+    return overrides[parameter.name].value if parameter.name in overrides else None
+
+
+def _not_allowed(node: Node, parameter: Parameter, value: object) -> ParameterError:
+    return ParameterError(
+        f"parameter {parameter.name} of {node.get_fully_qualified_name()} is {value!r}: "
+        f"need {parameter.allowed()} ({parameter.description})"
+    )

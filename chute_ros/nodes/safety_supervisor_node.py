@@ -1,0 +1,345 @@
+"""The safety supervisor: carries its core's decisions out into ROS and the inputs back in.
+
+One loop does it all: every message and request becomes an input of the core; one timer, set to the
+core's next deadline, wakes it when nothing comes. Its heartbeat comes from that loop alone.
+"""
+
+from __future__ import annotations
+
+import time
+from itertools import count
+from typing import Any
+
+from chute_msgs.msg import (
+    ActionReport,
+    LinkHeartbeat,
+    ParachuteStatus,
+    SafetyDecision,
+    SafetyRequest,
+    SafetyState,
+    VehicleState,
+)
+from chute_msgs.srv import Arm, Deploy, Kill, SetMode
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from chute_ros import model
+from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.parameters import declare
+from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.supervisor import inputs
+from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.state import LinkEvidence, State
+
+HEARTBEAT_INTERVAL = 0.1  # s
+STATE_INTERVAL = 1.0  # s, at the latest
+#: A device node's arm service that has not answered by then is given up, s.
+ARM_TIMEOUT = 10.0
+
+
+class SafetySupervisorNode(Node):
+    """The node safety_supervisor."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("safety_supervisor", **options)
+        self.values = declare(self, PARAMETERS)
+        self.config = config_from(self.values)
+        self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        now = time.monotonic()
+        # Rises from start to start; a device node that knows a higher one makes us go on above it.
+        epoch = max(1, int(time.time()) & 0xFFFFFFFF)
+        self.state = State(epoch, now, mode=inputs.Mode[self.values["mode"]])
+        self._tokens = count(1)
+        self._waiting: dict[int, Future] = {}
+        self._arming: dict[int, tuple[inputs.ArmDevices, dict[str, tuple[bool, str]], float]] = {}
+        self._seq = count()
+        self._beat_at = now
+        self._state_at = now
+        self._latest = 0.0
+        self._published: State | None = None
+        self._decision_publisher = self.create_publisher(
+            SafetyDecision, "safety/decision", qos.DECISION
+        )
+        self._state_publisher = self.create_publisher(SafetyState, "safety/state", qos.LATCHED)
+        self._heartbeat_publisher = self.create_publisher(
+            LinkHeartbeat, "safety/heartbeat", qos.STATUS
+        )
+        self._diagnostics_publisher = self.create_publisher(
+            DiagnosticArray, "/diagnostics", qos.STATUS
+        )
+        for kind, topic, callback, profile in (
+            (LinkHeartbeat, "safety/heartbeat", self._heartbeat, qos.STATUS),
+            (ParachuteStatus, "parachute/status", self._parachute, qos.STATUS),
+            (VehicleState, "vehicle/state", self._vehicle, qos.STATUS),
+            (ActionReport, "safety/action", self._action, qos.DECISION),
+            (SafetyRequest, "safety/request", self._device_request, qos.STATUS),
+        ):
+            self.create_subscription(kind, topic, callback, profile)
+        self._arm_clients = {
+            link: self.create_client(Arm, f"{link}/arm") for link in self.config.deploy_links
+        }
+        self.create_service(Arm, "safety/arm", self._arm)
+        self.create_service(Deploy, "safety/deploy", self._deploy)
+        self.create_service(Kill, "safety/kill", self._kill)
+        self.create_service(Trigger, "safety/reset", self._reset)
+        self.create_service(SetMode, "safety/set_mode", self._set_mode)
+        self.create_timer(1.0, self._diagnose, clock=self._steady)
+        self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self._steady)
+        self._turn()
+
+    # -- the loop -------------------------------------------------------------------------------------
+
+    def _turn(self, *new: inputs.Input) -> None:
+        """Give the core what came, do what it says, sleep until its next deadline."""
+        now = time.monotonic()
+        self.state, outputs = update(self.config, self.state, new, now)
+        for output in outputs:
+            self._do(output, now)
+        self._give_up_arming(now)
+        if now >= self._beat_at:
+            self._beat(now)
+        if self._changed() or now >= self._state_at:
+            self._publish_state(now)
+        wake = min(next_deadline(self.config, self.state, now), self._beat_at, self._state_at)
+        self._timer.timer_period_ns = max(1_000_000, int((wake - time.monotonic()) * 1e9))
+        self._timer.reset()
+
+    def _do(self, output: inputs.Output, now: float) -> None:
+        if isinstance(output, inputs.Decide):
+            self._publish_decision(output)
+        elif isinstance(output, inputs.Finish):
+            future = self._waiting.pop(output.token, None)
+            if future is not None:
+                future.set_result(output)
+        elif isinstance(output, inputs.ArmDevices):
+            self._arm_devices(output, now)
+        else:
+            log = self.get_logger()
+            log.error(output.text) if output.alarm else log.info(output.text)
+
+    def _publish_decision(self, output: inputs.Decide) -> None:
+        decision = output.decision
+        self._decision_publisher.publish(
+            messages.decision(decision, self.wall.now().to_msg())
+        )
+        if not output.again:
+            shadow = " (SHADOW, not sent)" if decision.shadow else ""
+            self.get_logger().warning(
+                f"decision {decision.epoch}.{decision.id} {decision.action.name}{shadow} by rule "
+                f"'{decision.rule}' to {', '.join(decision.targets)}: "
+                f"{'; '.join(decision.reasons)}"
+            )
+
+    # -- inputs ---------------------------------------------------------------------------------------
+
+    def _heartbeat(self, message: LinkHeartbeat) -> None:
+        if not message.supervisor:
+            state = messages.link_state(message)
+            self._turn(
+                inputs.LinkHeartbeat(message.link, state, message.device_healthy, message.seq)
+            )
+
+    def _parachute(self, message: ParachuteStatus) -> None:
+        self._turn(
+            inputs.ParachuteReport(
+                message.link, message.device, message.deployed, tuple(message.faults)
+            )
+        )
+
+    def _vehicle(self, message: VehicleState) -> None:
+        self._turn(inputs.VehicleReport(messages.vehicle_state_from(message)))
+
+    def _action(self, message: ActionReport) -> None:
+        self._turn(
+            inputs.ActionReport(
+                message.epoch,
+                message.id,
+                message.link,
+                messages.outcome(message),
+                message.detail,
+                message.newest_epoch,
+            )
+        )
+
+    def _device_request(self, message: SafetyRequest) -> None:
+        if message.request == SafetyRequest.KILL:
+            by = f"{message.link} {message.device}".strip()
+            self._turn(inputs.KillRequest(0, by, message.reason))
+
+    # -- services -------------------------------------------------------------------------------------
+
+    async def _ask(self, make: Any) -> inputs.Finish:
+        token = next(self._tokens)
+        self._waiting[token] = future = Future()
+        self._turn(make(token))
+        return await future
+
+    async def _arm(self, request: Any, response: Any) -> Any:
+        end = await self._ask(lambda t: inputs.ArmRequest(t, request.arm, request.triggers))
+        response.success, response.message = end.success, end.message
+        return response
+
+    async def _deploy(self, request: Any, response: Any) -> Any:
+        end = await self._ask(lambda t: inputs.DeployRequest(t, request.force, request.reason))
+        response.success, response.accepted = end.success, end.accepted
+        response.message = end.message
+        return response
+
+    async def _kill(self, request: Any, response: Any) -> Any:
+        reason = request.reason or "no reason given"
+        end = await self._ask(lambda t: inputs.KillRequest(t, "operator", reason))
+        response.success, response.accepted = end.success, end.accepted
+        response.message = end.message
+        return response
+
+    async def _reset(self, request: Any, response: Any) -> Any:
+        end = await self._ask(inputs.ResetRequest)
+        response.success, response.message = end.success, end.message
+        return response
+
+    async def _set_mode(self, request: Any, response: Any) -> Any:
+        if request.mode not in inputs.Mode._value2member_map_:
+            response.message = f"mode {request.mode}: need ACTIVE 0, SHADOW 1 or INHIBITED 2"
+            return response
+        mode = inputs.Mode(request.mode)
+        self.get_logger().warning(f"set_mode {mode.name}: {request.reason!r}")
+        end = await self._ask(lambda t: inputs.ModeRequest(t, mode, request.force))
+        response.success, response.message = end.success, end.message
+        return response
+
+    # -- arming through the device nodes ---------------------------------------------------------------
+
+    def _arm_devices(self, order: inputs.ArmDevices, now: float) -> None:
+        self._arming[order.token] = (order, {}, now + ARM_TIMEOUT)
+        request = Arm.Request(arm=order.arm, triggers=order.triggers)
+        for link in order.links:
+            client = self._arm_clients[link]
+            if not client.service_is_ready():
+                self._armed(order.token, link, False, f"its service {link}/arm is not there")
+                continue
+            future = client.call_async(request)
+
+            def answered(future: Future, link: str = link) -> None:
+                answer = future.result()
+                self._armed(order.token, link, answer.success, answer.message)
+
+            future.add_done_callback(answered)
+
+    def _armed(self, token: int, link: str, success: bool, message: str) -> None:
+        if token not in self._arming:
+            return
+        order, answers, _ = self._arming[token]
+        answers[link] = (success, message)
+        if len(answers) < len(order.links):
+            return
+        del self._arming[token]
+        text = "; ".join(f"{name}: {answers[name][1]}" for name in order.links)
+        success = all(answer[0] for answer in answers.values())
+        self._turn(inputs.ArmDone(token, order.arm, success, text))
+
+    def _give_up_arming(self, now: float) -> None:
+        for token, (order, answers, until) in list(self._arming.items()):
+            if now >= until:
+                for link in [link for link in order.links if link not in answers]:
+                    self._armed(token, link, False, f"no answer within {ARM_TIMEOUT:g} s")
+
+    # -- outputs --------------------------------------------------------------------------------------
+
+    def _beat(self, now: float) -> None:
+        self._latest = now - self._beat_at
+        self._beat_at = max(self._beat_at + HEARTBEAT_INTERVAL, now)
+        message = LinkHeartbeat(
+            link=self.get_name(),
+            link_state=LinkHeartbeat.LINK_OK,
+            seq=next(self._seq) % 2**32,
+            device_healthy=True,
+            age=0.0,
+            supervisor=True,
+        )
+        message.header.stamp = self.wall.now().to_msg()
+        self._heartbeat_publisher.publish(message)
+
+    def _changed(self) -> bool:
+        before, now = self._published, self.state
+        return before is None or (before.stage, before.mode, before.next_id, before.alarms) != (
+            now.stage,
+            now.mode,
+            now.next_id,
+            now.alarms,
+        )
+
+    def _publish_state(self, now: float) -> None:
+        self._published, self._state_at = self.state, now + STATE_INTERVAL
+        state, config = self.state, self.config
+        reasons = block_reasons(config, state, now)
+        message = SafetyState(
+            epoch=state.epoch,
+            state=int(state.stage),
+            state_text=self._state_text(reasons),
+            mode=int(state.mode),
+            flight_blocked=self._flight_blocked(),
+            block_reasons=list(reasons) if self._flight_blocked() else [],
+            alarms=list(state.alarms),
+        )
+        message.header.stamp = self.wall.now().to_msg()
+        for link in config.links:
+            evidence = state.links.get(link, LinkEvidence())
+            message.links.append(link)
+            message.link_states.append(int(evidence.state(config, now)))
+            message.link_ages.append(now - evidence.heard)
+            message.devices_healthy.append(evidence.device_healthy)
+        newest = max(
+            (p.decision for p in (state.block, state.kill, state.deploy) if p is not None),
+            key=lambda decision: decision.id,
+            default=None,
+        )
+        if newest is not None:
+            message.decision_id = newest.id
+            message.decision_action = int(newest.action)
+            message.decision_rule = newest.rule
+        self._state_publisher.publish(message)
+
+    def _flight_blocked(self) -> bool:
+        block = self.state.block
+        return block is not None and block.decision.action is model.Action.FLIGHT_BLOCK
+
+    def _state_text(self, reasons: tuple[str, ...]) -> str:
+        stage = self.state.stage
+        if stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
+            return f"{stage.name}: {'; '.join(reasons)}"
+        if self.state.alarms:
+            return f"{stage.name}: {self.state.alarms[-1]}"
+        return stage.name
+
+    def _diagnose(self) -> None:
+        now, name = time.monotonic(), self.get_name()
+        state, config = self.state, self.config
+        reasons = block_reasons(config, state, now)
+        level = diagnostics.OK
+        if state.alarms or state.stage is Stage.FAULT:
+            level = diagnostics.ERROR
+        elif reasons:
+            level = diagnostics.WARN
+        values: dict[str, object] = {
+            "state": state.stage.name,
+            "mode": state.mode.name,
+            "epoch": state.epoch,
+            "decisions": state.next_id - 1,
+            "newest heartbeat late by (s)": self._latest,
+        }
+        for link in config.links:
+            evidence = state.links.get(link, LinkEvidence())
+            values[f"{link}: link"] = evidence.state(config, now).name
+            values[f"{link}: heartbeat age (s)"] = now - evidence.heard
+            values[f"{link}: device healthy"] = evidence.device_healthy
+        text = self._state_text(reasons)
+        task = diagnostics.status(name, "decisions", level, text, values, "")
+        self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), [task]))
+
+

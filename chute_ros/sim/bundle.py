@@ -1,0 +1,43 @@
+"""Several wires as one: a simulated device that is on two networks at once."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+from chute_ros.transport.wire import Wire
+
+
+class WireBundle:
+    """Reads from all its wires and writes to all."""
+
+    def __init__(self, wires: list[Wire]) -> None:
+        self._wires = wires
+
+    @property
+    def is_open(self) -> bool:
+        return all(wire.is_open for wire in self._wires)
+
+    def open(self) -> None:
+        for wire in self._wires:
+            if not wire.is_open:
+                wire.open()
+
+    def close(self) -> None:
+        for wire in self._wires:
+            wire.close()
+
+    def files(self) -> list[int]:
+        return [file for wire in self._wires for file in wire.files()]
+
+    def read(self, file: int) -> list[tuple[bytes, Hashable]]:
+        for wire in self._wires:
+            if file in wire.files():
+                return wire.read(file)
+        return []
+
+    def write(self, data: bytes) -> None:
+        for wire in self._wires:
+            wire.write(data)
+
+    def describe(self) -> str:
+        return " + ".join(wire.describe() for wire in self._wires)

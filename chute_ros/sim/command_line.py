@@ -1,0 +1,106 @@
+"""What the command lines of all simulators share, and running one until the end."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+import time
+from typing import Any
+
+from chute_ros.errors import ChuteError, ParameterError
+from chute_ros.sim.bundle import WireBundle
+from chute_ros.sim.faults import FaultKnobs, FaultyLink
+from chute_ros.sim.mavlink_device import MavlinkDevice
+from chute_ros.transport.address import FORMS, parse_address
+from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
+from chute_ros.transport.wire import make_wire
+
+
+def parser(program: str, text: str, connection: str, actions: str) -> argparse.ArgumentParser:
+    """Options that every simulator has."""
+    options = argparse.ArgumentParser(program, description=text)
+    options.add_argument(
+        "--connection",
+        action="append",
+        metavar="WIRE",
+        help=f"{FORMS}; may be given more than once (default: {connection})",
+    )
+    options.set_defaults(default_connection=connection)
+    options.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="SECONDS:ACTION",
+        help=f"do this so long after the start; ACTION is one of {actions}",
+    )
+    for name, text in (
+        ("loss", "probability that a packet is lost, 0 to 1, each way"),
+        ("duplicate", "probability that a packet comes twice"),
+        ("corrupt", "probability that a byte of a packet is wrong"),
+        ("delay", "longest delay of a packet, s"),
+    ):
+        options.add_argument(f"--{name}", type=float, default=0.0, metavar="X", help=text)
+    options.add_argument("--seed", type=int, default=1, help="of the random faults (default: 1)")
+    options.add_argument("--quiet", action="store_true", help="print nothing")
+    return options
+
+
+def script_of(entries: list[str]) -> list[tuple[float, str]]:
+    """The entries of --at as (seconds, action)."""
+    script = []
+    for entry in entries:
+        seconds, colon, action = entry.partition(":")
+        try:
+            script.append((float(seconds), action))
+        except ValueError:
+            colon = ""
+        if not colon or not action:
+            raise ParameterError(f"--at {entry!r}: need SECONDS:ACTION, for example 5:reboot")
+    return script
+
+
+def number(name: str) -> Any:
+    """A converter for argparse: a whole number, decimal or 0x..."""
+
+    def convert(text: str) -> int:
+        return int(text, 0)
+
+    convert.__name__ = name
+    return convert
+
+
+def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
+    """Run device on its wires until SIGINT or SIGTERM; ends with 2 on a user's mistake."""
+    for _, action in script_of(options.at):
+        if action.partition("=")[0] not in device.actions:
+            known = ", ".join(sorted(device.actions))
+            raise ParameterError(f"--at: action {action!r} is not known: need one of {known}")
+    knobs = FaultKnobs(options.loss, options.duplicate, options.corrupt, options.delay)
+    connections = options.connection or [options.default_connection]
+    wires = [make_wire(parse_address(text)) for text in connections]
+    started = time.monotonic()
+
+    def show(events: list[Any]) -> None:
+        for event in events:
+            text = event.text if isinstance(event, (WireChange, LoopFault)) else event
+            if not options.quiet or isinstance(event, LoopFault):
+                print(f"{time.monotonic() - started:8.3f} {text}", flush=True)
+
+    ended = threading.Event()
+    for number_ in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number_, lambda *_: ended.set())
+    link = FaultyLink(device, knobs, options.seed)
+    loop = WireLoop(link, WireBundle(wires), show)
+    loop.start()
+    ended.wait()
+    loop.stop()
+
+
+def main_of(make: Any) -> None:
+    """Run make() and turn a user's mistake into one line and exit code 2."""
+    try:
+        make()
+    except ChuteError as error:
+        sys.exit(f"{error}")

@@ -1,0 +1,28 @@
+"""Executable sim_autopilot: a simulated MAVLink autopilot that flies a small vertical model."""
+
+from __future__ import annotations
+
+from chute_ros.sim.autopilot_device import AutopilotDevice
+from chute_ros.sim.command_line import main_of, number, parser, run, script_of
+
+
+def _run() -> None:
+    options = parser(
+        "sim_autopilot",
+        "A MAVLink autopilot: arms, takes off, fails and falls; a PARACHUTE_STATUS that says "
+        "deployed opens its canopy.",
+        "udpout:127.0.0.1:14550",
+        "mute, unmute, silent, speak, reboot, arm, takeoff=HEIGHT, fail-motor",
+    )
+    options.add_argument("--system-id", type=number("id"), default=1)
+    chosen = options.parse_args()
+    run(AutopilotDevice(chosen.system_id, script_of(chosen.at)), chosen)
+
+
+def main() -> None:
+    """Run the simulator."""
+    main_of(_run)
+
+
+if __name__ == "__main__":
+    main()

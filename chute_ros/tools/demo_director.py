@@ -1,0 +1,142 @@
+"""Sees a simulated flight through ROS as a user would, and plays the operator."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from chute_msgs.msg import ActionReport, ParachuteStatus, SafetyDecision, SafetyState, VehicleState
+from chute_msgs.srv import Arm, Deploy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from chute_ros import model
+from chute_ros.errors import ChuteError
+from chute_ros.nodes import qos
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.processes import Processes
+
+
+class StepFailedError(ChuteError):
+    """A step of the story did not happen in its time."""
+
+
+class Director:
+    """Follows the topics, calls the services, tells the story, and stops it when a step fails."""
+
+    def __init__(self, namespace: str, processes: Processes) -> None:
+        self._processes = processes
+        self._started = time.monotonic()
+        self._failure_at: float | None = None
+        self.vehicle = VehicleState()
+        self.parachute = ParachuteStatus()
+        self.safety = SafetyState()
+        self.decisions: list[tuple[float, SafetyDecision]] = []
+        self.reports: list[tuple[float, ActionReport]] = []
+        self.track: list[tuple[float, float]] = []
+        rclpy.init(args=[])
+        self.node = Node("director", namespace=namespace)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        subscribe = self.node.create_subscription
+        subscribe(VehicleState, "vehicle/state", self._vehicle, qos.STATUS)
+        subscribe(ParachuteStatus, "parachute/status", self._parachute, qos.STATUS)
+        subscribe(SafetyState, "safety/state", self._safety, qos.LATCHED)
+        subscribe(SafetyDecision, "safety/decision", self._decision, qos.DECISION)
+        subscribe(ActionReport, "safety/action", self._report, qos.DECISION)
+        self._arm = self.node.create_client(Arm, "safety/arm")
+        self._deploy = self.node.create_client(Deploy, "safety/deploy")
+
+    def close(self) -> None:
+        """Leave ROS."""
+        self.node.destroy_node()
+        rclpy.shutdown()
+
+    # -- telling ---------------------------------------------------------------------------------
+
+    def failure_now(self) -> None:
+        """From here on times count from the failure."""
+        self._failure_at = time.monotonic()
+
+    def clock(self) -> str:
+        """Time since the failure, or since the start before it."""
+        now = time.monotonic()
+        if self._failure_at is not None:
+            return f"T+{now - self._failure_at:6.2f} s"
+        return f"  {now - self._started:6.2f} s"
+
+    def since_failure(self, when: float) -> float:
+        """Seconds from the failure to when."""
+        assert self._failure_at is not None
+        return when - self._failure_at
+
+    def say(self, who: str, text: str) -> None:
+        """One line of the story."""
+        print(f"{self.clock()}  {who:<10} {text}", flush=True)
+
+    # -- awaiting --------------------------------------------------------------------------------
+
+    def until(self, what: str, seconds: float, condition: Callable[[], bool]) -> None:
+        """Spin until condition holds; StepFailedError if it does not within seconds."""
+        end = time.monotonic() + seconds
+        while not condition():
+            self._processes.check()
+            if time.monotonic() >= end:
+                logs = "\n".join(self._processes.tail(name) for name in self._processes.names())
+                raise StepFailedError(f"{what}: not within {seconds:g} s\n{logs}")
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def stage(self, stage: Stage) -> Callable[[], bool]:
+        """The supervisor says that the vehicle is in this stage."""
+        return lambda: self.safety.state == stage
+
+    def outcome(self, action: model.Action, outcome: model.Outcome) -> ActionReport | None:
+        """The first report of this outcome of this action."""
+        for _, report in self.reports:
+            if (report.action, report.outcome) == (action, outcome):
+                return report
+        return None
+
+    def when(self, action: model.Action, outcome: model.Outcome) -> float:
+        """When that report came."""
+        return next(
+            when
+            for when, report in self.reports
+            if (report.action, report.outcome) == (action, outcome)
+        )
+
+    def ask_arm(self) -> Any:
+        """Call safety/arm; the future of its answer."""
+        self.until("safety/arm is offered", 10.0, self._arm.service_is_ready)
+        return self._arm.call_async(Arm.Request(arm=True, triggers=0))
+
+    def ask_deploy(self, reason: str) -> Any:
+        """Call safety/deploy; the future of its answer."""
+        return self._deploy.call_async(Deploy.Request(force=False, reason=reason))
+
+    # -- topics ----------------------------------------------------------------------------------
+
+    def _vehicle(self, message: VehicleState) -> None:
+        self.vehicle = message
+        if message.height == message.height:
+            self.track.append((time.monotonic(), message.height))
+
+    def _parachute(self, message: ParachuteStatus) -> None:
+        self.parachute = message
+
+    def _safety(self, message: SafetyState) -> None:
+        self.safety = message
+
+    def _decision(self, message: SafetyDecision) -> None:
+        if any((message.epoch, message.id) == (d.epoch, d.id) for _, d in self.decisions):
+            return
+        self.decisions.append((time.monotonic(), message))
+        action = model.Action(message.action)
+        self.say("supervisor", f"{action.name} ({'; '.join(message.reasons)})")
+
+    def _report(self, message: ActionReport) -> None:
+        self.reports.append((time.monotonic(), message))
+        action, outcome = model.Action(message.action), model.Outcome(message.outcome)
+        self.say(message.link[:10], f"{action.name} {outcome.name}: {message.detail}")

@@ -1,0 +1,40 @@
+"""Keeps a simulation to itself: a ROS domain of its own, this host only, ports free right now.
+
+A simulation must never fire a real vehicle, nor a real one confuse a simulation.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import socket
+from collections.abc import Iterator
+
+from domain_coordinator import domain_id
+
+
+@contextlib.contextmanager
+def isolated_ros() -> Iterator[str]:
+    """Set this process's (and its children's) ROS environment; yields a namespace of its own.
+
+    The domain is reserved among all who ask in this way on this host; the namespace keeps us
+    apart even from someone who chose the same domain by hand.
+    """
+    with domain_id(selector=lambda: secrets.randbelow(100) + 1) as domain:
+        os.environ["ROS_DOMAIN_ID"] = str(domain)
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        os.environ.pop("ROS_STATIC_PEERS", None)
+        yield f"/sim_{secrets.token_hex(4)}"
+
+
+def free_udp_ports(count: int) -> list[int]:
+    """Ports of 127.0.0.1 that nobody uses at this moment."""
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    try:
+        for one in sockets:
+            one.bind(("127.0.0.1", 0))
+        return [one.getsockname()[1] for one in sockets]
+    finally:
+        for one in sockets:
+            one.close()

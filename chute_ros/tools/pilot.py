@@ -1,0 +1,57 @@
+"""A ground station's pilot for simulated flights: arms, takes off, breaks a motor, over MAVLink."""
+
+from __future__ import annotations
+
+import time
+
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.transport.address import parse_address
+from chute_ros.transport.udp import UdpWire
+
+_GROUND_STATION = (255, 190)
+
+
+class Pilot:
+    """Speaks to one autopilot (system_id/1) at connection."""
+
+    def __init__(self, connection: str, system_id: int) -> None:
+        self._wire = UdpWire(parse_address(connection))
+        self._wire.open()
+        self._system_id = system_id
+        self._encoder = FrameEncoder(*_GROUND_STATION)
+        self._decoder = FrameDecoder()
+        self.results: dict[int, int] = {}
+
+    def arm(self) -> None:
+        """Arm the motors."""
+        self._command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def take_off(self, height: float) -> None:
+        """Climb to height, m."""
+        self._command(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height)
+
+    def fail_motor(self) -> None:
+        """Let a motor fail (MAV_CMD_INJECT_FAILURE)."""
+        motor, off = dialect.FAILURE_UNIT_SYSTEM_MOTOR, dialect.FAILURE_TYPE_OFF
+        self._command(dialect.MAV_CMD_INJECT_FAILURE, float(motor), float(off))
+
+    def accepted(self, command: int) -> bool:
+        """The autopilot has accepted this MAV_CMD since it was last sent."""
+        now = time.monotonic()
+        for file in self._wire.files():
+            for data, _ in self._wire.read(file):
+                for frame in self._decoder.feed_datagram(data, now):
+                    if frame.message.get_type() == "COMMAND_ACK":
+                        self.results[frame.message.command] = frame.message.result
+        return self.results.get(command) == dialect.MAV_RESULT_ACCEPTED
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._wire.close()
+
+    def _command(self, number: int, *params: float) -> None:
+        self.results.pop(number, None)
+        values = [*params, *[0.0] * (7 - len(params))]
+        message = dialect.MAVLink_command_long_message(self._system_id, 1, number, 0, *values)
+        self._wire.write(self._encoder.encode(message, time.monotonic()))

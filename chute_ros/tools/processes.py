@@ -1,0 +1,66 @@
+"""Child processes with their output in files: started, watched, ended."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from chute_ros.errors import ChuteError
+
+END_TIMEOUT = 5.0  # s
+
+
+class ProcessEndedError(ChuteError):
+    """A child ended by itself. The text shows the end of what it wrote."""
+
+
+class Processes:
+    """Modules of ours, each in a Python of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, name: str, module: str, *arguments: str) -> None:
+        """Run module as name; what it writes goes to name.log."""
+        with self.log(name).open("wb") as log:
+            self._running[name] = subprocess.Popen(
+                [sys.executable, "-m", module, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+
+    def log(self, name: str) -> Path:
+        """Where the output of name goes."""
+        return self._folder / f"{name}.log"
+
+    def tail(self, name: str, lines: int = 15) -> str:
+        """The end of what name wrote."""
+        text = self.log(name).read_text(errors="replace").splitlines()
+        return "\n".join(f"    {name}: {line}" for line in text[-lines:])
+
+    def check(self) -> None:
+        """ProcessEndedError if one is not running any more."""
+        for name, process in self._running.items():
+            code = process.poll()
+            if code is not None:
+                raise ProcessEndedError(f"{name} ended with code {code}:\n{self.tail(name)}")
+
+    def names(self) -> list[str]:
+        """All that were started."""
+        return list(self._running)
+
+    def end(self) -> None:
+        """SIGINT to all, SIGKILL to those that do not end."""
+        for process in self._running.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        for process in self._running.values():
+            try:
+                process.wait(END_TIMEOUT)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
