@@ -19,6 +19,7 @@ from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyD
 from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
@@ -66,6 +67,8 @@ class DeviceNode(Node, ABC):
         self.gate = DecisionGate(name, self.values["max_decision_age"])
         self.wire_text = "not opened yet"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        # A service that awaits the device must not keep the other callbacks from running.
+        self._service_group = ReentrantCallbackGroup()
         self._inbox: deque[Any] = deque()
         self._guard = self.create_guard_condition(self._drain)
         self._tokens = count(1)
@@ -103,8 +106,8 @@ class DeviceNode(Node, ABC):
         self.create_subscription(
             LinkHeartbeat, "safety/heartbeat", self._heartbeat_heard, qos.STATUS
         )
-        self.create_service(Arm, "~/arm", self._arm)
-        self.create_service(Deploy, "~/deploy", self._deploy)
+        self.serve(Arm, "~/arm", self._arm)
+        self.serve(Deploy, "~/deploy", self._deploy)
         period = 1.0 / self.values["heartbeat_rate"]
         self.create_timer(period, self._beat, clock=self._steady)
         self.create_timer(1.0, self._diagnose, clock=self._steady)
@@ -116,6 +119,10 @@ class DeviceNode(Node, ABC):
             self.loop.stop()
             self.loop = None
         super().destroy_node()
+
+    def serve(self, kind: Any, name: str, callback: Any) -> None:
+        """Offer a service whose callback may await the device."""
+        self.create_service(kind, name, callback, callback_group=self._service_group)
 
     # -- for the subclass to fill ------------------------------------------------------------------
 

@@ -15,8 +15,9 @@ _NOT_BUILT = (
 )
 
 
-def run(module: str, class_name: str) -> None:
-    """Make the node class_name of module and spin it until the end; exits with 2 on a mistake."""
+def run(name: str, class_name: str) -> None:
+    """Make the class of node name and spin it until the end; exits with 2 on a user's mistake."""
+    module = f"chute_ros.nodes.{name}_node"
     try:
         node_class = getattr(importlib.import_module(module), class_name)
     except ImportError as error:
@@ -42,7 +43,7 @@ def run(module: str, class_name: str) -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # the usual ways to end a node
     except ChuteError as error:
-        print(f"{class_name}: {error}", file=sys.stderr)
+        print(f"{name}: {error}", file=sys.stderr)
         sys.exit(2)
     finally:
         if node is not None:

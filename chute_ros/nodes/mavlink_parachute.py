@@ -5,7 +5,7 @@ from chute_ros.nodes.entry import run
 
 def main() -> None:
     """Run the node."""
-    run("chute_ros.nodes.mavlink_parachute_node", "MavlinkParachuteNode")
+    run("mavlink_parachute", "MavlinkParachuteNode")
 
 
 if __name__ == "__main__":

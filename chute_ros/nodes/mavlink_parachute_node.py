@@ -67,11 +67,11 @@ class MavlinkParachuteNode(DeviceNode):
         self._vehicle_publisher = self.create_publisher(
             VehicleState, "vehicle/state", qos.STATUS
         )
-        self.create_service(SetTriggers, "~/set_triggers", self._set_triggers)
-        self.create_service(ParachuteAction, "~/parachute_action", self._parachute_action)
-        self.create_service(RequestMessage, "~/request_message", self._request_message)
-        self.create_service(SetMessageInterval, "~/set_message_interval", self._set_interval)
-        self.create_service(GetInfo, "~/get_info", self._get_info)
+        self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
+        self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
+        self.serve(RequestMessage, "~/request_message", self._request_message)
+        self.serve(SetMessageInterval, "~/set_message_interval", self._set_interval)
+        self.serve(GetInfo, "~/get_info", self._get_info)
         self.begin()
 
     # -- what DeviceNode asks for ---------------------------------------------------------------------

@@ -10,8 +10,7 @@ from typing import Any
 
 from chute_ros.errors import SigningKeyError
 from chute_ros.model import ErrorFlags, TriggerFlags
-from chute_ros.nodes.parameters import Parameter
-from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.protocol.mavlink.commands import CommandLimits
 from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
 from chute_ros.protocol.mavlink.effect import EffectLimits
@@ -113,12 +112,8 @@ def config_from(values: Mapping[str, Any]) -> MavlinkConfig:
         parachute_component_id=values["parachute_component_id"],
         autopilot_system_id=values["autopilot_system_id"],
         autopilot_component_id=values["autopilot_component_id"],
-        parachute_liveness=LivenessLimits(
-            values["parachute_stale_after"], values["parachute_lost_after"]
-        ),
-        autopilot_liveness=LivenessLimits(
-            values["autopilot_stale_after"], values["autopilot_lost_after"]
-        ),
+        parachute_liveness=liveness_from(values, "parachute"),
+        autopilot_liveness=liveness_from(values, "autopilot"),
         status=StatusLimits(values["status_timeout"], ErrorFlags(values["ignored_error_flags"])),
         commands=CommandLimits(
             values["ack_timeout"],

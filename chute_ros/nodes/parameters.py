@@ -19,6 +19,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 
 from chute_ros.errors import ParameterError
+from chute_ros.protocol.liveness import LivenessLimits
 
 Value = bool | int | float | str | list[str]
 
@@ -38,7 +39,7 @@ class Parameter:
     def allowed(self) -> str:
         """What may be given, in words."""
         kind = {bool: "true or false", str: "text", list: "a list of texts"}.get(
-            type(self.default), "a whole number" if isinstance(self.default, int) else "a number"
+            type(self.default), "a whole number" if isinstance(self.default, int) else "a number (1.0, not 1)"
         )
         if self.choices:
             return "one of " + ", ".join(self.choices)
@@ -82,6 +83,17 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
             raise _not_allowed(node, parameter, value)
         values[parameter.name] = value
     return values
+
+
+def liveness_from(values: Mapping[str, Any], name: str) -> LivenessLimits:
+    """The limits in the parameters name_stale_after and name_lost_after."""
+    stale, lost = values[f"{name}_stale_after"], values[f"{name}_lost_after"]
+    if stale >= lost:
+        raise ParameterError(
+            f"parameter {name}_stale_after is {stale} and {name}_lost_after is {lost}: "
+            "a link is stale before it is lost; need a smaller first or a larger second"
+        )
+    return LivenessLimits(stale, lost)
 
 
 def _given(node: Node, parameter: Parameter) -> object:

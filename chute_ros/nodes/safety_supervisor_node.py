@@ -21,6 +21,7 @@ from chute_msgs.msg import (
 )
 from chute_msgs.srv import Arm, Deploy, Kill, SetMode
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
@@ -84,11 +85,16 @@ class SafetySupervisorNode(Node):
         self._arm_clients = {
             link: self.create_client(Arm, f"{link}/arm") for link in self.config.deploy_links
         }
-        self.create_service(Arm, "safety/arm", self._arm)
-        self.create_service(Deploy, "safety/deploy", self._deploy)
-        self.create_service(Kill, "safety/kill", self._kill)
-        self.create_service(Trigger, "safety/reset", self._reset)
-        self.create_service(SetMode, "safety/set_mode", self._set_mode)
+        # A service that awaits its outcome must not keep the decision loop from running.
+        group = ReentrantCallbackGroup()
+        for kind, name, callback in (
+            (Arm, "safety/arm", self._arm),
+            (Deploy, "safety/deploy", self._deploy),
+            (Kill, "safety/kill", self._kill),
+            (Trigger, "safety/reset", self._reset),
+            (SetMode, "safety/set_mode", self._set_mode),
+        ):
+            self.create_service(kind, name, callback, callback_group=group)
         self.create_timer(1.0, self._diagnose, clock=self._steady)
         self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self._steady)
         self._turn()

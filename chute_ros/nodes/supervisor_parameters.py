@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from chute_ros.nodes.parameters import Parameter
-from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 
@@ -58,7 +57,7 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         required_links=tuple(values["required_links"]),
         kill_links=tuple(values["kill_links"]),
         deploy_links=tuple(values["deploy_links"]),
-        heartbeat=LivenessLimits(values["heartbeat_stale_after"], values["heartbeat_lost_after"]),
+        heartbeat=liveness_from(values, "heartbeat"),
         startup_grace=values["startup_grace"],
         kill_to_deploy_delay=values["kill_to_deploy_delay"],
         deploy_timeout=values["deploy_timeout"],

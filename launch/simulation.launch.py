@@ -1,0 +1,60 @@
+"""One simulated vehicle: the nodes of vehicle.launch.py, an autopilot and a parachute.
+
+ros2 launch chute_ros simulation.launch.py namespace:=drone1 port:=14600
+
+Only on this host: the simulators speak over loopback. Two vehicles need two namespaces and two
+ports; port + 1 is used as well.
+"""
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    SetEnvironmentVariable,
+)
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+
+def _vehicle(context: LaunchContext) -> list:
+    share = get_package_share_directory("chute_ros")
+    namespace = LaunchConfiguration("namespace").perform(context)
+    port = int(LaunchConfiguration("port").perform(context))
+    network, air = f"udpout:127.0.0.1:{port}", f"127.0.0.1:{port + 1}"
+    return [
+        IncludeLaunchDescription(
+            PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
+            launch_arguments={
+                "namespace": namespace,
+                "connection": f"udpin:127.0.0.1:{port}",
+            }.items(),
+        ),
+        Node(
+            package="chute_ros",
+            executable="sim_autopilot",
+            arguments=["--connection", network, "--connection", f"udpin:{air}"],
+            output="screen",
+        ),
+        Node(
+            package="chute_ros",
+            executable="sim_mavlink_parachute",
+            arguments=["--connection", network, "--connection", f"udpout:{air}"],
+            output="screen",
+        ),
+    ]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """The vehicle and what it speaks to."""
+    return LaunchDescription(
+        [
+            # A simulation must never meet a real vehicle on the network.
+            SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+            DeclareLaunchArgument("namespace", default_value="sim", description="of the vehicle"),
+            DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
+            OpaqueFunction(function=_vehicle),
+        ]
+    )
