@@ -4,10 +4,11 @@ ros2 launch chute_ros vehicle.launch.py namespace:=drone1 connection:=udpin:0.0.
 """
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+
+from launch import LaunchDescription
 
 
 def generate_launch_description() -> LaunchDescription:

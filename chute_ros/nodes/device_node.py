@@ -15,7 +15,13 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
-from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision, SafetyRequest
+from chute_msgs.msg import (
+    ActionReport,
+    LinkHeartbeat,
+    ParachuteStatus,
+    SafetyDecision,
+    SafetyRequest,
+)
 from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
@@ -90,9 +96,7 @@ class DeviceNode(Node, ABC):
         self._request_publisher = self.create_publisher(
             SafetyRequest, "safety/request", qos.STATUS
         )
-        self._report_publisher = self.create_publisher(
-            ActionReport, "safety/action", qos.DECISION
-        )
+        self._report_publisher = self.create_publisher(ActionReport, "safety/action", qos.DECISION)
         self._diagnostics_publisher = self.create_publisher(
             DiagnosticArray, "/diagnostics", qos.STATUS
         )
@@ -100,9 +104,7 @@ class DeviceNode(Node, ABC):
     def begin(self) -> None:
         """Start the link's thread and everything that reacts to it."""
         assert self.loop is not None
-        self.create_subscription(
-            SafetyDecision, "safety/decision", self._decision, qos.DECISION
-        )
+        self.create_subscription(SafetyDecision, "safety/decision", self._decision, qos.DECISION)
         self.create_subscription(
             LinkHeartbeat, "safety/heartbeat", self._heartbeat_heard, qos.STATUS
         )
@@ -124,7 +126,7 @@ class DeviceNode(Node, ABC):
         """Offer a service whose callback may await the device."""
         self.create_service(kind, name, callback, callback_group=self._service_group)
 
-    # -- for the subclass to fill ------------------------------------------------------------------
+    # -- for the subclass to fill ---------------------------------------------------------------
 
     @abstractmethod
     def summarise(self, link: Any, now: float) -> Summary:
@@ -153,7 +155,7 @@ class DeviceNode(Node, ABC):
     def parameter_changed(self, name: str, value: Any) -> None:
         """A changeable parameter has a new value."""
 
-    # -- requests to the link ----------------------------------------------------------------------
+    # -- requests to the link -------------------------------------------------------------------
 
     def request(self, begin: Callable[[Any, int, float], None]) -> Future:
         """Have begin(link, token, now) called in the link's thread; the future is its end."""
@@ -219,7 +221,7 @@ class DeviceNode(Node, ABC):
         """The wall clock, for headers."""
         return self.wall.now().to_msg()
 
-    # -- inside --------------------------------------------------------------------------------------
+    # -- inside ---------------------------------------------------------------------------------
 
     def deliver(self, events: list[Any]) -> None:
         """In the link's thread: hand events to the executor."""

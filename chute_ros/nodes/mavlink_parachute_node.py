@@ -64,9 +64,7 @@ class MavlinkParachuteNode(DeviceNode):
         self.loop = WireLoop(link, make_wire(address), self.deliver)
         self._statuses: dict[str, model.ParachuteStatus] = {}
         self._rates: dict[str, tuple[int, float]] = {}
-        self._vehicle_publisher = self.create_publisher(
-            VehicleState, "vehicle/state", qos.STATUS
-        )
+        self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
         self.serve(RequestMessage, "~/request_message", self._request_message)
@@ -74,15 +72,17 @@ class MavlinkParachuteNode(DeviceNode):
         self.serve(GetInfo, "~/get_info", self._get_info)
         self.begin()
 
-    # -- what DeviceNode asks for ---------------------------------------------------------------------
+    # -- what DeviceNode asks for ---------------------------------------------------------------
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         chosen = link.chosen_parachute()
         vehicle = link.vehicle_state(now)
         doubts = tuple(link.doubts())
         details = Details(
-            tuple((p.status(now), p.status_interval, p.liveness.age(now))
-                  for p in link.parachutes.all()),
+            tuple(
+                (p.status(now), p.status_interval, p.liveness.age(now))
+                for p in link.parachutes.all()
+            ),
             vehicle,
             doubts,
             link.received_count,
@@ -149,7 +149,7 @@ class MavlinkParachuteNode(DeviceNode):
             self._diagnose_autopilot(details.vehicle),
         ]
 
-    # -- services -------------------------------------------------------------------------------------
+    # -- services -------------------------------------------------------------------------------
 
     async def _set_triggers(self, request: Any, response: Any) -> Any:
         if not 1 <= request.select <= 255 or request.arm > 255:
@@ -226,7 +226,7 @@ class MavlinkParachuteNode(DeviceNode):
             lambda link, token, now: link.request_message(token, message_id, device, now)
         )
 
-    # -- inside ---------------------------------------------------------------------------------------
+    # -- inside ---------------------------------------------------------------------------------
 
     def _armed_triggers(self, device: str) -> int:
         """By the newest status that was published."""

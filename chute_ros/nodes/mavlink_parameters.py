@@ -37,14 +37,16 @@ PARAMETERS = (
     Parameter(
         "parachute_stale_after", 2.5, "parachute silent for this long is STALE, s", 0.1, 600.0
     ),
-    Parameter("parachute_lost_after", 5.0, "parachute silent for this long is LOST, s", 0.1, 600.0),
+    Parameter(
+        "parachute_lost_after", 5.0, "parachute silent for this long is LOST, s", 0.1, 600.0
+    ),
     Parameter(
         "autopilot_stale_after", 2.5, "autopilot silent for this long is STALE, s", 0.1, 600.0
     ),
-    Parameter("autopilot_lost_after", 5.0, "autopilot silent for this long is LOST, s", 0.1, 600.0),
     Parameter(
-        "status_timeout", 3.5, "PARACHUTE_STATUS older than this is a fault, s", 0.1, 600.0
+        "autopilot_lost_after", 5.0, "autopilot silent for this long is LOST, s", 0.1, 600.0
     ),
+    Parameter("status_timeout", 3.5, "PARACHUTE_STATUS older than this is a fault, s", 0.1, 600.0),
     Parameter(
         "ignored_error_flags",
         0,
@@ -52,10 +54,14 @@ PARAMETERS = (
         0,
         2**32 - 1,
     ),
-    Parameter("ack_timeout", 0.5, "wait for an acknowledgement before sending again, s", 0.02, 60.0),
+    Parameter(
+        "ack_timeout", 0.5, "wait for an acknowledgement before sending again, s", 0.02, 60.0
+    ),
     Parameter("ack_tries", 3, "how often a command is sent at most", 1, 100),
     Parameter("in_progress_timeout", 5.0, "wait after an answer IN_PROGRESS, s", 0.1, 600.0),
-    Parameter("late_ack_window", 5.0, "how long a late acknowledgement may still come, s", 0.1, 60.0),
+    Parameter(
+        "late_ack_window", 5.0, "how long a late acknowledgement may still come, s", 0.1, 60.0
+    ),
     Parameter(
         "effect_timeout",
         1.5,
@@ -83,9 +89,7 @@ PARAMETERS = (
         "how the autopilot is told to stop the motors",
         choices=tuple(method.value for method in KillMethod),
     ),
-    Parameter(
-        "disarm_when_blocked", True, "undo arming on the ground while flight is blocked"
-    ),
+    Parameter("disarm_when_blocked", True, "undo arming on the ground while flight is blocked"),
     Parameter(
         "autopilot_message_rate",
         10.0,
@@ -97,7 +101,7 @@ PARAMETERS = (
     Parameter(
         "signing_key_file",
         "",
-        "file with the MAVLink signing key (32 bytes, or 64 hexadecimal digits); empty: no signing",
+        "file with the MAVLink signing key (32 bytes or 64 hexadecimal digits); empty: none",
     ),
     Parameter("signing_link_id", 0, "link id in our signatures", 0, 255),
 )

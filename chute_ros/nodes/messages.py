@@ -7,7 +7,13 @@ import enum
 import math
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision, VehicleState
+from chute_msgs.msg import (
+    ActionReport,
+    LinkHeartbeat,
+    ParachuteStatus,
+    SafetyDecision,
+    VehicleState,
+)
 
 from chute_ros import model
 
@@ -51,7 +57,7 @@ def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
 
 
 def vehicle_state_from(message: VehicleState) -> model.VehicleState:
-    """What somebody published on vehicle/state; numbers that no enumeration has read as unknown."""
+    """What somebody published on vehicle/state; a number without a name reads as unknown."""
     values = {f.name: getattr(message, f.name) for f in dataclasses.fields(model.VehicleState)}
     values["link_state"] = _known(model.LinkState, values["link_state"])
     values["armed"] = _known(model.Armed, values["armed"])

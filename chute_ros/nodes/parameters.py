@@ -39,7 +39,8 @@ class Parameter:
     def allowed(self) -> str:
         """What may be given, in words."""
         kind = {bool: "true or false", str: "text", list: "a list of texts"}.get(
-            type(self.default), "a whole number" if isinstance(self.default, int) else "a number (1.0, not 1)"
+            type(self.default),
+            "a whole number" if isinstance(self.default, int) else "a number (1.0, not 1)",
         )
         if self.choices:
             return "one of " + ", ".join(self.choices)
@@ -79,6 +80,8 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
             ParameterUninitializedException,
         ):
             raise _not_allowed(node, parameter, _given(node, parameter)) from None
+        if value is None:
+            value = []  # how ROS reads an empty list on the command line
         if parameter.choices and value not in parameter.choices:
             raise _not_allowed(node, parameter, value)
         values[parameter.name] = value

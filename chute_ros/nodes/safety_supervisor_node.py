@@ -99,7 +99,7 @@ class SafetySupervisorNode(Node):
         self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self._steady)
         self._turn()
 
-    # -- the loop -------------------------------------------------------------------------------------
+    # -- the loop -------------------------------------------------------------------------------
 
     def _turn(self, *new: inputs.Input) -> None:
         """Give the core what came, do what it says, sleep until its next deadline."""
@@ -131,9 +131,7 @@ class SafetySupervisorNode(Node):
 
     def _publish_decision(self, output: inputs.Decide) -> None:
         decision = output.decision
-        self._decision_publisher.publish(
-            messages.decision(decision, self.wall.now().to_msg())
-        )
+        self._decision_publisher.publish(messages.decision(decision, self.wall.now().to_msg()))
         if not output.again:
             shadow = " (SHADOW, not sent)" if decision.shadow else ""
             self.get_logger().warning(
@@ -142,7 +140,7 @@ class SafetySupervisorNode(Node):
                 f"{'; '.join(decision.reasons)}"
             )
 
-    # -- inputs ---------------------------------------------------------------------------------------
+    # -- inputs ---------------------------------------------------------------------------------
 
     def _heartbeat(self, message: LinkHeartbeat) -> None:
         if not message.supervisor:
@@ -178,7 +176,7 @@ class SafetySupervisorNode(Node):
             by = f"{message.link} {message.device}".strip()
             self._turn(inputs.KillRequest(0, by, message.reason))
 
-    # -- services -------------------------------------------------------------------------------------
+    # -- services -------------------------------------------------------------------------------
 
     async def _ask(self, make: Any) -> inputs.Finish:
         token = next(self._tokens)
@@ -219,7 +217,7 @@ class SafetySupervisorNode(Node):
         response.success, response.message = end.success, end.message
         return response
 
-    # -- arming through the device nodes ---------------------------------------------------------------
+    # -- arming through the device nodes --------------------------------------------------------
 
     def _arm_devices(self, order: inputs.ArmDevices, now: float) -> None:
         self._arming[order.token] = (order, {}, now + ARM_TIMEOUT)
@@ -255,7 +253,7 @@ class SafetySupervisorNode(Node):
                 for link in [link for link in order.links if link not in answers]:
                     self._armed(token, link, False, f"no answer within {ARM_TIMEOUT:g} s")
 
-    # -- outputs --------------------------------------------------------------------------------------
+    # -- outputs --------------------------------------------------------------------------------
 
     def _beat(self, now: float) -> None:
         self._latest = now - self._beat_at
@@ -347,5 +345,3 @@ class SafetySupervisorNode(Node):
         text = self._state_text(reasons)
         task = diagnostics.status(name, "decisions", level, text, values, "")
         self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), [task]))
-
-

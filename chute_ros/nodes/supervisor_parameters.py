@@ -17,10 +17,14 @@ PARAMETERS = (
         choices=tuple(mode.name for mode in Mode),
     ),
     Parameter(
-        "required_links", ["mavlink_parachute"], "links whose health flight depends on (node names)"
+        "required_links",
+        ["mavlink_parachute"],
+        "links whose health flight depends on (node names)",
     ),
     Parameter("kill_links", ["mavlink_parachute"], "links that stop the motors (node names)"),
-    Parameter("deploy_links", ["mavlink_parachute"], "links that release a parachute (node names)"),
+    Parameter(
+        "deploy_links", ["mavlink_parachute"], "links that release a parachute (node names)"
+    ),
     Parameter(
         "heartbeat_stale_after", 0.5, "a node silent for this long is STALE, s", 0.05, 600.0
     ),
@@ -36,10 +40,18 @@ PARAMETERS = (
     Parameter("deploy_timeout", 8.0, "how long a deploy may take to be confirmed, s", 0.1, 60.0),
     Parameter("kill_timeout", 6.0, "how long a kill may take to be confirmed, s", 0.1, 60.0),
     Parameter(
-        "resend_interval", 0.1, "a decision that nobody reported on is sent again after, s", 0.02, 60.0
+        "resend_interval",
+        0.1,
+        "a decision that nobody reported on is sent again after, s",
+        0.02,
+        60.0,
     ),
     Parameter(
-        "vehicle_state_age", 2.5, "parts of vehicle/state that are older do not count, s", 0.1, 60.0
+        "vehicle_state_age",
+        2.5,
+        "parts of vehicle/state that are older do not count, s",
+        0.1,
+        60.0,
     ),
     Parameter(
         "takeoff_height",

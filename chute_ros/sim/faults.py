@@ -85,6 +85,8 @@ class FaultyLink:
         for _ in range(copies):
             if data and chance() < knobs.corrupt:
                 at = self._random.randrange(len(data))
-                data = data[:at] + bytes([data[at] ^ self._random.randrange(1, 256)]) + data[at + 1 :]
+                data = (
+                    data[:at] + bytes([data[at] ^ self._random.randrange(1, 256)]) + data[at + 1 :]
+                )
             spoiled.append((now + chance() * knobs.delay, data))
         return spoiled

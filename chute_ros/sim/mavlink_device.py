@@ -55,7 +55,7 @@ class MavlinkDevice:
         self._output: list[bytes] = []
         self._events: list[str] = []
 
-    # -- as the loop wants it --------------------------------------------------------------------
+    # -- as the loop wants it -------------------------------------------------------------------
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         self.now = now
@@ -100,7 +100,7 @@ class MavlinkDevice:
         events, self._events = self._events, []
         return events
 
-    # -- for the subclass ------------------------------------------------------------------------
+    # -- for the subclass -----------------------------------------------------------------------
 
     def step(self, now: float) -> None:
         """Move the device's own world on to now."""
@@ -139,7 +139,7 @@ class MavlinkDevice:
         if not self.silent:
             self._output.append(self._encoder.encode(message, self.now))
 
-    # -- commands --------------------------------------------------------------------------------
+    # -- commands -------------------------------------------------------------------------------
 
     def _command(self, frame: Frame) -> None:
         message = frame.message

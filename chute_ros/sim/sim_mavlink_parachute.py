@@ -23,22 +23,31 @@ def _run() -> None:
         "--armed", type=number("mask"), default=0, help="PARACHUTE_TRIGGER_FLAGS at the start"
     )
     options.add_argument(
-        "--deployed", choices=[t.name for t in DeploymentTrigger], default="NONE",
+        "--deployed",
+        choices=[t.name for t in DeploymentTrigger],
+        default="NONE",
         help="released at the start, by this trigger",
     )
     options.add_argument(
-        "--error", action="append", choices=[e.name for e in ErrorFlags], default=[],
+        "--error",
+        action="append",
+        choices=[e.name for e in ErrorFlags],
+        default=[],
         help="error at the start; may be given more than once",
     )
     options.add_argument(
-        "--ground-cleared", choices=("auto", "yes", "no"), default=start.ground_cleared,
+        "--ground-cleared",
+        choices=("auto", "yes", "no"),
+        default=start.ground_cleared,
         help="auto: by the height that an autopilot on the network tells, yes where none is heard",
     )
     options.add_argument("--clear-height", type=float, default=start.clear_height, help="m")
     options.add_argument("--ats-arm-altitude", type=number("m"), default=start.ats_arm_altitude)
     options.add_argument("--packed-date", default=start.packed_date, help="YYYY-MM-DD")
     options.add_argument(
-        "--system-status", type=number("MAV_STATE"), default=start.system_status,
+        "--system-status",
+        type=number("MAV_STATE"),
+        default=start.system_status,
         help="MAV_STATE in the heartbeat (3 standby, 5 critical)",
     )
     chosen = options.parse_args()

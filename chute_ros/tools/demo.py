@@ -139,14 +139,14 @@ def _fail_and_deploy(director: Director, pilot: Pilot) -> None:
     director.failure_now()
     director.say("vehicle", f"MOTOR FAILURE at {director.vehicle.height:.1f} m")
     pilot.fail_motor()
-    director.until(
-        "it falls", 5.0, lambda: director.vehicle.vertical_speed < OPERATOR_SINK
-    )
+    director.until("it falls", 5.0, lambda: director.vehicle.vertical_speed < OPERATOR_SINK)
     director.say("operator", f"sees {director.vehicle.vertical_speed:.1f} m/s and calls deploy")
     answer = director.ask_deploy("it falls")
     director.until("the deploy is answered", 15.0, answer.done)
     result = answer.result()
-    director.say("operator", f"success={result.success} accepted={result.accepted}: {result.message}")
+    director.say(
+        "operator", f"success={result.success} accepted={result.accepted}: {result.message}"
+    )
     if not (result.success and result.accepted):
         raise StepFailedError(f"deploy: {result.message}")
     fastest = {"sink": 0.0}
@@ -158,7 +158,9 @@ def _fail_and_deploy(director: Director, pilot: Pilot) -> None:
 
     director.until("the canopy carries", 15.0, carried)
     state = director.vehicle
-    director.say("vehicle", f"CANOPY OPEN: {state.vertical_speed:+.1f} m/s at {state.height:.1f} m")
+    director.say(
+        "vehicle", f"CANOPY OPEN: {state.vertical_speed:+.1f} m/s at {state.height:.1f} m"
+    )
     last = {"speed": 0.0}
 
     def landed() -> bool:

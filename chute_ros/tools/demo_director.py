@@ -54,7 +54,7 @@ class Director:
         self.node.destroy_node()
         rclpy.shutdown()
 
-    # -- telling ---------------------------------------------------------------------------------
+    # -- telling --------------------------------------------------------------------------------
 
     def failure_now(self) -> None:
         """From here on times count from the failure."""
@@ -76,7 +76,7 @@ class Director:
         """One line of the story."""
         print(f"{self.clock()}  {who:<10} {text}", flush=True)
 
-    # -- awaiting --------------------------------------------------------------------------------
+    # -- awaiting -------------------------------------------------------------------------------
 
     def until(self, what: str, seconds: float, condition: Callable[[], bool]) -> None:
         """Spin until condition holds; StepFailedError if it does not within seconds."""
@@ -116,7 +116,7 @@ class Director:
         """Call safety/deploy; the future of its answer."""
         return self._deploy.call_async(Deploy.Request(force=False, reason=reason))
 
-    # -- topics ----------------------------------------------------------------------------------
+    # -- topics ---------------------------------------------------------------------------------
 
     def _vehicle(self, message: VehicleState) -> None:
         self.vehicle = message

@@ -1,4 +1,4 @@
-"""A ground station's pilot for simulated flights: arms, takes off, breaks a motor, over MAVLink."""
+"""The pilot of simulated flights: arms, takes off, breaks a motor, over MAVLink."""
 
 from __future__ import annotations
 

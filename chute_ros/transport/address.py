@@ -1,10 +1,10 @@
 """Where a byte wire is, in one string.
 
-    udpin:HOST:PORT                        listen; answer everyone who was heard there
-    udpout:HOST:PORT                       send there; listen to what comes back
-    udppair:HOST:PORT:HOST:PORT            two one-way sockets: listen on the first, send to the second
-    tcp:HOST:PORT    tcpin:HOST:PORT       connect; accept connections
-    serial:PATH[:BAUD]                     a serial port, 57600 baud if not said
+udpin:HOST:PORT                        listen; answer everyone who was heard there
+udpout:HOST:PORT                       send there; listen to what comes back
+udppair:HOST:PORT:HOST:PORT            two one-way sockets: listen on the first, send to the second
+tcp:HOST:PORT    tcpin:HOST:PORT       connect; accept connections
+serial:PATH[:BAUD]                     a serial port, 57600 baud if not said
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class WireLoop(Generic[LinkT]):
         while not self._stopping:
             try:
                 self._turn()
-            except Exception:
+            except Exception:  # noqa: BLE001
                 # The node must outlive a mistake of ours; the report makes it visible.
                 self._deliver([LoopFault(traceback.format_exc())])
                 # A mistake that repeats each turn must not take the whole processor.

@@ -6,18 +6,18 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1]
-INTERFACES = sorted([*PACKAGE.glob('msg/*.msg'), *PACKAGE.glob('srv/*.srv')])
-CONSTANT = re.compile(r'^[\w/]+(\[.*?\])?\s+[A-Z][A-Z0-9_]*\s*=')
+INTERFACES = sorted([*PACKAGE.glob("msg/*.msg"), *PACKAGE.glob("srv/*.srv")])
+CONSTANT = re.compile(r"^[\w/]+(\[.*?\])?\s+[A-Z][A-Z0-9_]*\s*=")
 
 
 def undocumented_fields(text):
     """Return the fields that have no comment on their own line or on the line before."""
     missing = []
-    before = ''
+    before = ""
     for line in text.splitlines():
         line = line.strip()
-        is_field = line and line != '---' and not line.startswith('#') and not CONSTANT.match(line)
-        if is_field and '#' not in line and not before.startswith('#'):
+        is_field = line and line != "---" and not line.startswith("#") and not CONSTANT.match(line)
+        if is_field and "#" not in line and not before.startswith("#"):
             missing.append(line)
         before = line
     return missing
@@ -28,22 +28,25 @@ def test_there_are_interfaces():
     assert INTERFACES
 
 
-@pytest.mark.parametrize('path', INTERFACES, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", INTERFACES, ids=lambda path: path.name)
 def test_every_field_has_a_comment(path):
     """A unit, a range, or what it means."""
     assert undocumented_fields(path.read_text()) == []
 
 
-@pytest.mark.parametrize(('text', 'missing'), [
-    ('float64 height', ['float64 height']),
-    ('# m\nfloat64 height', []),
-    ('float64 height  # m', []),
-    ('# m\n\nfloat64 height', ['float64 height']),
-    ('# m\nfloat64 height\nfloat64 speed', ['float64 speed']),
-    ('# wanted\nbool arm\n---\nbool success', ['bool success']),
-    ('uint8 NONE = 0\nuint8[<=4] LIMIT=1', []),
-    ('# any\nuint8 state 3\nstring<=8 name', ['string<=8 name']),
-])
+@pytest.mark.parametrize(
+    ("text", "missing"),
+    [
+        ("float64 height", ["float64 height"]),
+        ("# m\nfloat64 height", []),
+        ("float64 height  # m", []),
+        ("# m\n\nfloat64 height", ["float64 height"]),
+        ("# m\nfloat64 height\nfloat64 speed", ["float64 speed"]),
+        ("# wanted\nbool arm\n---\nbool success", ["bool success"]),
+        ("uint8 NONE = 0\nuint8[<=4] LIMIT=1", []),
+        ("# any\nuint8 state 3\nstring<=8 name", ["string<=8 name"]),
+    ],
+)
 def test_the_check_bites(text, missing):
     """The check itself finds what it should."""
     assert undocumented_fields(text) == missing
