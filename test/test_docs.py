@@ -1,0 +1,25 @@
+"""What is said of the parameters elsewhere is what the nodes declare."""
+
+from pathlib import Path
+
+from chute_ros.tools import parameter_docs
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def test_the_config_file_is_up_to_date() -> None:
+    text = (ROOT / parameter_docs.CONFIG).read_text()
+    assert text == parameter_docs.config_text(), "run: make docs"
+
+
+def test_the_tables_of_the_readme_are_up_to_date() -> None:
+    text = (ROOT / parameter_docs.README).read_text()
+    assert text == parameter_docs.readme_text(text), "run: make docs"
+
+
+def test_every_executable_is_in_the_readme() -> None:
+    text = (ROOT / parameter_docs.README).read_text()
+    setup = (ROOT / "setup.py").read_text()
+    scripts = [line.split("=")[0].strip(' "') for line in setup.splitlines() if ":main" in line]
+    assert len(scripts) >= 5
+    assert [name for name in scripts if f"`{name}`" not in text] == []
