@@ -7,15 +7,17 @@ import signal
 import sys
 import threading
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from chute_ros.errors import ChuteError, ParameterError
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
-from chute_ros.sim.mavlink_device import MavlinkDevice
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
 from chute_ros.transport.wire import make_wire
+
+if TYPE_CHECKING:
+    from chute_ros.sim.mavlink_device import MavlinkDevice
 
 
 def parser(program: str, text: str, connection: str, actions: str) -> argparse.ArgumentParser:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.command_line import main_of, number, parser, run, script_of
 
 
 def _run() -> None:
+    # Here, so that a dialect that is not built ends in one line and not in a traceback.
+    from chute_ros.sim.autopilot_device import AutopilotDevice
+
     options = parser(
         "sim_autopilot",
         "A MAVLink autopilot: arms, takes off, fails and falls; a PARACHUTE_STATUS that says "

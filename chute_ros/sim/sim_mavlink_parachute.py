@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from chute_ros.model import DeploymentTrigger, ErrorFlags
 from chute_ros.sim.command_line import main_of, number, parser, run, script_of
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 
 
 def _run() -> None:
+    # Here, so that a dialect that is not built ends in one line and not in a traceback.
+    from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
+
     start = ParachuteSettings()
     options = parser(
         "sim_mavlink_parachute",
