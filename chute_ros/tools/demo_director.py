@@ -137,6 +137,9 @@ class Director:
         self.say("supervisor", f"{action.name} ({'; '.join(message.reasons)})")
 
     def _report(self, message: ActionReport) -> None:
+        said = (message.epoch, message.id, message.link, message.outcome)
+        if any(said == (r.epoch, r.id, r.link, r.outcome) for _, r in self.reports):
+            return  # said again, in case that nobody was there to hear it
         self.reports.append((time.monotonic(), message))
         action, outcome = model.Action(message.action), model.Outcome(message.outcome)
         self.say(message.link[:10], f"{action.name} {outcome.name}: {message.detail}")
