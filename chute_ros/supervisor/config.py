@@ -22,12 +22,15 @@ class SupervisorConfig:
     heartbeat: LivenessLimits = field(default=LivenessLimits(0.5, 1.0))
     #: How long links may take to come up before that counts as a fault.
     startup_grace: float = 10.0
-    #: The parachute is released this long after the kill was decided, confirmed or not (ArduPilot).
+    #: The parachute is released this long after the kill, confirmed or not (as ArduPilot does).
     kill_to_deploy_delay: float = 0.5
     #: How long a deploy may take until its confirmation.
     deploy_timeout: float = 8.0
     #: A kill without confirmation is given up, as seen by its caller, after this.
     kill_timeout: float = 6.0
+    #: A parachute that says released is believed at once; its node's report is awaited this long,
+    #: only to tell the caller how it went.
+    report_wait: float = 0.5
     #: A decision that nobody has reported on is sent again after this.
     resend_interval: float = 0.1
     #: vehicle/state counts only while its parts are younger than this.

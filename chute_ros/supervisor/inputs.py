@@ -1,11 +1,11 @@
-"""What goes into the supervisor's core and what comes out. All of it can be recorded and replayed."""
+"""What goes into the supervisor's core and what comes out; it can be recorded and replayed."""
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
 
-from chute_ros.model import Action, Decision, LinkState, Outcome, VehicleState
+from chute_ros.model import Decision, LinkState, Outcome, VehicleState
 
 
 class Mode(enum.IntEnum):
@@ -159,6 +159,3 @@ class Say:
 
 
 Output = Decide | ArmDevices | Finish | Say
-
-#: Actions that a person sees the effect of; the block ones are renewed without a word.
-FIRING = (Action.KILL, Action.DEPLOY)

@@ -1,4 +1,4 @@
-"""Why flight is blocked: every reason, each with its value and its limit, in words."""
+"""Why flight is blocked or arming refused: every reason with its value and its limit, in words."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 from chute_ros.model import LinkState
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.state import LinkEvidence, State
 
 
@@ -17,12 +18,10 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
         who = "node" if math.isnan(evidence.heard) else "device"
         return f"{link}: its {who} was never heard"
     if state in (LinkState.STALE, LinkState.LOST):
-        if now - evidence.heard >= config.heartbeat.stale_after:
-            limit = config.heartbeat.stale_after
-            return (
-                f"{link}: {state.name}, heartbeat of its node "
-                f"{now - evidence.heard:.2f} s old (limit {limit:g} s)"
-            )
+        silence, limit = now - evidence.heard, config.heartbeat.stale_after
+        if silence >= limit:
+            text = f"heartbeat of its node {silence:.2f} s old (limit {limit:g} s)"
+            return f"{link}: {state.name}, {text}"
         return f"{link}: its device is {state.name}" + _faults(evidence)
     if not evidence.device_healthy:
         return f"{link}: its device is not healthy" + _faults(evidence)
@@ -30,7 +29,11 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
 
 
 def _faults(evidence: LinkEvidence) -> str:
-    return f" ({'; '.join(evidence.faults)})" if evidence.faults else ""
+    faults = [
+        f"{device} {fault}" for device, all_ in sorted(evidence.faults.items()) for fault in all_
+    ]
+    faults += [f"{device} is released" for device in sorted(evidence.deployed)]
+    return f" ({'; '.join(faults)})" if faults else ""
 
 
 def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
@@ -39,6 +42,14 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
         link_problem(config, link, state.links.get(link, LinkEvidence()), now)
         for link in config.required_links
     ]
-    if state.mode is not Mode.ACTIVE:
-        problems.append(f"supervisor mode is {state.mode.name} (need ACTIVE)")
     return tuple(problem for problem in problems if problem)
+
+
+def arm_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
+    """Every reason against arming the parachute now; empty: none."""
+    reasons = block_reasons(config, state, now)
+    if state.mode is not Mode.ACTIVE:
+        reasons += (f"supervisor mode is {state.mode.name} (need ACTIVE)",)
+    if state.stage not in (Stage.READY, Stage.ARMED):
+        reasons += (f"the vehicle is {state.stage.name} (need READY)",)
+    return reasons

@@ -1,16 +1,18 @@
-"""All that the supervisor's core remembers between two updates. Frozen: an update makes a new one."""
+"""All that the supervisor's core remembers. Frozen: an update makes a new one."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 from chute_ros.model import Armed, Decision, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
+
+_NOTHING: MappingProxyType[str, tuple[str, ...]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -21,11 +23,17 @@ class LinkEvidence:
     reported: LinkState = LinkState.NEVER_SEEN
     device_healthy: bool = False
     seq: int = 0
-    deployed: bool = False
-    faults: tuple[str, ...] = ()
+    #: The devices on this link whose own status says released.
+    deployed: frozenset[str] = frozenset()
+    #: Faults of each device on this link, in words.
+    faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: _NOTHING)
+
+    def node_silent(self, config: SupervisorConfig, now: float) -> bool:
+        """The node itself, not only its device, is not heard."""
+        return not now - self.heard < config.heartbeat.lost_after
 
     def state(self, config: SupervisorConfig, now: float) -> LinkState:
-        """The worse of what the node says of its wire, and of what its silence says of the node."""
+        """The worse of what the node says of its wire, and what its silence says of itself."""
         if math.isnan(self.heard):
             return LinkState.NEVER_SEEN
         silence = now - self.heard
@@ -38,26 +46,42 @@ class LinkEvidence:
 
 @dataclass(frozen=True)
 class Pending:
-    """A decision on its way. reached: the furthest outcome of each link that reported."""
+    """A decision on its way, with every outcome that each link reported."""
 
     decision: Decision
     decided_at: float
     sent_at: float
-    reached: MappingProxyType[str, Outcome] = field(default_factory=lambda: MappingProxyType({}))
+    outcomes: Mapping[str, frozenset[Outcome]] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
     details: tuple[str, ...] = ()
 
-    def furthest(self) -> Outcome:
-        """The best that any target got to: one parachute that is out is enough."""
-        good = [outcome for outcome in self.reached.values() if outcome is not Outcome.FAILED]
-        return max(good, default=Outcome.NONE)
+    def of(self, link: str) -> frozenset[Outcome]:
+        """What this link reported so far."""
+        return self.outcomes.get(link, frozenset())
+
+    def reached(self, outcome: Outcome) -> bool:
+        """A link has got this far, or further: one parachute that is out is enough."""
+        good = [o for outcomes in self.outcomes.values() for o in outcomes]
+        return any(o >= outcome for o in good if o is not Outcome.FAILED)
+
+    @property
+    def confirmed(self) -> bool:
+        """A device's own status showed the effect."""
+        return self.reached(Outcome.CONFIRMED)
 
     def all_failed(self) -> bool:
-        """Every target has failed."""
-        return all(self.reached.get(t) is Outcome.FAILED for t in self.decision.targets)
+        """Every target has failed, and none was confirmed."""
+        failed = all(Outcome.FAILED in self.of(target) for target in self.decision.targets)
+        return failed and not self.confirmed
 
-    def unreported(self) -> bool:
-        """A target has not even said that it has sent it."""
-        return any(target not in self.reached for target in self.decision.targets)
+    def unreported(self) -> tuple[str, ...]:
+        """The targets that have not even said that they have sent it."""
+        return tuple(target for target in self.decision.targets if not self.of(target))
+
+    def newest_details(self) -> str:
+        """What was reported last, in words."""
+        return "; ".join(self.details[-2:])
 
 
 @dataclass(frozen=True)
@@ -70,21 +94,18 @@ class State:
     stage_since: float = math.nan
     mode: Mode = Mode.ACTIVE
     next_id: int = 1
-    links: MappingProxyType[str, LinkEvidence] = field(default_factory=lambda: MappingProxyType({}))
+    links: Mapping[str, LinkEvidence] = field(default_factory=lambda: MappingProxyType({}))
     vehicle: VehicleState = field(default=VehicleState())
     vehicle_received: float = math.nan
     block: Pending | None = None
     kill: Pending | None = None
     deploy: Pending | None = None
-    #: A deploy follows the kill: why, and the token of who asked (0: nobody waits).
+    #: Why a deploy follows the kill; empty: none does.
     deploy_reason: str = ""
-    deploy_token: int = 0
-    kill_token: int = 0
+    #: Who waits for the outcome.
+    kill_tokens: tuple[int, ...] = ()
+    deploy_tokens: tuple[int, ...] = ()
     alarms: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        if math.isnan(self.stage_since):
-            object.__setattr__(self, "stage_since", self.started_at)
 
     def in_air(self, config: SupervisorConfig, now: float) -> bool | None:
         """Is the vehicle in the air? None: nothing that is fresh says so or otherwise."""
@@ -101,8 +122,3 @@ class State:
             armed = vehicle.armed is Armed.ARMED
             return armed and vehicle.height > config.takeoff_height
         return None
-
-
-def frozen(mapping: dict[str, Any]) -> MappingProxyType[str, Any]:
-    """A read-only copy."""
-    return MappingProxyType(dict(mapping))

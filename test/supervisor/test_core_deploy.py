@@ -1,0 +1,249 @@
+"""A person's deploy: refused for stated reasons, the kill first, each step until confirmed."""
+
+import pytest
+from story import LINK, Story
+
+from chute_ros.model import Action, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.machine import Stage
+
+K, D = Action.KILL, Action.DEPLOY
+
+
+def out(link: str = LINK, device: str = "1/161", deployed: bool = True) -> i.ParachuteReport:
+    return i.ParachuteReport(link, device, deployed, ())
+
+
+def deploying(config: SupervisorConfig | None = None) -> Story:
+    """In flight, deploy asked for at t = 1 (token 5), the kill confirmed at 1.1."""
+    story = Story(config or SupervisorConfig()).flying()
+    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    story.at(1.1, story.report(K, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.DEPLOYING
+    return story
+
+
+def test_on_the_ground_it_is_refused_with_the_reason() -> None:
+    story = Story().ready()
+    story.at(0.1, i.DeployRequest(1, False, "no"))
+    answer = story.answer(1)
+    assert not answer.success
+    assert "READY, not in flight; force" in answer.message
+    assert story.decisions(K) == []
+    assert story.decisions(D) == []
+
+
+def test_on_the_ground_force_deploys_all_the_same_kill_first() -> None:
+    story = Story().ready()
+    story.at(0.1, i.DeployRequest(1, True, "test"))
+    assert story.state.stage is Stage.KILLING
+    story.at(0.2, story.report(K, Outcome.CONFIRMED))
+    assert "operator, forced: test" in story.newest(D).reasons[0]
+
+
+def test_the_deploy_follows_the_kill_at_its_confirmation() -> None:
+    story = deploying()
+    assert story.when(K) == 1.0
+    assert story.when(D) == 1.1
+    assert story.newest(D).id > story.newest(K).id
+    assert "kill confirmed after 0.10 s (limit 0.5 s)" in story.newest(D).reasons[1]
+
+
+def test_the_deploy_follows_the_kill_after_the_delay_without_confirmation() -> None:
+    story = Story().flying()
+    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    story.at(3.0)
+    assert story.when(D) == pytest.approx(1.5)
+    assert "kill not confirmed after 0.50 s" in story.newest(D).reasons[1]
+
+
+@pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED, Outcome.FAILED])
+def test_less_than_a_confirmation_waits_for_the_delay(outcome: Outcome) -> None:
+    story = Story().flying()
+    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    story.at(1.1, story.report(K, outcome))
+    story.at(1.4)
+    assert story.decisions(D) == []
+    story.at(1.6)
+    assert len(story.decisions(D)) == 1
+
+
+def test_success_is_the_devices_own_confirmation() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.SENT))
+    story.at(1.3, story.report(D, Outcome.ACCEPTED))
+    assert story.answers(5) == []
+    story.at(1.4, story.report(D, Outcome.CONFIRMED, detail="PARACHUTE_STATUS says deployed"))
+    assert story.state.stage is Stage.DEPLOYED
+    answer = story.answer(5)
+    assert answer.success
+    assert answer.accepted
+    assert "PARACHUTE_STATUS says deployed" in answer.message
+
+
+def test_a_status_that_says_released_is_believed_and_the_report_awaited_for_the_answer() -> None:
+    story = deploying()
+    story.at(1.2, out())
+    assert story.state.stage is Stage.DEPLOYED
+    assert story.answers(5) == []
+    story.at(1.25, story.report(D, Outcome.ACCEPTED), story.report(D, Outcome.CONFIRMED))
+    assert story.answer(5).accepted
+
+
+def test_the_answer_does_not_wait_for_a_report_for_ever() -> None:
+    story = deploying()
+    story.at(1.2, out())
+    story.at(3.0)
+    answer = story.answer(5)
+    assert answer.success
+    assert not answer.accepted
+
+
+def test_a_failure_after_the_acknowledgement_is_a_fault_and_says_accepted() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.ACCEPTED))
+    story.at(6.0, story.report(D, Outcome.FAILED, detail="never showed"))
+    assert story.state.stage is Stage.FAULT
+    answer = story.answer(5)
+    assert (answer.success, answer.accepted) == (False, True)
+    assert "never showed" in answer.message
+    assert "no parachute confirmed" in story.alarms()[0]
+
+
+def test_no_report_at_all_is_a_fault_after_the_limit() -> None:
+    story = deploying()
+    story.at(9.0)
+    assert story.state.stage is Stage.DEPLOYING
+    story.at(9.2)
+    assert story.state.stage is Stage.FAULT
+    assert "no device node reported" in story.answer(5).message
+
+
+def test_one_failed_parachute_of_two_is_no_failure_while_the_other_may_come() -> None:
+    config = SupervisorConfig(deploy_links=(LINK, "upf_can"))
+    story = deploying(config)
+    story.at(1.2, story.report(D, Outcome.FAILED))
+    assert story.state.stage is Stage.DEPLOYING
+    story.at(1.3, story.report(D, Outcome.CONFIRMED, link="upf_can"))
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_a_failure_reported_after_the_confirmation_undoes_nothing() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.CONFIRMED))
+    story.at(1.3, story.report(D, Outcome.FAILED))
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_a_second_parachute_on_the_same_link_does_not_hide_the_first() -> None:
+    story = deploying()
+    story.at(1.2, out(device="1/161"), out(device="1/162", deployed=False))
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_after_a_fault_a_person_may_try_again_and_a_late_parachute_still_counts() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.FAILED))
+    assert story.state.stage is Stage.FAULT
+    story.at(2.0, i.DeployRequest(6, False, "again"))
+    story.at(2.1, story.report(K, Outcome.CONFIRMED))
+    assert len(story.decisions(D)) == 2
+    story.at(2.2, out())
+    story.at(3.0)
+    assert story.answer(6).success
+
+
+def test_a_second_caller_joins_and_both_are_answered_and_it_fires_once() -> None:
+    story = deploying()
+    story.at(1.2, i.DeployRequest(6, False, "me too"))
+    story.at(1.3, story.report(D, Outcome.CONFIRMED))
+    assert story.answer(5).success
+    assert story.answer(6).success
+    assert len(story.decisions(D)) == 1
+
+
+def test_a_parachute_that_is_out_is_not_deployed_again() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.CONFIRMED))
+    story.at(2.0, i.DeployRequest(6, True, "again"))
+    assert "out already" in story.answer(6).message
+    assert len(story.decisions(D)) == 1
+
+
+def test_a_deploy_after_a_kill_alone_leaves_at_once_when_the_delay_is_over() -> None:
+    story = Story().flying()
+    story.at(1.0, i.KillRequest(4, "operator", "stop"))
+    story.at(2.0)
+    assert story.decisions(D) == []
+    story.at(2.0, i.DeployRequest(5, False, "now this"))
+    assert story.when(D) == 2.0
+    assert len(story.decisions(K)) == 1
+
+
+def test_a_decision_is_sent_again_until_a_node_reports_and_with_the_same_number() -> None:
+    story = deploying()
+    story.at(1.45)
+    again = [o for _, o in story.outputs if isinstance(o, i.Decide) and o.again]
+    deploys = [o.decision for o in again if o.decision.action is D]
+    assert len(deploys) == 3
+    assert {d.id for d in deploys} == {story.newest(D).id}
+    story.at(1.46, story.report(D, Outcome.SENT))
+    count = len(story.outputs)
+    story.at(2.5)
+    assert not [o for _, o in story.outputs[count:] if isinstance(o, i.Decide)]
+
+
+def test_a_node_that_restarts_in_between_hears_of_it_under_a_new_number() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.SENT))
+    story.seq = -1
+    story.at(1.3, story.heartbeat())
+    assert len(story.decisions(D)) == 2
+
+
+def test_a_node_that_restarts_after_a_failed_deploy_fires_nothing() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.FAILED))
+    story.seq = -1
+    story.at(60.0, story.heartbeat())
+    assert len(story.decisions(D)) == 1
+    assert len(story.decisions(K)) == 1
+
+
+def test_a_node_that_restarts_after_the_confirmation_is_not_asked_again() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.CONFIRMED))
+    story.seq = -1
+    story.at(1.3, story.heartbeat())
+    assert len(story.decisions(D)) == 1
+
+
+def test_a_report_for_an_older_decision_confirms_nothing() -> None:
+    story = deploying()
+    kill = story.newest(K)
+    story.at(1.2, i.ActionReport(kill.epoch, kill.id, LINK, Outcome.CONFIRMED, "old", kill.epoch))
+    story.at(1.2, i.ActionReport(6, story.newest(D).id, LINK, Outcome.CONFIRMED, "old", 6))
+    assert story.state.stage is Stage.DEPLOYING
+
+
+def test_a_report_of_a_link_that_was_not_asked_confirms_nothing() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.CONFIRMED, link="stranger"))
+    assert story.state.stage is Stage.DEPLOYING
+
+
+def test_a_parachute_that_opens_by_itself_in_flight_stops_the_motors() -> None:
+    story = Story().flying()
+    story.at(1.0, out())
+    assert story.state.stage is Stage.DEPLOYED
+    assert story.newest(K).rule == "parachute open"
+    assert story.decisions(D) == []
+
+
+def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named() -> None:
+    story = Story().ready()
+    story.at(0.1, out(), story.heartbeat(healthy=False))
+    assert story.state.stage is Stage.BLOCKED
+    assert "1/161 is released" in "; ".join(story.newest(Action.FLIGHT_BLOCK).reasons)
+    assert story.decisions(K) == []

@@ -1,0 +1,46 @@
+"""The table of stages: what is listed, and that nothing else is possible."""
+
+import itertools
+
+import pytest
+
+from chute_ros.errors import TransitionError
+from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus, listed, next_stage
+
+PAIRS = list(itertools.product(Stage, Stimulus))
+
+
+@pytest.mark.parametrize(("stage", "stimulus"), PAIRS, ids=lambda one: one.name)
+def test_a_pair_is_listed_or_raises(stage: Stage, stimulus: Stimulus) -> None:
+    if (stage, stimulus) in TRANSITIONS:
+        assert listed(stage, stimulus)
+        assert next_stage(stage, stimulus) is TRANSITIONS[stage, stimulus]
+    else:
+        assert not listed(stage, stimulus)
+        with pytest.raises(TransitionError, match=stage.name):
+            next_stage(stage, stimulus)
+
+
+def test_every_stage_is_reachable_from_the_start() -> None:
+    reached = {Stage.STARTUP}
+    while True:
+        more = {after for (before, _), after in TRANSITIONS.items() if before in reached}
+        if more <= reached:
+            break
+        reached |= more
+    assert reached == set(Stage)
+
+
+def test_deploying_is_entered_only_from_killing() -> None:
+    entries = {before for (before, _), after in TRANSITIONS.items() if after is Stage.DEPLOYING}
+    assert entries == {Stage.KILLING}
+
+
+def test_only_a_reset_leaves_deployed() -> None:
+    ways = {stimulus for (before, stimulus) in TRANSITIONS if before is Stage.DEPLOYED}
+    assert ways == {Stimulus.RESET}
+
+
+def test_nothing_but_a_reset_leads_back_to_the_start() -> None:
+    ways = {s for (_, s), after in TRANSITIONS.items() if after is Stage.STARTUP}
+    assert ways == {Stimulus.RESET}

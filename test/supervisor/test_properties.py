@@ -1,0 +1,150 @@
+"""What must always hold, for any order and timing of inputs."""
+
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from story import FLYING, LINK, STANDING, START
+
+from chute_ros.model import Action, LinkState, Outcome, VehicleState
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.state import State
+
+LINKS = st.sampled_from([LINK, "upf_can", "stranger"])
+CONFIG = SupervisorConfig(deploy_links=(LINK, "upf_can"))
+
+EVIDENCE = st.one_of(
+    st.builds(
+        i.LinkHeartbeat, LINKS, st.sampled_from(LinkState), st.booleans(), st.integers(0, 5)
+    ),
+    st.builds(i.VehicleReport, st.sampled_from([FLYING, STANDING, VehicleState()])),
+    st.builds(
+        i.ActionReport,
+        st.integers(6, 9),
+        st.integers(0, 12),
+        LINKS,
+        st.sampled_from(Outcome),
+        st.just("told"),
+        st.integers(6, 9),
+    ),
+    st.builds(
+        i.ParachuteReport, LINKS, st.sampled_from(["1/161", "33"]), st.just(False), st.just(())
+    ),
+)
+RELEASED = st.builds(i.ParachuteReport, LINKS, st.just("1/161"), st.just(True), st.just(()))
+# Tokens are given by position later, so that each is used once.
+REQUESTS = st.one_of(
+    st.builds(i.ArmRequest, st.just(1), st.booleans(), st.just(0)),
+    st.builds(i.KillRequest, st.just(1), st.just("operator"), st.just("stop")),
+    st.builds(i.DeployRequest, st.just(1), st.booleans(), st.just("it falls")),
+    st.builds(i.ResetRequest, st.just(1)),
+    st.builds(i.ModeRequest, st.just(1), st.sampled_from(i.Mode), st.booleans()),
+)
+ArmAnswer = st.tuples(st.just("arm"), st.booleans())
+TIMES = st.sampled_from([0.0, 0.001, 0.05, 0.1, 0.3, 0.5, 1.0, 7.0, 20.0])
+
+
+def steps(*inputs: st.SearchStrategy) -> st.SearchStrategy:
+    return st.lists(st.tuples(TIMES, st.one_of(*inputs)), max_size=40)
+
+
+class Run:
+    """Feeds a sequence to the core and keeps what came out."""
+
+    def __init__(self, sequence: list, mode: i.Mode = i.Mode.ACTIVE) -> None:
+        self.now = START
+        self.state = State(epoch=7, started_at=START, mode=mode)
+        self.decisions: list[tuple[i.Mode, i.Decide]] = []
+        self.answers: list[int] = []
+        self.asked: list[int] = []
+        self.arming: list[i.ArmDevices] = []
+        for number, (wait, one) in enumerate(sequence, start=1):
+            self.now += wait
+            if isinstance(one, tuple):
+                self.answer_arming(one[1])
+                continue
+            if hasattr(one, "token") and one.token:
+                one = type(one)(number, *list(vars(one).values())[1:])
+                self.asked.append(number)
+            self.update((one,))
+
+    def update(self, inputs: tuple) -> tuple:
+        mode = self.state.mode
+        self.state, outputs = update(CONFIG, self.state, inputs, self.now)
+        for output in outputs:
+            if isinstance(output, i.Decide):
+                self.decisions.append((mode, output))
+            elif isinstance(output, i.Finish):
+                self.answers.append(output.token)
+            elif isinstance(output, i.ArmDevices):
+                self.arming.append(output)
+        assert next_deadline(CONFIG, self.state, self.now) > self.now
+        return outputs
+
+    def answer_arming(self, success: bool) -> None:
+        while self.arming:
+            order = self.arming.pop()
+            self.update((i.ArmDone(order.token, order.arm, success, "done"),))
+
+    def actions(self) -> list[Action]:
+        return [output.decision.action for _, output in self.decisions]
+
+
+@settings(max_examples=300, deadline=None)
+@given(steps(EVIDENCE))
+def test_without_a_request_or_a_released_parachute_nothing_ever_fires(sequence: list) -> None:
+    run = Run(sequence)
+    assert Action.KILL not in run.actions()
+    assert Action.DEPLOY not in run.actions()
+
+
+@settings(max_examples=300, deadline=None)
+@given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer), st.sampled_from(i.Mode))
+def test_what_always_holds(sequence: list, mode: i.Mode) -> None:
+    run = Run(sequence, mode)
+    killed = False
+    order = (0, 0)
+    for mode_then, output in run.decisions:
+        decision = output.decision
+        if not output.again:
+            assert (decision.epoch, decision.id) > order, "numbers rise"
+            order = (decision.epoch, decision.id)
+        if decision.action is Action.DEPLOY:
+            assert killed, "every deploy is preceded by a kill"
+        killed = killed or decision.action is Action.KILL
+        if mode_then is i.Mode.SHADOW:
+            leaves_mode = decision.rule == "links"
+            assert decision.shadow or leaves_mode
+        if mode_then is i.Mode.INHIBITED:
+            assert decision.action in (Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE)
+
+
+@settings(max_examples=300, deadline=None)
+@given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer))
+def test_each_request_is_answered_exactly_once(sequence: list) -> None:
+    run = Run(sequence)
+    run.answer_arming(True)
+    while math.isfinite(deadline := next_deadline(CONFIG, run.state, run.now)):
+        run.now = deadline
+        run.update(())
+        assert run.now < START + 10_000.0
+    # What waits for a kill or a deploy has an answer in the end; nothing has two.
+    assert sorted(run.answers) == sorted(run.asked)
+
+
+@settings(max_examples=100, deadline=None)
+@given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer))
+def test_looking_twice_at_the_same_moment_decides_nothing_more(sequence: list) -> None:
+    run = Run(sequence)
+    run.update(())
+    assert run.update(()) == ()
+
+
+@settings(max_examples=100, deadline=None)
+@given(steps(EVIDENCE, RELEASED, REQUESTS, ArmAnswer))
+def test_the_same_inputs_give_the_same_decisions(sequence: list) -> None:
+    first, second = Run(sequence), Run(sequence)
+    assert first.state == second.state
+    assert first.decisions == second.decisions
