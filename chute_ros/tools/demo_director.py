@@ -74,7 +74,7 @@ class Director:
 
     def say(self, who: str, text: str) -> None:
         """One line of the story."""
-        print(f"{self.clock()}  {who:<10} {text}", flush=True)
+        print(f"{self.clock()}  {who:<17} {text}", flush=True)
 
     # -- awaiting -------------------------------------------------------------------------------
 
@@ -142,4 +142,4 @@ class Director:
             return  # said again, in case that nobody was there to hear it
         self.reports.append((time.monotonic(), message))
         action, outcome = model.Action(message.action), model.Outcome(message.outcome)
-        self.say(message.link[:10], f"{action.name} {outcome.name}: {message.detail}")
+        self.say(message.link, f"{action.name} {outcome.name}: {message.detail}")
