@@ -193,6 +193,9 @@ class _Update(Requests):
                 text = deploy.newest_details() or "no device node reported"
                 self.move(Stimulus.DEPLOY_FAILED, text)
                 self.alarm(f"no parachute confirmed within {waited:.1f} s: {text}")
+        elif self.state.stage is Stage.DEPLOYING:
+            # The mode was changed in between, which took back what was on its way.
+            self.move(Stimulus.DEPLOY_FAILED, "the mode was changed")
         accepted = deploy is not None and deploy.reached(Outcome.ACCEPTED)
         text = deploy.newest_details() if deploy is not None else ""
         if self.state.stage is Stage.FAULT:
@@ -215,6 +218,11 @@ class _Update(Requests):
         else:
             return
         block = self.state.block
+        if self.state.mode is i.Mode.SHADOW and block is not None and not block.decision.shadow:
+            # Leaving ACTIVE took the block back; that must arrive before anything is only said.
+            if self._worth_sending(block):
+                return
+            block = None
         if block is None or block.decision.action is not action:
             self.decide("block", action, "links", reasons, self.config.links)
 

@@ -71,7 +71,9 @@ class Requests(Steps):
             tokens = (*self.state.deploy_tokens, one.token)
             reason = self.state.deploy_reason or reason
             self.state = replace(self.state, deploy_tokens=tokens, deploy_reason=reason)
-            if stage not in (Stage.KILLING, Stage.DEPLOYING):
+            if stage is not Stage.DEPLOYING and (
+                stage is not Stage.KILLING or not self.state.kill
+            ):
                 self.move(Stimulus.KILL, reason)
                 self.fire(Action.KILL, "operator", (reason,))
 
@@ -102,6 +104,7 @@ class Requests(Steps):
             return
         if before is i.Mode.ACTIVE:
             self.give_up_waiting(f"mode changed to {one.mode.name}")
+            self.state = replace(self.state, kill=None, deploy=None)
             block = self.state.block
             if block is not None and block.decision.action is Action.FLIGHT_BLOCK:
                 reasons = (f"mode changes from ACTIVE to {one.mode.name}",)
