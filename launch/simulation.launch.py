@@ -9,13 +9,14 @@ ports; port + 1 is used as well.
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import (
     DeclareLaunchArgument,
+    ExecuteProcess,
     IncludeLaunchDescription,
     OpaqueFunction,
     SetEnvironmentVariable,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.substitutions import ExecutableInPackage
 
 from launch import LaunchContext, LaunchDescription
 
@@ -33,19 +34,17 @@ def _vehicle(context: LaunchContext) -> list:
                 "connection": f"udpin:127.0.0.1:{port}",
             }.items(),
         ),
-        Node(
-            package="chute_ros",
-            executable="sim_autopilot",
-            arguments=["--connection", network, "--connection", f"udpin:{air}"],
-            output="screen",
-        ),
-        Node(
-            package="chute_ros",
-            executable="sim_mavlink_parachute",
-            arguments=["--connection", network, "--connection", f"udpout:{air}"],
-            output="screen",
-        ),
+        _simulator("sim_autopilot", network, f"udpin:{air}"),
+        _simulator("sim_mavlink_parachute", network, f"udpout:{air}"),
     ]
+
+
+def _simulator(executable: str, *connections: str) -> ExecuteProcess:
+    # Not a Node: launch_ros would add --ros-args, and a simulator knows nothing of ROS.
+    command: list = [ExecutableInPackage(executable, "chute_ros")]
+    for connection in connections:
+        command += ["--connection", connection]
+    return ExecuteProcess(cmd=command, name=executable, output="screen")
 
 
 def generate_launch_description() -> LaunchDescription:

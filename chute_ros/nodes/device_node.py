@@ -48,6 +48,8 @@ COMMON_PARAMETERS = (
 )
 #: Our own link's heartbeat stops when the executor was silent for this long, s.
 OWNER_SILENCE = 1.0
+#: So many decisions are remembered with how far they got, to be reported once more.
+MOST_REPORTS = 50
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ class DeviceNode(Node, ABC):
         self._tokens = count(1)
         self._waiting: dict[int, Future] = {}
         self._decisions: dict[int, model.Decision] = {}
-        self._last_report: ActionReport | None = None
+        #: The newest report on each of the newest decisions.
+        self._reports: dict[tuple[int, int], ActionReport] = {}
         self._seq = count()
         self._verdicts: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
         self._loop_faults = 0
@@ -198,7 +201,10 @@ class DeviceNode(Node, ABC):
         message.link, message.detail = self.get_name(), detail
         message.newest_epoch = self.gate.newest_epoch
         self._report_publisher.publish(message)
-        self._last_report = message
+        self._reports.pop((message.epoch, message.id), None)
+        self._reports[message.epoch, message.id] = message
+        while len(self._reports) > MOST_REPORTS:
+            del self._reports[next(iter(self._reports))]
         self.get_logger().info(
             f"decision {decision.epoch}.{decision.id} {decision.action.name}: "
             f"{outcome.name}: {detail}"
@@ -283,8 +289,9 @@ class DeviceNode(Node, ABC):
             self.carry_out(decision)
         elif verdict is Verdict.REPEATED:
             # The supervisor has not heard our report, perhaps because it was not there yet.
-            if self._last_report is not None and self._last_report.id == decision.id:
-                self._report_publisher.publish(self._last_report)
+            report = self._reports.get((decision.epoch, decision.id))
+            if report is not None:
+                self._report_publisher.publish(report)
         elif verdict is Verdict.OLDER:
             self.report_on(decision, model.Outcome.FAILED, Verdict.OLDER.value)
         elif verdict is Verdict.TOO_LATE:

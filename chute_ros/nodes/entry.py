@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 
@@ -42,10 +43,16 @@ def run(name: str, class_name: str) -> None:
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # the usual ways to end a node
+    except RuntimeError:
+        # What a publish raises once a signal has shut ROS down; otherwise a mistake of ours.
+        if rclpy.ok():
+            raise
     except ChuteError as error:
         print(f"{name}: {error}", file=sys.stderr)
         sys.exit(2)
     finally:
         if node is not None:
             node.destroy_node()
-        rclpy.try_shutdown()
+        # The signal's own handler may be shutting down at this very moment.
+        with contextlib.suppress(RuntimeError):
+            rclpy.try_shutdown()

@@ -311,7 +311,9 @@ class SafetySupervisorNode(Node):
 
     def _flight_blocked(self) -> bool:
         block = self.state.block
-        return block is not None and block.decision.action is model.Action.FLIGHT_BLOCK
+        if block is None or block.decision.shadow:
+            return False
+        return block.decision.action is model.Action.FLIGHT_BLOCK
 
     def _state_text(self, reasons: tuple[str, ...]) -> str:
         stage = self.state.stage

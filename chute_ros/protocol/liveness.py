@@ -103,9 +103,10 @@ class Liveness:
         """Look at the clock; returns the limits that were passed, each at the time it was passed."""
         changes: list[LinkChange] = []
         silence = self.age(now)
-        if self.state is LinkState.OK and silence >= self.limits.stale_after:
+        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        if self.state is LinkState.OK and now >= self.next_deadline():
             changes += self._take(Stimulus.STALE_LIMIT, now, silence)
-        if self.state is LinkState.STALE and silence >= self.limits.lost_after:
+        if self.state is LinkState.STALE and now >= self.next_deadline():
             changes += self._take(Stimulus.LOST_LIMIT, now, silence)
             self.lost_at = now
             self.lost_count += 1

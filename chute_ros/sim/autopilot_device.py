@@ -54,6 +54,7 @@ class AutopilotDevice(MavlinkDevice):
             "takeoff": lambda height: setattr(self.model, "target_height", float(height)),
             "fail-motor": lambda _: self._fail_motor(),
         }
+        self.arguments |= {"takeoff": float}
 
     def reboot(self) -> None:
         """Start anew: an autopilot that restarts in the air does not hold the vehicle any more."""
@@ -89,7 +90,8 @@ class AutopilotDevice(MavlinkDevice):
         if armed is not self.model.armed:
             self.model.armed = armed
             self.say("ARMED" if armed else "DISARMED")
-            self.send(self._heartbeat())
+            # Shown at once, but after the acknowledgement of whatever command did it.
+            self._due[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self.now
 
     def _fail_motor(self) -> None:
         self.model.motors_failed = True

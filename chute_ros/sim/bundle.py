@@ -36,8 +36,15 @@ class WireBundle:
         return []
 
     def write(self, data: bytes) -> None:
+        failure: OSError | None = None
         for wire in self._wires:
-            wire.write(data)
+            try:
+                wire.write(data)
+            except OSError as error:
+                # One network that is down must not keep the frame from the others.
+                failure = error
+        if failure is not None:
+            raise failure
 
     def describe(self) -> str:
         return " + ".join(wire.describe() for wire in self._wires)

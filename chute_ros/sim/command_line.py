@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 import sys
 import threading
@@ -55,30 +56,51 @@ def script_of(entries: list[str]) -> list[tuple[float, str]]:
     for entry in entries:
         seconds, colon, action = entry.partition(":")
         try:
-            script.append((float(seconds), action))
+            when = float(seconds)
         except ValueError:
-            colon = ""
-        if not colon or not action:
+            when = math.nan
+        if not colon or not action or not 0.0 <= when < math.inf:
             raise ParameterError(f"--at {entry!r}: need SECONDS:ACTION, for example 5:reboot")
+        script.append((when, action))
     return script
 
 
-def number(name: str) -> Any:
-    """A converter for argparse: a whole number, decimal or 0x..."""
+def number(name: str, lowest: int, highest: int) -> Any:
+    """A converter for argparse: a whole number in this range, decimal or 0x..."""
 
     def convert(text: str) -> int:
-        return int(text, 0)
+        try:
+            value = int(text, 0)
+        except ValueError:
+            value = lowest - 1
+        if not lowest <= value <= highest:
+            raise argparse.ArgumentTypeError(f"{name} {text!r}: need {lowest} to {highest}")
+        return value
 
-    convert.__name__ = name
     return convert
+
+
+def _check_action(device: MavlinkDevice, action: str) -> None:
+    name, equals, argument = action.partition("=")
+    if name not in device.actions:
+        known = ", ".join(sorted(device.actions))
+        raise ParameterError(f"--at: action {name!r} is not known: need one of {known}")
+    convert = device.arguments.get(name)
+    if convert is None:
+        if equals:
+            raise ParameterError(f"--at: action {action!r}: {name} takes no argument")
+        return
+    try:
+        convert(argument)
+    except (KeyError, ValueError):
+        text = f"--at: action {action!r}: {argument!r} is nothing that {name} can take"
+        raise ParameterError(text) from None
 
 
 def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     """Run device on its wires until SIGINT or SIGTERM; ends with 2 on a user's mistake."""
     for _, action in script_of(options.at):
-        if action.partition("=")[0] not in device.actions:
-            known = ", ".join(sorted(device.actions))
-            raise ParameterError(f"--at: action {action!r} is not known: need one of {known}")
+        _check_action(device, action)
     knobs = FaultKnobs(options.loss, options.duplicate, options.corrupt, options.delay)
     connections = options.connection or [options.default_connection]
     wires = [make_wire(parse_address(text)) for text in connections]
@@ -105,4 +127,5 @@ def main_of(make: Any) -> None:
     try:
         make()
     except ChuteError as error:
-        sys.exit(f"{error}")
+        print(error, file=sys.stderr)
+        sys.exit(2)

@@ -83,10 +83,8 @@ class FaultyLink:
         copies = 2 if chance() < knobs.duplicate else 1
         spoiled = []
         for _ in range(copies):
+            copy = bytearray(data)
             if data and chance() < knobs.corrupt:
-                at = self._random.randrange(len(data))
-                data = (
-                    data[:at] + bytes([data[at] ^ self._random.randrange(1, 256)]) + data[at + 1 :]
-                )
-            spoiled.append((now + chance() * knobs.delay, data))
+                copy[self._random.randrange(len(data))] ^= self._random.randrange(1, 256)
+            spoiled.append((now + chance() * knobs.delay, bytes(copy)))
         return spoiled

@@ -45,6 +45,8 @@ class MavlinkDevice:
             "speak": lambda _: setattr(self, "silent", False),
             "reboot": lambda _: self.reboot(),
         }
+        #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
+        self.arguments: dict[str, Callable[[str], Any]] = {}
         self._script = sorted(script)
         self._started_at = math.nan
         self._intervals: dict[int, float] = {}
@@ -70,7 +72,10 @@ class MavlinkDevice:
                 self.heard(frame)
 
     def stream_ended(self, stream: Hashable) -> None:
-        self._decoders.pop(stream, None)
+        if stream is None:
+            self._decoders.clear()
+        else:
+            self._decoders.pop(stream, None)
 
     def update(self, now: float) -> None:
         self.now = now

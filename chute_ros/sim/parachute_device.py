@@ -68,6 +68,10 @@ class ParachuteDevice(MavlinkDevice):
             "clear-errors": lambda _: self._set_errors(ErrorFlags(0)),
             "deploy": lambda name: self._deploy(DeploymentTrigger[name]),
         }
+        self.arguments |= {
+            "error": ErrorFlags.__getitem__,
+            "deploy": DeploymentTrigger.__getitem__,
+        }
 
     def reboot(self) -> None:
         """Start as the settings say; what was released stays released."""
@@ -170,7 +174,7 @@ class ParachuteDevice(MavlinkDevice):
             self.deployment = trigger
             self.say(f"RELEASED by {trigger.name}")
             # On the vehicle's network the release is news; its own stream may be a second away.
-            self._after_acknowledgement.append(self.status())
+            self._due[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS] = self.now
 
     def _automatic_trigger(self, sink_speed: float) -> None:
         altitude = self.settings.ats_arm_altitude

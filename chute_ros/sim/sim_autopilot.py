@@ -16,7 +16,7 @@ def _run() -> None:
         "udpout:127.0.0.1:14550",
         "mute, unmute, silent, speak, reboot, arm, takeoff=HEIGHT, fail-motor",
     )
-    options.add_argument("--system-id", type=number("id"), default=1)
+    options.add_argument("--system-id", type=number("id", 1, 255), default=1)
     chosen = options.parse_args()
     run(AutopilotDevice(chosen.system_id, script_of(chosen.at)), chosen)
 

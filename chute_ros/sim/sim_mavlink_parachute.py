@@ -19,10 +19,13 @@ def _run() -> None:
         "mute, unmute, silent, speak, reboot, error=NAME, clear-errors, deploy=TRIGGER "
         "(names of PARACHUTE_ERROR_FLAGS and PARACHUTE_DEPLOYMENT_TRIGGER without their prefix)",
     )
-    options.add_argument("--system-id", type=number("id"), default=start.system_id)
-    options.add_argument("--component-id", type=number("id"), default=start.component_id)
+    options.add_argument("--system-id", type=number("id", 1, 255), default=start.system_id)
+    options.add_argument("--component-id", type=number("id", 1, 255), default=start.component_id)
     options.add_argument(
-        "--armed", type=number("mask"), default=0, help="PARACHUTE_TRIGGER_FLAGS at the start"
+        "--armed",
+        type=number("mask", 0, 255),
+        default=0,
+        help="PARACHUTE_TRIGGER_FLAGS at the start",
     )
     options.add_argument(
         "--deployed",
@@ -44,11 +47,13 @@ def _run() -> None:
         help="auto: by the height that an autopilot on the network tells, yes where none is heard",
     )
     options.add_argument("--clear-height", type=float, default=start.clear_height, help="m")
-    options.add_argument("--ats-arm-altitude", type=number("m"), default=start.ats_arm_altitude)
+    options.add_argument(
+        "--ats-arm-altitude", type=number("m", 0, 255), default=start.ats_arm_altitude
+    )
     options.add_argument("--packed-date", default=start.packed_date, help="YYYY-MM-DD")
     options.add_argument(
         "--system-status",
-        type=number("MAV_STATE"),
+        type=number("MAV_STATE", 0, 8),
         default=start.system_status,
         help="MAV_STATE in the heartbeat (3 standby, 5 critical)",
     )

@@ -27,12 +27,17 @@ FAILURE_HEIGHT = 60.0  # m
 OPERATOR_SINK = -4.0
 #: What counts as carried by the canopy, and as a soft touchdown, m/s.
 CANOPY_SINK = -6.5
+#: What --fault adds to the command line of the simulated parachute.
+FAULTS = {"parachute-silent": ("--at", "0:silent"), "parachute-mute": ("--at", "0:mute")}
 
 
 def main() -> None:
     """Fly; exit code 0 if every step happened."""
     options = argparse.ArgumentParser("demo", description=__doc__)
     options.add_argument("--logs", type=Path, help="keep the logs of all processes in this folder")
+    options.add_argument(
+        "--fault", choices=FAULTS, help="spoil a step, to see that the demo then fails"
+    )
     chosen = options.parse_args()
     with tempfile.TemporaryDirectory(prefix="chute_ros_demo_") as scratch:
         folder = chosen.logs or Path(scratch)
@@ -40,7 +45,7 @@ def main() -> None:
         processes = Processes(folder)
         try:
             with isolated_ros() as namespace:
-                _fly(namespace, processes)
+                _fly(namespace, processes, FAULTS.get(chosen.fault, ()))
         except KeyboardInterrupt:
             sys.exit("demo: interrupted")
         except ChuteError as error:
@@ -49,7 +54,7 @@ def main() -> None:
             processes.end()
 
 
-def _fly(namespace: str, processes: Processes) -> None:
+def _fly(namespace: str, processes: Processes, fault: tuple[str, ...]) -> None:
     node_port, vehicle_port = free_udp_ports(2)
     network, vehicle = f"udpout:127.0.0.1:{node_port}", f"127.0.0.1:{vehicle_port}"
     ros = ("--ros-args", "-r", f"__ns:={namespace}")
@@ -70,7 +75,8 @@ def _fly(namespace: str, processes: Processes) -> None:
             "chute_ros.sim.sim_autopilot",
             *("--connection", network, "--connection", f"udpin:{vehicle}"),
         )
-        _preflight(director, pilot, processes, network, vehicle)
+        parachute = ("--connection", network, "--connection", f"udpout:{vehicle}", *fault)
+        _preflight(director, pilot, processes, parachute)
         _climb(director, pilot)
         _fail_and_deploy(director, pilot)
         _summary(director)
@@ -80,7 +86,7 @@ def _fly(namespace: str, processes: Processes) -> None:
 
 
 def _preflight(
-    director: Director, pilot: Pilot, processes: Processes, network: str, vehicle: str
+    director: Director, pilot: Pilot, processes: Processes, parachute: tuple[str, ...]
 ) -> None:
     director.until("the supervisor speaks", 20.0, lambda: bool(director.safety.links))
     director.until("the autopilot is heard", 20.0, lambda: director.vehicle.armed != 0)
@@ -97,11 +103,7 @@ def _preflight(
     director.say("vehicle", "armed, and disarmed at once: flight is blocked")
 
     director.say("demo", "plugs the parachute in")
-    processes.start(
-        "parachute",
-        "chute_ros.sim.sim_mavlink_parachute",
-        *("--connection", network, "--connection", f"udpout:{vehicle}"),
-    )
+    processes.start("parachute", "chute_ros.sim.sim_mavlink_parachute", *parachute)
     director.until("the parachute is heard", 15.0, lambda: director.parachute.link_state == 1)
     director.say("parachute", f"{director.parachute.device} heard")
     director.until("flight is released", 15.0, director.stage(Stage.READY))
@@ -145,8 +147,14 @@ def _fail_and_deploy(director: Director, pilot: Pilot) -> None:
     director.say(
         "operator", f"success={result.success} accepted={result.accepted}: {result.message}"
     )
-    if not (result.success and result.accepted):
+    if not result.success:
         raise StepFailedError(f"deploy: {result.message}")
+    for step in (Outcome.ACCEPTED, Outcome.CONFIRMED):
+
+        def reported(step: Outcome = step) -> bool:
+            return director.outcome(Action.DEPLOY, step) is not None
+
+        director.until(f"the deploy is reported {step.name}", 5.0, reported)
     fastest = {"sink": 0.0}
 
     def carried() -> bool:

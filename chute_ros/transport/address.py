@@ -18,6 +18,7 @@ FORMS = (
     "tcpin:HOST:PORT or serial:PATH[:BAUD]"
 )
 DEFAULT_BAUD = 57600
+_LISTENING = ("udpin", "tcpin")
 _PARTS = {"udpin": 2, "udpout": 2, "udppair": 4, "tcp": 2, "tcpin": 2}
 
 
@@ -32,24 +33,29 @@ class Address:
     send_port: int = 0
 
 
-def _port(text: str, whole: str) -> int:
-    if text.isascii() and text.isdigit() and 0 <= int(text) <= 65535:
+def _port(text: str, whole: str, lowest: int) -> int:
+    if text.isascii() and text.isdigit() and lowest <= int(text) <= 65535:
         return int(text)
-    raise ParameterError(f"connection {whole!r}: port {text!r} is no number from 0 to 65535")
+    raise ParameterError(
+        f"connection {whole!r}: port {text!r} is no number from {lowest} to 65535: need {FORMS}"
+    )
 
 
 def parse_address(text: str) -> Address:
     """The address in text; ParameterError with the allowed forms if it is none."""
     kind, colon, rest = text.partition(":")
-    if kind == "serial" and rest:
-        path, colon, baud = rest.rpartition(":")
-        if colon and baud.isascii() and baud.isdigit() and int(baud) > 0:
+    if kind == "serial":
+        path, colon_before_baud, baud = rest.rpartition(":")
+        if not colon_before_baud or (baud and not (baud.isascii() and baud.isdigit())):
+            # Names under /dev/serial/by-path hold colons of their own.
+            path, baud = rest, str(DEFAULT_BAUD)
+        if path and baud and int(baud) > 0:
             return Address(kind, path, int(baud))
-        return Address(kind, rest, DEFAULT_BAUD)
     parts = rest.split(":") if colon else []
     if kind not in _PARTS or len(parts) != _PARTS[kind] or not all(parts):
         raise ParameterError(f"connection {text!r} is not understood: need {FORMS}")
     if kind == "udppair":
         host, port, send_host, send_port = parts
-        return Address(kind, host, _port(port, text), send_host, _port(send_port, text))
-    return Address(kind, parts[0], _port(parts[1], text))
+        return Address(kind, host, _port(port, text, 0), send_host, _port(send_port, text, 1))
+    # Port 0 lets the system choose one to listen on; nothing can be sent to it.
+    return Address(kind, parts[0], _port(parts[1], text, 0 if kind in _LISTENING else 1))

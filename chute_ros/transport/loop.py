@@ -129,13 +129,20 @@ class WireLoop(Generic[LinkT]):
             else:
                 self._read(file, now)
         while self._calls:
-            self._calls.popleft()(self.link, now)
+            self._guarded(self._calls.popleft(), self.link, now)
         self.link.update(now)
         for frame in self.link.take_output():
             self._write(frame)
         events = self.link.take_events()
         if events:
             self._deliver(events)
+
+    def _guarded(self, step: Callable[..., None], *arguments: Any) -> None:
+        """One step of the protocol: a mistake of ours in it must not cost those that follow."""
+        try:
+            step(*arguments)
+        except Exception:  # noqa: BLE001
+            self._deliver([LoopFault(traceback.format_exc())])
 
     def _wait(self, now: float) -> list[int]:
         poll = select.poll()
@@ -154,9 +161,9 @@ class WireLoop(Generic[LinkT]):
             return
         for data, stream in chunks:
             if data or stream is None:
-                self.link.receive(data, now, stream)
+                self._guarded(self.link.receive, data, now, stream)
             else:
-                self.link.stream_ended(stream)
+                self._guarded(self.link.stream_ended, stream)
 
     def _write(self, frame: bytes) -> None:
         if not self.wire.is_open:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import termios
 from collections.abc import Hashable
 from itertools import count
 
@@ -27,7 +28,11 @@ class SerialWire:
     def open(self) -> None:
         # SerialException is an OSError; the descriptor is read directly, as pyserial's own read
         # hides a hang-up behind an empty answer.
-        self._port = serial.Serial(self._path, self._baud, timeout=0, exclusive=True)
+        try:
+            self._port = serial.Serial(self._path, self._baud, timeout=0, exclusive=True)
+        except termios.error as error:
+            # How a port that vanishes while it is set up shows itself; it is no OSError.
+            raise OSError(*error.args) from None
         os.set_blocking(self._port.fileno(), False)
         self._stream = (self._path, next(_stream_numbers))
 

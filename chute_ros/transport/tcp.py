@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 from collections.abc import Hashable
 from itertools import count
@@ -103,11 +104,13 @@ class TcpServerWire:
         return [(data, stream)]
 
     def write(self, data: bytes) -> None:
-        for file, (client, _) in list(self._clients.items()):
+        for client, _ in self._clients.values():
             try:
                 _send_whole(client, data)
             except OSError:
-                self._drop(file)
+                # The next read finds its end and says which stream that was.
+                with contextlib.suppress(OSError):
+                    client.shutdown(socket.SHUT_RDWR)
 
     def describe(self) -> str:
         port = self._port if self._listener is None else self._listener.getsockname()[1]

@@ -14,14 +14,10 @@ from typing import Any
 
 from chute_ros.model import Armed, LandedState, Reading, VehicleState
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.boot_clock import Age, BootClock
 from chute_ros.protocol.mavlink.dialect import dialect
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
-#: A device clock that runs back by more than this (ms) has restarted; less is reordering.
-REBOOT_JUMP_MS = 1000
-_WRAP_MS = 2**32
-_WRAP_MARGIN_MS = 60_000
-
 #: Ask for the stream when a part is older than this (s), and again after the interval (s).
 STREAM_SILENCE = 2.5
 STREAM_ASK_INTERVAL = 5.0
@@ -36,12 +32,34 @@ STREAMED_MESSAGES: tuple[int, ...] = (
 )
 
 
+#: Types that never fly the vehicle, whatever their heartbeat says in its field autopilot.
+_NOT_FLYING = frozenset(
+    {
+        dialect.MAV_TYPE_ANTENNA_TRACKER,
+        dialect.MAV_TYPE_GCS,
+        dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+        dialect.MAV_TYPE_GIMBAL,
+        dialect.MAV_TYPE_ADSB,
+        dialect.MAV_TYPE_CAMERA,
+        dialect.MAV_TYPE_CHARGING_STATION,
+        dialect.MAV_TYPE_FLARM,
+        dialect.MAV_TYPE_SERVO,
+        dialect.MAV_TYPE_ODID,
+        dialect.MAV_TYPE_BATTERY,
+        dialect.MAV_TYPE_PARACHUTE,
+        dialect.MAV_TYPE_LOG,
+        dialect.MAV_TYPE_OSD,
+        dialect.MAV_TYPE_IMU,
+        dialect.MAV_TYPE_GPS,
+        dialect.MAV_TYPE_WINCH,
+    }
+)
+
+
 def is_autopilot(heartbeat: Any) -> bool:
-    """A flight controller sends this heartbeat: not a ground station, radio, or other component."""
-    return bool(
-        heartbeat.autopilot != dialect.MAV_AUTOPILOT_INVALID
-        and heartbeat.type not in (dialect.MAV_TYPE_GCS, dialect.MAV_TYPE_PARACHUTE)
-    )
+    """A flight controller sends this heartbeat: not a ground station or another component."""
+    no_autopilot = heartbeat.autopilot == dialect.MAV_AUTOPILOT_INVALID
+    return not no_autopilot and heartbeat.type not in _NOT_FLYING
 
 
 class AutopilotTracker:
@@ -56,7 +74,8 @@ class AutopilotTracker:
         self._readings: dict[str, Reading] = {}
         self._system_status = 0
         self._asked_at = -math.inf
-        self._boot_ms: int | None = None
+        self._clock = BootClock()
+        self._in_flight_before = False
         self._readers: dict[str, Callable[[Any, float], None]] = {
             "EXTENDED_SYS_STATE": self._extended_sys_state,
             "GLOBAL_POSITION_INT": self._global_position_int,
@@ -71,7 +90,7 @@ class AutopilotTracker:
 
     @property
     def device(self) -> str:
-        """"system/component"."""
+        """ "system/component"."""
         return f"{self.system_id}/{self.component_id}"
 
     @property
@@ -85,6 +104,11 @@ class AutopilotTracker:
         """By the newest EXTENDED_SYS_STATE."""
         reading = self._readings.get("landed_state")
         return LandedState.UNKNOWN if reading is None else LandedState(int(reading.value))
+
+    def on_ground(self, now: float) -> bool:
+        """The autopilot says so now: what it said before its stream fell silent proves nothing."""
+        age = self._readings.get("landed_state", Reading()).age(now)
+        return self.landed_state is LandedState.ON_GROUND and age < STREAM_SILENCE
 
     @property
     def motors_off(self) -> bool:
@@ -112,10 +136,11 @@ class AutopilotTracker:
 
     def message(self, message: Any, now: float) -> bool:
         """Any other message of the autopilot; True: the vehicle's picture changed."""
-        boot_ms = getattr(message, "time_boot_ms", None)
-        if boot_ms:
-            self._watch_clock(boot_ms)
-        reader = self._readers.get(message.get_type())
+        kind = message.get_type()
+        reader = self._readers.get(kind)
+        # Others (NAMED_VALUE_FLOAT, ...) carry times that a user's script may have filled in.
+        if reader is not None or kind == "SYSTEM_TIME":
+            self._watch_clock(getattr(message, "time_boot_ms", 0))
         if reader is None:
             return False
         reader(message, now)
@@ -155,7 +180,7 @@ class AutopilotTracker:
             battery_remaining=value("battery_remaining"),
             battery_age=age("battery_voltage"),
             system_status=self._system_status,
-            uptime=math.nan if self._boot_ms is None else self._boot_ms / 1000.0,
+            uptime=self._clock.uptime,
             reboot_count=self.reboot_count,
             rebooted_in_flight=self.rebooted_in_flight,
         )
@@ -165,32 +190,35 @@ class AutopilotTracker:
             self._readings[name] = Reading(float(value), now)
 
     def _watch_clock(self, boot_ms: int) -> None:
-        last = self._boot_ms
-        if last is None or boot_ms >= last:
-            self._boot_ms = boot_ms
-            return
-        if last - boot_ms <= REBOOT_JUMP_MS:
-            return
-        self._boot_ms = boot_ms
-        if last > _WRAP_MS - _WRAP_MARGIN_MS and boot_ms < _WRAP_MARGIN_MS:
+        age = self._clock.observe(boot_ms)
+        if age is Age.DOUBTFUL:
+            known = self.landed_state is not LandedState.UNKNOWN
+            in_air = known and self.landed_state is not LandedState.ON_GROUND
+            # Restarts again before it said where it is: it is where it was.
+            still_there = not known and self.rebooted_in_flight
+            self._in_flight_before = in_air or still_there or self.armed is Armed.ARMED
+        if age is not Age.RESTARTED:
             return
         self.reboot_count += 1
-        in_air = self.landed_state not in (LandedState.UNKNOWN, LandedState.ON_GROUND)
-        self.rebooted_in_flight = in_air or self.armed is Armed.ARMED
+        self.rebooted_in_flight = self._in_flight_before
         self._asked_at = -math.inf
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         for name in ("armed", "landed_state"):
             self._readings.pop(name, None)
 
     def _extended_sys_state(self, message: Any, now: float) -> None:
-        if message.landed_state in set(LandedState) - {LandedState.UNKNOWN}:
+        if LandedState.UNKNOWN < message.landed_state <= max(LandedState):
             self._set("landed_state", message.landed_state, now)
 
     def _global_position_int(self, message: Any, now: float) -> None:
         self._set("height", message.relative_alt / 1000.0, now)
         self._set("vertical_speed", -message.vz / 100.0, now)
-        self._set("latitude", message.lat / 1e7, now)
-        self._set("longitude", message.lon / 1e7, now)
+        latitude, longitude = message.lat / 1e7, message.lon / 1e7
+        # 0, 0 is what autopilots send before they know.
+        known = (latitude, longitude) != (0.0, 0.0)
+        if known and abs(latitude) <= 90.0 and abs(longitude) <= 180.0:
+            self._set("latitude", latitude, now)
+            self._set("longitude", longitude, now)
 
     def _local_position_ned(self, message: Any, now: float) -> None:
         # Its origin may not be the take-off point, so that only the speed is taken from it.
@@ -231,7 +259,5 @@ class AutopilotTracker:
     def _sys_status(self, message: Any, now: float) -> None:
         if message.voltage_battery != 0xFFFF:
             self._set("battery_voltage", message.voltage_battery / 1000.0, now)
-        if message.battery_remaining >= 0:
+        if 0 <= message.battery_remaining <= 100:
             self._set("battery_remaining", message.battery_remaining / 100.0, now)
-
-

@@ -3,20 +3,19 @@
 Source: MAVLink developer guide, "Command protocol". Sent again with a rising confirmation until an
 acknowledgement comes from the component that was addressed; IN_PROGRESS extends the wait.
 
-COMMAND_ACK names only the number of the command, so an answer to an earlier command of the same
-number could be taken for one to a later command. Therefore every send owes one answer: a new
-transaction counts as answered only by the first answer beyond those that earlier sends still owe
-(they lapse after late_ack_window), and it may send once more for each of them.
+Which answer is to which send: see unanswered.py. A transaction that must tell its answers from those
+to N earlier sends may send N times more.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.unanswered import UnansweredSends
 
 
 @dataclass(frozen=True)
@@ -49,15 +48,13 @@ class Command:
 
 @dataclass(frozen=True)
 class Acknowledgement:
-    """A COMMAND_ACK with its sender. target_* are 0 where the sender does not fill them."""
+    """A COMMAND_ACK with its sender."""
 
     system_id: int
     component_id: int
     number: int
     result: int
     progress: int = 255
-    target_system: int = 0
-    target_component: int = 0
 
 
 @dataclass(frozen=True)
@@ -66,6 +63,8 @@ class SendCommand:
 
     command: Command
     confirmation: int
+    #: Of the transaction that it belongs to; None: of none (send_once).
+    token: int | None = None
 
 
 @dataclass(frozen=True)
@@ -95,6 +94,9 @@ class CommandFinished:
 
 _Key = tuple[int, int, int]
 
+#: Family of the sends that nobody waits for.
+_NOBODY = 0
+
 
 def _key(command: Command) -> _Key:
     return (command.system_id, command.component_id, command.number)
@@ -102,13 +104,23 @@ def _key(command: Command) -> _Key:
 
 @dataclass
 class _Open:
-    token: int
+    tokens: list[int]
     command: Command
+    family: int
     started: float
     deadline: float
-    sends: int = 1
-    answers_to_pass: int = 0
-    send_times: list[float] = field(default_factory=list)
+    others: int
+    tries: int
+    sends: int = 0
+    answers: Counter[int] = field(default_factory=Counter)
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    token: int
+    command: Command
+    family: int
+    since: float
 
 
 class CommandTransactions:
@@ -119,72 +131,76 @@ class CommandTransactions:
         self.late_count = 0
         self.unexpected_count = 0
         self._open: dict[_Key, _Open] = {}
-        self._owed: dict[_Key, list[float]] = {}
-        self._waiting: dict[_Key, deque[tuple[int, Command]]] = {}
+        self._sends: dict[_Key, UnansweredSends] = {}
+        self._waiting: dict[_Key, deque[_Waiting]] = {}
         self._out: list[SendCommand] = []
         self._finished: list[CommandFinished] = []
 
-    def start(self, token: int, command: Command, now: float, urgent: bool = False) -> None:
-        """Send command; its end is reported with token.
+    def start(
+        self,
+        token: int,
+        command: Command,
+        now: float,
+        urgent: bool = False,
+        family: int | None = None,
+    ) -> None:
+        """Send command; its end is reported with token. family: by default the token.
 
-        While one of the same number to the same component is open, an urgent command takes its
-        place and any other waits for its turn.
+        While one of the same number to the same component is open, a command waits for its turn.
+        An urgent one does not: it joins one that asks for the very same, which is sent again at
+        once, or takes the place of any other; what waits is given up, lest it undo it.
         """
         key = _key(command)
+        family = token if family is None else family
         earlier = self._open.get(key)
         if earlier is not None and not urgent:
-            self._waiting.setdefault(key, deque()).append((token, command))
+            waiting = self._waiting.setdefault(key, deque())
+            waiting.append(_Waiting(token, command, family, now))
+            return
+        for other in self._waiting.pop(key, ()):
+            self._report(other.token, other.command, now - other.since, superseded=True)
+        if earlier is not None and earlier.command == command:
+            earlier.tokens.append(token)
+            earlier.tries = max(earlier.tries, earlier.sends + self.limits.tries)
+            self._send(earlier, now)
             return
         if earlier is not None:
             self._end(key, earlier, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
-        self._begin(key, token, command, now)
+        self._begin(key, _Waiting(token, command, family, now), now)
 
     def send_once(self, command: Command, now: float) -> None:
         """Send command once; nobody waits for its acknowledgement, and it confirms nothing else."""
         key = _key(command)
         self._out.append(SendCommand(command, 0))
-        self._owed.setdefault(key, []).append(now)
+        self._sends_of(key).add(_NOBODY, now)
         if key in self._open:
-            self._open[key].answers_to_pass += 1
-
-    def _begin(self, key: _Key, token: int, command: Command, now: float) -> None:
-        transaction = _Open(
-            token,
-            command,
-            started=now,
-            deadline=now + self.limits.ack_timeout,
-            send_times=[now],
-        )
-        transaction.answers_to_pass = len(self._still_owed(key, now))
-        self._open[key] = transaction
-        self._out.append(SendCommand(command, 0))
+            self._open[key].others += 1
 
     def acknowledged(self, ack: Acknowledgement, now: float) -> None:
         """An acknowledgement that is addressed to us came."""
         key = (ack.system_id, ack.component_id, ack.number)
-        transaction = self._open.get(key)
-        if transaction is None:
-            if self._still_owed(key, now):
-                self._owed[key].pop(0)
-                self.late_count += 1
-            else:
-                self.unexpected_count += 1
+        sends, transaction = self._sends.get(key), self._open.get(key)
+        if sends is None:
+            self.unexpected_count += 1
             return
+        others = 0 if transaction is None else sends.of_others(transaction.family, now)
         if ack.result == results.IN_PROGRESS:
-            if transaction.answers_to_pass:
+            sends.in_progress(now, self.limits.in_progress_timeout)
+            if transaction is None or others:
                 self.late_count += 1
             else:
                 transaction.deadline = now + self.limits.in_progress_timeout
             return
-        if transaction.answers_to_pass:
-            owed = self._still_owed(key, now)
-            if owed:
-                owed.pop(0)
-            transaction.answers_to_pass -= 1
+        if not sends.answer(now):
+            self.unexpected_count += 1
+            return
+        if transaction is None:
             self.late_count += 1
             return
-        # This answer settles one of the sends; the others may still be answered late.
-        transaction.send_times.pop(0)
+        transaction.answers[ack.result] += 1
+        if others and transaction.answers[ack.result] <= transaction.others:
+            self.late_count += 1
+            return
         self._end(key, transaction, ack.result, now)
         self._start_waiting(key, now)
 
@@ -193,16 +209,12 @@ class CommandTransactions:
         for key, transaction in list(self._open.items()):
             if now < transaction.deadline:
                 continue
-            still_owed = len(self._still_owed(key, now))
-            transaction.answers_to_pass = min(transaction.answers_to_pass, still_owed)
-            if transaction.sends >= min(self.limits.tries + transaction.answers_to_pass, 256):
+            others = self._sends_of(key).of_others(transaction.family, now)
+            if transaction.sends >= min(transaction.tries + others, 256):
                 self._end(key, transaction, results.NO_ACKNOWLEDGEMENT, now)
                 self._start_waiting(key, now)
-                continue
-            self._out.append(SendCommand(transaction.command, transaction.sends))
-            transaction.sends += 1
-            transaction.send_times.append(now)
-            transaction.deadline = now + self.limits.ack_timeout
+            else:
+                self._send(transaction, now)
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
@@ -219,46 +231,62 @@ class CommandTransactions:
         return finished
 
     def cancel(self, token: int, now: float) -> None:
-        """Whoever started this command does not want it any more."""
-        for waiting in self._waiting.values():
-            for entry in [entry for entry in waiting if entry[0] == token]:
-                waiting.remove(entry)
+        """Whoever started this command does not want it any more: nothing is sent or reported."""
+        for key, waiting in list(self._waiting.items()):
+            left = deque(entry for entry in waiting if entry.token != token)
+            if left:
+                self._waiting[key] = left
+            else:
+                del self._waiting[key]
         for key, transaction in list(self._open.items()):
-            if transaction.token == token:
-                self._end(key, transaction, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
-                self._start_waiting(key, now)
+            if token in transaction.tokens:
+                transaction.tokens.remove(token)
+                if not transaction.tokens:
+                    del self._open[key]
+                    self._start_waiting(key, now)
+
+    def _sends_of(self, key: _Key) -> UnansweredSends:
+        return self._sends.setdefault(key, UnansweredSends(self.limits.late_ack_window))
+
+    def _begin(self, key: _Key, start: _Waiting, now: float) -> None:
+        others = self._sends_of(key).of_others(start.family, now)
+        self._open[key] = _Open(
+            [start.token], start.command, start.family, now, now, others, self.limits.tries
+        )
+        self._send(self._open[key], now)
+
+    def _send(self, transaction: _Open, now: float) -> None:
+        confirmation = min(transaction.sends, 255)
+        token = transaction.tokens[-1]
+        self._out.append(SendCommand(transaction.command, confirmation, token))
+        self._sends_of(_key(transaction.command)).add(transaction.family, now)
+        transaction.sends += 1
+        transaction.deadline = now + self.limits.ack_timeout
 
     def _start_waiting(self, key: _Key, now: float) -> None:
         waiting = self._waiting.get(key)
         if not waiting:
             return
-        token, command = waiting.popleft()
+        start = waiting.popleft()
         if not waiting:
             del self._waiting[key]
-        self._begin(key, token, command, now)
-
-    def _still_owed(self, key: _Key, now: float) -> list[float]:
-        since = now - self.limits.late_ack_window
-        owed = [time for time in self._owed.get(key, []) if time > since]
-        if owed:
-            self._owed[key] = owed
-        else:
-            self._owed.pop(key, None)
-        return owed
+        self._begin(key, start, now)
 
     def _end(
         self, key: _Key, transaction: _Open, result: int, now: float, superseded: bool = False
     ) -> None:
         del self._open[key]
-        if transaction.send_times:
-            self._owed.setdefault(key, []).extend(transaction.send_times)
-        self._finished.append(
-            CommandFinished(
-                transaction.token,
-                transaction.command,
-                result,
-                transaction.sends,
-                now - transaction.started,
-                superseded,
-            )
-        )
+        seconds = now - transaction.started
+        for token in transaction.tokens:
+            self._report(token, transaction.command, seconds, superseded, result, transaction.sends)
+
+    def _report(
+        self,
+        token: int,
+        command: Command,
+        seconds: float,
+        superseded: bool = False,
+        result: int = results.NO_ACKNOWLEDGEMENT,
+        sends: int = 0,
+    ) -> None:
+        self._finished.append(CommandFinished(token, command, result, sends, seconds, superseded))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
 
+from chute_ros.errors import ParameterError
 from chute_ros.model import TriggerFlags
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.protocol.mavlink.commands import CommandLimits
@@ -43,3 +45,9 @@ class MavlinkConfig:
     #: Undo arming on the ground while flight is blocked.
     disarm_when_blocked: bool = True
     heartbeat_interval: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.heartbeat_interval < math.inf:
+            raise ParameterError(
+                f"heartbeat_interval is {self.heartbeat_interval}: need a time above 0 s"
+            )

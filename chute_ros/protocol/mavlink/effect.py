@@ -80,6 +80,7 @@ class Goal:
     shown: True once the device's own status shows the effect; None: the acknowledgement is all
     that there is to see. refresh: asks the device for the status that shows it.
     insist: no refusal but time ends the tries. urgent: does not queue behind another command.
+    hinders_release: makes the parachute less ready; gives way to a release.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Goal:
     refresh: Command | None = None
     insist: bool = False
     urgent: bool = False
+    hinders_release: bool = False
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ class EffectLoop:
         self._deadline = math.inf  # of the present phase
         self._refresh_at = math.inf
         self._accepted_after = math.nan
-        self._sends = 0
+        self._sent = False
         self._result = results.NO_ACKNOWLEDGEMENT
         self._answer = ""
         self._commands: list[Command] = []
@@ -135,18 +137,22 @@ class EffectLoop:
             self._end(True, f"{goal.effect} already; nothing was sent")
             return
         self._send()
-        self._reports.append(Report(token, Outcome.SENT, f"{goal.name} sent"))
 
     @property
     def ended(self) -> bool:
         """Nothing more will come of it."""
         return self.phase in _ENDED
 
+    def command_sent(self, command: Command) -> None:
+        """One of the goal's commands went out (it may have waited for its turn)."""
+        if command == self.goal.commands[-1] and not self._sent:
+            self._sent = True
+            self._reports.append(Report(self.token, Outcome.SENT, f"{self.goal.name} sent"))
+
     def command_finished(self, finished: CommandFinished, now: float) -> None:
         """The transaction of the goal's last command ended."""
         if self.phase is not Phase.WAIT_ACKNOWLEDGEMENT:
             return
-        self._sends += finished.sends
         self._answer = finished.text()
         if finished.result != results.NO_ACKNOWLEDGEMENT:
             self._result = finished.result
@@ -158,7 +164,7 @@ class EffectLoop:
             self._deadline = now + self._limits.effect_timeout
             self._refresh(now)
             self.effect_may_show(now)
-        elif finished.superseded or not self._worth_another_try(finished.result):
+        elif not self._worth_another_try(finished):
             self._take(Happening.REFUSED, now)
             self._end(False, f"{self.goal.name} {self._answer}")
         else:
@@ -187,11 +193,18 @@ class EffectLoop:
         else:
             self._end(True, f"{self.goal.effect} after {seconds:.2f} s; {acknowledged}")
 
+    def abandon(self, why: str, now: float) -> None:
+        """It is not wanted any more."""
+        if self.ended:
+            return
+        self._take(Happening.GIVE_UP, now)
+        self._end(False, f"{self.goal.name} given up: {why}")
+
     def update(self, now: float) -> None:
         """Look at the clock."""
         if self.ended:
             return
-        if now - self._started >= self._limits.give_up_after:
+        if now >= self._started + self._limits.give_up_after:
             self._take(Happening.GIVE_UP, now)
             self._end(False, self._what_did_not_come(now))
             return
@@ -236,9 +249,11 @@ class EffectLoop:
             self._refreshes.append(self.goal.refresh)
             self._refresh_at = now + self._limits.retry_interval
 
-    def _worth_another_try(self, result: int) -> bool:
+    def _worth_another_try(self, finished: CommandFinished) -> bool:
+        if finished.superseded:
+            return self.goal.urgent
         not_now = (results.TEMPORARILY_REJECTED, results.NO_ACKNOWLEDGEMENT)
-        return self.goal.insist or result in not_now
+        return self.goal.insist or finished.result in not_now
 
     def _what_did_not_come(self, now: float) -> str:
         text = f"{self.goal.name} given up after {now - self._started:.1f} s: "
@@ -247,6 +262,8 @@ class EffectLoop:
                 f"acknowledged after {self._accepted_after:.2f} s, "
                 f"but the device's own status never showed: {self.goal.effect}"
             )
+        if not self._sent:
+            return f"{text}never sent: an earlier command of the same number was under way"
         answer = self._answer or "no acknowledgement came"
         if self.goal.shown is None:
             return text + answer

@@ -7,8 +7,9 @@ search goes on at its second byte, and every dropped byte is counted under a rea
 
 from __future__ import annotations
 
+import math
 import struct
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,119 +64,142 @@ class FrameDecoder:
         self.counts: Counter[str] = Counter() if counts is None else counts
         self._verifier = verifier
         self._buffer = bytearray()
-        self._buffer_since = 0.0
+        #: (time of receipt, how many) of the bytes in the buffer, oldest first.
+        self._received: deque[tuple[float, int]] = deque()
         self._reader = dialect.MAVLink(None)
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
         """Frames completed by data, the next bytes of a stream; the rest is kept for the next call."""
-        frames: list[Frame] = []
-        if self._buffer and now - self._buffer_since > LONGEST_FRAME_TIME:
-            # A false start mark must not hold back the true frames behind it.
-            self.counts[NOISE] += 1
-            del self._buffer[0]
-            frames = self._take(now)
-        self._buffer += data
+        frames = self.update(now)
+        if data:
+            self._buffer += data
+            self._received.append((now, len(data)))
         return frames + self._take(now)
 
-    def _take(self, now: float) -> list[Frame]:
-        frames, used = self._scan(self._buffer, now)
-        del self._buffer[:used]
-        if used or not self._buffer_since:
-            self._buffer_since = now
+    def update(self, now: float) -> list[Frame]:
+        """Look at the clock: a false start mark must not hold back the true frames behind it."""
+        frames: list[Frame] = []
+        while self.next_deadline() <= now:
+            self.counts[NOISE] += 1
+            self._drop(1)
+            frames += self._take(now)
         return frames
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return self._received[0][0] + LONGEST_FRAME_TIME if self._received else math.inf
 
     def feed_datagram(self, data: bytes, now: float) -> list[Frame]:
         """Frames in data, a datagram: none continues in the next one."""
-        frames, used = self._scan(data, now)
-        if used < len(data):
-            self.counts[TRUNCATED] += 1
+        frames: list[Frame] = []
+        rest = data
+        truncated = False
+        while rest:
+            found, used = self._scan(rest, now)
+            frames += found
+            rest = rest[used:]
+            # What looks like the start of a longer frame may be noise before a true one.
+            truncated = truncated or bool(rest)
+            rest = rest[1:]
+        self.counts[TRUNCATED] += truncated
         return frames
+
+    def _take(self, now: float) -> list[Frame]:
+        frames, used = self._scan(self._buffer, now)
+        self._drop(used)
+        return frames
+
+    def _drop(self, used: int) -> None:
+        del self._buffer[:used]
+        while used:
+            received, size = self._received.popleft()
+            if size > used:
+                self._received.appendleft((received, size - used))
+            used -= min(size, used)
 
     def _scan(self, data: bytes | bytearray, now: float) -> tuple[list[Frame], int]:
         frames: list[Frame] = []
         position, size = 0, len(data)
         while position < size:
-            magic = data[position]
-            if magic not in (MAGIC_V1, MAGIC_V2):
-                self.counts[NOISE] += 1
-                position += 1
-                continue
             length = self._frame_length(data, position)
+            if length == 0 or position + length > size:
+                break
             if length < 0:
                 self.counts[NOISE] += 1
                 position += 1
                 continue
-            if length == 0 or position + length > size:
-                break
-            frame = self._read(bytes(data[position : position + length]), now)
-            if frame is None:
-                position += self._skip(data, position, length)
-            else:
-                position += length
-                if frame.message is not None:
-                    frames.append(frame)
+            frame, used = self._read(bytes(data[position : position + length]), now)
+            position += used
+            if frame is not None:
+                frames.append(frame)
         return frames, position
 
     @staticmethod
     def _frame_length(data: bytes | bytearray, position: int) -> int:
         """Length of the frame that starts at position; 0: too few bytes to tell; -1: no frame."""
         have = len(data) - position
-        version_1 = data[position] == MAGIC_V1
-        header = _HEADER_V1 if version_1 else _HEADER_V2
-        if have < header:
-            return 0
-        payload = data[position + 1]
-        if version_1:
-            message_id = data[position + 5]
-            signature = 0
-        else:
-            message_id = int.from_bytes(data[position + 7 : position + 10], "little")
-            signature = _SIGNATURE if data[position + 2] & _FLAG_SIGNED else 0
-        kind = dialect.mavlink_map.get(message_id)
-        if kind is not None and payload > kind.unpacker.size:
+        if data[position] == MAGIC_V1:
+            if have < _HEADER_V1:
+                return 0
+            payload = data[position + 1]
+            kind = dialect.mavlink_map.get(data[position + 5])
+            if kind is not None and payload > kind.unpacker.size:
+                return -1
+            return _HEADER_V1 + payload + _CHECKSUM
+        if data[position] != MAGIC_V2:
             return -1
-        return header + payload + _CHECKSUM + signature
+        if have < _HEADER_V2:
+            return 0
+        # A payload longer than ours may be: a newer dialect has more extension fields.
+        signature = _SIGNATURE if data[position + 2] & _FLAG_SIGNED else 0
+        return _HEADER_V2 + data[position + 1] + _CHECKSUM + signature
 
-    def _read(self, raw: bytes, now: float) -> Frame | None:
-        """The frame in raw. None: no valid frame; a frame without message: valid, but refused."""
+    def _read(self, raw: bytes, now: float) -> tuple[Frame | None, int]:
+        """The frame in raw, if it is good, and after how many bytes the search goes on.
+
+        A true frame that is not for us is passed over whole, so that nothing inside it is taken
+        for a frame; in one that is damaged the length may be the damage.
+        """
         version = 2 if raw[0] == MAGIC_V2 else 1
         signed = False
         if version == 2:
             if raw[2] & ~_FLAG_SIGNED:
                 self.counts[UNKNOWN_FLAGS] += 1
-                return None
+                return None, 1
             signed = bool(raw[2] & _FLAG_SIGNED)
             sequence, system_id, component_id = raw[4], raw[5], raw[6]
             message_id = int.from_bytes(raw[7:10], "little")
         else:
             sequence, system_id, component_id, message_id = raw[2], raw[3], raw[4], raw[5]
         if message_id not in dialect.mavlink_map:
-            self.counts[UNKNOWN_MESSAGE] += 1
-            return None
+            whole = _checksum_may_fit(raw[: len(raw) - _SIGNATURE] if signed else raw)
+            self.counts[UNKNOWN_MESSAGE if whole else NOISE] += 1
+            return None, len(raw) if whole else 1
         try:
             message = self._reader.decode(bytearray(raw))
         except dialect.MAVError:
             # Length, id and flags are checked above: what is left to fail is the checksum.
             self.counts[BAD_CHECKSUM] += 1
-            return None
+            return None, 1
         if self._verifier is not None:
             refusal = self._verifier.refusal(raw, signed, message_id, now)
             if refusal:
                 self.counts[refusal] += 1
-                message = None
-        return Frame(message, system_id, component_id, sequence, version, signed)
+                return None, len(raw)
+        return Frame(message, system_id, component_id, sequence, version, signed), len(raw)
 
-    @staticmethod
-    def _skip(data: bytes | bytearray, position: int, length: int) -> int:
-        """How far to go on after a frame that could not be read.
 
-        Where another frame, or the end, follows directly, the length was right and the frame is
-        skipped whole; otherwise the length may be the damage, and only the first byte is.
-        """
-        end = position + length
-        if end == len(data) or data[end] in (MAGIC_V1, MAGIC_V2):
-            return length
-        return 1
+def _checksum_may_fit(raw: bytes) -> bool:
+    """Some CRC_EXTRA makes the checksum right: one false start in 256 passes, every true frame does."""
+    checksum = int.from_bytes(raw[-_CHECKSUM:], "little")
+    state: int = dialect.x25crc(raw[1:-_CHECKSUM]).crc
+    # The last step of the checksum (CRC-16/MCRF4XX) takes CRC_EXTRA in.
+    for extra in range(256):
+        mixed = extra ^ (state & 0xFF)
+        mixed = (mixed ^ (mixed << 4)) & 0xFF
+        if checksum == (state >> 8) ^ (mixed << 8) ^ (mixed << 3) ^ (mixed >> 4):
+            return True
+    return False
 
 
 class FrameEncoder:

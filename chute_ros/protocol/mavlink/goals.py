@@ -1,4 +1,4 @@
-"""The goals that the MAVLink parachute protocol knows: which commands, and what shows their effect.
+"""The goals of the MAVLink parachute protocol: which commands, and what shows their effect.
 
 Sources: Parachute Protocol (MAV_CMD_SET_PARACHUTE_ARM, PARACHUTE_STATUS), MAVLink common.xml
 (MAV_CMD_DO_PARACHUTE, MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_COMPONENT_ARM_DISARM,
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.model import TriggerFlags, flag_names
+from chute_ros.model import LinkState, TriggerFlags, flag_names
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Command
 from chute_ros.protocol.mavlink.config import KillMethod
@@ -21,6 +21,8 @@ from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 #: param2 of MAV_CMD_COMPONENT_ARM_DISARM that makes the autopilot disarm in flight.
 FORCE_DISARM = 21196.0
 
+#: Whole numbers up to here are exact in a param, which is a 32-bit float.
+MOST_EXACT = 2**24
 
 #: Name of the goal that fires.
 RELEASE = "release"
@@ -45,9 +47,10 @@ def set_triggers(
         fresh = parachute.status_received > now
         return fresh and parachute.armed_triggers & select == arm & select
 
+    disarmed = TriggerFlags(int(select) & ~int(arm))
     changed = ", ".join(
-        f"{name} {'armed' if int(arm) & int(TriggerFlags[name]) else 'disarmed'}"
-        for name in flag_names(select)
+        [f"{name} armed" for name in flag_names(select & arm)]
+        + [f"{name} disarmed" for name in flag_names(disarmed)]
     )
     return Goal(
         "MAV_CMD_SET_PARACHUTE_ARM",
@@ -55,11 +58,21 @@ def set_triggers(
         f"PARACHUTE_STATUS says {changed}",
         shown,
         request_status(parachute),
+        hinders_release=bool(disarmed),
     )
 
 
-def release(parachute: ParachuteTracker, force: bool) -> Goal:
-    """Release the parachute; with force its flight-controller trigger is armed on the way."""
+def release(parachute: ParachuteTracker, force: bool, now: float) -> Goal:
+    """Release the parachute; with force its flight-controller trigger is armed on the way.
+
+    A status from before the order is believed only while device and status stream are alive: what
+    a lost device said long ago must not keep us from sending.
+    """
+    alive = parachute.liveness.state is LinkState.OK and not parachute.status_overdue(now)
+
+    def shown() -> bool:
+        return parachute.deployed and (alive or parachute.status_received > now)
+
     commands: tuple[Command, ...] = (
         command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(dialect.PARACHUTE_RELEASE)),
     )
@@ -71,20 +84,27 @@ def release(parachute: ParachuteTracker, force: bool) -> Goal:
         RELEASE,
         commands,
         "PARACHUTE_STATUS says deployed",
-        lambda: parachute.deployed,
+        shown,
         request_status(parachute),
         insist=force,
         urgent=True,
     )
 
 
+#: The actions of MAV_CMD_DO_PARACHUTE that do not fire.
+ACTION_NAMES: dict[int, str] = {
+    dialect.PARACHUTE_DISABLE: "disable",
+    dialect.PARACHUTE_ENABLE: "enable",
+}
+
+
 def parachute_action(parachute: ParachuteTracker, action: int) -> Goal:
     """MAV_CMD_DO_PARACHUTE disable or enable; the status has no field that shows it."""
-    names = {dialect.PARACHUTE_DISABLE: "disable", dialect.PARACHUTE_ENABLE: "enable"}
     return Goal(
-        f"MAV_CMD_DO_PARACHUTE {names[action]}",
+        f"MAV_CMD_DO_PARACHUTE {ACTION_NAMES[action]}",
         (command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(action)),),
         "acknowledged",
+        hinders_release=action == dialect.PARACHUTE_DISABLE,
     )
 
 
@@ -156,9 +176,7 @@ def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Goal,
     return Goal(f"request of {name}", (ask,), f"{name} came", watch.seen), watch
 
 
-def set_message_interval(
-    parachute: ParachuteTracker, message_id: int, interval_us: int
-) -> Goal:
+def set_message_interval(parachute: ParachuteTracker, message_id: int, interval_us: int) -> Goal:
     """Set the interval of a message (MAV_CMD_SET_MESSAGE_INTERVAL), microseconds."""
     order = command(
         parachute,
@@ -170,7 +188,7 @@ def set_message_interval(
 
 
 def read_message_interval(parachute: ParachuteTracker, message_id: int) -> tuple[Goal, Watch]:
-    """Ask how often a message is sent (MESSAGE_INTERVAL, asked for with MAV_CMD_REQUEST_MESSAGE)."""
+    """Ask how often a message is sent: a MAV_CMD_REQUEST_MESSAGE of MESSAGE_INTERVAL."""
     watch = Watch(
         parachute.system_id,
         parachute.component_id,
@@ -181,5 +199,3 @@ def read_message_interval(parachute: ParachuteTracker, message_id: int) -> tuple
     wanted = float(dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL)
     ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, float(message_id))
     return Goal("request of MESSAGE_INTERVAL", (ask,), "MESSAGE_INTERVAL came", watch.seen), watch
-
-

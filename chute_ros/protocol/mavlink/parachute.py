@@ -24,6 +24,7 @@ from chute_ros.model import (
     flag_names,
 )
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.boot_clock import Age, BootClock
 from chute_ros.protocol.mavlink.dialect import dialect
 
 _UNHEALTHY_STATES = {
@@ -32,7 +33,10 @@ _UNHEALTHY_STATES = {
     dialect.MAV_STATE_POWEROFF: "powering off",
     dialect.MAV_STATE_FLIGHT_TERMINATION: "flight termination",
 }
-_STARTING_STATES = {dialect.MAV_STATE_BOOT: "starting", dialect.MAV_STATE_CALIBRATING: "calibrating"}
+_STARTING_STATES = {
+    dialect.MAV_STATE_BOOT: "starting",
+    dialect.MAV_STATE_CALIBRATING: "calibrating",
+}
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
@@ -106,6 +110,7 @@ class ParachuteTracker:
         self.status_received = math.nan
         self.status_interval = math.nan  # s, between the two newest
         self.reboot_count = 0
+        self._clock = BootClock()
         self._limits = status
         self._system_status = 0
         self._message: Any = None
@@ -113,7 +118,7 @@ class ParachuteTracker:
 
     @property
     def device(self) -> str:
-        """"system/component"."""
+        """ "system/component"."""
         return f"{self.system_id}/{self.component_id}"
 
     @property
@@ -133,8 +138,11 @@ class ParachuteTracker:
 
     def parachute_status(self, message: Any, now: float) -> None:
         """A PARACHUTE_STATUS of the device."""
-        if self._message is not None and message.time_boot_ms + 1000 < self._message.time_boot_ms:
-            self.reboot_count += 1
+        age = self._clock.observe(message.time_boot_ms)
+        self.reboot_count += age is Age.RESTARTED
+        if age in (Age.OLD, Age.DOUBTFUL):
+            # Delayed: it must not undo what a newer one said.
+            return
         self.status_interval = now - self.status_received
         self.status_received = now
         self._overdue = False
@@ -145,8 +153,9 @@ class ParachuteTracker:
         self.information = component_information(message)
 
     def status_overdue(self, now: float) -> bool:
-        """The status stream stopped: the newest is older than the limit, though the link may live."""
-        return now - self.status_received >= self._limits.status_timeout
+        """The status stream stopped: the newest is too old, though the link may live."""
+        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        return now >= self.status_received + self._limits.status_timeout
 
     def update(self, now: float) -> tuple[list[LinkChange], bool]:
         """Look at the clock: (what changed of the link, whether the picture changed)."""
@@ -167,13 +176,13 @@ class ParachuteTracker:
         message = self._message
         if message is None:
             return ParachuteStatus(
-                self.device, self.liveness.state, self._state(now, faults), faults=tuple(faults)
+                self.device, self.liveness.state, self._state(now), faults=tuple(faults)
             )
         date, wrong = packed_date(message.parachute_packed_date)
         return ParachuteStatus(
             device=self.device,
             link_state=self.liveness.state,
-            state=self._state(now, faults),
+            state=self._state(now),
             armed=bool(self.armed_triggers & TRIGGER_SOURCES),
             deployed=self.deployed,
             deployment_trigger=message.deployment_status,
@@ -188,20 +197,30 @@ class ParachuteTracker:
             faults=tuple([*faults, wrong] if wrong else faults),
         )
 
+    @property
+    def _errors(self) -> ErrorFlags:
+        """The error flags that matter. On whole numbers: ~ of a flag drops the unnamed bits."""
+        return ErrorFlags(self._message.error_status & ~int(self._limits.ignored_errors))
+
+    @property
+    def _unhealthy(self) -> str:
+        """What is wrong by the heartbeat; empty: nothing."""
+        if self._system_status > dialect.MAV_STATE_FLIGHT_TERMINATION:
+            return f"state {self._system_status}, which has no name"
+        return _UNHEALTHY_STATES.get(self._system_status, "")
+
     def _faults(self, now: float) -> list[str]:
         faults = []
         silence = self.liveness.age(now)
         if self.liveness.state in (LinkState.STALE, LinkState.LOST):
             faults.append(f"heartbeat {self.liveness.state.name}: {silence:.1f} s old")
-        if self._system_status in _UNHEALTHY_STATES:
-            faults.append(f"heartbeat says {_UNHEALTHY_STATES[self._system_status]}")
+        if self._unhealthy:
+            faults.append(f"heartbeat says {self._unhealthy}")
         if self._message is None:
-            faults.append("no PARACHUTE_STATUS received")
-            return faults
+            return [*faults, "no PARACHUTE_STATUS received"]
         if self.status_overdue(now):
             faults.append(f"PARACHUTE_STATUS {now - self.status_received:.1f} s old")
-        errors = ErrorFlags(self._message.error_status)
-        faults += flag_names(errors & ~self._limits.ignored_errors)
+        faults += flag_names(self._errors)
         if self._message.deployment_status > max(DeploymentTrigger):
             faults.append(f"deployment trigger {self._message.deployment_status} has no name")
         for kind, flags in (
@@ -211,7 +230,7 @@ class ParachuteTracker:
             faults += [f"{kind} {name} has no name" for name in flags if name.startswith("bit ")]
         return faults
 
-    def _state(self, now: float, faults: list[str]) -> ParachuteState:
+    def _state(self, now: float) -> ParachuteState:
         """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest."""
         message = self._message
         if message is not None and message.deployment_status != 0:
@@ -221,8 +240,7 @@ class ParachuteTracker:
             return ParachuteState.NOT_READY
         if self.liveness.state is LinkState.NEVER_SEEN or message is None:
             return ParachuteState.UNKNOWN
-        errors = ErrorFlags(message.error_status) & ~self._limits.ignored_errors
-        if errors or self._system_status in _UNHEALTHY_STATES or self.status_overdue(now):
+        if self._errors or self._unhealthy or self.status_overdue(now):
             return ParachuteState.ABNORMAL
         if self.armed_triggers & TRIGGER_SOURCES:
             return ParachuteState.ARMED

@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from typing import Generic, Protocol, TypeVar
 
+from chute_ros.protocol.liveness import Liveness
+
 
 class Device(Protocol):
     """What a roster knows of a device."""
 
+    liveness: Liveness
+
     @property
     def device(self) -> str:
-        """"system/component"."""
+        """ "system/component"."""
 
 
 DeviceT = TypeVar("DeviceT", bound=Device)
@@ -32,13 +36,15 @@ class Roster(Generic[DeviceT]):
         self.system_id = system_id
         self.component_id = component_id
         self.refused_count = 0
-        self._named = system_id != 0
+        #: The system was named by a parameter, not taken as the first one heard.
+        self.fixed = system_id != 0
         self._ours: dict[tuple[int, int], DeviceT] = {}
         self._other_systems: set[int] = set()
 
     def admits(self, system_id: int, component_id: int) -> bool:
-        """Is a device with these ids ours? The first system heard becomes ours if none was named."""
-        if self.component_id not in (0, component_id):
+        """Is a device with these ids ours? If no system was named, the first one heard is."""
+        if system_id == 0 or self.component_id not in (0, component_id):
+            # A command to system 0 would go to every vehicle.
             return False
         if self.system_id == 0:
             self.system_id = system_id
@@ -68,7 +74,7 @@ class Roster(Generic[DeviceT]):
 
     def doubt(self) -> str:
         """Why the choice is doubtful; empty: it is not."""
-        if self._named or not self._other_systems:
+        if self.fixed or not self._other_systems:
             return ""
         systems = sorted({self.system_id, *self._other_systems})
         return (

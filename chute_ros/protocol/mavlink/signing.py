@@ -39,9 +39,12 @@ def key_from_text(text: bytes, name: str) -> bytes:
     stripped = text.strip()
     if len(stripped) == 2 * KEY_BYTES:
         try:
-            return bytes.fromhex(stripped.decode("ascii"))
+            key = bytes.fromhex(stripped.decode("ascii"))
         except ValueError:
-            pass
+            key = b""
+        # fromhex passes over spaces, which would leave a shorter key.
+        if len(key) == KEY_BYTES:
+            return key
     raise SigningKeyError(
         f"{name} holds {len(text)} bytes that are no key: need 32 raw bytes or 64 hexadecimal "
         "digits (make one with: head -c 32 /dev/urandom > FILE; chmod 600 FILE)"

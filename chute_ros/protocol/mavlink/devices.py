@@ -1,0 +1,171 @@
+"""Our parachutes and our autopilot on one MAVLink network: who they are and what they say.
+
+It only listens. What is sent to them, and when, is the business of MavlinkLink.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from chute_ros.model import LinkState, VehicleState
+from chute_ros.protocol.liveness import LinkChange
+from chute_ros.protocol.mavlink.autopilot import AutopilotTracker, is_autopilot
+from chute_ros.protocol.mavlink.config import MavlinkConfig
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.events import (
+    DeviceLinkChanged,
+    Event,
+    Notice,
+    ParachuteChanged,
+    Severity,
+    VehicleChanged,
+)
+from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+from chute_ros.protocol.mavlink.roster import DeviceT, Roster
+
+Ids = tuple[int, int]
+
+
+class Devices:
+    """Follows the devices that are ours, each known by its heartbeat's type and its ids."""
+
+    def __init__(self, config: MavlinkConfig) -> None:
+        self.parachutes: Roster[ParachuteTracker] = Roster(
+            "parachute", config.parachute_system_id, config.parachute_component_id
+        )
+        self.autopilots: Roster[AutopilotTracker] = Roster(
+            "autopilot", config.autopilot_system_id, config.autopilot_component_id
+        )
+        self._config = config
+        self._events: list[Event] = []
+
+    # -- who -------------------------------------------------------------------------------------
+
+    def chosen_parachute(self) -> ParachuteTracker | None:
+        """Where requests without a device go: the first that is not lost, or the first."""
+        return _first_alive(self.parachutes)
+
+    def chosen_autopilot(self) -> AutopilotTracker | None:
+        """The first autopilot of ours that is not lost, or the first."""
+        return _first_alive(self.autopilots)
+
+    def doubts(self) -> list[str]:
+        """Why it is doubtful which devices are ours."""
+        doubts = [self.parachutes.doubt(), self.autopilots.doubt()]
+        both = self.parachutes.all() and self.autopilots.all()
+        if both and self.parachutes.system_id != self.autopilots.system_id:
+            unset = [f"{self.parachutes.kind}_system_id"] if not self.parachutes.fixed else []
+            unset += [f"{self.autopilots.kind}_system_id"] if not self.autopilots.fixed else []
+            if unset:
+                doubts.append(
+                    f"the parachute is of system {self.parachutes.system_id}, the autopilot of "
+                    f"system {self.autopilots.system_id}: set {' and '.join(unset)}"
+                )
+        return [doubt for doubt in doubts if doubt]
+
+    # -- what they say ---------------------------------------------------------------------------
+
+    def heard(self, message: Any, ids: Ids, now: float) -> None:
+        """A message of anybody on the network."""
+        if message.get_type() != "HEARTBEAT":
+            self._from_parachute(message, ids, now)
+            self._from_autopilot(message, ids, now)
+        elif message.type == dialect.MAV_TYPE_PARACHUTE:
+            self._parachute_heartbeat(message, ids, now)
+        elif is_autopilot(message):
+            self._autopilot_heartbeat(message, ids, now)
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        for parachute in self.parachutes.all():
+            changes, picture_changed = parachute.update(now)
+            self._changed(f"parachute {parachute.device}", changes)
+            if picture_changed:
+                self._events.append(ParachuteChanged(parachute.status(now)))
+        for autopilot in self.autopilots.all():
+            changes = autopilot.liveness.update(now)
+            self._changed(f"autopilot {autopilot.device}", changes)
+            if changes:
+                self._vehicle_changed(now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        deadlines = [p.next_deadline() for p in self.parachutes.all()]
+        deadlines += [a.liveness.next_deadline() for a in self.autopilots.all()]
+        return min(deadlines, default=math.inf)
+
+    def vehicle_state(self, now: float) -> VehicleState:
+        """The picture of our autopilot's vehicle."""
+        autopilot = self.chosen_autopilot()
+        return VehicleState() if autopilot is None else autopilot.vehicle_state(now)
+
+    def take_events(self) -> list[Event]:
+        """What happened, oldest first; each is handed out once."""
+        events, self._events = self._events, []
+        return events
+
+    def notice(self, severity: Severity, text: str) -> None:
+        """Put a notice among the events."""
+        self._events.append(Notice(severity, text))
+
+    def _parachute_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
+        if not self.parachutes.admits(*ids):
+            return
+        parachute = self.parachutes.get(*ids)
+        if parachute is None:
+            config = self._config
+            parachute = ParachuteTracker(*ids, config.parachute_liveness, config.status)
+            self.parachutes.add(*ids, parachute)
+        self._changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
+        self._events.append(ParachuteChanged(parachute.status(now)))
+
+    def _autopilot_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
+        if not self.autopilots.admits(*ids):
+            return
+        autopilot = self.autopilots.get(*ids)
+        if autopilot is None:
+            autopilot = AutopilotTracker(*ids, self._config.autopilot_liveness)
+            self.autopilots.add(*ids, autopilot)
+        self._changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
+        self._vehicle_changed(now)
+
+    def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:
+        parachute = self.parachutes.get(*ids)
+        if parachute is None:
+            return
+        kind = message.get_type()
+        if kind == "PARACHUTE_STATUS":
+            reboots = parachute.reboot_count
+            parachute.parachute_status(message, now)
+            if parachute.reboot_count > reboots:
+                text = f"parachute {parachute.device} restarted"
+                self.notice(Severity.ERROR, text)
+            self._events.append(ParachuteChanged(parachute.status(now)))
+        elif kind == "COMPONENT_INFORMATION_BASIC":
+            parachute.component_information(message)
+
+    def _from_autopilot(self, message: Any, ids: Ids, now: float) -> None:
+        autopilot = self.autopilots.get(*ids)
+        if autopilot is None:
+            return
+        reboots = autopilot.reboot_count
+        changed = autopilot.message(message, now)
+        if autopilot.reboot_count > reboots:
+            where = "in flight" if autopilot.rebooted_in_flight else "on the ground"
+            text = f"autopilot {autopilot.device} restarted {where}"
+            self.notice(Severity.ERROR, text)
+        if changed:
+            self._vehicle_changed(now)
+
+    def _vehicle_changed(self, now: float) -> None:
+        self._events.append(VehicleChanged(self.vehicle_state(now)))
+
+    def _changed(self, name: str, changes: list[LinkChange]) -> None:
+        self._events += [DeviceLinkChanged(name, change) for change in changes]
+
+
+def _first_alive(roster: Roster[DeviceT]) -> DeviceT | None:
+    ours = roster.all()
+    alive = (device for device in ours if device.liveness.state is not LinkState.LOST)
+    return next(alive, ours[0] if ours else None)

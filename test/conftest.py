@@ -1,0 +1,52 @@
+"""What all tests share: deadlines instead of sleeps, and a ROS of their own.
+
+No test may reach a real vehicle, nor another run: the ROS domain is reserved among all runs on
+this host, discovery stays on this host, and each test has a namespace of its own.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+#: How long anything that must happen may take on a busy machine, s.
+PATIENCE = 20.0
+
+
+@pytest.fixture(scope="session")
+def await_until() -> Callable[..., None]:
+    """await_until(condition, what): returns once condition() holds, fails after PATIENCE."""
+
+    def wait(condition: Callable[[], object], what: str, seconds: float = PATIENCE) -> None:
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, f"not within {seconds:g} s: {what}"
+            time.sleep(0.002)
+
+    return wait
+
+
+@pytest.fixture(scope="session")
+def ros() -> Iterator[str]:
+    """rclpy in a domain of this run; yields the run's namespace."""
+    # Not at the top: the pure tests run without ROS.
+    import rclpy
+
+    from chute_ros.tools.isolation import isolated_ros
+
+    with isolated_ros() as namespace:
+        rclpy.init(args=[])
+        yield namespace
+        rclpy.shutdown()
+
+
+_numbers = itertools.count(1)
+
+
+@pytest.fixture
+def namespace(ros: str) -> str:
+    """A namespace for one test."""
+    return f"{ros}/test_{next(_numbers)}"

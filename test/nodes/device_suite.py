@@ -1,0 +1,281 @@
+"""The stories that every device node must pass, whatever its link.
+
+A test module of a device node subclasses DeviceSuite and says in make_device how its simulated
+device is plugged in. The names and texts below are the contract of all links.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision
+from chute_msgs.srv import Arm, Deploy
+from node_bench import Bench, stamped
+from simulated_device import SimulatedDevice
+
+from chute_ros.model import Action, LinkState, Outcome, ParachuteState
+from chute_ros.nodes import qos
+
+#: Parameters of every device node, quickened.
+HEARTBEAT_RATE = 50.0
+
+
+class DeviceSuite:
+    """Inherit, name the node, and give it a device."""
+
+    #: The node's name, which is its link's name as well.
+    name: str
+
+    def make(self, bench: Bench, **parameters: Any) -> SimulatedDevice:
+        """Start the node with short limits (stale 0.4 s, lost 0.8 s); its device, unplugged."""
+        raise NotImplementedError
+
+    # -- what the stories say -----------------------------------------------------------------
+
+    @pytest.fixture
+    def device(self, bench: Bench) -> SimulatedDevice:
+        self.bench = bench
+        self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+        self.statuses = bench.follow(ParachuteStatus, "parachute/status")
+        self.reports = bench.follow(ActionReport, "safety/action", qos.DECISION)
+        self.numbers = iter(range(1, 1000))
+        return self.make(bench, heartbeat_rate=HEARTBEAT_RATE)
+
+    def plugged(self, device: SimulatedDevice) -> None:
+        device.plug_in()
+        self.await_link(LinkState.OK)
+        self.bench.until(
+            lambda: self.beats[-1].device_healthy and self.statuses, "the device is healthy"
+        )
+
+    def armed(self, device: SimulatedDevice) -> None:
+        self.plugged(device)
+        answer = self.bench.call(Arm, f"{self.name}/arm", arm=True)
+        assert answer.success, answer.message
+
+    def await_link(self, state: LinkState) -> None:
+        self.bench.until(
+            lambda: self.beats and self.beats[-1].link_state == state, f"the link is {state.name}"
+        )
+
+    def decide(self, action: Action, **fields: Any) -> SafetyDecision:
+        """Publish a decision as the supervisor would."""
+        age = fields.pop("age", 0.0)
+        values = {"epoch": 1, "id": next(self.numbers), "targets": [self.name]} | fields
+        message = SafetyDecision(action=int(action), rule="test", reasons=["a test"], **values)
+        stamped(self.bench.client, message, age)
+        self.bench.publish(message, "safety/decision", qos.DECISION)
+        return message
+
+    def await_report(self, outcome: Outcome, decision: SafetyDecision) -> ActionReport:
+        order = (decision.epoch, decision.id)
+
+        def found() -> ActionReport | None:
+            matching = (r for r in self.reports if (r.epoch, r.id) == order)
+            return next((r for r in matching if r.outcome == outcome), None)
+
+        return self.bench.until(found, f"{outcome.name} is reported")
+
+    # -- link states --------------------------------------------------------------------------
+
+    def test_never_seen_ok_stale_lost_and_regained(self, device: SimulatedDevice) -> None:
+        self.await_link(LinkState.NEVER_SEEN)
+        assert self.beats[-1].age != self.beats[-1].age, "not known is NaN"
+        self.plugged(device)
+        assert self.beats[-1].device_healthy
+        device.fall_silent()
+        self.await_link(LinkState.STALE)
+        assert not self.beats[-1].device_healthy
+        self.await_link(LinkState.LOST)
+        assert self.beats[-1].age >= 0.8
+        device.speak_again()
+        self.await_link(LinkState.OK)
+        told = [beat.link_state for beat in self.beats]
+        assert list(dict.fromkeys(told)) == [0, 1, 2, 3], "none is left out"
+        told = [status.link_state for status in self.statuses]
+        assert list(dict.fromkeys(told)) == [1, 2, 3], "the status tells the same"
+        assert told[-1] == LinkState.OK or self.bench.until(
+            lambda: self.statuses[-1].link_state == LinkState.OK, "the status is back, too"
+        )
+
+    def test_its_heartbeat_is_numbered_and_signed(self, device: SimulatedDevice) -> None:
+        self.bench.until(lambda: len(self.beats) >= 5, "it beats")
+        numbers = [beat.seq for beat in self.beats]
+        assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+        assert {beat.link for beat in self.beats} == {self.name}
+        assert not any(beat.supervisor for beat in self.beats)
+
+    def test_a_device_that_breaks_down_is_not_healthy(self, device: SimulatedDevice) -> None:
+        self.plugged(device)
+        fault = device.break_down()
+        self.bench.until(
+            lambda: any(fault in text for text in self.statuses[-1].faults), "the fault is told"
+        )
+        self.bench.until(lambda: not self.beats[-1].device_healthy, "the heartbeat says so")
+        assert self.beats[-1].link_state == LinkState.OK, "the wire itself is well"
+        assert self.statuses[-1].state == ParachuteState.ABNORMAL
+
+    # -- arm and deploy -----------------------------------------------------------------------
+
+    def test_arm_and_disarm_are_confirmed_by_the_devices_own_status(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        self.bench.until(lambda: self.statuses[-1].armed, "the status says so")
+        assert self.statuses[-1].state == ParachuteState.ARMED
+        answer = self.bench.call(Arm, f"{self.name}/arm", arm=False)
+        assert answer.success, answer.message
+        self.bench.until(lambda: not self.statuses[-1].armed, "the status says so")
+
+    def test_deploy_is_accepted_and_then_shown(self, device: SimulatedDevice) -> None:
+        self.armed(device)
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        assert (answer.success, answer.accepted) == (True, True), answer.message
+        assert device.deployed
+        self.bench.until(lambda: self.statuses[-1].deployed, "the status says so")
+
+    def test_deploy_of_what_is_out_already_sends_nothing(self, device: SimulatedDevice) -> None:
+        self.armed(device)
+        self.bench.call(Deploy, f"{self.name}/deploy", reason="first")
+        sent = device.commands_to_deploy()
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="second")
+        assert (answer.success, answer.accepted) == (True, False)
+        assert "already" in answer.message
+        assert device.commands_to_deploy() == sent
+
+    def test_deploy_of_a_device_that_is_not_armed_is_refused(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.plugged(device)
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        assert (answer.success, answer.accepted) == (False, False)
+        assert "failed" in answer.message
+        assert not device.deployed
+
+    def test_deploy_too_near_the_ground_is_refused(self, device: SimulatedDevice) -> None:
+        self.armed(device)
+        device.come_to_ground()
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        assert (answer.success, answer.accepted) == (False, False)
+        assert "temporarily rejected" in answer.message
+        assert not device.deployed
+
+    def test_deploy_says_plainly_when_nothing_came_back(self, device: SimulatedDevice) -> None:
+        self.armed(device)
+        device.stop_answering()
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        assert (answer.success, answer.accepted) == (False, False)
+        assert "given up after" in answer.message
+        assert "no acknowledgement" in answer.message
+
+    def test_deploy_says_plainly_when_only_the_status_did_not_come(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        device.be_stuck()
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", reason="a test")
+        assert (answer.success, answer.accepted) == (False, True)
+        assert "acknowledged after" in answer.message
+        assert "never showed" in answer.message
+
+    @pytest.mark.parametrize(("kind", "service"), [(Arm, "arm"), (Deploy, "deploy")])
+    def test_without_any_device_a_request_is_refused_at_once(
+        self, device: SimulatedDevice, kind: Any, service: str
+    ) -> None:
+        answer = self.bench.call(kind, f"{self.name}/{service}")
+        assert not answer.success
+        assert "heard" in answer.message
+
+    def test_a_service_that_waits_stops_neither_heartbeat_nor_status(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        device.stop_answering()
+        future = self.bench.ask(Deploy, f"{self.name}/deploy", reason="a test")
+        self.bench.until(device.commands_to_deploy, "the service has begun")
+        self.beats.clear()
+        self.statuses.clear()
+        self.bench.until(lambda: len(self.beats) >= 5 and len(self.statuses) >= 3, "both go on")
+        assert not future.done(), "all that while the service was waiting"
+        self.bench.until(future.done, "the service ends")
+
+    # -- decisions ----------------------------------------------------------------------------
+
+    def test_a_decision_to_deploy_is_carried_out_and_each_step_reported(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        decision = self.decide(Action.DEPLOY)
+        self.await_report(Outcome.CONFIRMED, decision)
+        assert device.deployed
+        outcomes = [report.outcome for report in self.reports]
+        assert outcomes == [Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED]
+        assert {report.link for report in self.reports} == {self.name}
+        assert {report.action for report in self.reports} == {Action.DEPLOY}
+        assert all(report.detail for report in self.reports)
+
+    @pytest.mark.parametrize(
+        "fields",
+        [
+            {"targets": ["another_link"]},
+            {"targets": []},
+            {"shadow": True},
+            {"age": 30.0},
+            {"age": -30.0},
+        ],
+        ids=["for another", "for nobody", "shadow", "old", "from the future"],
+    )
+    def test_a_decision_that_is_not_for_it_now_is_not_acted_on(
+        self, device: SimulatedDevice, fields: dict[str, Any]
+    ) -> None:
+        self.armed(device)
+        self.decide(Action.DEPLOY, **fields)
+        # What follows comes after it on the same topic: once it is done, so is the judgement.
+        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE))
+        assert not device.deployed
+        assert device.commands_to_deploy() == 0
+
+    def test_a_repeated_decision_is_reported_again_and_not_fired_twice(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        decision = self.decide(Action.DEPLOY)
+        self.await_report(Outcome.CONFIRMED, decision)
+        sent = device.commands_to_deploy()
+        for _ in range(3):
+            self.reports.clear()
+            self.decide(Action.DEPLOY, id=decision.id)
+            assert self.await_report(Outcome.CONFIRMED, decision).action == Action.DEPLOY
+        assert device.commands_to_deploy() == sent == 1
+
+    def test_a_decision_of_an_older_epoch_fails_and_names_the_newest(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE, epoch=7))
+        old = self.decide(Action.DEPLOY, epoch=6, id=10_000)
+        assert self.await_report(Outcome.FAILED, old).newest_epoch == 7
+        assert not device.deployed
+
+    def test_a_decision_is_not_heard_by_a_node_that_starts_later(self, bench: Bench) -> None:
+        self.bench, self.numbers = bench, iter(range(1, 10))
+        self.statuses = bench.follow(ParachuteStatus, "parachute/status")
+        self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+        publisher = bench.client.create_publisher(SafetyDecision, "safety/decision", qos.DECISION)
+        message = SafetyDecision(
+            epoch=1, id=1, action=int(Action.DEPLOY), rule="test", targets=[self.name]
+        )
+        publisher.publish(stamped(bench.client, message))
+        device = self.make(bench, heartbeat_rate=HEARTBEAT_RATE, max_decision_age=10.0)
+        self.armed(device)
+        assert device.commands_to_deploy() == 0
+
+    def test_a_decision_that_the_device_refuses_is_reported_as_failed(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.armed(device)
+        device.come_to_ground()
+        report = self.await_report(Outcome.FAILED, self.decide(Action.DEPLOY))
+        assert report.detail
+        assert not device.deployed

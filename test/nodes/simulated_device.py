@@ -1,0 +1,46 @@
+"""What the stories of device_suite need of a simulated device, whatever its link."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+
+class SimulatedDevice(ABC):
+    """A parachute module on this link, as the stories need it. It clears the ground."""
+
+    @abstractmethod
+    def plug_in(self) -> None:
+        """It is on the wire, and speaks often."""
+
+    @abstractmethod
+    def fall_silent(self) -> None:
+        """It says nothing any more."""
+
+    @abstractmethod
+    def speak_again(self) -> None:
+        """It speaks as before."""
+
+    @abstractmethod
+    def stop_answering(self) -> None:
+        """It goes on telling its status, but takes no command."""
+
+    @abstractmethod
+    def be_stuck(self) -> None:
+        """It acknowledges everything, but what is deployed stays in its pod."""
+
+    @abstractmethod
+    def break_down(self) -> str:
+        """It says that it is not healthy; a word of the fault it then shows."""
+
+    @abstractmethod
+    def come_to_ground(self) -> None:
+        """It refuses to deploy: too near the ground."""
+
+    @abstractmethod
+    def commands_to_deploy(self) -> int:
+        """How many commands to release have come over the wire."""
+
+    @property
+    @abstractmethod
+    def deployed(self) -> bool:
+        """The parachute has really left its pod."""

@@ -1,0 +1,119 @@
+"""The launch files refer to what there is. `launch` itself is not among the wheels."""
+
+import ast
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from chute_ros.sim.command_line import parser
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = sorted((ROOT / "launch").glob("*.launch.py"))
+EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+
+
+def calls(file, name):
+    """The keyword arguments of every call of name, as source."""
+    found = []
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == name:
+            found.append({k.arg: ast.unparse(k.value) for k in node.keywords})
+            found[-1] |= {index: ast.unparse(value) for index, value in enumerate(node.args)}
+    return found
+
+
+def executables():
+    setup = ast.parse((ROOT / "setup.py").read_text())
+    texts = [n.value for n in ast.walk(setup) if isinstance(n, ast.Constant)]
+    return {
+        text.split("=")[0].strip() for text in texts if isinstance(text, str) and ":main" in text
+    }
+
+
+def test_there_are_launch_files_with_and_without_simulators():
+    assert [file.name for file in FILES] == ["simulation.launch.py", "vehicle.launch.py"]
+
+
+def started(file):
+    """The executables of this package that it starts."""
+    nodes = [call["executable"] for call in calls(file, "Node")]
+    # A simulator is no ROS node; a helper of the file makes its process.
+    simulators = [call[0] for call in calls(file, "_simulator")]
+    return {ast.literal_eval(name) for name in nodes + simulators}
+
+
+@EVERY
+def test_it_starts_what_setup_installs(file):
+    assert started(file)
+    assert started(file) <= executables()
+    assert all(call["package"] == "'chute_ros'" for call in calls(file, "Node"))
+
+
+def test_both_together_start_nodes_and_simulators():
+    names = set().union(*map(started, FILES))
+    assert names >= {"mavlink_parachute", "safety_supervisor"}
+    assert names >= {"sim_autopilot", "sim_mavlink_parachute"}
+
+
+@EVERY
+def test_every_argument_that_it_uses_is_declared_and_described(file):
+    declared = calls(file, "DeclareLaunchArgument")
+    used = {call[0] for call in calls(file, "LaunchConfiguration")}
+    assert {call[0] for call in declared} == used
+    assert all(call.get("description") for call in declared)
+
+
+def test_the_files_that_they_name_are_installed():
+    setup = (ROOT / "setup.py").read_text()
+    for folder, pattern in (("launch", "launch/*.py"), ("config", "config/*.yaml")):
+        assert f'"/{folder}", glob("{pattern}")' in setup
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                text = ast.unparse(node).strip("f'\"")
+                if text.startswith("{share}/"):
+                    assert (ROOT / text.removeprefix("{share}/")).is_file(), text
+
+
+def test_the_simulation_stays_on_this_host():
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    (variable,) = calls(simulation, "SetEnvironmentVariable")
+    assert variable[0] == "'ROS_AUTOMATIC_DISCOVERY_RANGE'"
+    assert variable[1] == "'LOCALHOST'"
+    assert "0.0.0.0" not in simulation.read_text()
+
+
+def test_the_simulators_take_the_options_that_are_given_to_them():
+    options = parser("any", "", "udpin:127.0.0.1:0", "")
+    known = {text for action in options._actions for text in action.option_strings}
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    texts = [
+        node.value
+        for node in ast.walk(ast.parse(simulation.read_text()))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    given = {text for text in texts if text.startswith("--")}
+    assert given
+    assert given <= known
+
+
+def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    for node in calls(vehicle, "Node"):
+        assert node["namespace"] == "namespace"
+        assert "config" in node["parameters"]
+
+
+@EVERY
+def test_it_makes_a_description(file):
+    """Really, where `launch` is there; elsewhere at least as Python with that one function."""
+    code = compile(file.read_text(), str(file), "exec")
+    if all(importlib.util.find_spec(name) for name in ("launch.actions", "launch_ros")):
+        space = {}
+        exec(code, space)
+        description = space["generate_launch_description"]()
+        assert len(description.entities) >= 3
+    else:
+        functions = [n.name for n in ast.parse(file.read_text()).body if hasattr(n, "name")]
+        assert "generate_launch_description" in functions

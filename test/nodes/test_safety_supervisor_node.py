@@ -1,0 +1,227 @@
+"""The supervisor's node among stub device nodes: what it publishes, serves and calls.
+
+The words in which its core explains itself are the business of test/supervisor.
+"""
+
+from __future__ import annotations
+
+import pytest
+from chute_msgs.msg import LinkHeartbeat, SafetyState
+from chute_msgs.srv import Arm, Deploy, Kill, SetMode
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from std_srvs.srv import Trigger
+from supervisor_bench import QUICK, Scene
+
+from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.nodes import qos
+from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+
+
+@pytest.fixture
+def scene(bench):
+    return Scene(bench)
+
+
+@pytest.fixture
+def ready(scene):
+    scene.link.offer_arming()
+    scene.await_stage(SafetyState.READY)
+    return scene
+
+
+# Block and release
+
+
+def test_healthy_links_release_flight_and_the_state_says_why(ready):
+    release = ready.await_decision(Action.FLIGHT_BLOCK_RELEASE)
+    assert release.targets == ["mavlink_parachute"]
+    assert release.reasons
+    state = ready.states[-1]
+    assert not state.flight_blocked
+    assert list(state.block_reasons) == []
+    assert list(state.links) == ["mavlink_parachute"]
+    assert list(state.link_states) == [LinkState.OK]
+    assert list(state.devices_healthy) == [True]
+    assert state.link_ages[0] < 20.0
+
+
+def test_a_link_that_was_never_heard_blocks_flight(bench):
+    states = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+    bench.add(SafetySupervisorNode, **QUICK)
+    bench.until(lambda: states and states[-1].state == SafetyState.BLOCKED, "flight is blocked")
+    assert states[-1].flight_blocked
+    assert "mavlink_parachute" in states[-1].block_reasons[0]
+    assert states[-1].link_ages[0] != states[-1].link_ages[0], "never heard is NaN"
+
+
+@pytest.mark.parametrize("why", ["device unhealthy", "device lost", "node silent"])
+def test_what_becomes_unhealthy_blocks_and_what_recovers_releases(ready, why):
+    if why == "device unhealthy":
+        ready.link.healthy = False
+    elif why == "device lost":
+        ready.link.state = LinkState.LOST
+    else:
+        ready.link.beating = False
+    state = ready.await_stage(SafetyState.BLOCKED)
+    assert state.flight_blocked
+    assert state.block_reasons
+    ready.await_decision(Action.FLIGHT_BLOCK)
+    ready.link.healthy, ready.link.state, ready.link.beating = True, LinkState.OK, True
+    ready.await_stage(SafetyState.READY)
+
+
+# Its own heartbeat and diagnostics
+
+
+def test_it_beats_by_itself_and_numbers_its_beats(bench):
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    bench.add(SafetySupervisorNode)
+    bench.until(lambda: len(beats) >= 10, "it beats")
+    assert all(beat.supervisor for beat in beats)
+    assert {beat.link for beat in beats} == {"safety_supervisor"}
+    numbers = [beat.seq for beat in beats]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+
+
+def test_its_diagnostics_follow_its_health(ready):
+    said = ready.bench.follow(DiagnosticArray, "/diagnostics")
+
+    def level():
+        return said and {
+            s.level for s in said[-1].status if s.name.startswith("safety_supervisor: ")
+        }
+
+    ready.bench.until(lambda: level() == {DiagnosticStatus.OK}, "it is well")
+    ready.link.healthy = False
+    ready.bench.until(lambda: level() and level() != {DiagnosticStatus.OK}, "it is not well")
+
+
+# Arm
+
+
+def test_arm_goes_to_the_device_node_and_back(ready):
+    answer = ready.call(Arm, "arm", arm=True, triggers=4)
+    assert answer.success, answer.message
+    assert ready.link.arm_requests == [(True, 4)]
+    ready.await_stage(SafetyState.ARMED)
+    assert ready.call(Arm, "arm", arm=False).success
+    assert ready.link.arm_requests[1:] == [(False, 0)]
+    ready.await_stage(SafetyState.READY)
+
+
+def test_arm_fails_where_the_device_node_fails(ready):
+    ready.link.arm_succeeds = False
+    answer = ready.call(Arm, "arm", arm=True)
+    assert not answer.success
+    assert "mavlink_parachute: as told" in answer.message
+    assert ready.states[-1].state == SafetyState.READY
+
+
+def test_arm_fails_where_the_device_nodes_service_is_missing(scene):
+    scene.await_stage(SafetyState.READY)
+    answer = scene.call(Arm, "arm", arm=True)
+    assert not answer.success
+    assert "mavlink_parachute/arm is not there" in answer.message
+
+
+def test_arm_is_refused_while_flight_is_blocked(ready):
+    ready.link.healthy = False
+    ready.await_stage(SafetyState.BLOCKED)
+    answer = ready.call(Arm, "arm", arm=True)
+    assert not answer.success
+    assert answer.message
+    assert ready.link.arm_requests == []
+
+
+# Kill and deploy
+
+
+def test_kill_is_carried_through_to_its_confirmation(ready):
+    answer = ready.call(Kill, "kill", reason="a test")
+    assert (answer.success, answer.accepted) == (True, True), answer.message
+    (kill,) = ready.decided(Action.KILL)
+    assert kill.targets == ["mavlink_parachute"]
+    assert any("a test" in reason for reason in kill.reasons)
+
+
+def test_a_kill_that_fails_is_answered_so(ready):
+    ready.link.outcomes = [Outcome.SENT, Outcome.FAILED]
+    answer = ready.call(Kill, "kill", reason="a test")
+    assert not answer.success
+    assert answer.message
+
+
+def test_deploy_goes_after_the_kill_and_only_after_it(ready):
+    answer = ready.call(Deploy, "deploy", force=True, reason="a test")
+    assert (answer.success, answer.accepted) == (True, True), answer.message
+    fired = [d for d in ready.decisions if d.action in (Action.KILL, Action.DEPLOY)]
+    assert [d.action for d in fired] == [Action.KILL, Action.DEPLOY]
+    assert fired[0].id < fired[1].id
+    ready.await_stage(SafetyState.DEPLOYED)
+
+
+def test_deploy_on_the_ground_needs_force(ready):
+    answer = ready.call(Deploy, "deploy", reason="a slip")
+    assert not answer.success
+    assert answer.message
+    assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
+
+
+def test_a_deploy_that_nobody_confirms_is_answered_so(ready):
+    ready.link.outcomes = [Outcome.SENT, Outcome.FAILED]
+    answer = ready.call(Deploy, "deploy", force=True, reason="a test")
+    assert not answer.success
+    ready.await_stage(SafetyState.FAULT)
+    assert ready.states[-1].alarms
+
+
+def test_a_decision_that_nobody_reports_on_is_sent_again_with_its_number(ready):
+    ready.link.outcomes = []
+    ready.bench.ask(Kill, "safety/kill", reason="a test")
+    ready.bench.until(
+        lambda: sum(d.action == Action.KILL for d in ready.decisions) >= 3, "it is sent again"
+    )
+    assert len(ready.decided(Action.KILL)) == 1
+
+
+def test_after_a_restart_of_the_supervisor_its_epoch_is_higher(ready):
+    before = ready.states[-1].epoch
+    ready.bench.remove(ready.supervisor)
+    ready.states.clear()
+    again = ready.bench.add(SafetySupervisorNode, **QUICK)
+    ready.bench.until(lambda: ready.states, "it speaks")
+    assert ready.states[-1].epoch >= before
+    assert again.state.epoch > 0
+
+
+# Reset and modes
+
+
+def test_reset_goes_back_to_the_start(ready):
+    ready.call(Deploy, "deploy", force=True, reason="a test")
+    ready.await_stage(SafetyState.DEPLOYED)
+    answer = ready.call(Trigger, "reset")
+    assert answer.success, answer.message
+    ready.await_stage(SafetyState.READY)
+
+
+def test_in_shadow_it_says_and_does_not_do(ready):
+    assert ready.call(SetMode, "set_mode", mode=1, reason="a test").success
+    answer = ready.call(Kill, "kill", reason="a test")
+    assert not answer.success
+    assert all(d.shadow for d in ready.decided(Action.KILL))
+    ready.bench.until(lambda: ready.states[-1].mode == SafetyState.SHADOW, "it says its mode")
+    assert ready.call(SetMode, "set_mode", mode=0).success
+
+
+def test_inhibited_it_does_nothing(ready):
+    assert ready.call(SetMode, "set_mode", mode=2, reason="a test").success
+    assert not ready.call(Deploy, "deploy", force=True, reason="a test").success
+    assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
+
+
+def test_a_mode_that_is_none_is_refused_in_words(ready):
+    answer = ready.call(SetMode, "set_mode", mode=9)
+    assert not answer.success
+    assert "mode 9: need ACTIVE 0, SHADOW 1 or INHIBITED 2" in answer.message
+    assert ready.states[-1].mode == SafetyState.ACTIVE

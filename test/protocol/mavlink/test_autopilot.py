@@ -1,0 +1,278 @@
+"""What the autopilot says of the vehicle: each message and field, its sign, what is no value."""
+
+import math
+
+import pytest
+from link_bench import copter, heartbeat, landed
+
+from chute_ros.model import Armed, LandedState, LinkState
+from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.protocol.mavlink.autopilot import (
+    STREAM_ASK_INTERVAL,
+    STREAM_SILENCE,
+    AutopilotTracker,
+    is_autopilot,
+)
+from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+
+NAN, INF = math.nan, math.inf
+
+
+class Told:
+    """An autopilot whose messages come over the wire's bytes."""
+
+    def __init__(self) -> None:
+        self.tracker = AutopilotTracker(1, 1, LivenessLimits(2.5, 5.0))
+        self._encoder, self._decoder = FrameEncoder(1, 1), FrameDecoder()
+
+    def hear(self, *messages, now: float = 0.0) -> "Told":
+        for message in messages:
+            (frame,) = self._decoder.feed_datagram(self._encoder.encode(message, now), now)
+            if frame.message.get_type() == "HEARTBEAT":
+                self.tracker.heartbeat(frame.message, now)
+            else:
+                self.tracker.message(frame.message, now)
+        return self
+
+    def at(self, now: float = 0.0):
+        return self.tracker.vehicle_state(now)
+
+
+def position(boot_ms=1000, lat=0, lon=0, relative=0, vz=0):
+    return d.MAVLink_global_position_int_message(boot_ms, lat, lon, 0, relative, 0, 0, vz, 0)
+
+
+def attitude(boot_ms=1000, roll=0.0, pitch=0.0, yaw=0.0):
+    return d.MAVLink_attitude_message(boot_ms, roll, pitch, yaw, 0.0, 0.0, 0.0)
+
+
+def quaternion(w, x, y, z):
+    return d.MAVLink_attitude_quaternion_message(1000, w, x, y, z, 0.0, 0.0, 0.0)
+
+
+def imu(x, y, z):
+    return d.MAVLink_scaled_imu_message(1000, x, y, z, 0, 0, 0, 0, 0, 0)
+
+
+def highres(x, y, z):
+    return d.MAVLink_highres_imu_message(0, x, y, z, *[0.0] * 10, 0)
+
+
+def power(millivolt, percent):
+    return d.MAVLink_sys_status_message(0, 0, 0, 0, millivolt, -1, percent, 0, 0, 0, 0, 0, 0)
+
+
+def local(vz):
+    return d.MAVLink_local_position_ned_message(1000, 0.0, 0.0, -50.0, 0.0, 0.0, vz)
+
+
+def altitude(relative):
+    return d.MAVLink_altitude_message(0, 0.0, 0.0, 0.0, relative, 0.0, 0.0)
+
+
+HALF = math.sqrt(0.5)
+VALUES = [
+    (copter(True), "armed", Armed.ARMED),
+    (copter(False), "armed", Armed.DISARMED),
+    (copter(False, d.MAV_STATE_CRITICAL), "system_status", d.MAV_STATE_CRITICAL),
+    (landed(1), "landed_state", LandedState.ON_GROUND),
+    (landed(2), "landed_state", LandedState.IN_AIR),
+    (landed(3), "landed_state", LandedState.TAKING_OFF),
+    (landed(4), "landed_state", LandedState.LANDING),
+    (position(relative=12_340), "height", 12.34),
+    (position(relative=-1500), "height", -1.5),
+    (position(vz=250), "vertical_speed", -2.5),  # down positive on the wire
+    (position(vz=-300), "vertical_speed", 3.0),
+    (position(lat=-337_000_000, lon=1_512_000_000), "latitude", -33.7),
+    (position(lat=-337_000_000, lon=1_512_000_000), "longitude", 151.2),
+    (local(4.0), "vertical_speed", -4.0),
+    (altitude(33.0), "height", 33.0),
+    (attitude(roll=0.5), "roll", 0.5),
+    (attitude(pitch=-0.25), "pitch", -0.25),
+    (attitude(yaw=-3.0), "yaw", -3.0),
+    (attitude(roll=-0.5), "tilt", 0.5),
+    (attitude(roll=math.pi), "tilt", math.pi),
+    (quaternion(1, 0, 0, 0), "tilt", 0.0),
+    (quaternion(HALF, HALF, 0, 0), "roll", math.pi / 2),
+    (quaternion(HALF, 0, HALF, 0), "pitch", math.pi / 2),
+    (quaternion(HALF, 0, 0, HALF), "yaw", math.pi / 2),
+    (quaternion(0, 1, 0, 0), "tilt", math.pi),
+    (quaternion(0.9, 0, 0, 0), "tilt", 0.0),
+    (imu(0, 0, -1000), "acceleration", 9.80665),
+    (imu(300, 400, 0), "acceleration", 0.5 * 9.80665),
+    (highres(3.0, 4.0, 0.0), "acceleration", 5.0),
+    (power(22_800, 80), "battery_voltage", 22.8),
+    (power(22_800, 80), "battery_remaining", 0.8),
+    (power(0xFFFF, 0), "battery_remaining", 0.0),
+    (position(boot_ms=2500), "uptime", 2.5),
+    (d.MAVLink_system_time_message(0, 7500), "uptime", 7.5),
+]
+
+
+@pytest.mark.parametrize(
+    ("message", "field", "value"),
+    [pytest.param(*v, id=f"{v[0].get_type()}-{v[1]}") for v in VALUES],
+)
+def test_field(message, field, value):
+    assert getattr(Told().hear(message).at(), field) == pytest.approx(value, abs=1e-3)
+
+
+NO_VALUES = [
+    (position(), "latitude"),  # 0, 0 is sent before it is known
+    (position(lat=950_000_000, lon=1), "latitude"),
+    (local(NAN), "vertical_speed"),
+    (altitude(NAN), "height"),
+    (altitude(INF), "height"),
+    (attitude(roll=NAN), "tilt"),
+    (attitude(yaw=INF), "roll"),
+    (quaternion(NAN, 0, 0, 0), "tilt"),
+    (quaternion(0, 0, 0, 0), "tilt"),
+    (quaternion(INF, 0, 0, 0), "tilt"),
+    (highres(NAN, 0.0, 0.0), "acceleration"),
+    (power(0xFFFF, -1), "battery_voltage"),
+    (power(0xFFFF, -1), "battery_remaining"),
+    (power(0xFFFF, 101), "battery_remaining"),
+]
+
+
+@pytest.mark.parametrize(
+    ("message", "field"), [pytest.param(*v, id=f"{v[0].get_type()}-{v[1]}") for v in NO_VALUES]
+)
+def test_what_is_no_value_is_not_taken_over(message, field):
+    assert math.isnan(getattr(Told().hear(message).at(), field))
+
+
+@pytest.mark.parametrize("state", [0, 5, 255])
+def test_undefined_landed_state_lets_the_known_one_age(state):
+    told = Told().hear(landed(2), now=1.0).hear(landed(state), now=3.0)
+    assert told.at(4.0).landed_state is LandedState.IN_AIR
+    assert told.at(4.0).landed_state_age == 3.0
+
+
+def test_each_part_has_its_own_age():
+    told = Told().hear(copter(), now=1.0).hear(landed(), now=2.0).hear(position(vz=5), now=3.0)
+    told.hear(attitude(), now=4.0).hear(imu(0, 0, 0), now=5.0).hear(power(1, 1), now=6.0)
+    told.hear(position(lat=1, lon=1), now=7.0)
+    state = told.at(10.0)
+    ages = "armed landed_state height vertical_speed attitude acceleration battery position"
+    assert [getattr(state, f"{part}_age") for part in ages.split()] == [9, 8, 3, 3, 6, 5, 4, 3]
+
+
+def test_nothing_is_known_at_first():
+    state = Told().at(5.0)
+    assert (state.armed, state.landed_state) == (Armed.UNKNOWN, LandedState.UNKNOWN)
+    assert state.link_state is LinkState.NEVER_SEEN
+    assert all(math.isnan(getattr(state, name)) for name in vars(state) if name.endswith("_age"))
+    assert math.isnan(state.uptime)
+
+
+@pytest.mark.parametrize(
+    ("armed", "state", "off"),
+    [
+        (False, d.MAV_STATE_STANDBY, True),
+        (True, d.MAV_STATE_ACTIVE, False),
+        (True, d.MAV_STATE_FLIGHT_TERMINATION, True),
+    ],
+)
+def test_motors_off_by_disarm_or_termination(armed, state, off):
+    assert Told().hear(copter(armed, state)).tracker.motors_off == off
+    assert not Told().tracker.motors_off
+
+
+# -- restart ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("before", "in_flight"),
+    [
+        ([copter(True), landed(2)], True),
+        ([copter(True), landed(1)], True),  # armed: the motors may turn
+        ([copter(False), landed(2)], True),
+        ([copter(False), landed(1)], False),
+        ([copter(False)], False),
+    ],
+)
+def test_restart_is_seen_and_forgets_what_it_no_longer_knows(before, in_flight):
+    told = Told().hear(*before, position(boot_ms=90_000, relative=5000), now=1.0)
+    told.hear(attitude(200), attitude(300), now=2.0)
+    state = told.at(2.0)
+    assert (state.reboot_count, state.rebooted_in_flight) == (1, in_flight)
+    assert (state.armed, state.landed_state) == (Armed.UNKNOWN, LandedState.UNKNOWN)
+    assert math.isnan(state.landed_state_age)
+    assert (state.height, state.height_age) == (5.0, 1.0)
+    assert state.uptime == pytest.approx(0.3)
+
+
+def test_second_restart_before_it_says_where_it_is_still_is_in_flight():
+    told = Told().hear(copter(True), landed(2), attitude(90_000))
+    told.hear(attitude(200), attitude(5000), copter(False), attitude(300), attitude(400))
+    assert told.at().reboot_count == 2
+    assert told.at().rebooted_in_flight
+    # After it said that it stands on the ground, a restart there is one.
+    told.hear(landed(1), attitude(5000), attitude(300), attitude(400))
+    assert (told.at().reboot_count, told.at().rebooted_in_flight) == (3, False)
+
+
+@pytest.mark.parametrize("times", [[5000, 4100, 5050], [5000, 3000, 5050], [5000, 0, 5050]])
+def test_reordered_delayed_and_empty_times_are_no_restart(times):
+    told = Told().hear(copter(True), *[attitude(boot_ms) for boot_ms in times])
+    assert told.at().reboot_count == 0
+    assert told.at().armed is Armed.ARMED
+    assert told.at().uptime == 5.05
+
+
+def test_wrap_after_49_days_is_no_restart():
+    times = [2**32 - 100, 50, 2**32 - 50, 100, 150]
+    told = Told().hear(*[attitude(boot_ms) for boot_ms in times])
+    assert told.at().reboot_count == 0
+    assert told.at().uptime == 0.15
+
+
+def test_time_that_a_script_filled_in_is_no_restart():
+    told = Told().hear(attitude(90_000))
+    told.hear(*[d.MAVLink_named_value_float_message(t, b"x", 1.0) for t in (5, 6, 7)])
+    assert told.at().reboot_count == 0
+
+
+# -- who is an autopilot --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kind", "autopilot", "expected"),
+    [
+        (d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, True),
+        (d.MAV_TYPE_GENERIC, d.MAV_AUTOPILOT_GENERIC, True),
+        (d.MAV_TYPE_PARAFOIL, d.MAV_AUTOPILOT_ARDUPILOTMEGA, True),
+        (99, d.MAV_AUTOPILOT_PX4, True),  # a vehicle newer than the dialect
+        (d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_INVALID, False),
+        (d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID, False),
+        (d.MAV_TYPE_GIMBAL, d.MAV_AUTOPILOT_INVALID, False),
+        # Components that fill in what they are not:
+        (d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_GENERIC, False),
+        (d.MAV_TYPE_PARACHUTE, d.MAV_AUTOPILOT_GENERIC, False),
+        (d.MAV_TYPE_GIMBAL, d.MAV_AUTOPILOT_ARDUPILOTMEGA, False),
+        (d.MAV_TYPE_CAMERA, d.MAV_AUTOPILOT_GENERIC, False),
+        (d.MAV_TYPE_ANTENNA_TRACKER, d.MAV_AUTOPILOT_ARDUPILOTMEGA, False),
+        (d.MAV_TYPE_ONBOARD_CONTROLLER, d.MAV_AUTOPILOT_GENERIC, False),
+    ],
+)
+def test_is_autopilot(kind, autopilot, expected):
+    assert is_autopilot(heartbeat(kind, autopilot)) is expected
+
+
+# -- the stream -----------------------------------------------------------------------------------
+
+
+def test_missing_stream_is_asked_for_now_and_then():
+    told = Told()
+    assert told.tracker.wants_stream(0.0)
+    assert not told.tracker.wants_stream(STREAM_ASK_INTERVAL - 0.1)
+    assert told.tracker.wants_stream(STREAM_ASK_INTERVAL)
+
+
+def test_whole_and_fresh_picture_is_not_asked_for_until_a_part_stops():
+    told = Told().hear(landed(), position(), attitude(), imu(0, 0, 0), power(1, 1), now=1.0)
+    assert not told.tracker.wants_stream(1.0 + STREAM_SILENCE - 0.01)
+    told.hear(position(), attitude(), imu(0, 0, 0), power(1, 1), now=3.0)
+    assert told.tracker.wants_stream(1.0 + STREAM_SILENCE)

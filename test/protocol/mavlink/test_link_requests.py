@@ -1,0 +1,277 @@
+"""Stories of requests over a whole link: the closed loop of a release, kill, what is refused."""
+
+import pytest
+from link_bench import Bench, ack, copter, heartbeat, status
+
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.events import RequestReport
+
+CHUTE, PILOT = (1, 161), (1, 1)
+RELEASE, TRIGGERS, REQUEST, TERMINATE = 208, 225, 512, 185
+
+
+def ready(**config):
+    bench = Bench(**config).hear(CHUTE, heartbeat(), status(armed=12)).hear(PILOT, copter(True))
+    bench.clear()
+    return bench.at(0.5)
+
+
+def steps(bench, token):
+    reports = [e.report for e in bench.events if isinstance(e, RequestReport)]
+    return [report.outcome.name for report in reports if report.token == token]
+
+
+# -- release ----------------------------------------------------------------------------------
+
+
+def test_release_is_done_when_the_parachute_itself_says_deployed():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.6).hear(CHUTE, ack(RELEASE))
+    assert steps(bench, 1) == ["SENT", "ACCEPTED"]
+    assert bench.commands(REQUEST)[0].param1 == 430  # does not wait for the 1 Hz stream
+    bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
+    assert steps(bench, 1) == ["SENT", "ACCEPTED", "CONFIRMED"]
+    assert bench.end(1).finished.message == (
+        "PARACHUTE_STATUS says deployed after 0.30 s; acknowledged after 0.10 s"
+    )
+    count = len(bench.commands())
+    bench.at(10.0)
+    assert len(bench.commands()) == count  # nothing more is sent
+
+
+def test_release_whose_acknowledgement_was_lost_is_done_all_the_same():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
+    end = bench.end(1).finished
+    assert (end.success, end.accepted) == (True, False)
+
+
+def test_release_that_nobody_answers_is_resent_and_given_up_in_time():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(20.0)
+    orders = bench.commands(RELEASE)
+    assert [order.confirmation for order in orders[:3]] == [0, 1, 2]
+    end = bench.end(1).finished
+    assert (end.success, end.accepted, end.result) == (False, False, results.NO_ACKNOWLEDGEMENT)
+    assert "given up after 5.0 s" in end.message
+
+
+def test_release_acknowledged_but_never_shown_is_a_failure_that_says_so():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.6).hear(CHUTE, ack(RELEASE)).at(20.0)
+    end = bench.end(1).finished
+    assert (end.success, end.accepted) == (False, True)
+    assert "never showed: PARACHUTE_STATUS says deployed" in end.message
+
+
+def test_release_without_ground_clearance_goes_on_until_it_is_accepted():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.6).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_TEMPORARILY_REJECTED))
+    bench.at(1.0).hear(CHUTE, ack(RELEASE), status(boot_ms=5500, deployed=4))
+    assert bench.end(1).finished.success
+
+
+def test_release_with_force_arms_the_trigger_on_the_way():
+    bench = ready()
+    bench.link.deploy(1, True, bench.now)
+    bench.collect()
+    arm, order = bench.commands()
+    assert (arm.command, arm.param1, arm.param2) == (TRIGGERS, 12, 12)
+    assert (order.command, order.param1) == (RELEASE, 2)
+
+
+@pytest.mark.parametrize("foreign", [(2, 161), (1, 162), (255, 190), (1, 1)])
+def test_release_is_not_acknowledged_by_another_component(foreign):
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.6).hear(foreign, heartbeat(), ack(RELEASE), status(deployed=4))
+    assert steps(bench, 1) == ["SENT"]
+
+
+def test_acknowledgement_to_another_component_is_not_ours():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.6).hear(CHUTE, ack(RELEASE, target=(255, 190)), ack(RELEASE, target=(1, 1)))
+    assert steps(bench, 1) == ["SENT"]
+    assert bench.link.counts["acknowledgements for another component"] == 2
+    bench.hear(CHUTE, ack(RELEASE, target=(1, 191)))
+    assert steps(bench, 1) == ["SENT", "ACCEPTED"]
+
+
+def test_deployed_parachute_is_not_released_again():
+    bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2))
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    assert bench.end(1).finished.success
+    assert bench.commands() == []
+
+
+def test_old_word_of_having_deployed_does_not_hold_back_a_release():
+    bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2))
+    bench.stream(6.0, 1.0, CHUTE, heartbeat)
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    assert len(bench.commands(RELEASE)) == 1
+    assert bench.ends(1) == []
+    bench.at(6.1).hear(CHUTE, status(boot_ms=11_000, deployed=2))
+    assert bench.end(1).finished.success
+
+
+def test_nothing_makes_a_parachute_less_ready_while_it_is_being_released():
+    bench = ready()
+    bench.link.deploy(1, False, bench.now)
+    bench.link.set_triggers(2, 0, 4, "", bench.now)
+    bench.link.parachute_action(3, d.PARACHUTE_DISABLE, "", bench.now)
+    bench.collect()
+    for token in (2, 3):
+        assert "a release is under way" in bench.end(token).finished.message
+    assert [order.command for order in bench.commands()] == [RELEASE]
+
+
+def test_disarm_under_way_gives_way_to_a_release():
+    bench = ready()
+    bench.link.arm(1, False, 0, bench.now)
+    bench.link.deploy(2, False, bench.now)
+    bench.stream(6.0, 0.5, CHUTE, heartbeat)
+    assert not bench.end(1).finished.success
+    assert "a release was ordered" in bench.end(1).finished.message
+    assert len(bench.commands(TRIGGERS)) <= 1
+
+
+# -- kill -------------------------------------------------------------------------------------
+
+
+def test_kill_before_deploy_go_side_by_side():
+    bench = ready()
+    bench.link.kill(1, bench.now)
+    bench.link.deploy(2, False, bench.now)
+    bench.collect()
+    assert [order.command for order in bench.commands()] == [TERMINATE, RELEASE]
+    bench.at(0.6).hear(PILOT, ack(TERMINATE)).hear(CHUTE, ack(RELEASE))
+    bench.hear(CHUTE, status(boot_ms=5100, deployed=4))
+    assert bench.end(2).finished.success
+    bench.at(0.7).hear(PILOT, copter(True, d.MAV_STATE_FLIGHT_TERMINATION))
+    assert bench.end(1).finished.success
+
+
+def test_kill_is_sent_even_if_the_motors_are_thought_to_be_off():
+    bench = Bench().hear(PILOT, copter(armed=False)).at(0.5)
+    bench.link.kill(1, bench.now)
+    bench.collect()
+    assert len(bench.commands(TERMINATE)) == 1
+    assert bench.ends(1) == []
+    bench.at(0.6).hear(PILOT, copter(armed=False))
+    assert bench.end(1).finished.success
+
+
+def test_kill_that_is_refused_is_tried_on_until_time_is_up():
+    bench = ready()
+    bench.link.kill(1, bench.now)
+    denied = ack(TERMINATE, d.MAV_RESULT_DENIED)
+    bench.stream(6.0, 0.1, PILOT, lambda: denied)
+    assert len(bench.commands(TERMINATE)) > 10
+    assert bench.end(1).finished.result == d.MAV_RESULT_DENIED
+
+
+def test_kill_without_an_autopilot_says_so():
+    bench = Bench().hear(CHUTE, heartbeat())
+    bench.link.kill(1, bench.now)
+    bench.collect()
+    assert "no autopilot of ours was ever heard" in bench.end(1).finished.message
+
+
+# -- the rest ---------------------------------------------------------------------------------
+
+ALL = [
+    lambda link, token, device, now: link.set_triggers(token, 4, 4, device, now),
+    lambda link, token, device, now: link.deploy(token, False, now, device),
+    lambda link, token, device, now: link.parachute_action(token, 1, device, now),
+    lambda link, token, device, now: link.request_message(token, 430, device, now),
+    lambda link, token, device, now: link.set_message_interval(token, 430, 1, device, now),
+]
+
+
+@pytest.mark.parametrize("ask", ALL)
+def test_device_that_is_not_there_is_refused_and_nothing_sent(ask):
+    bench = ready()
+    ask(bench.link, 9, "1/7", bench.now)
+    bench.collect()
+    text = "no parachute '1/7' was heard on this link (heard: 1/161)"
+    assert bench.end(9).finished.message == text
+    assert bench.commands() == []
+
+
+@pytest.mark.parametrize("ask", ALL)
+def test_every_request_ends_exactly_once(ask):
+    bench = ready()
+    ask(bench.link, 9, "", bench.now)
+    bench.stream(30.0, 1.0, CHUTE, heartbeat)
+    assert not bench.end(9).finished.success
+
+
+@pytest.mark.parametrize("action", [3, 7, 255, -1])
+def test_action_that_does_not_exist_is_refused(action):
+    bench = ready()
+    bench.link.parachute_action(9, action, "", bench.now)
+    bench.collect()
+    assert not bench.end(9).finished.success
+    assert bench.commands() == []
+
+
+@pytest.mark.parametrize(("arm", "triggers", "masks"), [(True, 0, (12, 12)), (False, 6, (0, 6))])
+def test_arm_by_default_and_by_mask(arm, triggers, masks):
+    bench = ready()
+    bench.link.arm(1, arm, triggers, bench.now)
+    bench.collect()
+    (order,) = bench.commands(TRIGGERS)
+    assert (order.param1, order.param2) == masks
+
+
+def test_public_emulator_speaks_as_255_0_and_is_answered_there():
+    bench = Bench(system_id=1).hear((255, 0), heartbeat(), status())
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    (order,) = bench.commands()
+    assert (order.target_system, order.target_component) == (255, 0)
+    bench.at(0.1).hear((255, 0), ack(RELEASE), status(boot_ms=5100, deployed=4))
+    assert bench.end(1).finished.success
+
+
+def test_copy_of_an_acknowledgement_settles_nothing_twice():
+    bench = ready().hear(CHUTE, heartbeat())
+    bench.link.parachute_action(1, 1, "", bench.now)
+    raw = bench.encoder(CHUTE).encode(ack(RELEASE), bench.now)
+    bench.link.receive(raw, bench.now)
+    bench.link.parachute_action(2, 0, "", bench.now)
+    bench.link.receive(raw, bench.now)
+    bench.collect()
+    assert bench.end(1).finished.success
+    assert bench.ends(2) == []
+    assert bench.link.counts["acknowledgements that came twice"] == 1
+
+
+STREAMED = [245, 33, 30, 26, 1]
+
+
+def test_autopilots_messages_are_asked_for_at_the_set_rate():
+    bench = Bench(autopilot_message_rate=20.0).hear(PILOT, copter())
+    orders = bench.commands(511)
+    assert [(order.param1, order.param2) for order in orders] == [(i, 50_000) for i in STREAMED]
+    bench.stream(4.0, 0.5, PILOT, copter)
+    assert len(bench.commands(511)) == 5
+    bench.stream(6.0, 0.5, PILOT, copter)
+    assert len(bench.commands(511)) == 10
+    bench.clear()
+    bench.link.set_autopilot_message_rate(4.0, bench.now)
+    bench.collect()
+    assert [order.param2 for order in bench.commands(511)] == [250_000] * 5
+    bench.clear()
+    bench.link.set_autopilot_message_rate(0.0, bench.now)
+    bench.stream(20.0, 0.5, PILOT, copter)
+    assert bench.commands() == []

@@ -1,0 +1,250 @@
+"""Each sentence of the two parachute protocol documents that test_parachute.py does not hold."""
+
+import pytest
+from link_bench import Bench, ack, copter, heartbeat, status
+
+from chute_ros.model import LinkState, ParachuteState, TriggerFlags
+from chute_ros.protocol.mavlink.config import KillMethod
+from chute_ros.protocol.mavlink.dialect import dialect as d
+
+PARACHUTE = (1, 161)
+
+
+def ready(ids=PARACHUTE, **config):
+    return Bench(**config).hear(ids, heartbeat(), status())
+
+
+# -- "Parachute Connection" -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "component",
+    [
+        pytest.param(d.MAV_COMP_ID_PARACHUTE, id="MAV_COMP_ID_PARACHUTE_by_default"),
+        pytest.param(1, id="any_ID_may_be_used_1"),
+        pytest.param(191, id="any_ID_may_be_used_that_of_a_computer_of_another_system"),
+        pytest.param(0, id="any_ID_may_be_used_0_of_the_public_emulator"),
+        pytest.param(255, id="any_ID_may_be_used_255"),
+    ],
+)
+def test_connection_identified_by_type_MAV_TYPE_PARACHUTE(component):  # noqa: N802
+    bench = ready((2, component))
+    assert bench.link.chosen_parachute().device == f"2/{component}"
+    assert bench.last_status().state is ParachuteState.READY
+
+
+def test_connection_MAV_COMP_ID_PARACHUTE_without_the_type_is_no_parachute():  # noqa: N802
+    bench = Bench().hear(PARACHUTE, heartbeat(kind=d.MAV_TYPE_GIMBAL), status())
+    assert bench.link.chosen_parachute() is None
+    assert bench.events == []
+
+
+def test_connection_type_counts_whatever_the_field_autopilot_says():
+    bench = Bench().hear(PARACHUTE, heartbeat(autopilot=d.MAV_AUTOPILOT_GENERIC), status())
+    assert bench.link.chosen_parachute().device == "1/161"
+    assert bench.link.autopilots.all() == []
+
+
+def test_connection_heartbeats_at_1_Hz_keep_it_and_their_end_loses_it():  # noqa: N802
+    bench = ready().stream(5.0, 1.0, PARACHUTE, heartbeat)
+    assert bench.link.chosen_parachute().liveness.state is LinkState.OK
+    bench.at(7.6)
+    assert bench.last_status().link_state is LinkState.STALE
+    bench.at(10.1)
+    assert bench.last_status().link_state is LinkState.LOST
+
+
+def test_connection_distinguished_by_component_id():
+    bench = ready().hear((1, 162), heartbeat(), status(errors=1))
+    assert [p.device for p in bench.link.parachutes.all()] == ["1/161", "1/162"]
+    states = [p.status(bench.now).state for p in bench.link.parachutes.all()]
+    assert states == [ParachuteState.READY, ParachuteState.ABNORMAL]
+
+
+def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
+    bench = Bench().hear(PARACHUTE, status())
+    assert bench.link.chosen_parachute() is None
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    assert "no parachute was heard on this link" in bench.end(1).finished.message
+    assert bench.commands() == []
+
+
+@pytest.mark.parametrize(
+    ("message_id", "answer"),
+    [
+        pytest.param(430, status(boot_ms=5100), id="PARACHUTE_STATUS"),
+        pytest.param(
+            396,
+            d.MAVLink_component_information_basic_message(
+                1500, 3, 86400, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
+            ),
+            id="COMPONENT_INFORMATION_BASIC",
+        ),
+    ],
+)
+def test_connection_MAV_CMD_REQUEST_MESSAGE_512_of(message_id, answer):  # noqa: N802
+    bench = ready().at(1.0)
+    bench.link.request_message(7, message_id, "", bench.now)
+    bench.collect()
+    (order,) = bench.commands()
+    assert (order.command, order.param1) == (512, message_id)
+    assert (order.target_system, order.target_component) == PARACHUTE
+    bench.at(1.1).hear(PARACHUTE, ack(512), answer)
+    end = bench.end(7)
+    assert end.finished.success
+    assert end.data.get_type() == answer.get_type()
+
+
+def test_connection_COMPONENT_INFORMATION_BASIC_field_by_field():  # noqa: N802
+    message = d.MAVLink_component_information_basic_message(
+        1500, 3, 86400, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
+    )
+    information = ready().hear(PARACHUTE, message).link.chosen_parachute().information
+    assert vars(information) == {
+        "vendor_name": "Maker",
+        "model_name": "Chute 3",
+        "software_version": "1.2.3",
+        "hardware_version": "B",
+        "serial_number": "S-7",
+        "manufacture_date": "1970-01-02",
+        "capabilities": 3,
+        "uptime": 1.5,
+    }
+
+
+# -- "MAV_CMD_SET_PARACHUTE_ARM", "Parachute Triggering Sources" ------------------------------
+
+
+def on_the_wire(bench):
+    (order,) = bench.commands(225)
+    return int(order.param1), int(order.param2)
+
+
+def test_SET_PARACHUTE_ARM_worked_example():  # noqa: N802
+    """ATS and FC are armed, MANUAL and GEOFENCE disarmed; bit 3 is left alone."""
+    bench = ready()
+    bench.link.set_triggers(3, 0b00000110, 0b00010111, "", bench.now)
+    bench.collect()
+    assert on_the_wire(bench) == (0b00000110, 0b00010111)
+    bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=0b00001110))
+    assert bench.end(3).finished.success
+    text = "PARACHUTE_STATUS says ATS armed, FC armed, MANUAL disarmed, GEOFENCE disarmed"
+    assert text in bench.end(3).finished.message
+
+
+@pytest.mark.parametrize("flag", list(TriggerFlags), ids=lambda flag: flag.name)
+@pytest.mark.parametrize("arm", [True, False], ids=["1_arms", "0_disarms"])
+def test_SET_PARACHUTE_ARM_single_source(flag, arm):  # noqa: N802
+    bench = ready()
+    bench.link.set_triggers(3, int(flag) if arm else 0, int(flag), "", bench.now)
+    bench.collect()
+    assert on_the_wire(bench) == (int(flag) if arm else 0, int(flag))
+    others = 0xFF & ~int(flag)
+    shown = others | (int(flag) if arm else 0)
+    bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=shown))
+    assert bench.end(3).finished.success
+
+
+def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: N802
+    bench = ready()
+    bench.link.set_triggers(3, 4, 4, "", bench.now)
+    bench.at(0.1).hear(PARACHUTE, ack(225))
+    boot = iter(range(5100, 9000, 100))
+    bench.stream(5.5, 0.5, PARACHUTE, lambda: status(boot_ms=next(boot), armed=0))
+    end = bench.end(3).finished
+    assert (end.success, end.accepted) == (False, True)
+    assert "never showed: PARACHUTE_STATUS says FC armed" in end.message
+
+
+def test_SET_PARACHUTE_ARM_bit_beyond_128_is_the_devices_to_deny():  # noqa: N802
+    bench = ready()
+    bench.link.arm(3, True, 256, bench.now)
+    bench.collect()
+    assert on_the_wire(bench) == (256, 256)
+    bench.hear(PARACHUTE, ack(225, d.MAV_RESULT_DENIED))
+    assert bench.end(3).finished.result == d.MAV_RESULT_DENIED
+
+
+@pytest.mark.parametrize(("arm", "select"), [(0, 0), (1, 2**24), (2**32 - 1, 1), (-1, 1)])
+def test_SET_PARACHUTE_ARM_mask_that_a_param_cannot_hold_is_not_sent(arm, select):  # noqa: N802
+    bench = ready()
+    bench.link.set_triggers(3, arm, select, "", bench.now)
+    bench.collect()
+    assert not bench.end(3).finished.success
+    assert bench.commands() == []
+
+
+# -- "Parachute Status" -----------------------------------------------------------------------
+
+
+def test_STATUS_stream_nominally_1_Hz_is_watched():  # noqa: N802
+    bench = ready().at(1.0).hear(PARACHUTE, heartbeat(), status(boot_ms=6000))
+    assert bench.link.chosen_parachute().status_interval == pytest.approx(1.0)
+    bench.stream(4.0, 1.0, PARACHUTE, heartbeat).at(4.5)
+    assert bench.last_status().faults == ("PARACHUTE_STATUS 3.5 s old",)
+
+
+def test_STATUS_rate_by_MAV_CMD_SET_MESSAGE_INTERVAL_511_and_read_back():  # noqa: N802
+    bench = ready()
+    bench.link.set_message_interval(4, 430, 500_000, "", bench.now)
+    bench.collect()
+    (order,) = bench.commands(511)
+    assert (order.param1, order.param2) == (430, 500_000)
+    bench.at(0.1).hear(PARACHUTE, ack(511))
+    (ask,) = bench.commands(512)
+    assert (ask.param1, ask.param2) == (d.MAVLINK_MSG_ID_MESSAGE_INTERVAL, 430)
+    other = d.MAVLink_message_interval_message(30, 1)
+    answer = d.MAVLink_message_interval_message(430, 500_000)
+    bench.at(0.2).hear(PARACHUTE, ack(512), other, answer)
+    end = bench.end(4)
+    assert end.finished.success
+    assert (end.data.message_id, end.data.interval_us) == (430, 500_000)
+
+
+# -- commands of the reduced document and its note --------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("action", "param1"),
+    [
+        pytest.param("PARACHUTE_DISABLE", 0, id="PARACHUTE_DISABLE"),
+        pytest.param("PARACHUTE_ENABLE", 1, id="PARACHUTE_ENABLE"),
+        pytest.param("PARACHUTE_RELEASE", 2, id="PARACHUTE_RELEASE"),
+    ],
+)
+def test_MAV_CMD_DO_PARACHUTE_208(action, param1):  # noqa: N802
+    bench = ready()
+    bench.link.parachute_action(5, getattr(d, action), "", bench.now)
+    bench.collect()
+    (order,) = bench.commands()
+    assert (order.command, order.param1) == (208, param1)
+    bench.hear(PARACHUTE, ack(208))
+    if action == "PARACHUTE_RELEASE":
+        assert bench.ends(5) == []
+        deployed = d.PARACHUTE_DEPLOYMENT_TRIGGER_MAVLINK
+        bench.at(0.2).hear(PARACHUTE, status(boot_ms=5200, deployed=deployed))
+    assert bench.end(5).finished.success
+
+
+@pytest.mark.parametrize(
+    ("method", "number", "params"),
+    [
+        pytest.param(
+            KillMethod.FLIGHT_TERMINATION, 185, (1, 0), id="MAV_CMD_DO_FLIGHTTERMINATION"
+        ),
+        pytest.param(KillMethod.FORCED_DISARM, 400, (0, 21196), id="MAV_CMD_COMPONENT_ARM_DISARM"),
+    ],
+)
+def test_kill(method, number, params):
+    bench = Bench(kill_method=method).hear((1, 1), copter(armed=True))
+    bench.link.kill(6, bench.now)
+    bench.collect()
+    (order,) = bench.commands()
+    assert (order.command, order.param1, order.param2) == (number, *params)
+    assert (order.target_system, order.target_component) == (1, 1)
+    bench.at(0.1).hear((1, 1), ack(number))
+    assert bench.ends(6) == []
+    bench.at(0.2).hear((1, 1), copter(armed=False))
+    assert bench.end(6).finished.success
+    assert "the autopilot's heartbeat says motors off" in bench.end(6).finished.message

@@ -1,0 +1,255 @@
+"""The simulators as executables: without ROS, with every mistake told in one line."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+
+PARACHUTE, AUTOPILOT = "sim_mavlink_parachute", "sim_autopilot"
+BOTH = pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
+LOCAL = "127.0.0.1"
+#: Makes `import rclpy` fail as on a machine without ROS.
+NO_ROS = """
+import sys
+
+
+class NoRos:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("rclpy", "rosidl_runtime_py", "rpyutils"):
+            raise ImportError(f"no ROS here: {name}")
+
+
+sys.meta_path.insert(0, NoRos())
+"""
+
+
+@pytest.fixture
+def environment(tmp_path):
+    """An environment in which rclpy cannot be imported."""
+    (tmp_path / "sitecustomize.py").write_text(NO_ROS)
+    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
+    return {**os.environ, "PYTHONPATH": path}
+
+
+class Simulator:
+    """One that runs, and the lines that it has printed."""
+
+    def __init__(self, name, environment, *arguments):
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", f"chute_ros.sim.{name}", *arguments],
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.lines = []
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip())
+
+    def said(self, text):
+        return next((line for line in self.lines if text in line), None)
+
+    def end(self, number=signal.SIGINT):
+        """Its exit code after this signal."""
+        self.process.send_signal(number)
+        code = self.process.wait(20.0)
+        self._reader.join()
+        return code
+
+
+@pytest.fixture
+def start(environment):
+    started = []
+
+    def begin(name, *arguments):
+        started.append(Simulator(name, environment, *arguments))
+        return started[-1]
+
+    yield begin
+    for simulator in started:
+        if simulator.process.poll() is None:
+            simulator.process.kill()
+            simulator.end()
+        simulator.process.stdout.close()
+
+
+@pytest.fixture
+def fail(environment):
+    """What it says to a mistake: (exit code, stderr)."""
+
+    def run(name, *arguments):
+        done = subprocess.run(
+            [sys.executable, "-m", f"chute_ros.sim.{name}", *arguments],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=20.0,
+            check=False,
+        )
+        assert done.stdout == ""
+        assert "Traceback" not in done.stderr
+        return done.returncode, done.stderr
+
+    return run
+
+
+def port_in(line):
+    """The port that was really bound."""
+    return int(re.search(r"udpin:127\.0\.0\.1:(\d+)", line)[1])
+
+
+def test_rclpy_is_really_out_of_reach_in_these_tests(environment):
+    done = subprocess.run(
+        [sys.executable, "-c", "import rclpy"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "no ROS here: rclpy" in done.stderr
+
+
+@BOTH
+def test_it_runs_without_ros_answers_and_ends_on_an_interrupt(simulator, start, await_until):
+    running = start(simulator, "--connection", f"udpin:{LOCAL}:0")
+    await_until(lambda: running.said("is open"), "it is open")
+    port = port_in(running.said("is open"))
+    component = 161 if simulator == PARACHUTE else 1
+    ask = dialect.MAVLink_command_long_message(1, component, 512, 0, 0, 0, 0, 0, 0, 0, 0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.settimeout(20.0)
+        station.sendto(FrameEncoder(255, 190).encode(ask, 0.0), (LOCAL, port))
+        (frame,) = FrameDecoder().feed_datagram(station.recv(300), 0.0)
+    assert frame.device == f"1/{component}"
+    assert running.end() == 0
+    assert all(re.match(r" *\d+\.\d{3} ", line) for line in running.lines), running.lines
+
+
+def test_it_ends_on_a_termination_too(start, await_until):
+    running = start(PARACHUTE, "--connection", f"udpin:{LOCAL}:0")
+    await_until(lambda: running.said("is open"), "it is open")
+    assert running.end(signal.SIGTERM) == 0
+
+
+def test_a_busy_port_is_told_and_taken_when_it_is_free(start, await_until):
+    holder = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    holder.bind((LOCAL, 0))
+    running = start(PARACHUTE, "--connection", f"udpin:{LOCAL}:{holder.getsockname()[1]}")
+    await_until(lambda: running.said("cannot be opened"), "it says so")
+    line = running.said("cannot be opened")
+    assert "Address already in use; trying again each 0.5 s" in line
+    assert running.process.poll() is None
+    holder.close()
+    await_until(lambda: running.said("is open"), "it is open after all")
+    assert running.end() == 0
+    assert len([one for one in running.lines if "cannot be opened" in one]) == 1
+
+
+def test_it_does_what_the_options_and_the_script_say(start, await_until):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind((LOCAL, 0))
+        station.settimeout(20.0)
+        running = start(
+            PARACHUTE,
+            *("--connection", f"udpout:{LOCAL}:{station.getsockname()[1]}"),
+            *("--system-id", "9", "--component-id", "0xa2", "--armed", "0x0c"),
+            *("--error", "LOW_POWER", "--error", "GPS_ERROR", "--packed-date", "2020-01-31"),
+            *("--at", "0.05:deploy=GEOFENCE", "--ats-arm-altitude", "30"),
+        )
+        statuses = []
+        while not statuses or not statuses[-1].message.deployment_status:
+            frames = FrameDecoder().feed_datagram(station.recv(300), 0.0)
+            statuses += [f for f in frames if f.message.get_type() == "PARACHUTE_STATUS"]
+    told = statuses[-1].message
+    assert statuses[-1].device == "9/162"
+    assert (told.arm_status, told.error_status) == (12, 8 | 2048)
+    assert (told.deployment_status, told.ats_arm_altitude) == (5, 30)
+    assert told.parachute_packed_date == "2020-01-31"
+    await_until(lambda: running.said("action deploy=GEOFENCE"), "it says what it does")
+
+
+def test_quiet_it_prints_nothing(start):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind((LOCAL, 0))
+        station.settimeout(20.0)
+        where = f"udpout:{LOCAL}:{station.getsockname()[1]}"
+        running = start(AUTOPILOT, "--quiet", "--connection", where)
+        assert station.recv(300)
+    assert running.end() == 0
+    assert running.lines == []
+
+
+@BOTH
+def test_help_names_every_action_and_form(simulator, environment):
+    done = subprocess.run(
+        [sys.executable, "-m", f"chute_ros.sim.{simulator}", "--help"],
+        env={**environment, "COLUMNS": "500"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    for word in ("udpin:HOST:PORT", "serial:PATH[:BAUD]", "--loss", "--seed", "mute", "reboot"):
+        assert word in done.stdout
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--at", "reboot"), "--at 'reboot': need SECONDS:ACTION, for example 5:reboot"),
+        (("--at", "5:"), "--at '5:': need SECONDS:ACTION"),
+        (("--at", "soon:reboot"), "--at 'soon:reboot': need SECONDS:ACTION"),
+        (("--at", "nan:reboot"), "--at 'nan:reboot': need SECONDS:ACTION"),
+        (("--at=-1:reboot",), "--at '-1:reboot': need SECONDS:ACTION"),
+        (("--at", "5:explode"), "action 'explode' is not known: need one of "),
+        (("--at", "5:reboot=now"), "action 'reboot=now': reboot takes no argument"),
+        (("--connection", "udp:1"), "connection 'udp:1' is not understood: need udpin:HOST:PORT"),
+        (("--connection", f"udpin:{LOCAL}:0", "--connection", "tcpin::0"), "'tcpin::0' is not"),
+        (("--loss", "30"), "loss is 30.0: need 0 to 1"),
+        (("--system-id", "300"), "id '300': need 1 to 255"),
+        (("--system-id", "one"), "id 'one': need 1 to 255"),
+        (("--warp", "9"), "unrecognized arguments: --warp 9"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(simulator, arguments, said, fail):
+    code, text = fail(simulator, *arguments)
+    assert code == 2
+    assert said in text.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("simulator", "arguments", "said"),
+    [
+        (PARACHUTE, ("--at", "5:error=TIRED"), "'TIRED' is nothing that error can take"),
+        (PARACHUTE, ("--at", "5:deploy"), "'' is nothing that deploy can take"),
+        (PARACHUTE, ("--armed", "256"), "mask '256': need 0 to 255"),
+        (PARACHUTE, ("--ats-arm-altitude", "300"), "m '300': need 0 to 255"),
+        (PARACHUTE, ("--error", "TIRED"), "invalid choice: 'TIRED'"),
+        (AUTOPILOT, ("--at", "5:takeoff=high"), "'high' is nothing that takeoff can take"),
+    ],
+)
+def test_a_mistake_in_its_own_options_is_told_too(simulator, arguments, said, fail):
+    code, text = fail(simulator, *arguments)
+    assert code == 2
+    assert said in text.splitlines()[-1]
+
+
+def test_a_dialect_that_is_not_built_is_told_in_one_line(fail, environment, tmp_path):
+    (tmp_path / "chute_msgs").mkdir()
+    (tmp_path / "chute_msgs" / "__init__.py").touch()
+    code, text = fail(PARACHUTE)
+    assert code == 2
+    assert "colcon build --base-paths src src/chute_ros/msg_defs" in text
+    assert len(text.splitlines()) == 1

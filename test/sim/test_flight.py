@@ -1,0 +1,153 @@
+"""The flight model: heights, speeds and times that mean something."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chute_ros.sim.flight import GRAVITY, FlightModel
+
+STEP = 0.02
+
+
+def fly(model, seconds):
+    """The heights on the way."""
+    heights = []
+    for _ in range(round(seconds / STEP)):
+        model.step(STEP)
+        heights.append(model.height)
+    return heights
+
+
+def hovering(height):
+    model = FlightModel(armed=True, target_height=height)
+    fly(model, 20.0 + height / 5.0)
+    return model
+
+
+def test_it_stands_until_it_is_armed_and_told_to_climb():
+    model = FlightModel(target_height=60.0)
+    fly(model, 5.0)
+    assert model.on_ground
+    assert model.acceleration == pytest.approx(GRAVITY)
+    model = FlightModel(armed=True)
+    fly(model, 5.0)
+    assert model.on_ground
+
+
+def test_it_climbs_to_its_target_and_hovers_there():
+    model = FlightModel(armed=True, target_height=60.0)
+    heights = fly(model, 40.0)
+    assert max(heights) < 60.5, "it does not swing"
+    assert model.height == pytest.approx(60.0, abs=0.5)
+    assert model.vertical_speed == pytest.approx(0.0, abs=0.1)
+    assert model.roll == 0.0
+    assert model.acceleration == pytest.approx(GRAVITY, rel=0.02)
+
+
+def test_on_its_way_up_it_is_no_faster_than_its_climb_speed():
+    model = FlightModel(armed=True, target_height=60.0)
+    fastest = 0.0
+    while model.height < 50.0:
+        model.step(STEP)
+        fastest = max(fastest, model.vertical_speed)
+    assert model.climb_speed * 0.8 < fastest < model.climb_speed * 1.05
+
+
+def test_it_lands_softly_when_told_to():
+    model = hovering(10.0)
+    model.target_height = 0.0
+    speeds = []
+    for _ in range(round(20.0 / STEP)):
+        model.step(STEP)
+        speeds.append(model.vertical_speed)
+    assert model.on_ground
+    assert min(speeds) > -2.5
+
+
+def test_after_a_motor_failure_it_falls_and_tumbles_to_its_terminal_speed():
+    model = hovering(500.0)
+    model.motors_failed = True
+    model.step(STEP)
+    assert model.acceleration < 1.0, "a falling accelerometer feels next to nothing"
+    fly(model, 1.0)
+    assert model.vertical_speed < -8.0
+    assert model.roll > 1.0
+    fly(model, 10.0)
+    assert model.vertical_speed == pytest.approx(-model.fall_speed, rel=0.02)
+    assert model.height > 0.0
+
+
+@pytest.mark.parametrize("why", ["disarmed", "failed"])
+def test_motors_that_are_off_do_not_hold_it(why):
+    model = hovering(60.0)
+    if why == "disarmed":
+        model.armed = False
+    else:
+        model.motors_failed = True
+    fly(model, 2.0)
+    assert model.vertical_speed < -12.0
+
+
+def test_the_canopy_opens_in_its_time_and_carries_at_its_speed():
+    model = hovering(200.0)
+    model.armed = False
+    fly(model, 1.0)
+    model.release()
+    assert model.canopy == 0.0
+    fly(model, model.canopy_opening_time / 2)
+    assert model.canopy == pytest.approx(0.5, abs=0.03)
+    fly(model, 6.0)
+    assert model.canopy == 1.0
+    assert model.vertical_speed == pytest.approx(-model.canopy_speed, rel=0.02)
+    assert model.roll == 0.0, "it hangs upright"
+
+
+def test_a_second_release_does_not_fold_the_canopy_again():
+    model = hovering(200.0)
+    model.release()
+    fly(model, 2.0)
+    model.release()
+    assert model.canopy == 1.0
+
+
+def test_it_touches_down_under_its_canopy_and_stays_there():
+    model = hovering(60.0)
+    model.armed = False
+    model.release()
+    fly(model, 30.0)
+    assert model.on_ground
+    assert fly(model, 5.0) == [0.0] * round(5.0 / STEP)
+    assert model.vertical_speed == 0.0
+    assert model.acceleration == pytest.approx(GRAVITY)
+
+
+EVENTS = st.one_of(
+    st.tuples(st.just("armed"), st.booleans()),
+    st.tuples(st.just("motors_failed"), st.booleans()),
+    st.tuples(st.just("target_height"), st.floats(-10.0, 500.0)),
+    st.tuples(st.just("release"), st.none()),
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    flight=st.lists(st.tuples(EVENTS, st.integers(0, 60)), max_size=12),
+    dt=st.floats(0.0, 0.1),
+)
+def test_whatever_happens_it_is_never_below_the_ground_and_never_nowhere(flight, dt):
+    model = FlightModel()
+    for (name, value), steps in flight:
+        if name == "release":
+            model.release()
+        else:
+            setattr(model, name, value)
+        for _ in range(steps):
+            model.step(dt)
+            numbers = (model.height, model.vertical_speed, model.roll, model.acceleration)
+            assert all(map(math.isfinite, numbers))
+            assert model.height >= 0.0
+            assert abs(model.vertical_speed) < 60.0
+            assert 0.0 <= model.canopy <= 1.0
+            assert abs(model.roll) <= math.pi

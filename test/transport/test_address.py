@@ -1,0 +1,95 @@
+"""A connection string becomes an address, or one line that says what is wrong with it."""
+
+import pytest
+
+from chute_ros.errors import ParameterError
+from chute_ros.transport.address import FORMS, Address, parse_address
+from chute_ros.transport.serial_wire import SerialWire
+from chute_ros.transport.tcp import TcpClientWire, TcpServerWire
+from chute_ros.transport.udp import UdpWire
+from chute_ros.transport.wire import make_wire
+
+BY_PATH = "/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0"
+
+FORMS_AND_MEANING = {
+    "udpin:0.0.0.0:14550": (Address("udpin", "0.0.0.0", 14550), UdpWire),
+    "udpin:127.0.0.1:0": (Address("udpin", "127.0.0.1", 0), UdpWire),
+    "udpout:10.0.0.2:14550": (Address("udpout", "10.0.0.2", 14550), UdpWire),
+    "udppair:127.0.0.1:14541:127.0.0.1:14540": (
+        Address("udppair", "127.0.0.1", 14541, "127.0.0.1", 14540),
+        UdpWire,
+    ),
+    "tcp:drone.local:5760": (Address("tcp", "drone.local", 5760), TcpClientWire),
+    "tcpin:0.0.0.0:65535": (Address("tcpin", "0.0.0.0", 65535), TcpServerWire),
+    "serial:/dev/ttyUSB0": (Address("serial", "/dev/ttyUSB0", 57600), SerialWire),
+    "serial:/dev/ttyACM0:921600": (Address("serial", "/dev/ttyACM0", 921600), SerialWire),
+    f"serial:{BY_PATH}": (Address("serial", BY_PATH, 57600), SerialWire),
+    f"serial:{BY_PATH}:115200": (Address("serial", BY_PATH, 115200), SerialWire),
+}
+
+
+@pytest.mark.parametrize("text", FORMS_AND_MEANING)
+def test_every_form_is_understood(text):
+    address, wire = FORMS_AND_MEANING[text]
+    assert parse_address(text) == address
+    assert isinstance(make_wire(address), wire)
+
+
+def test_the_table_above_covers_every_form_that_is_offered():
+    offered = {form.strip().split(":")[0] for form in FORMS.replace(" or ", ",").split(",")}
+    tried = {text.split(":")[0] for text in FORMS_AND_MEANING}
+    assert offered == tried
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "udpin",
+        "udpin:",
+        "udpin:14550",
+        "udpin::14550",
+        "udpin:127.0.0.1:",
+        "udpin:127.0.0.1:14550:",
+        "udpin:::1:14550",
+        "udp:127.0.0.1:14550",
+        "UDPIN:127.0.0.1:14550",
+        "udppair:127.0.0.1:14541",
+        "udppair:127.0.0.1:14541:127.0.0.1:",
+        "tcp:localhost",
+        "serial",
+        "serial:",
+        "serial::57600",
+        "serial:/dev/ttyUSB0:",
+        "serial:/dev/ttyUSB0:0",
+        "/dev/ttyUSB0",
+    ],
+)
+def test_what_is_no_address_is_named_with_what_would_be(text):
+    with pytest.raises(ParameterError) as caught:
+        parse_address(text)
+    assert repr(text) in str(caught.value)
+    assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "port"),
+    [
+        ("udpin:127.0.0.1:65536", "65536"),
+        ("udpin:127.0.0.1:-1", "-1"),
+        ("udpin:127.0.0.1:mavlink", "mavlink"),
+        ("udpin:127.0.0.1:1e3", "1e3"),
+        ("udpin:127.0.0.1:\u0661\u0662", "\u0661\u0662"),
+        ("udpin:127.0.0.1: 14550", " 14550"),
+        # Nothing can be sent to port 0.
+        ("udpout:127.0.0.1:0", "0"),
+        ("tcp:127.0.0.1:0", "0"),
+        ("udppair:127.0.0.1:14541:127.0.0.1:0", "0"),
+    ],
+)
+def test_a_port_that_is_none_is_named_with_its_connection(text, port):
+    with pytest.raises(ParameterError) as caught:
+        parse_address(text)
+    assert f"connection {text!r}: port {port!r}" in str(caught.value)
+    assert "to 65535" in str(caught.value)
+    assert FORMS in str(caught.value)

@@ -1,0 +1,139 @@
+"""UDP as a wire, over real sockets on loopback."""
+
+import socket
+
+import pytest
+from loop_bench import LOCAL, descriptors, free_port, running, udp
+
+from chute_ros.transport.address import Address
+from chute_ros.transport.udp import MOST_PEERS, UdpWire
+
+
+def test_listening_hears_a_datagram_and_answers_its_sender(await_until):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as device:
+        node.link.answer = lambda data: b"answer to " + data
+        device.sendto(b"hello", (LOCAL, node.port))
+        assert device.recv(100) == b"answer to hello"
+        assert node.link.received == [(b"hello", None)]
+
+
+def test_sending_out_hears_what_comes_back():
+    with udp() as device, running(f"udpout:{LOCAL}:{device.getsockname()[1]}") as node:
+        node.link.answer = lambda data: b"thanks for " + data
+        node.send(b"knock")
+        data, peer = device.recvfrom(100)
+        assert data == b"knock"
+        device.sendto(b"this", peer)
+        assert device.recv(100) == b"thanks for this"
+
+
+def test_a_pair_listens_on_one_port_and_sends_to_another():
+    ear = udp()
+    pair = f"udppair:{LOCAL}:0:{LOCAL}:{ear.getsockname()[1]}"
+    with ear, udp() as mouth, running(pair) as node:
+        node.link.answer = lambda data: b"heard " + data
+        mouth.sendto(b"one way", (LOCAL, node.port))
+        data, sender = ear.recvfrom(100)
+        assert data == b"heard one way"
+        # It is sent from a socket of its own: nothing that answers it there is listened to.
+        assert sender[1] != node.port
+
+
+def test_everyone_who_was_heard_is_answered():
+    with running(f"udpin:{LOCAL}:0") as node, udp() as first, udp() as second:
+        node.link.answer = lambda data: data
+        for device in (first, second):
+            device.sendto(b"here", (LOCAL, node.port))
+            assert device.recv(100) == b"here"
+        assert first.recv(100) == b"here"  # the answer to the second one
+        node.send(b"to all")
+        assert [device.recv(100) for device in (first, second)] == [b"to all", b"to all"]
+
+
+def test_of_too_many_peers_the_one_that_was_silent_longest_is_forgotten():
+    wire = UdpWire(Address("udpin", LOCAL, 0))
+    wire.open()
+    peers = [udp() for _ in range(MOST_PEERS + 1)]
+    try:
+        here = (LOCAL, int(wire.describe().split(":")[2]))
+        # The very first one speaks again before the last one comes: it is not the most silent.
+        for peer in [*peers[:-1], peers[0], peers[-1]]:
+            peer.sendto(b"here", here)
+            while not wire.read(wire.files()[0]):
+                pass  # loopback delivers at once, or almost
+        wire.write(b"to all")
+        heard = []
+        for peer in peers:
+            peer.settimeout(20.0 if peer is not peers[1] else 0.05)
+            try:
+                heard.append(peer.recv(100) == b"to all")
+            except TimeoutError:
+                heard.append(False)
+        assert heard == [True, False, *[True] * (MOST_PEERS - 1)]
+    finally:
+        wire.close()
+        for peer in peers:
+            peer.close()
+
+
+def test_nobody_is_there_to_hear_and_later_somebody_is(await_until):
+    port = free_port(socket.SOCK_DGRAM)
+    with running(f"udpout:{LOCAL}:{port}") as node:
+        for number in range(5):
+            node.send(b"into the void %d" % number)
+        await_until(lambda: len(node.link.updates) > 2, "the loop goes on")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
+            late.bind((LOCAL, port))
+            late.settimeout(20.0)
+            node.send(b"now")
+            assert late.recv(100) == b"now"
+        assert [change.is_open for change in node.changes] == [True]
+
+
+def test_an_unreachable_peer_costs_its_own_frame_only(await_until):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as gone, udp() as here:
+        for device in (gone, here):
+            device.sendto(b"x", (LOCAL, node.port))
+        await_until(lambda: len(node.link.received) == 2, "both are heard")
+        # An address to which this host has no right to send fails in sendto itself.
+        node.wire._peers = {("255.255.255.255", 9): None, **node.wire._peers}
+        gone.close()
+        node.send(b"first")
+        node.send(b"second")
+        assert [here.recv(100), here.recv(100)] == [b"first", b"second"]
+        await_until(lambda: node.loop.send_errors == 2, "the failures are counted")
+        assert node.wire.is_open
+
+
+def test_a_large_datagram_is_sent_whole_or_counted(await_until):
+    with udp() as device, running(f"udpout:{LOCAL}:{device.getsockname()[1]}") as node:
+        node.send(bytes(100_000))
+        node.send(b"small")
+        assert device.recv(100) == b"small"
+        assert node.loop.send_errors == 1
+
+
+def test_a_busy_port_is_said_once_and_taken_when_it_is_free(await_until):
+    holder = udp()
+    port = holder.getsockname()[1]
+    with running(f"udpin:{LOCAL}:{port}") as node:
+        change = node.changes[0]
+        assert not change.is_open
+        assert f"udpin:{LOCAL}:{port} cannot be opened" in change.text
+        assert "Address already in use" in change.text
+        assert "trying again each 0.5 s" in change.text
+        before = len(node.link.updates)
+        await_until(lambda: len(node.link.updates) > before + 6, "it has tried again")
+        assert len(node.changes) == 1, "the same failure is said once"
+        holder.close()
+        await_until(lambda: node.wire.is_open, "the port is taken")
+        assert node.changes[-1].is_open
+
+
+def test_a_name_that_does_not_resolve_leaves_no_descriptor():
+    wire = UdpWire(Address("udpout", "no-such-host.invalid", 14550))
+    before = descriptors()
+    with pytest.raises(OSError):
+        wire.open()
+    assert descriptors() == before
+    assert not wire.is_open
