@@ -152,7 +152,11 @@ class SafetySupervisorNode(Node):
     def _parachute(self, message: ParachuteStatus) -> None:
         self._turn(
             inputs.ParachuteReport(
-                message.link, message.device, message.deployed, tuple(message.faults)
+                message.link,
+                message.device,
+                message.deployed,
+                tuple(message.faults),
+                message.link_state == ParachuteStatus.LINK_OK,
             )
         )
 

@@ -54,6 +54,11 @@ PARAMETERS = (
         60.0,
     ),
     Parameter(
+        "require_vehicle_state",
+        True,
+        "block flight without vehicle/state: nobody could tell flight from ground",
+    ),
+    Parameter(
         "takeoff_height",
         2.0,
         "armed and higher is in the air, where no landed state is known, m",
@@ -76,5 +81,6 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         kill_timeout=values["kill_timeout"],
         resend_interval=values["resend_interval"],
         vehicle_state_age=values["vehicle_state_age"],
+        require_vehicle_state=values["require_vehicle_state"],
         takeoff_height=values["takeoff_height"],
     )

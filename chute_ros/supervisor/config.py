@@ -35,6 +35,8 @@ class SupervisorConfig:
     resend_interval: float = 0.1
     #: vehicle/state counts only while its parts are younger than this.
     vehicle_state_age: float = 2.5
+    #: Without vehicle/state flight is blocked: nobody could tell flight from ground.
+    require_vehicle_state: bool = True
     #: Without a landed state, armed and higher than this (m) is in the air.
     takeoff_height: float = 2.0
 

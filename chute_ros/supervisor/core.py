@@ -11,7 +11,7 @@ import math
 from dataclasses import replace
 from types import MappingProxyType
 
-from chute_ros.model import Action, Outcome
+from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
@@ -41,6 +41,10 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
         for evidence in state.links.values()
         for limit in (config.heartbeat.stale_after, config.heartbeat.lost_after)
     ]
+    if state.stage in (Stage.STARTUP, Stage.READY, Stage.ARMED, Stage.LANDED):
+        since = state.vehicle_received - state.vehicle.armed_age
+        # Just after the limit, which still counts as young enough.
+        deadlines.append(math.nextafter(since + config.vehicle_state_age, math.inf) + 1e-6)
     if state.stage is Stage.STARTUP:
         deadlines.append(state.started_at + config.startup_grace)
     if state.stage is Stage.DEPLOYED and state.deploy_tokens:
@@ -58,6 +62,10 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
 
 class _Update(Requests):
     """One update."""
+
+    def __init__(self, config: SupervisorConfig, state: State, now: float) -> None:
+        super().__init__(config, state, now)
+        self._told_released: set[str] = set()
 
     def take(self, one: i.Input) -> None:
         """One input, in the order in which it came."""
@@ -113,8 +121,9 @@ class _Update(Requests):
             return
         evidence = self.evidence(one.link)
         deployed = evidence.deployed - {one.device}
-        if one.deployed:
+        if one.deployed and one.alive:
             deployed |= {one.device}
+            self._told_released.add(one.link)
         faults = MappingProxyType({**evidence.faults, one.device: one.faults})
         self.set_evidence(one.link, replace(evidence, deployed=deployed, faults=faults))
 
@@ -128,7 +137,7 @@ class _Update(Requests):
             return
         for slot in SLOTS:
             pending = self.pending(slot)
-            if pending is None or one.link not in pending.decision.targets:
+            if pending is None or one.link not in pending.targets:
                 continue
             if (one.epoch, one.id) == (pending.decision.epoch, pending.decision.id):
                 reached = pending.of(one.link) | {one.outcome}
@@ -156,7 +165,7 @@ class _Update(Requests):
             self.move(stimulus, "; ".join(reasons))
 
     def _look_at_parachutes(self) -> None:
-        out = [name for name in self.config.deploy_links if self.evidence(name).deployed]
+        out = [name for name in self.config.deploy_links if self._released(name)]
         stage = self.state.stage
         if not out or not listed(stage, Stimulus.PARACHUTE_OPEN):
             return
@@ -164,6 +173,14 @@ class _Update(Requests):
         if stage is Stage.IN_FLIGHT:
             # Released by itself: motors that turn under an open canopy tear it.
             self.fire(Action.KILL, "parachute open", ("its own status says deployed",))
+
+    def _released(self, link: str) -> bool:
+        """A device on link says so now; what a lost one said last is not what it is."""
+        evidence = self.evidence(link)
+        fresh = (
+            evidence.state(self.config, self.now) is LinkState.OK or link in self._told_released
+        )
+        return bool(evidence.deployed) and fresh
 
     def _look_at_kill(self) -> None:
         kill = self.state.kill
@@ -206,13 +223,13 @@ class _Update(Requests):
                 self.finish_deploy(True, accepted, text or "its own status says deployed")
 
     def _block_or_release(self) -> None:
-        """Flight is blocked on the ground in every stage but READY and ARMED."""
+        """Flight is blocked on the ground until READY, and after a deploy until a reset."""
         if self.state.mode is i.Mode.INHIBITED:
             return
         if self.state.stage in (Stage.READY, Stage.ARMED):
             action = Action.FLIGHT_BLOCK_RELEASE
             reasons: tuple[str, ...] = ("every required link is healthy",)
-        elif self.state.stage in (Stage.STARTUP, Stage.BLOCKED):
+        elif self.state.stage in (Stage.STARTUP, Stage.BLOCKED, Stage.DEPLOYED, Stage.FAULT):
             action = Action.FLIGHT_BLOCK
             reasons = block_reasons(self.config, self.state, self.now) or ("starting",)
         else:
@@ -231,9 +248,14 @@ class _Update(Requests):
             pending = self.pending(slot)
             if pending is None or pending.decision.shadow or not self._worth_sending(pending):
                 continue
-            if self.now - pending.sent_at >= self.config.resend_interval:
+            if self.now - pending.sent_at < self.config.resend_interval:
+                continue
+            if pending.decision.id == self.state.next_id - 1:
                 self.outputs.append(i.Decide(pending.decision, again=True))
                 self.put(slot, replace(pending, sent_at=self.now))
+            else:
+                # A node that has seen a newer one would refuse this number.
+                self.decide_for_missing(slot)
 
     def _worth_sending(self, pending: Pending) -> bool:
         """Somebody has not reported: a node that is alive, or any while it can still help."""

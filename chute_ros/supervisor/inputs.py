@@ -34,6 +34,8 @@ class ParachuteReport:
     device: str
     deployed: bool
     faults: tuple[str, ...]
+    #: The device is heard: what a lost one said last is not what it is.
+    alive: bool = True
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,32 @@ def _faults(evidence: LinkEvidence) -> str:
 
 def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
     """Every reason against taking off now; empty: none."""
-    problems = [
-        link_problem(config, link, state.links.get(link, LinkEvidence()), now)
-        for link in config.required_links
-    ]
-    return tuple(problem for problem in problems if problem)
+    problem = {
+        link: link_problem(config, link, state.links.get(link, LinkEvidence()), now)
+        for link in config.links
+    }
+    against = [link for link in config.required_links if problem[link]]
+    for links in (config.kill_links, config.deploy_links):
+        # One that can do it is enough; none at all means that nobody would.
+        if all(problem[link] for link in links):
+            against += links
+    reasons = [problem[link] for link in dict.fromkeys(against)]
+    if config.require_vehicle_state and (text := _vehicle_problem(config, state, now)):
+        reasons.append(text)
+    if state.stage in (Stage.DEPLOYED, Stage.FAULT):
+        reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
+    return tuple(reasons)
+
+
+def _vehicle_problem(config: SupervisorConfig, state: State, now: float) -> str:
+    """Without vehicle/state nobody can tell flight from ground; empty: it is there."""
+    age = state.vehicle.armed_age + now - state.vehicle_received
+    if math.isnan(age):
+        return "vehicle/state: whether the motors are armed was never told"
+    if age > config.vehicle_state_age:
+        limit = config.vehicle_state_age
+        return f"vehicle/state: armed or not is {age:.1f} s old (limit {limit:g} s)"
+    return ""
 
 
 def arm_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:

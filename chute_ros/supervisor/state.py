@@ -49,6 +49,8 @@ class Pending:
     """A decision on its way, with every outcome that each link reported."""
 
     decision: Decision
+    #: All that shall carry it out; a decision made again may name only those still missing.
+    targets: tuple[str, ...]
     decided_at: float
     sent_at: float
     outcomes: Mapping[str, frozenset[Outcome]] = field(
@@ -72,12 +74,12 @@ class Pending:
 
     def all_failed(self) -> bool:
         """Every target has failed, and none was confirmed."""
-        failed = all(Outcome.FAILED in self.of(target) for target in self.decision.targets)
+        failed = all(Outcome.FAILED in self.of(target) for target in self.targets)
         return failed and not self.confirmed
 
     def unreported(self) -> tuple[str, ...]:
         """The targets that have not even said that they have sent it."""
-        return tuple(target for target in self.decision.targets if not self.of(target))
+        return tuple(target for target in self.targets if not self.of(target))
 
     def newest_details(self) -> str:
         """What was reported last, in words."""

@@ -56,7 +56,7 @@ class Steps:
         decision = Decision(state.epoch, state.next_id, action, rule, reasons, targets, shadow)
         self.outputs.append(i.Decide(decision))
         self.state = replace(state, next_id=state.next_id + 1)
-        self.put(slot, Pending(decision, self.now, self.now))
+        self.put(slot, Pending(decision, targets, self.now, self.now))
 
     def renew(self, why: str) -> None:
         """Decide again, under a new number, what is still to be carried out.
@@ -73,12 +73,32 @@ class Steps:
             pending = self.pending(slot)
             if pending is None or (pending.confirmed and slot != "block"):
                 continue
-            d = pending.decision
-            self.decide(slot, d.action, d.rule, (*d.reasons, why), d.targets)
-            renewed = self.pending(slot)
-            assert renewed is not None
-            # The time since the first decision goes on counting towards its limits.
-            self.put(slot, replace(renewed, decided_at=pending.decided_at))
+            self.decide_again(slot, why)
+
+    def decide_again(self, slot: Slot, why: str) -> None:
+        """The same decision under a new number, to all that it was for."""
+        pending = self.pending(slot)
+        assert pending is not None
+        renewed = self._under_new_number(slot, pending, pending.targets, why)
+        # The time since the first decision goes on counting towards its limits.
+        self.put(slot, replace(renewed, decided_at=pending.decided_at))
+
+    def decide_for_missing(self, slot: Slot) -> None:
+        """The same under a new number, to those that have not reported; what is known stays."""
+        pending = self.pending(slot)
+        assert pending is not None
+        renewed = self._under_new_number(slot, pending, pending.unreported(), "not reported yet")
+        self.put(slot, replace(pending, decision=renewed.decision, sent_at=self.now))
+
+    def _under_new_number(
+        self, slot: Slot, pending: Pending, targets: tuple[str, ...], why: str
+    ) -> Pending:
+        d = pending.decision
+        reasons = d.reasons if why in d.reasons else (*d.reasons, why)
+        self.decide(slot, d.action, d.rule, reasons, targets)
+        renewed = self.pending(slot)
+        assert renewed is not None
+        return renewed
 
     def pending(self, slot: Slot) -> Pending | None:
         """The decision in this slot."""

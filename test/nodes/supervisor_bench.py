@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 
-from chute_msgs.msg import ActionReport, LinkHeartbeat, SafetyDecision, SafetyState
+from chute_msgs.msg import ActionReport, LinkHeartbeat, SafetyDecision, SafetyState, VehicleState
 from chute_msgs.srv import Arm
 from node_bench import stamped
 from rclpy.node import Node
@@ -18,7 +18,10 @@ QUICK = {"startup_grace": 0.3, "deploy_timeout": 2.0, "kill_timeout": 2.0}
 
 
 class StubLink(Node):
-    """A device node that beats, arms and carries decisions out as it is told."""
+    """A device node that beats, arms and carries decisions out as it is told.
+
+    It tells of a vehicle that stands disarmed on the ground.
+    """
 
     def __init__(self, name, *, namespace, parameter_overrides):
         super().__init__(name, namespace=namespace, parameter_overrides=parameter_overrides)
@@ -29,6 +32,7 @@ class StubLink(Node):
         self.decisions = []
         self._seq = itertools.count()
         self._beats = self.create_publisher(LinkHeartbeat, "safety/heartbeat", qos.STATUS)
+        self._vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self._reports = self.create_publisher(ActionReport, "safety/action", qos.DECISION)
         self.create_subscription(SafetyDecision, "safety/decision", self._decision, qos.DECISION)
         self.create_timer(0.05, self._beat)
@@ -45,6 +49,14 @@ class StubLink(Node):
                 device_healthy=self.healthy,
             )
             self._beats.publish(stamped(self, message))
+        vehicle = VehicleState(
+            source="1/1",
+            link_state=int(LinkState.OK),
+            armed=VehicleState.DISARMED,
+            landed_state=1,
+            height=0.0,
+        )
+        self._vehicle.publish(stamped(self, vehicle))
 
     def _arm(self, request, response):
         self.arm_requests.append((request.arm, request.triggers))

@@ -247,3 +247,50 @@ def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named() -> None
     assert story.state.stage is Stage.BLOCKED
     assert "1/161 is released" in "; ".join(story.newest(Action.FLIGHT_BLOCK).reasons)
     assert story.decisions(K) == []
+
+
+def test_what_a_lost_parachute_said_last_is_not_believed_and_it_is_deployed_all_the_same() -> None:
+    story = Story().ready()
+    story.at(0.1, out(), i.ParachuteReport(LINK, "1/161", True, (), alive=False))
+    story.at(10.0, i.DeployRequest(5, True, "once more"))
+    story.at(10.1, story.report(K, Outcome.CONFIRMED))
+    assert len(story.decisions(D)) == 1
+    assert story.answers(5) == []
+
+
+def test_what_a_parachute_said_before_its_node_fell_silent_is_not_believed() -> None:
+    story = Story().ready()
+    story.at(0.1, out())
+    story.at(10.0, i.DeployRequest(5, True, "once more"))
+    story.at(10.1, story.report(K, Outcome.CONFIRMED))
+    assert len(story.decisions(D)) == 1
+
+
+def test_after_a_deploy_flight_stays_blocked_until_a_reset() -> None:
+    story = deploying()
+    story.at(1.2, story.report(D, Outcome.CONFIRMED))
+    block = story.newest(Action.FLIGHT_BLOCK)
+    assert "DEPLOYED: needs a reset" in "; ".join(block.reasons)
+
+
+def test_a_kill_that_a_node_missed_goes_out_under_a_new_number_after_a_newer_decision() -> None:
+    story = Story().flying()
+    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    first = story.newest(K)
+    story.at(1.65)
+    assert story.newest(K).id > story.decisions(D)[0].id > first.id
+    assert story.newest(K).reasons[-1] == "not reported yet"
+    story.at(1.7, story.report(K, Outcome.CONFIRMED), story.report(D, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_a_new_number_for_a_missing_node_does_not_forget_what_the_other_said() -> None:
+    config = SupervisorConfig(kill_links=(LINK, "upf_can"))
+    story = Story(config).flying()
+    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    story.at(1.1, story.report(K, Outcome.CONFIRMED))
+    story.at(1.35)
+    again = story.newest(K)
+    assert again.targets == ("upf_can",)
+    assert story.state.kill is not None
+    assert story.state.kill.confirmed

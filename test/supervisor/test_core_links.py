@@ -32,7 +32,7 @@ def test_links_that_do_not_come_up_in_time_are_a_fault() -> None:
 def test_healthy_links_release_flight() -> None:
     story = Story()
     story.at(0.0)
-    story.at(0.1, story.heartbeat())
+    story.at(0.1, story.heartbeat(), i.VehicleReport(STANDING))
     blocked = [Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE]
     assert [d.action for d in story.decisions()] == blocked
     assert story.state.stage is Stage.READY
@@ -161,3 +161,38 @@ def test_the_largest_epoch_cannot_be_overtaken_and_is_not_followed() -> None:
     story = Story().ready()
     story.at(0.1, i.ActionReport(7, 1, LINK, Outcome.FAILED, "older", newest_epoch=2**32 - 1))
     assert story.state.epoch == 7
+
+
+def test_without_vehicle_state_flight_is_blocked_in_those_words() -> None:
+    story = Story()
+    story.at(0.0, story.heartbeat())
+    assert story.state.stage is Stage.STARTUP
+    assert "whether the motors are armed was never told" in reasons(story)
+
+
+def test_a_vehicle_state_that_stops_blocks_flight_at_its_limit() -> None:
+    story = Story().ready()
+    story.alive(2.4)
+    assert story.state.stage is Stage.READY
+    story.alive(2.6)
+    assert story.state.stage is Stage.BLOCKED
+    assert "armed or not is 2.6 s old (limit 2.5 s)" in reasons(story)
+
+
+def test_vehicle_state_can_be_done_without() -> None:
+    story = Story(SupervisorConfig(require_vehicle_state=False))
+    story.at(0.0, story.heartbeat())
+    assert story.state.stage is Stage.READY
+
+
+def test_a_deploy_link_that_does_not_exist_blocks_flight_and_is_named() -> None:
+    story = Story(SupervisorConfig(deploy_links=("umbilicl",)))
+    story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.STARTUP
+    assert reasons(story) == "umbilicl: its node was never heard"
+
+
+def test_a_kill_link_that_does_not_exist_blocks_flight_and_is_named() -> None:
+    story = Story(SupervisorConfig(kill_links=("mavlnk",)))
+    story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
+    assert reasons(story) == "mavlnk: its node was never heard"

@@ -98,6 +98,7 @@ def test_a_second_kill_joins_one_that_is_under_way() -> None:
 def test_a_kill_under_an_open_canopy_is_not_refused() -> None:
     story = Story().flying()
     story.at(1.0, i.ParachuteReport(LINK, "1/161", True, ()))
+    story.at(1.1, story.report(K, Outcome.SENT))
     story.at(20.0, i.KillRequest(1, "operator", "they turn"))
     assert len(story.decisions(K)) == 2
 

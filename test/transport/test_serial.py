@@ -13,6 +13,7 @@ class Device:
     def __init__(self, path):
         self.master, slave = os.openpty()
         tty.setraw(slave)
+        self.path = path
         point(path, os.ttyname(slave))
         os.close(slave)
         self.open = True
@@ -26,6 +27,8 @@ class Device:
     def unplug(self):
         if self.open:
             self.open = False
+            # The name goes first: its number is free for any other process from then on.
+            self.path.unlink()
             os.close(self.master)
 
 
