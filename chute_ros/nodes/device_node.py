@@ -62,6 +62,14 @@ class Summary:
     details: Any
 
 
+@dataclass(frozen=True)
+class CallFailed:
+    """A request could not even be begun, by a mistake of ours."""
+
+    token: int
+    text: str
+
+
 class DeviceNode(Node, ABC):
     """Base of the nodes that speak to a device. The subclass makes self.loop and calls begin."""
 
@@ -74,6 +82,8 @@ class DeviceNode(Node, ABC):
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         self.gate = DecisionGate(name, self.values["max_decision_age"])
         self.wire_text = "not opened yet"
+        #: With the namespace, so that the diagnostics of several vehicles can be told apart.
+        self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         # A service that awaits the device must not keep the other callbacks from running.
         self._service_group = ReentrantCallbackGroup()
@@ -140,6 +150,10 @@ class DeviceNode(Node, ABC):
         """In the executor: one event of the link."""
 
     @abstractmethod
+    def failed_end(self, token: int, text: str) -> Any:
+        """The end of a request that could not be begun."""
+
+    @abstractmethod
     def carry_out(self, decision: model.Decision) -> None:
         """In the executor: do what the gate let through."""
 
@@ -177,7 +191,16 @@ class DeviceNode(Node, ABC):
 
     def _call(self, token: int, begin: Callable[[Any, int, float], None]) -> None:
         assert self.loop is not None
-        self.loop.call(lambda link, now: begin(link, token, now))
+
+        def begin_or_say(link: Any, now: float) -> None:
+            try:
+                begin(link, token, now)
+            except Exception as error:
+                # Whoever waits must get an answer; the loop reports the mistake itself.
+                self.deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
+                raise
+
+        self.loop.call(begin_or_say)
 
     def finished(self, token: int, end: Any) -> None:
         """A request ended: its caller gets end."""
@@ -246,6 +269,9 @@ class DeviceNode(Node, ABC):
             elif isinstance(event, LoopFault):
                 self._loop_faults += 1
                 self.get_logger().error(event.text, throttle_duration_sec=1.0)
+            elif isinstance(event, CallFailed):
+                self.report(event.token, model.Outcome.FAILED, event.text)
+                self.finished(event.token, self.failed_end(event.token, event.text))
             else:
                 self.event(event)
 
@@ -298,7 +324,8 @@ class DeviceNode(Node, ABC):
             limit = self.values["max_decision_age"]
             self.get_logger().error(
                 f"decision {decision.epoch}.{decision.id} {decision.action.name} is {age:.3f} s "
-                f"old (limit {limit:g} s): not acted on; do the clocks of the hosts agree?"
+                f"old (limit {limit:g} s): not acted on; do the hosts' clocks agree? "
+                f"is this host overloaded?"
             )
 
     async def _arm(self, request: Arm.Request, response: Arm.Response) -> Arm.Response:
@@ -322,7 +349,7 @@ class DeviceNode(Node, ABC):
         return SetParametersResult(successful=True)
 
     def _diagnose(self) -> None:
-        name = self.get_name()
+        name = self.diagnostic_name
         summary = self._summary
         assert self.loop is not None
         silent = time.monotonic() - self.loop.last_run
@@ -352,4 +379,4 @@ class DeviceNode(Node, ABC):
             "exceptions in the link's thread": self._loop_faults,
         }
         values |= {f"decisions: {verdict.value}": n for verdict, n in self._verdicts.items()}
-        return diagnostics.status(self.get_name(), "supervisor", level, text, values, "")
+        return diagnostics.status(self.diagnostic_name, "supervisor", level, text, values, "")

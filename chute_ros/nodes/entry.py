@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import signal
 import sys
 
 from chute_ros.errors import ChuteError
@@ -34,7 +35,12 @@ def run(name: str, class_name: str) -> None:
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
-    rclpy.init()
+    try:
+        rclpy.init()
+    except RuntimeError as error:
+        # Arguments and parameter files that cannot be read; ROS names them before its own code.
+        print(f"{name}: {str(error).partition(', at /')[0]}", file=sys.stderr)
+        sys.exit(2)
     node = None
     try:
         node = node_class()
@@ -51,6 +57,8 @@ def run(name: str, class_name: str) -> None:
         print(f"{name}: {error}", file=sys.stderr)
         sys.exit(2)
     finally:
+        # A second Ctrl-C must not cut the ending short: the link's thread is being joined.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
         # The signal's own handler may be shutting down at this very moment.

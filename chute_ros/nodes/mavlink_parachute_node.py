@@ -21,7 +21,9 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.device_node import DeviceNode, Summary
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from, signing_from
+from chute_ros.protocol.mavlink import results
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.effect import EffectFinished
 from chute_ros.protocol.mavlink.events import (
     DeviceLinkChanged,
     Notice,
@@ -116,6 +118,10 @@ class MavlinkParachuteNode(DeviceNode):
                 Severity.WARNING: log.warning,
                 Severity.ERROR: log.error,
             }[event.severity](event.text)
+
+    def failed_end(self, token: int, text: str) -> RequestFinished:
+        finished = EffectFinished(token, False, False, results.NO_ACKNOWLEDGEMENT, text)
+        return RequestFinished(finished)
 
     def carry_out(self, decision: model.Decision) -> None:
         force = self.values["deploy_arms_trigger"]
@@ -263,19 +269,19 @@ class MavlinkParachuteNode(DeviceNode):
         }
         values |= {f"dropped: {reason}": n for reason, n in sorted(dropped.items())}
         return diagnostics.status(
-            self.get_name(), "link", level, text, values, self.values["connection"]
+            self.diagnostic_name, "link", level, text, values, self.values["connection"]
         )
 
     def _diagnose_parachutes(self, details: Details) -> list[DiagnosticStatus]:
         if not details.parachutes:
             return [
                 diagnostics.status(
-                    self.get_name(), "parachute", diagnostics.STALE, "never heard", {}, ""
+                    self.diagnostic_name, "parachute", diagnostics.STALE, "never heard", {}, ""
                 )
             ]
         return [
             diagnostics.status(
-                self.get_name(),
+                self.diagnostic_name,
                 f"parachute {status.device}",
                 diagnostics.OK if status.healthy else diagnostics.ERROR,
                 "; ".join(status.faults) or status.state.name,
@@ -313,7 +319,7 @@ class MavlinkParachuteNode(DeviceNode):
             "restarts": vehicle.reboot_count,
         }
         return diagnostics.status(
-            self.get_name(), "autopilot", level, text, values, vehicle.source
+            self.diagnostic_name, "autopilot", level, text, values, vehicle.source
         )
 
     def _rate(self, name: str, value: int) -> float:

@@ -50,6 +50,8 @@ class SafetySupervisorNode(Node):
         super().__init__("safety_supervisor", **options)
         self.values = declare(self, PARAMETERS)
         self.config = config_from(self.values)
+        #: With the namespace, so that the diagnostics of several vehicles can be told apart.
+        self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         now = time.monotonic()
@@ -328,7 +330,7 @@ class SafetySupervisorNode(Node):
         return stage.name
 
     def _diagnose(self) -> None:
-        now, name = time.monotonic(), self.get_name()
+        now, name = time.monotonic(), self.diagnostic_name
         state, config = self.state, self.config
         reasons = block_reasons(config, state, now)
         level = diagnostics.OK

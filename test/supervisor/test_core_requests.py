@@ -187,3 +187,15 @@ def test_leaving_active_between_kill_and_deploy_stops_the_deploy_and_says_so() -
     assert "mode changed to INHIBITED" in story.answer(1).message
     story.at(30.0)
     assert story.decisions(D) == []
+
+
+def test_leaving_active_after_the_deploy_left_is_a_fault_that_may_be_tried_again() -> None:
+    story = Story().flying()
+    story.at(1.0, i.DeployRequest(1, False, "it falls"))
+    story.at(1.1, story.report(K, Outcome.CONFIRMED))
+    story.at(1.2, i.ModeRequest(2, i.Mode.INHIBITED, force=True))
+    assert story.state.stage is Stage.FAULT
+    story.at(1.3, i.ModeRequest(3, i.Mode.ACTIVE, force=True))
+    story.at(1.4, i.DeployRequest(4, False, "it still falls"))
+    story.at(1.5, story.report(K, Outcome.CONFIRMED))
+    assert len(story.decisions(D)) == 2
