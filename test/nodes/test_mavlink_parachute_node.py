@@ -200,8 +200,13 @@ def test_a_second_vehicle_where_none_was_named_forbids_take_off(bench, network):
 
 
 def tasks(diagnostics):
-    """Task -> its newest status."""
-    return {status.name: status for array in diagnostics for status in array.status}
+    """Node and task, without the namespace -> its newest status."""
+    found = {}
+    for status in (status for array in diagnostics for status in array.status):
+        node, _, task = status.name.partition(": ")
+        assert "/" in node, "the namespace tells the vehicles apart"
+        found[f"{node.rpartition('/')[2]}: {task}"] = status
+    return found
 
 
 def values(status):
