@@ -7,10 +7,18 @@ this host, discovery stays on this host, and each test has a namespace of its ow
 from __future__ import annotations
 
 import itertools
+import os
 import time
 from collections.abc import Callable, Iterator
 
 import pytest
+from hypothesis import settings
+
+# The gate tries the same examples each time: what it says of a commit can be repeated. New ones
+# are looked for with HYPOTHESIS_PROFILE=search.
+settings.register_profile("gate", derandomize=True, deadline=None)
+settings.register_profile("search", deadline=None, max_examples=2000)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "gate"))
 
 #: How long anything that must happen may take on a busy machine, s.
 PATIENCE = 20.0

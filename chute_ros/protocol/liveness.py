@@ -40,7 +40,9 @@ def next_state(state: LinkState, stimulus: Stimulus) -> LinkState:
     try:
         return TRANSITIONS[state, stimulus]
     except KeyError:
-        raise TransitionError(f"a link that is {state.name} cannot take '{stimulus.value}'") from None
+        raise TransitionError(
+            f"a link that is {state.name} cannot take '{stimulus.value}'"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Liveness:
         self.lost_count = 0
 
     def heard(self, now: float) -> list[LinkChange]:
-        """The device was heard at now; returns what changed, the passing of limits before included."""
+        """The device was heard at now; returns what changed, limits passed before included."""
         changes = self.update(now)
         silence = self.age(now)
         before = self.state
@@ -100,7 +102,7 @@ class Liveness:
         return changes
 
     def update(self, now: float) -> list[LinkChange]:
-        """Look at the clock; returns the limits that were passed, each at the time it was passed."""
+        """Look at the clock; returns the limits that were passed, each with its time."""
         changes: list[LinkChange] = []
         silence = self.age(now)
         # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.

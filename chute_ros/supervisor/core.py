@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import MappingProxyType
 
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.preflight import block_reasons
-from chute_ros.supervisor.requests import Requests
+from chute_ros.supervisor.reports import Reports
+from chute_ros.supervisor.requests import ON_GROUND
 from chute_ros.supervisor.state import Pending, State
 from chute_ros.supervisor.steps import SLOTS
-
-_LARGEST_EPOCH = 2**32 - 1
 
 
 def update(
@@ -51,32 +49,29 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
         deadlines.append(state.stage_since + config.report_wait)
     for pending in (state.block, state.kill, state.deploy):
         if pending is not None and pending.unreported():
-            deadlines.append(pending.sent_at + config.resend_interval)
+            deadlines.append(pending.resend_at(config))
     if state.kill is not None:
-        deadlines.append(state.kill.decided_at + config.kill_to_deploy_delay)
         deadlines.append(state.kill.decided_at + config.kill_timeout)
+    if state.stage is Stage.KILLING and state.deploy_reason:
+        deadlines.append(state.deploy_due)
     if state.deploy is not None:
         deadlines.append(state.deploy.decided_at + config.deploy_timeout)
     return min((deadline for deadline in deadlines if deadline > now), default=math.inf)
 
 
-class _Update(Requests):
+class _Update(Reports):
     """One update."""
-
-    def __init__(self, config: SupervisorConfig, state: State, now: float) -> None:
-        super().__init__(config, state, now)
-        self._told_released: set[str] = set()
 
     def take(self, one: i.Input) -> None:
         """One input, in the order in which it came."""
         if isinstance(one, i.LinkHeartbeat):
-            self._heartbeat(one)
+            self.heartbeat(one)
         elif isinstance(one, i.ParachuteReport):
-            self._parachute(one)
+            self.parachute(one)
         elif isinstance(one, i.VehicleReport):
             self.state = replace(self.state, vehicle=one.state, vehicle_received=self.now)
         elif isinstance(one, i.ActionReport):
-            self._action_report(one)
+            self.action_report(one)
         elif isinstance(one, i.ArmRequest):
             self.arm_request(one)
         elif isinstance(one, i.ArmDone):
@@ -100,51 +95,6 @@ class _Update(Requests):
         self._block_or_release()
         self._send_again()
 
-    def _heartbeat(self, one: i.LinkHeartbeat) -> None:
-        if one.link not in self.config.links:
-            return
-        before = self.evidence(one.link)
-        evidence = replace(
-            before,
-            heard=self.now,
-            reported=one.link_state,
-            device_healthy=one.device_healthy,
-            seq=one.seq,
-        )
-        self.set_evidence(one.link, evidence)
-        if one.seq < before.seq:
-            # A node that restarted knows of no decision; what still holds is decided anew.
-            self.renew(f"{one.link} restarted")
-
-    def _parachute(self, one: i.ParachuteReport) -> None:
-        if one.link not in self.config.links:
-            return
-        evidence = self.evidence(one.link)
-        deployed = evidence.deployed - {one.device}
-        if one.deployed and one.alive:
-            deployed |= {one.device}
-            self._told_released.add(one.link)
-        faults = MappingProxyType({**evidence.faults, one.device: one.faults})
-        self.set_evidence(one.link, replace(evidence, deployed=deployed, faults=faults))
-
-    def _action_report(self, one: i.ActionReport) -> None:
-        if self.state.epoch < one.newest_epoch < _LARGEST_EPOCH:
-            epoch = one.newest_epoch + 1
-            text = f"{one.link} has seen epoch {one.newest_epoch}: going on as {epoch}"
-            self.outputs.append(i.Say(text))
-            self.state = replace(self.state, epoch=epoch)
-            self.renew(f"{one.link} knows a newer epoch")
-            return
-        for slot in SLOTS:
-            pending = self.pending(slot)
-            if pending is None or one.link not in pending.targets:
-                continue
-            if (one.epoch, one.id) == (pending.decision.epoch, pending.decision.id):
-                reached = pending.of(one.link) | {one.outcome}
-                outcomes = MappingProxyType({**pending.outcomes, one.link: reached})
-                details = (*pending.details, f"{one.link}: {one.detail}")[-8:]
-                self.put(slot, replace(pending, outcomes=outcomes, details=details))
-
     def _look_at_vehicle(self) -> None:
         in_air = self.state.in_air(self.config, self.now)
         stage = self.state.stage
@@ -152,49 +102,52 @@ class _Update(Requests):
             if stage in (Stage.STARTUP, Stage.BLOCKED):
                 self.alarm(f"in the air although {stage.name}")
             self.move(Stimulus.TAKEN_OFF)
+            self.state = replace(self.state, flown=True)
         elif in_air is False and listed(stage, Stimulus.LANDED):
             self.move(Stimulus.LANDED)
+        if self.state.stage is Stage.LANDED and self.state.disarmed(self.config, self.now):
+            self.move(Stimulus.SECURED)
+        if in_air is False and not self.state.flown and self.state.stage in ON_GROUND:
+            self.note_released()
 
     def _look_at_links(self) -> None:
         reasons = block_reasons(self.config, self.state, self.now)
-        waited = self.now - self.state.started_at
-        if self.state.stage is Stage.STARTUP and reasons and waited < self.config.startup_grace:
+        grace = self.now < self.state.started_at + self.config.startup_grace
+        if self.state.stage is Stage.STARTUP and reasons and grace:
             return
         stimulus = Stimulus.LINKS_UNHEALTHY if reasons else Stimulus.LINKS_HEALTHY
         if listed(self.state.stage, stimulus):
             self.move(stimulus, "; ".join(reasons))
 
     def _look_at_parachutes(self) -> None:
-        out = [name for name in self.config.deploy_links if self._released(name)]
+        said = self.state.released(self.config) - self.state.released_before
+        out = sorted(one for one in said if self._fresh(one[0]))
         stage = self.state.stage
         if not out or not listed(stage, Stimulus.PARACHUTE_OPEN):
             return
-        self.move(Stimulus.PARACHUTE_OPEN, f"{', '.join(out)} says deployed")
+        self.move(Stimulus.PARACHUTE_OPEN, f"{', '.join(map(' '.join, out))} says deployed")
         if stage is Stage.IN_FLIGHT:
             # Released by itself: motors that turn under an open canopy tear it.
             self.fire(Action.KILL, "parachute open", ("its own status says deployed",))
 
-    def _released(self, link: str) -> bool:
-        """A device on link says so now; what a lost one said last is not what it is."""
+    def _fresh(self, link: str) -> bool:
+        """What a link says counts now; what a lost one said last is not what it is."""
         evidence = self.evidence(link)
-        fresh = (
-            evidence.state(self.config, self.now) is LinkState.OK or link in self._told_released
-        )
-        return bool(evidence.deployed) and fresh
+        return evidence.state(self.config, self.now) is LinkState.OK or link in self.told_released
 
     def _look_at_kill(self) -> None:
         kill = self.state.kill
         if kill is None:
             return
-        waited = self.now - kill.decided_at
-        if self.state.kill_tokens and (
-            kill.confirmed or kill.all_failed() or waited >= self.config.kill_timeout
-        ):
-            text = kill.newest_details() or f"no report within {waited:.1f} s"
-            self.finish_kill(kill.confirmed, kill.reached(Outcome.ACCEPTED), text)
+        self.end_kill()
         if self.state.stage is not Stage.KILLING or not self.state.deploy_reason:
             return
-        if kill.confirmed or waited >= self.config.kill_to_deploy_delay:
+        if kill.confirmed or self.now >= self.state.deploy_due:
+            if kill.unreported():
+                # A node that misses the kill must not see the deploy first: it would refuse the
+                # kill as older from then on.
+                self.send_again("kill")
+            waited = self.now - kill.decided_at
             why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
             limit = f"limit {self.config.kill_to_deploy_delay:g} s"
             self.move(Stimulus.DEPLOY_DUE, why)
@@ -206,20 +159,17 @@ class _Update(Requests):
             waited = self.now - deploy.decided_at
             if deploy.confirmed:
                 self.move(Stimulus.PARACHUTE_OPEN, deploy.details[-1])
-            elif deploy.all_failed() or waited >= self.config.deploy_timeout:
+            elif deploy.all_failed() or self.now >= deploy.decided_at + self.config.deploy_timeout:
                 text = deploy.newest_details() or "no device node reported"
                 self.move(Stimulus.DEPLOY_FAILED, text)
                 self.alarm(f"no parachute confirmed within {waited:.1f} s: {text}")
-        elif self.state.stage is Stage.DEPLOYING:
-            # The mode was changed in between, which took back what was on its way.
-            self.move(Stimulus.DEPLOY_FAILED, "the mode was changed")
         accepted = deploy is not None and deploy.reached(Outcome.ACCEPTED)
         text = deploy.newest_details() if deploy is not None else ""
         if self.state.stage is Stage.FAULT:
             self.finish_deploy(False, accepted, text or "no device node reported")
         elif self.state.stage is Stage.DEPLOYED and self.state.deploy_tokens:
             reported = deploy is None or deploy.confirmed
-            if reported or self.now - self.state.stage_since >= self.config.report_wait:
+            if reported or self.now >= self.state.stage_since + self.config.report_wait:
                 self.finish_deploy(True, accepted, text or "its own status says deployed")
 
     def _block_or_release(self) -> None:
@@ -232,6 +182,8 @@ class _Update(Requests):
         elif self.state.stage in (Stage.STARTUP, Stage.BLOCKED, Stage.DEPLOYED, Stage.FAULT):
             action = Action.FLIGHT_BLOCK
             reasons = block_reasons(self.config, self.state, self.now) or ("starting",)
+        elif self.state.stage is Stage.IN_FLIGHT:
+            action, reasons = Action.FLIGHT_BLOCK_RELEASE, ("in the air",)
         else:
             return
         block = self.state.block
@@ -248,22 +200,19 @@ class _Update(Requests):
             pending = self.pending(slot)
             if pending is None or pending.decision.shadow or not self._worth_sending(pending):
                 continue
-            if self.now - pending.sent_at < self.config.resend_interval:
-                continue
-            if pending.decision.id == self.state.next_id - 1:
-                self.outputs.append(i.Decide(pending.decision, again=True))
-                self.put(slot, replace(pending, sent_at=self.now))
-            else:
-                # A node that has seen a newer one would refuse this number.
-                self.decide_for_missing(slot)
+            if self.now >= pending.resend_at(self.config):
+                self.send_again(slot)
 
     def _worth_sending(self, pending: Pending) -> bool:
         """Somebody has not reported: a node that is alive, or any while it can still help."""
-        if pending.decision.action in (Action.KILL, Action.DEPLOY):
+        action = pending.decision.action
+        if action is Action.DEPLOY:
+            # It ends with the stage, by its limit or because a parachute is out.
+            return self.state.stage is Stage.DEPLOYING and bool(pending.unreported())
+        if action is Action.KILL:
             limit = max(self.config.kill_timeout, self.config.deploy_timeout)
-            young = self.now - pending.decided_at < limit
-            return young and bool(pending.unreported())
+            return self.now < pending.decided_at + limit and bool(pending.unreported())
+        lost_after = self.config.heartbeat.lost_after
         return any(
-            not self.evidence(link).node_silent(self.config, self.now)
-            for link in pending.unreported()
+            not self.evidence(link).silent(lost_after, self.now) for link in pending.unreported()
         )

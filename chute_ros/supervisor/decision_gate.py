@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 
 from chute_ros.model import Decision
 
@@ -30,6 +31,9 @@ class DecisionGate:
     max_decision_age: float
     newest_epoch: int = 0
     newest_id: int = 0
+    #: The newest that were acted on. One that comes again after a newer one is a repetition, not
+    #: a refusal: its outcome is what the supervisor has not heard.
+    acted: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=50))
 
     def judge(self, decision: Decision, age: float) -> Verdict:
         """What to do with decision, which is age seconds old. Only ACT is remembered as seen."""
@@ -39,11 +43,12 @@ class DecisionGate:
             return Verdict.SHADOW
         order = (decision.epoch, decision.id)
         newest = (self.newest_epoch, self.newest_id)
-        if order == newest:
+        if order in self.acted:
             return Verdict.REPEATED
-        if order < newest:
+        if order <= newest:
             return Verdict.OLDER
         if not -self.max_decision_age <= age <= self.max_decision_age:
             return Verdict.TOO_LATE
         self.newest_epoch, self.newest_id = order
+        self.acted.append(order)
         return Verdict.ACT

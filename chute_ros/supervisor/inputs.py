@@ -54,7 +54,9 @@ class ActionReport:
     link: str
     outcome: Outcome
     detail: str
+    #: The newest decision that this node has seen, whoever made it; id 0: it does not say.
     newest_epoch: int = 0
+    newest_id: int = 0
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ class Stimulus(enum.Enum):
     DISARMED = "the parachute was disarmed"
     TAKEN_OFF = "the vehicle is in the air"
     LANDED = "the vehicle is on the ground"
+    SECURED = "the vehicle is on the ground with its motors disarmed"
     KILL = "a kill was decided"
     DEPLOY_DUE = "the kill is confirmed or its time is over, and a deploy follows"
     PARACHUTE_OPEN = "a parachute says that it was released"
@@ -75,6 +76,7 @@ TRANSITIONS: dict[tuple[Stage, Stimulus], Stage] = {
     (_S.DEPLOYED, _E.RESET): _S.STARTUP,
     (_S.LANDED, _E.LINKS_UNHEALTHY): _S.BLOCKED,
     (_S.LANDED, _E.DISARMED): _S.READY,
+    (_S.LANDED, _E.SECURED): _S.READY,
     (_S.LANDED, _E.TAKEN_OFF): _S.IN_FLIGHT,
     (_S.LANDED, _E.KILL): _S.KILLING,
     (_S.LANDED, _E.RESET): _S.STARTUP,

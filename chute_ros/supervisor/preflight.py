@@ -19,7 +19,7 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
         return f"{link}: its {who} was never heard"
     if state in (LinkState.STALE, LinkState.LOST):
         silence, limit = now - evidence.heard, config.heartbeat.stale_after
-        if silence >= limit:
+        if evidence.silent(limit, now):
             text = f"heartbeat of its node {silence:.2f} s old (limit {limit:g} s)"
             return f"{link}: {state.name}, {text}"
         return f"{link}: its device is {state.name}" + _faults(evidence)

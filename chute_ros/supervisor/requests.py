@@ -21,7 +21,7 @@ class Requests(Steps):
         """Arming needs every pre-flight check; disarming only the ground."""
         if one.arm:
             wrong = arm_reasons(self.config, self.state, self.now)
-        elif self.state.stage in ON_GROUND:
+        elif self.state.stage in ON_GROUND or self._down():
             wrong = ()
         else:
             wrong = (f"the vehicle is {self.state.stage.name}: not disarmed in flight",)
@@ -42,54 +42,97 @@ class Requests(Steps):
         """Never refused while ACTIVE; one that is under way is joined."""
         reason = f"{one.by}: {one.reason}"
         if self.state.mode is not i.Mode.ACTIVE:
-            self._only_said(one.token, (Action.KILL,), reason)
+            self.only_say(Action.KILL, one.by, (reason,))
+            self._nothing_sent(one.token)
             return
+        self.end_kill()
         if one.token:
             self.state = replace(self.state, kill_tokens=(*self.state.kill_tokens, one.token))
-        kill = self.state.kill
-        under_way = self.state.stage in (Stage.KILLING, Stage.DEPLOYING)
-        if under_way and kill is not None and not kill.all_failed():
-            return
         if listed(self.state.stage, Stimulus.KILL):
             self.move(Stimulus.KILL, reason)
-        self.fire(Action.KILL, one.by, (reason,))
+        if not self._kill_joined(one.token):
+            self.fire(Action.KILL, one.by, (reason,))
+
+    def _kill_under_way(self) -> bool:
+        """A kill is on its way and may still be confirmed."""
+        kill = self.state.kill
+        return kill is not None and not kill.confirmed and not self.kill_failed(kill)
+
+    def _kill_joined(self, token: int) -> bool:
+        """Does a kill that was decided already serve this request?
+
+        A person who asks after the confirmation sees motors that turn, and is obeyed again. A
+        device repeats itself; that must not become a new decision each time.
+        """
+        kill = self.state.kill
+        if token or kill is None or self._kill_under_way():
+            return self._kill_under_way()
+        wait = self.config.kill_timeout if kill.confirmed else self.config.resend_interval
+        return self.now < kill.decided_at + wait
 
     def deploy_request(self, one: i.DeployRequest) -> None:
         """Refused on the ground unless forced; one that is under way is joined."""
         stage = self.state.stage
+        in_air = self.state.in_air(self.config, self.now)
         reason = f"operator{', forced' if one.force else ''}: {one.reason or 'no reason given'}"
         wrong = ""
         if stage is Stage.DEPLOYED:
             wrong = "a parachute is out already"
         elif stage not in _DEPLOY_ALLOWED and not one.force:
-            wrong = f"the vehicle is {stage.name}, not in flight; force deploys all the same"
+            unknown = " (nothing fresh says whether it is in the air)" if in_air is None else ""
+            wrong = f"the vehicle is {stage.name}, not in flight{unknown}; "
+            wrong += "force deploys all the same"
         if wrong:
             self.finish(one.token, False, False, "refused: " + wrong)
         elif self.state.mode is not i.Mode.ACTIVE:
-            self._only_said(one.token, (Action.KILL, Action.DEPLOY), reason)
+            for action in (Action.KILL, Action.DEPLOY):
+                self.only_say(action, "operator", (reason,))
+            self._nothing_sent(one.token)
         else:
             tokens = (*self.state.deploy_tokens, one.token)
-            reason = self.state.deploy_reason or reason
-            self.state = replace(self.state, deploy_tokens=tokens, deploy_reason=reason)
-            if stage is not Stage.DEPLOYING and (
-                stage is not Stage.KILLING or not self.state.kill
-            ):
-                self.move(Stimulus.KILL, reason)
-                self.fire(Action.KILL, "operator", (reason,))
+            self.state = replace(self.state, deploy_tokens=tokens)
+            if not self.state.deploy_reason:
+                self._begin_deploy(reason)
+
+    def _begin_deploy(self, reason: str) -> None:
+        """The kill first, unless one is on its way or confirmed."""
+        if self.state.stage in ON_GROUND:
+            self.note_released()
+        self.end_kill()
+        kill, since = self.state.kill, self.now
+        if self.state.stage is Stage.KILLING and self._kill_under_way():
+            assert kill is not None
+            since = kill.decided_at
+        elif self.state.stage is not Stage.KILLING or kill is None or not kill.confirmed:
+            self.move(Stimulus.KILL, reason)
+            self.fire(Action.KILL, "operator", (reason,))
+        due = since + self.config.kill_to_deploy_delay
+        self.state = replace(self.state, deploy_reason=reason, deploy_due=due)
 
     def reset_request(self, one: i.ResetRequest) -> None:
         """Back to the start, on the ground only."""
         stage = self.state.stage
-        if self.state.in_air(self.config, self.now) or stage is Stage.IN_FLIGHT:
+        in_air = self.state.in_air(self.config, self.now)
+        if in_air or stage is Stage.IN_FLIGHT:
             self.finish(one.token, False, False, "refused: the vehicle is in the air")
+        elif in_air is None and self.state.deploy_reason:
+            text = "refused: a deploy is under way and nothing fresh says that it is on the ground"
+            self.finish(one.token, False, False, text)
         elif not listed(stage, Stimulus.RESET):
             self.finish(one.token, False, False, f"refused: the vehicle is {stage.name}")
         else:
             self.give_up_waiting("reset by a person")
             self.move(Stimulus.RESET)
             self.state = replace(
-                self.state, started_at=self.now, block=None, kill=None, deploy=None, alarms=()
+                self.state,
+                started_at=self.now,
+                block=None,
+                kill=None,
+                deploy=None,
+                flown=False,
+                alarms=(),
             )
+            self.note_released()
             self.finish(one.token, True, True, "back to the start")
 
     def mode_request(self, one: i.ModeRequest) -> None:
@@ -105,6 +148,8 @@ class Requests(Steps):
         if before is i.Mode.ACTIVE:
             self.give_up_waiting(f"mode changed to {one.mode.name}")
             self.state = replace(self.state, kill=None, deploy=None)
+            if stage is Stage.DEPLOYING:
+                self.move(Stimulus.DEPLOY_FAILED, "the mode was changed")
             block = self.state.block
             if block is not None and block.decision.action is Action.FLIGHT_BLOCK:
                 reasons = (f"mode changes from ACTIVE to {one.mode.name}",)
@@ -116,14 +161,12 @@ class Requests(Steps):
         self.state = replace(self.state, mode=one.mode)
         self.finish(one.token, True, True, f"mode {one.mode.name}")
 
-    def _only_said(self, token: int, actions: tuple[Action, ...], reason: str) -> None:
-        """Not ACTIVE: in SHADOW the decisions are published as what would have been done."""
-        mode = self.state.mode
-        if mode is i.Mode.SHADOW:
-            for action in actions:
-                if action is Action.KILL:
-                    self.decide("kill", action, "operator", (reason,), self.config.kill_links)
-                else:
-                    self.decide("deploy", action, "operator", (reason,), self.config.deploy_links)
-            self.state = replace(self.state, kill=None, deploy=None)
-        self.finish(token, False, False, f"refused: mode is {mode.name}; nothing is sent")
+    def _down(self) -> bool:
+        """Known to be on the ground, and no deploy on its way."""
+        if self.state.deploy_reason:
+            return False
+        return self.state.in_air(self.config, self.now) is False
+
+    def _nothing_sent(self, token: int) -> None:
+        text = f"refused: mode is {self.state.mode.name}; nothing is sent"
+        self.finish(token, False, False, text)

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from chute_ros.model import Armed, Decision, LandedState, LinkState, Outcome, VehicleState
+from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 
+#: A flight block that nobody reports on is sent at least so often, s.
+_RAREST_RESEND = 1.0
 _NOTHING: MappingProxyType[str, tuple[str, ...]] = MappingProxyType({})
 
 
@@ -28,18 +30,20 @@ class LinkEvidence:
     #: Faults of each device on this link, in words.
     faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: _NOTHING)
 
-    def node_silent(self, config: SupervisorConfig, now: float) -> bool:
-        """The node itself, not only its device, is not heard."""
-        return not now - self.heard < config.heartbeat.lost_after
+    def silent(self, limit: float, now: float) -> bool:
+        """The node itself, not only its device, was not heard for limit s, or never.
+
+        Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        """
+        return not now < self.heard + limit
 
     def state(self, config: SupervisorConfig, now: float) -> LinkState:
         """The worse of what the node says of its wire, and what its silence says of itself."""
         if math.isnan(self.heard):
             return LinkState.NEVER_SEEN
-        silence = now - self.heard
-        if silence >= config.heartbeat.lost_after:
+        if self.silent(config.heartbeat.lost_after, now):
             return LinkState.LOST
-        if silence >= config.heartbeat.stale_after and self.reported is LinkState.OK:
+        if self.silent(config.heartbeat.stale_after, now) and self.reported is LinkState.OK:
             return LinkState.STALE
         return self.reported
 
@@ -57,6 +61,15 @@ class Pending:
         default_factory=lambda: MappingProxyType({})
     )
     details: tuple[str, ...] = ()
+    #: Numbers under which the same was decided before; a report on one of them counts.
+    earlier: frozenset[tuple[int, int]] = frozenset()
+    #: It was said that nothing came of it.
+    given_up: bool = False
+
+    @property
+    def number(self) -> tuple[int, int]:
+        """How the gates of the device nodes order decisions."""
+        return self.decision.epoch, self.decision.id
 
     def of(self, link: str) -> frozenset[Outcome]:
         """What this link reported so far."""
@@ -81,6 +94,18 @@ class Pending:
         """The targets that have not even said that they have sent it."""
         return tuple(target for target in self.targets if not self.of(target))
 
+    def not_begun(self) -> tuple[str, ...]:
+        """The targets that have not reported, or only that they failed."""
+        good = {Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED}
+        return tuple(t for t in self.targets if not self.of(t) & good)
+
+    def resend_at(self, config: SupervisorConfig) -> float:
+        """When to send it again. A flight block that stays without a report: ever more rarely."""
+        if self.decision.action in (Action.KILL, Action.DEPLOY):
+            return self.sent_at + config.resend_interval
+        slower = min((self.sent_at - self.decided_at) / 4, _RAREST_RESEND)
+        return self.sent_at + max(config.resend_interval, slower)
+
     def newest_details(self) -> str:
         """What was reported last, in words."""
         return "; ".join(self.details[-2:])
@@ -104,10 +129,30 @@ class State:
     deploy: Pending | None = None
     #: Why a deploy follows the kill; empty: none does.
     deploy_reason: str = ""
+    #: When it leaves at the latest. A kill that is decided again does not put it off.
+    deploy_due: float = math.nan
+    #: It was in the air since the start or the reset.
+    flown: bool = False
+    #: (link, device) that were released before the flight: they say nothing of what happens in it.
+    released_before: frozenset[tuple[str, str]] = frozenset()
     #: Who waits for the outcome.
     kill_tokens: tuple[int, ...] = ()
     deploy_tokens: tuple[int, ...] = ()
     alarms: tuple[str, ...] = ()
+
+    def released(self, config: SupervisorConfig) -> frozenset[tuple[str, str]]:
+        """(link, device) of every parachute that says that it is released."""
+        return frozenset(
+            (link, device)
+            for link in config.deploy_links
+            if link in self.links
+            for device in self.links[link].deployed
+        )
+
+    def disarmed(self, config: SupervisorConfig, now: float) -> bool:
+        """Does the autopilot say, freshly, that the motors are off?"""
+        age = self.vehicle.armed_age + (now - self.vehicle_received)
+        return age <= config.vehicle_state_age and self.vehicle.armed is Armed.DISARMED
 
     def in_air(self, config: SupervisorConfig, now: float) -> bool | None:
         """Is the vehicle in the air? None: nothing that is fresh says so or otherwise."""

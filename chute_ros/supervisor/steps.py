@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
 
-from chute_ros.model import Action, Decision
+from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage, Stimulus, next_stage
@@ -36,11 +36,20 @@ class Steps:
     def fire(self, action: Action, rule: str, reasons: tuple[str, ...]) -> None:
         """The only place from which a kill or a deploy leaves. Default is deny."""
         if self.state.mode is not i.Mode.ACTIVE:
-            return
-        if action is Action.KILL:
+            self.only_say(action, rule, reasons)
+        elif action is Action.KILL:
             self.decide("kill", action, rule, reasons, self.config.kill_links)
         elif self.state.stage is Stage.DEPLOYING and self.state.kill is not None:
             self.decide("deploy", action, rule, reasons, self.config.deploy_links)
+
+    def only_say(self, action: Action, rule: str, reasons: tuple[str, ...]) -> None:
+        """In SHADOW a kill or a deploy is published as what would have been done."""
+        if self.state.mode is i.Mode.SHADOW:
+            slot: Slot = "kill" if action is Action.KILL else "deploy"
+            links = self.config.kill_links if slot == "kill" else self.config.deploy_links
+            self.decide(slot, action, rule, reasons, links)
+            # Nobody carries it out, so nothing is awaited.
+            self.put(slot, None)
 
     def decide(
         self,
@@ -58,37 +67,39 @@ class Steps:
         self.state = replace(state, next_id=state.next_id + 1)
         self.put(slot, Pending(decision, targets, self.now, self.now))
 
-    def renew(self, why: str) -> None:
-        """Decide again, under a new number, what is still to be carried out.
+    def wanted(self, slot: Slot) -> bool:
+        """Does the present stage still want what is in this slot carried out?
 
-        Only what the present stage still wants: a deploy that failed before is not tried again
-        because a node restarts on the ground.
+        A deploy that failed before is not tried again because a node restarts on the ground, and
+        a flight block must not overtake a kill or a deploy that is on its way.
         """
-        wanted: list[Slot] = ["block"]
-        if self.state.stage in (Stage.KILLING, Stage.DEPLOYING, Stage.DEPLOYED):
-            wanted.append("kill")
-        if self.state.stage is Stage.DEPLOYING:
-            wanted.append("deploy")
-        for slot in wanted:
-            pending = self.pending(slot)
-            if pending is None or (pending.confirmed and slot != "block"):
-                continue
-            self.decide_again(slot, why)
+        stage = self.state.stage
+        if slot == "block":
+            return stage not in (Stage.KILLING, Stage.DEPLOYING)
+        if slot == "kill":
+            return stage in (Stage.KILLING, Stage.DEPLOYING, Stage.DEPLOYED)
+        return stage is Stage.DEPLOYING
 
-    def decide_again(self, slot: Slot, why: str) -> None:
-        """The same decision under a new number, to all that it was for."""
+    def renew(self, slot: Slot, why: str) -> None:
+        """Decide again, under a new number, what is still to be carried out."""
         pending = self.pending(slot)
-        assert pending is not None
-        renewed = self._under_new_number(slot, pending, pending.targets, why)
+        if pending is None or not self.wanted(slot):
+            return
+        if pending.confirmed and slot != "block":
+            return
+        new = self._under_new_number(slot, pending, pending.targets, why)
         # The time since the first decision goes on counting towards its limits.
-        self.put(slot, replace(renewed, decided_at=pending.decided_at))
+        new = replace(new, decided_at=pending.decided_at, given_up=pending.given_up)
+        self.put(slot, new)
 
-    def decide_for_missing(self, slot: Slot) -> None:
+    def renew_missing(self, slot: Slot, why: str) -> None:
         """The same under a new number, to those that have not reported; what is known stays."""
         pending = self.pending(slot)
         assert pending is not None
-        renewed = self._under_new_number(slot, pending, pending.unreported(), "not reported yet")
-        self.put(slot, replace(pending, decision=renewed.decision, sent_at=self.now))
+        new = self._under_new_number(slot, pending, pending.unreported(), why)
+        earlier = pending.earlier | {pending.number}
+        renewed = replace(pending, decision=new.decision, earlier=earlier, sent_at=self.now)
+        self.put(slot, renewed)
 
     def _under_new_number(
         self, slot: Slot, pending: Pending, targets: tuple[str, ...], why: str
@@ -99,6 +110,18 @@ class Steps:
         renewed = self.pending(slot)
         assert renewed is not None
         return renewed
+
+    def note_released(self) -> None:
+        """What is released now was so before the flight and says nothing of what happens in it."""
+        before = self.state.released_before | self.state.released(self.config)
+        self.state = replace(self.state, released_before=before)
+
+    def send_again(self, slot: Slot) -> None:
+        """The same decision once more: its number lets a node that knows it do nothing."""
+        pending = self.pending(slot)
+        assert pending is not None
+        self.outputs.append(i.Decide(pending.decision, again=True))
+        self.put(slot, replace(pending, sent_at=self.now))
 
     def pending(self, slot: Slot) -> Pending | None:
         """The decision in this slot."""
@@ -117,13 +140,33 @@ class Steps:
 
     def alarm(self, text: str) -> None:
         """Something that stays until a reset."""
-        self.state = replace(self.state, alarms=(*self.state.alarms, text))
+        if text not in self.state.alarms:
+            self.state = replace(self.state, alarms=(*self.state.alarms, text))
         self.outputs.append(i.Say(text, alarm=True))
 
     def finish(self, token: int, success: bool, accepted: bool, message: str) -> None:
         """Answer a request; token 0: nobody waits."""
         if token:
             self.outputs.append(i.Finish(token, success, accepted, message))
+
+    def kill_failed(self, kill: Pending) -> bool:
+        """Nobody has confirmed it, and nobody is expected to any more."""
+        late = self.now >= kill.decided_at + self.config.kill_timeout
+        return not kill.confirmed and (late or kill.all_failed())
+
+    def end_kill(self) -> None:
+        """Say how the kill went as soon as that is known, before another takes its place."""
+        kill = self.state.kill
+        if kill is None:
+            return
+        failed = self.kill_failed(kill)
+        waited = self.now - kill.decided_at
+        text = kill.newest_details() or f"no report within {waited:.1f} s"
+        if kill.confirmed or failed:
+            self.finish_kill(kill.confirmed, kill.reached(Outcome.ACCEPTED), text)
+        if failed and not kill.given_up:
+            self.put("kill", replace(kill, given_up=True))
+            self.alarm(f"the motors may still turn, no kill confirmed: {text}")
 
     def finish_kill(self, success: bool, accepted: bool, message: str) -> None:
         """Answer everyone who waits for the kill."""

@@ -19,6 +19,10 @@ FLYING = VehicleState(
 STANDING = VehicleState(
     armed=Armed.DISARMED, armed_age=0.0, landed_state=LandedState.ON_GROUND, landed_state_age=0.0
 )
+#: On the ground, the motors still turn.
+IDLING = VehicleState(
+    armed=Armed.ARMED, armed_age=0.0, landed_state=LandedState.ON_GROUND, landed_state_age=0.0
+)
 
 
 @dataclass

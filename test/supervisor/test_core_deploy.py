@@ -278,19 +278,34 @@ def test_a_kill_that_a_node_missed_goes_out_under_a_new_number_after_a_newer_dec
     story.at(1.0, i.DeployRequest(5, False, "it falls"))
     first = story.newest(K)
     story.at(1.65)
+    # Sent again under its number, which a node that has it takes for a repetition ...
+    assert story.newest(K) == first
+    # ... until one that saw the deploy first refuses it.
+    story.at(1.66, story.report(K, Outcome.FAILED, detail="older"))
     assert story.newest(K).id > story.decisions(D)[0].id > first.id
-    assert story.newest(K).reasons[-1] == "not reported yet"
+    assert "saw a newer decision first" in story.newest(K).reasons[-1]
     story.at(1.7, story.report(K, Outcome.CONFIRMED), story.report(D, Outcome.CONFIRMED))
     assert story.state.stage is Stage.DEPLOYED
 
 
 def test_a_new_number_for_a_missing_node_does_not_forget_what_the_other_said() -> None:
-    config = SupervisorConfig(kill_links=(LINK, "upf_can"))
-    story = Story(config).flying()
+    both = (LINK, "upf_can")
+    story = Story(SupervisorConfig(kill_links=both, deploy_links=both)).flying()
     story.at(1.0, i.DeployRequest(5, False, "it falls"))
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
-    story.at(1.35)
+    first = story.newest(K)
+    refused = story.report(K, Outcome.FAILED, link="upf_can", detail="older")
+    # It refuses each time that it was sent.
+    story.at(1.3, refused, refused)
     again = story.newest(K)
     assert again.targets == ("upf_can",)
+    assert len(story.decisions(K)) == 2
+    # What the other still says of the first number counts.
+    story.at(1.4, i.ActionReport(7, first.id, LINK, Outcome.FAILED, "late", 7))
     assert story.state.kill is not None
     assert story.state.kill.confirmed
+    assert Outcome.FAILED in story.state.kill.of(LINK)
+    assert story.state.kill.unreported() == ("upf_can",)
+    # A number that was never ours does not.
+    story.at(1.5, i.ActionReport(7, 99, "upf_can", Outcome.SENT, "?", 7))
+    assert story.state.kill.unreported() == ("upf_can",)

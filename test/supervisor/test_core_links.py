@@ -1,7 +1,9 @@
 """Heartbeats of the links: what blocks flight, in which words, and what releases it."""
 
+import itertools
+
 import pytest
-from story import FLYING, LINK, STANDING, Story
+from story import FLYING, IDLING, LINK, STANDING, Story
 
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -101,8 +103,38 @@ def test_a_restarted_node_hears_of_the_block_again() -> None:
     story.at(0.1, story.report(Action.FLIGHT_BLOCK, Outcome.CONFIRMED))
     story.at(0.2, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
     second = story.newest(Action.FLIGHT_BLOCK)
-    assert second.id > first.id
+    assert second.id == first.id + 1
     assert "restarted" in second.reasons[-1]
+
+
+def test_a_node_that_restarts_before_its_second_heartbeat_is_noticed_too() -> None:
+    story = Story()
+    story.at(0.0, i.ParachuteReport(LINK, "1/161", False, ()))
+    story.at(0.1, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
+    assert len(story.decisions()) == 1
+    story.at(0.2, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
+    assert len(story.decisions()) == 2
+
+
+def test_a_node_that_was_lost_may_have_restarted_and_hears_of_the_block_again() -> None:
+    story = Story()
+    story.at(0.0, story.heartbeat(healthy=False))
+    story.at(0.1, story.report(Action.FLIGHT_BLOCK, Outcome.CONFIRMED))
+    story.at(5.0, story.heartbeat(healthy=False))
+    assert len(story.decisions(Action.FLIGHT_BLOCK)) == 2
+    assert "is back" in story.newest(Action.FLIGHT_BLOCK).reasons[-1]
+
+
+def test_a_node_that_never_reports_is_asked_ever_more_rarely_but_once_a_second() -> None:
+    story = Story()
+    story.at(0.0, story.heartbeat(healthy=False))
+    for tick in range(1, 3000):
+        story.at(tick * 0.1, story.heartbeat(healthy=False))
+    times = [t for t, o in story.outputs if isinstance(o, i.Decide) and o.again]
+    gaps = [b - a for a, b in itertools.pairwise(times)]
+    assert gaps[0] == pytest.approx(0.1)
+    assert max(gaps) <= 1.1
+    assert len(times) < 320
 
 
 def test_a_block_is_sent_again_until_reported_but_only_to_a_node_that_lives() -> None:
@@ -124,6 +156,9 @@ def test_taking_off_although_blocked_is_an_alarm_and_followed_as_a_flight() -> N
     story.at(0.1, i.VehicleReport(FLYING))
     assert story.state.stage is Stage.IN_FLIGHT
     assert "in the air although" in story.alarms()[0]
+    # The device node undoes arming on the ground while blocked; one wrong landed state in the air
+    # must not make it stop the motors.
+    assert story.decisions()[-1].action is Action.FLIGHT_BLOCK_RELEASE
 
 
 def test_a_lost_link_in_flight_neither_blocks_nor_fires() -> None:
@@ -136,10 +171,27 @@ def test_a_lost_link_in_flight_neither_blocks_nor_fires() -> None:
 
 def test_after_landing_a_disarmed_parachute_makes_it_ready_again() -> None:
     story = Story().flying()
-    story.at(0.1, story.heartbeat(), i.VehicleReport(STANDING))
+    story.at(0.1, story.heartbeat(), i.VehicleReport(IDLING))
     assert story.state.stage is Stage.LANDED
     story.at(0.2, i.ArmDone(0, False, True, "done"))
     assert story.state.stage is Stage.READY
+
+
+def test_after_landing_an_autopilot_that_disarms_makes_it_ready_without_a_reset() -> None:
+    story = Story().flying()
+    story.at(0.1, story.heartbeat(), i.VehicleReport(IDLING))
+    assert story.state.stage is Stage.LANDED
+    story.at(0.2, i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.READY
+    story.at(0.3, i.VehicleReport(FLYING))
+    assert story.state.stage is Stage.IN_FLIGHT
+
+
+def test_after_landing_a_link_that_is_not_healthy_blocks_the_next_flight() -> None:
+    story = Story().flying()
+    story.at(0.1, story.heartbeat(healthy=False), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.BLOCKED
+    assert story.decisions()[-1].action is Action.FLIGHT_BLOCK
 
 
 def test_a_vehicle_state_that_is_old_says_nothing() -> None:
@@ -157,10 +209,36 @@ def test_a_lying_epoch_is_left_behind_and_what_holds_is_decided_anew() -> None:
     assert story.newest(Action.FLIGHT_BLOCK_RELEASE).epoch == 901
 
 
+def test_a_report_of_a_stranger_moves_no_epoch() -> None:
+    story = Story().ready()
+    story.at(0.1, i.ActionReport(7, 1, "stranger", Outcome.FAILED, "older", newest_epoch=900))
+    assert story.state.epoch == 7
+
+
+def test_a_report_on_the_decision_of_another_supervisor_moves_no_epoch() -> None:
+    # Two that overtook each other at every report would never end.
+    story = Story().ready()
+    story.at(0.1, i.ActionReport(900, 1, LINK, Outcome.SENT, "told", newest_epoch=900))
+    assert story.state.epoch == 7
+
+
+def test_a_node_that_knows_higher_numbers_of_our_own_epoch_is_overtaken() -> None:
+    # A supervisor before us had the same epoch: its host's clock starts at the same time always.
+    story = Story()
+    story.at(0.0, story.heartbeat(healthy=False))
+    report = i.ActionReport(7, 1, LINK, Outcome.CONFIRMED, "another 7.1", 7, newest_id=40)
+    story.at(0.1, report)
+    assert story.state.epoch == 8
+    assert story.newest(Action.FLIGHT_BLOCK).epoch == 8
+    assert story.state.block is not None
+    assert not story.state.block.confirmed
+
+
 def test_the_largest_epoch_cannot_be_overtaken_and_is_not_followed() -> None:
     story = Story().ready()
     story.at(0.1, i.ActionReport(7, 1, LINK, Outcome.FAILED, "older", newest_epoch=2**32 - 1))
     assert story.state.epoch == 7
+    assert "the largest: restart it" in story.alarms()[0]
 
 
 def test_without_vehicle_state_flight_is_blocked_in_those_words() -> None:

@@ -43,6 +43,25 @@ def test_an_older_decision_is_refused() -> None:
     assert one.judge(decision(epoch=4, number=100), 0.0) is Verdict.OLDER
 
 
+def test_one_that_was_acted_on_is_a_repetition_even_after_a_newer_one() -> None:
+    # Its report was lost: told that it is older, the supervisor would think it was never done.
+    one = gate()
+    assert one.judge(decision(number=8), 0.0) is Verdict.ACT
+    assert one.judge(decision(number=9), 0.0) is Verdict.ACT
+    assert one.judge(decision(number=8), 0.0) is Verdict.REPEATED
+
+
+def test_what_was_acted_on_long_ago_is_older_and_never_done_again() -> None:
+    one = gate()
+    for number in range(1, 100):
+        assert one.judge(decision(number=number), 0.0) is Verdict.ACT
+    assert one.judge(decision(number=1), 0.0) is Verdict.OLDER
+
+
+def test_the_number_that_no_decision_has_is_refused() -> None:
+    assert gate().judge(decision(epoch=0, number=0), 0.0) is Verdict.OLDER
+
+
 def test_a_new_epoch_starts_its_numbers_anew() -> None:
     one = gate()
     assert one.judge(decision(epoch=5, number=9), 0.0) is Verdict.ACT

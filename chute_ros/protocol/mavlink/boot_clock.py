@@ -39,7 +39,9 @@ class BootClock:
     def observe(self, boot_ms: int) -> Age:
         """A message of this time came. 0 is a sender without a clock: always new."""
         last = self.newest
-        wrapped = last is not None and last > _WRAP_MS - _WRAP_MARGIN_MS and boot_ms < _WRAP_MARGIN_MS
+        wrapped = (
+            last is not None and last > _WRAP_MS - _WRAP_MARGIN_MS and boot_ms < _WRAP_MARGIN_MS
+        )
         if last is None or boot_ms >= last or wrapped:
             self.newest, self._doubtful = boot_ms, None
             return Age.NEW

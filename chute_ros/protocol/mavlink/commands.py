@@ -3,8 +3,8 @@
 Source: MAVLink developer guide, "Command protocol". Sent again with a rising confirmation until an
 acknowledgement comes from the component that was addressed; IN_PROGRESS extends the wait.
 
-Which answer is to which send: see unanswered.py. A transaction that must tell its answers from those
-to N earlier sends may send N times more.
+Which answer is to which send: see unanswered.py. A transaction that must tell its answers from
+those to N earlier sends may send N times more.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ class CommandTransactions:
         self._begin(key, _Waiting(token, command, family, now), now)
 
     def send_once(self, command: Command, now: float) -> None:
-        """Send command once; nobody waits for its acknowledgement, and it confirms nothing else."""
+        """Send command once; nobody waits for its answer, and it confirms nothing else."""
         key = _key(command)
         self._out.append(SendCommand(command, 0))
         self._sends_of(key).add(_NOBODY, now)
@@ -278,7 +278,9 @@ class CommandTransactions:
         del self._open[key]
         seconds = now - transaction.started
         for token in transaction.tokens:
-            self._report(token, transaction.command, seconds, superseded, result, transaction.sends)
+            self._report(
+                token, transaction.command, seconds, superseded, result, transaction.sends
+            )
 
     def _report(
         self,

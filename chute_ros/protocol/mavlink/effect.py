@@ -57,6 +57,14 @@ TRANSITIONS: dict[tuple[Phase, Happening], Phase] = {
 _ENDED = (Phase.CONFIRMED, Phase.FAILED)
 
 
+def next_phase(phase: Phase, happening: Happening) -> Phase:
+    """The phase after happening; TransitionError for a pair that the table does not list."""
+    try:
+        return TRANSITIONS[phase, happening]
+    except KeyError:
+        raise TransitionError(f"'{happening.value}' while {phase.value}") from None
+
+
 @dataclass(frozen=True)
 class EffectLimits:
     """Seconds: from acknowledgement to effect, between tries, and for all tries together."""
@@ -81,6 +89,7 @@ class Goal:
     that there is to see. refresh: asks the device for the status that shows it.
     insist: no refusal but time ends the tries. urgent: does not queue behind another command.
     hinders_release: makes the parachute less ready; gives way to a release.
+    hint: what may be the cause of a refusal, by what the device says of itself; empty: unknown.
     """
 
     name: str
@@ -91,6 +100,7 @@ class Goal:
     insist: bool = False
     urgent: bool = False
     hinders_release: bool = False
+    hint: Callable[[], str] = str
 
 
 @dataclass(frozen=True)
@@ -157,18 +167,20 @@ class EffectLoop:
         if finished.result != results.NO_ACKNOWLEDGEMENT:
             self._result = finished.result
         if finished.accepted:
-            self._take(Happening.ACCEPTED, now)
-            self._accepted_after = now - self._started
-            detail = f"{self.goal.name} acknowledged after {self._accepted_after:.2f} s"
+            self._take(Happening.ACCEPTED)
+            waited = now - self._started
+            if math.isnan(self._accepted_after):
+                self._accepted_after = waited
+            detail = f"{self.goal.name} acknowledged after {waited:.2f} s"
             self._reports.append(Report(self.token, Outcome.ACCEPTED, detail))
             self._deadline = now + self._limits.effect_timeout
             self._refresh(now)
             self.effect_may_show(now)
         elif not self._worth_another_try(finished):
-            self._take(Happening.REFUSED, now)
+            self._take(Happening.REFUSED)
             self._end(False, f"{self.goal.name} {self._answer}")
         else:
-            self._take(Happening.NOT_NOW, now)
+            self._take(Happening.NOT_NOW)
             self._deadline = now + self._limits.retry_interval
 
     def effect_may_show(self, now: float) -> None:
@@ -181,7 +193,7 @@ class EffectLoop:
                 return
         elif not shown():
             return
-        self._take(Happening.EFFECT_SHOWN, now)
+        self._take(Happening.EFFECT_SHOWN)
         seconds = now - self._started
         acknowledged = (
             "not acknowledged"
@@ -197,7 +209,7 @@ class EffectLoop:
         """It is not wanted any more."""
         if self.ended:
             return
-        self._take(Happening.GIVE_UP, now)
+        self._take(Happening.GIVE_UP)
         self._end(False, f"{self.goal.name} given up: {why}")
 
     def update(self, now: float) -> None:
@@ -205,7 +217,7 @@ class EffectLoop:
         if self.ended:
             return
         if now >= self._started + self._limits.give_up_after:
-            self._take(Happening.GIVE_UP, now)
+            self._take(Happening.GIVE_UP)
             self._end(False, self._what_did_not_come(now))
             return
         if self.phase is Phase.WAIT_EFFECT and now >= self._refresh_at:
@@ -213,9 +225,9 @@ class EffectLoop:
         if now < self._deadline:
             return
         if self.phase is Phase.WAIT_EFFECT:
-            self._take(Happening.EFFECT_LATE, now)
+            self._take(Happening.EFFECT_LATE)
         if self.phase is Phase.WAIT_RETRY:
-            self._take(Happening.RETRY_DUE, now)
+            self._take(Happening.RETRY_DUE)
             self._send()
 
     def next_deadline(self) -> float:
@@ -269,15 +281,12 @@ class EffectLoop:
             return text + answer
         return f"{text}{answer}, and the device's own status never showed: {self.goal.effect}"
 
-    def _take(self, happening: Happening, now: float) -> None:
-        try:
-            self.phase = TRANSITIONS[self.phase, happening]
-        except KeyError:
-            raise TransitionError(
-                f"{self.goal.name} at {now:.3f} s: '{happening.value}' while {self.phase.value}"
-            ) from None
+    def _take(self, happening: Happening) -> None:
+        self.phase = next_phase(self.phase, happening)
 
     def _end(self, success: bool, message: str) -> None:
+        if not success and (hint := self.goal.hint()):
+            message = f"{message}; {hint}"
         outcome = Outcome.CONFIRMED if success else Outcome.FAILED
         self._reports.append(Report(self.token, outcome, message))
         accepted = not math.isnan(self._accepted_after)

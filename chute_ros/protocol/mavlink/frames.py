@@ -60,7 +60,9 @@ class FrameDecoder:
     of one link if the same Counter is given to each.
     """
 
-    def __init__(self, verifier: Verifier | None = None, counts: Counter[str] | None = None) -> None:
+    def __init__(
+        self, verifier: Verifier | None = None, counts: Counter[str] | None = None
+    ) -> None:
         self.counts: Counter[str] = Counter() if counts is None else counts
         self._verifier = verifier
         self._buffer = bytearray()
@@ -69,7 +71,7 @@ class FrameDecoder:
         self._reader = dialect.MAVLink(None)
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
-        """Frames completed by data, the next bytes of a stream; the rest is kept for the next call."""
+        """Frames completed by data, the next bytes of a stream; the rest is kept for later."""
         frames = self.update(now)
         if data:
             self._buffer += data
@@ -101,7 +103,8 @@ class FrameDecoder:
             # What looks like the start of a longer frame may be noise before a true one.
             truncated = truncated or bool(rest)
             rest = rest[1:]
-        self.counts[TRUNCATED] += truncated
+        if truncated:
+            self.counts[TRUNCATED] += 1
         return frames
 
     def _take(self, now: float) -> list[Frame]:
@@ -190,7 +193,7 @@ class FrameDecoder:
 
 
 def _checksum_may_fit(raw: bytes) -> bool:
-    """Some CRC_EXTRA makes the checksum right: one false start in 256 passes, every true frame does."""
+    """Some CRC_EXTRA makes the checksum right: as for every true frame, and one false in 256."""
     checksum = int.from_bytes(raw[-_CHECKSUM:], "little")
     state: int = dialect.x25crc(raw[1:-_CHECKSUM]).crc
     # The last step of the checksum (CRC-16/MCRF4XX) takes CRC_EXTRA in.

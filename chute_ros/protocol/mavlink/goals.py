@@ -88,7 +88,19 @@ def release(parachute: ParachuteTracker, force: bool, now: float) -> Goal:
         request_status(parachute),
         insist=force,
         urgent=True,
+        hint=lambda: _why_not_released(parachute),
     )
+
+
+def _why_not_released(parachute: ParachuteTracker) -> str:
+    """What of the device's own status keeps a module from releasing on command."""
+    hints = []
+    if not parachute.armed_triggers & (TriggerFlags.FC | TriggerFlags.OFFBOARD):
+        armed = ", ".join(flag_names(parachute.armed_triggers)) or "none"
+        hints.append(f"armed triggers: {armed}; need FC or OFFBOARD, which force arms on the way")
+    if not parachute.ground_cleared:
+        hints.append("its own status does not say GROUND_CLEARED")
+    return "; ".join(hints)
 
 
 #: The actions of MAV_CMD_DO_PARACHUTE that do not fire.

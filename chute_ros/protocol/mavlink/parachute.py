@@ -127,6 +127,13 @@ class ParachuteTracker:
         return self._message is not None and self._message.deployment_status != 0
 
     @property
+    def ground_cleared(self) -> bool:
+        """The newest status says that it is far enough from the ground."""
+        return self._message is not None and bool(
+            self._message.safety_status & SafetyFlags.GROUND_CLEARED
+        )
+
+    @property
     def armed_triggers(self) -> TriggerFlags:
         """The trigger sources that are armed by the newest status."""
         return TriggerFlags(self._message.arm_status if self._message is not None else 0)

@@ -142,9 +142,7 @@ class Requests:
         running = None if token is None else self._running.get(token)
         return None if running is None else running.loop
 
-    def _close(
-        self, token: int, running: _Running, finished: EffectFinished, now: float
-    ) -> None:
+    def _close(self, token: int, running: _Running, finished: EffectFinished, now: float) -> None:
         del self._running[token]
         for number in [n for n, owner in self._owners.items() if owner == token]:
             # What is not needed any more must not be sent again.

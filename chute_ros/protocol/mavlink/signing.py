@@ -1,8 +1,8 @@
 """MAVLink 2 message signing: who may speak.
 
 Source: MAVLink developer guide, "Message signing": SHA-256 over key, frame and time stamp, cut to
-48 bits; time stamps in units of 10 microseconds since 2015-01-01, rising in each stream (system, component,
-link id); a new stream may lag at most one minute.
+48 bits; time stamps in units of 10 microseconds since 2015-01-01, rising in each stream (system,
+component, link id); a new stream may lag at most one minute.
 
 A stream's time stamp is stored only after its signature was found right, so that a forged frame
 with a high time stamp does not shut out the true sender.

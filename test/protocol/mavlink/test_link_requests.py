@@ -275,3 +275,21 @@ def test_autopilots_messages_are_asked_for_at_the_set_rate():
     bench.link.set_autopilot_message_rate(0.0, bench.now)
     bench.stream(20.0, 0.5, PILOT, copter)
     assert bench.commands() == []
+
+
+def test_a_refused_release_names_what_the_parachute_says_of_itself():
+    bench = Bench().hear(CHUTE, heartbeat(), status(armed=2))
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED))
+    message = bench.end(1).finished.message
+    assert "armed triggers: ATS; need FC or OFFBOARD, which force arms on the way" in message
+    assert "does not say GROUND_CLEARED" in message
+
+
+def test_a_refused_release_of_a_ready_parachute_adds_nothing():
+    bench = Bench().hear(CHUTE, heartbeat(), status(armed=4, safety=1))
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_DENIED))
+    message = bench.end(1).finished.message
+    assert "armed triggers" not in message
+    assert "GROUND_CLEARED" not in message

@@ -1,0 +1,202 @@
+"""Acknowledged is not done: a goal is reached when the device's own status shows it."""
+
+import itertools
+import math
+
+import pytest
+
+from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.model import Outcome
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.commands import Command, CommandFinished
+from chute_ros.protocol.mavlink.effect import (
+    TRANSITIONS,
+    EffectLimits,
+    EffectLoop,
+    Goal,
+    Happening,
+    Phase,
+    next_phase,
+)
+
+ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
+ASK = Command(1, 161, 512, (430.0, *[0.0] * 6))
+PAIRS = list(itertools.product(Phase, Happening))
+
+
+class Bench:
+    """One loop and a device whose status the story sets."""
+
+    def __init__(self, already=False, effect=True, **goal):
+        self.there = already
+        self.goal = Goal(
+            "release",
+            (ORDER,),
+            "PARACHUTE_STATUS says deployed",
+            (lambda: self.there) if effect else None,
+            ASK,
+            **goal,
+        )
+        self.loop = EffectLoop(1, self.goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
+        self.sent, self.asked, self.reports = [], [], []
+        self.now = 0.0
+        self._collect()
+
+    def at(self, now):
+        while self.loop.next_deadline() <= now and not self.loop.ended:
+            self.now = max(self.now, self.loop.next_deadline())
+            self.loop.update(self.now)
+            self._collect()
+        self.now = now
+        return self
+
+    def answer(self, result=results.ACCEPTED, sends=1, superseded=False):
+        end = CommandFinished(1, ORDER, result, sends, self.now, superseded)
+        self.loop.command_finished(end, self.now)
+        self._collect()
+        return self
+
+    def shows(self):
+        self.there = True
+        self.loop.effect_may_show(self.now)
+        self._collect()
+        return self
+
+    def _collect(self):
+        commands = self.loop.take_commands()
+        self.sent += [self.now for _ in commands]
+        for command in commands:
+            self.loop.command_sent(command)
+        self.asked += [self.now for _ in self.loop.take_refreshes()]
+        self.reports += [report.outcome for report in self.loop.take_reports()]
+
+    @property
+    def end(self):
+        assert self.loop.finished is not None
+        return self.loop.finished
+
+
+@pytest.mark.parametrize(("phase", "happening"), PAIRS, ids=lambda one: one.name)
+def test_a_pair_is_in_the_table_or_raises(phase, happening):
+    if (phase, happening) in TRANSITIONS:
+        assert next_phase(phase, happening) is TRANSITIONS[phase, happening]
+    else:
+        with pytest.raises(TransitionError, match=phase.value):
+            next_phase(phase, happening)
+
+
+def test_no_way_leads_out_of_an_end():
+    assert not [pair for pair in TRANSITIONS if pair[0] in (Phase.CONFIRMED, Phase.FAILED)]
+
+
+def test_acknowledged_and_then_shown():
+    bench = Bench().at(0.1).answer()
+    assert not bench.loop.ended
+    assert bench.asked == [0.1]
+    bench.at(0.3).shows()
+    assert (bench.end.success, bench.end.accepted, bench.end.result) == (True, True, 0)
+    assert bench.end.message.startswith("PARACHUTE_STATUS says deployed after 0.30 s")
+    assert bench.reports == [Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED]
+
+
+def test_shown_without_an_acknowledgement_is_done_and_says_so():
+    bench = Bench().at(0.3).shows()
+    assert (bench.end.success, bench.end.accepted) == (True, False)
+    assert "not acknowledged" in bench.end.message
+
+
+def test_acknowledged_but_never_shown_says_which_did_not_come_and_when_it_gave_up():
+    bench = Bench().at(0.1).answer()
+    while not bench.loop.ended:
+        bench.at(bench.loop.next_deadline())
+        if bench.sent[-1] == bench.now and not bench.loop.ended:
+            bench.answer()
+    assert (bench.end.success, bench.end.accepted) == (False, True)
+    assert "given up after 5.0 s" in bench.end.message
+    assert "acknowledged after 0.10 s" in bench.end.message
+    assert "never showed: PARACHUTE_STATUS says deployed" in bench.end.message
+
+
+def test_neither_says_both():
+    bench = Bench().at(1.5).answer(results.NO_ACKNOWLEDGEMENT, sends=3).at(10.0)
+    assert (bench.end.success, bench.end.accepted) == (False, False)
+    assert bench.end.result == results.NO_ACKNOWLEDGEMENT
+    assert "no acknowledgement after 3 sends" in bench.end.message
+    assert "never showed" in bench.end.message
+
+
+def test_an_effect_that_is_late_is_asked_for_again_and_then_ordered_again():
+    bench = Bench().at(0.1).answer().at(1.7)
+    assert len(bench.asked) >= 5
+    assert bench.sent == [0.0, pytest.approx(1.6)]
+    bench.at(1.8).shows()
+    assert bench.end.success
+
+
+def test_temporarily_rejected_is_tried_again():
+    bench = Bench().at(0.1).answer(results.TEMPORARILY_REJECTED).at(0.4)
+    assert bench.sent == [0.0, pytest.approx(0.35)]
+    bench.answer().shows()
+    assert bench.end.success
+
+
+@pytest.mark.parametrize(
+    "result", [results.DENIED, results.UNSUPPORTED, results.FAILED, results.CANCELLED, 9, 99]
+)
+def test_any_other_refusal_is_final_and_in_words(result):
+    bench = Bench().at(0.1).answer(result)
+    assert (bench.end.success, bench.end.accepted, bench.end.result) == (False, False, result)
+    assert results.result_text(result) in bench.end.message
+    assert bench.reports[-1] is Outcome.FAILED
+
+
+@pytest.mark.parametrize("result", [results.DENIED, results.UNSUPPORTED, results.FAILED])
+def test_who_insists_is_stopped_by_time_alone(result):
+    bench = Bench(insist=True).at(0.1).answer(result).at(0.4)
+    assert len(bench.sent) == 2
+    bench.at(20.0)
+    assert "given up after 5.0 s" in bench.end.message
+
+
+def test_a_refusal_names_what_the_device_says_of_itself():
+    bench = Bench(hint=lambda: "armed triggers: none").at(0.1).answer(results.FAILED)
+    assert bench.end.message.endswith("; armed triggers: none")
+
+
+def test_an_effect_that_is_there_already_is_not_ordered_again():
+    bench = Bench(already=True)
+    assert bench.sent == []
+    assert bench.end.success
+    assert "nothing was sent" in bench.end.message
+    assert bench.reports == [Outcome.CONFIRMED]
+
+
+def test_nothing_more_is_sent_once_it_is_shown():
+    bench = Bench().at(0.1).answer().shows()
+    before = (list(bench.sent), list(bench.asked))
+    bench.at(100.0).answer()
+    assert (bench.sent, bench.asked) == before
+    assert bench.loop.next_deadline() == math.inf
+
+
+def test_where_no_status_shows_it_the_acknowledgement_is_all():
+    bench = Bench(effect=False).at(0.1)
+    bench.loop.effect_may_show(0.1)
+    assert not bench.loop.ended
+    bench.answer()
+    assert bench.end.success
+    assert bench.end.message == "release acknowledged after 0.10 s"
+
+
+def test_what_is_not_wanted_any_more_ends_with_the_reason():
+    bench = Bench().at(0.1)
+    bench.loop.abandon("a release was ordered", 0.1)
+    assert "given up: a release was ordered" in bench.end.message
+    bench.loop.abandon("again", 0.2)
+    assert "again" not in bench.end.message
+
+
+@pytest.mark.parametrize("name", ["effect_timeout", "retry_interval", "give_up_after"])
+def test_times_that_make_no_sense_are_refused_by_name(name):
+    with pytest.raises(ParameterError, match=name):
+        EffectLimits(**{name: 0.0})

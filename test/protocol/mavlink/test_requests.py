@@ -1,0 +1,157 @@
+"""Requests under way: each ends exactly once, and what is not wanted any more is not sent."""
+
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chute_ros.model import Outcome
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.commands import Acknowledgement, Command
+from chute_ros.protocol.mavlink.config import MavlinkConfig
+from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.effect import Goal
+from chute_ros.protocol.mavlink.events import RequestFinished, RequestReport
+from chute_ros.protocol.mavlink.goals import Watch
+from chute_ros.protocol.mavlink.requests import Requests
+
+ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
+SET = Command(1, 161, 511, (430.0, 500000.0, *[0.0] * 5))
+ASK = Command(1, 161, 512, (244.0, 430.0, *[0.0] * 5))
+
+
+def goal(name="release", command=ORDER, **options):
+    return Goal(name, (command,), "shown", **options)
+
+
+def ack(requests, command, now, result=results.ACCEPTED):
+    requests.commands.acknowledged(Acknowledgement(1, 161, command.number, result), now)
+    return requests.drive(now)
+
+
+def ends(requests):
+    return [e for e in requests.take_events() if isinstance(e, RequestFinished)]
+
+
+def test_a_request_is_sent_acknowledged_and_ends_once():
+    requests = Requests(MavlinkConfig())
+    requests.begin(5, goal(), 0.0)
+    assert [send.command for send in requests.drive(0.0)] == [ORDER]
+    assert 5 in requests
+    assert requests.under_way("release")
+    ack(requests, ORDER, 0.1)
+    (end,) = ends(requests)
+    assert (end.finished.token, end.finished.success) == (5, True)
+    assert 5 not in requests
+    assert requests.next_deadline() == math.inf
+
+
+def test_a_refused_request_reports_and_ends_without_anything_sent():
+    requests = Requests(MavlinkConfig())
+    requests.refuse(5, "no parachute")
+    report, end = requests.take_events()
+    assert isinstance(report, RequestReport)
+    assert report.report.outcome is Outcome.FAILED
+    assert end.finished.message == "no parachute"
+    assert requests.drive(0.0) == []
+
+
+def interval(requests):
+    message = d.MAVLINK_MSG_ID_MESSAGE_INTERVAL
+    watch = Watch(1, 161, message, "message_id", 430)
+    read_back = (goal("read", ASK, shown=watch.seen), watch)
+    requests.begin(5, goal("set", SET), 0.0, follow_up=read_back)
+    requests.drive(0.0)
+    ack(requests, SET, 0.1)
+
+
+def test_a_follow_up_is_asked_after_success_and_its_message_handed_over():
+    requests = Requests(MavlinkConfig())
+    interval(requests)
+    assert ends(requests) == []
+    requests.message(1, 161, d.MAVLink_message_interval_message(33, 1))
+    requests.message(1, 162, d.MAVLink_message_interval_message(430, 2))
+    requests.message(1, 161, d.MAVLink_message_interval_message(430, 500000))
+    requests.effects_may_show(0.2)
+    requests.drive(0.2)
+    (end,) = ends(requests)
+    assert end.finished.success
+    assert end.data.interval_us == 500000
+
+
+def test_a_follow_up_that_fails_cannot_turn_success_into_failure():
+    requests = Requests(MavlinkConfig())
+    interval(requests)
+    ack(requests, ASK, 0.2, results.DENIED)
+    (end,) = ends(requests)
+    assert end.finished.success
+    assert end.data is None
+    assert "set acknowledged" in end.finished.message
+    assert "denied" in end.finished.message
+
+
+def test_a_release_makes_way_for_itself():
+    requests = Requests(MavlinkConfig())
+    requests.begin(5, goal("disable", hinders_release=True), 0.0)
+    requests.drive(0.0)
+    requests.make_way_for_release(0.1)
+    requests.drive(0.1)
+    (end,) = ends(requests)
+    assert "a release was ordered" in end.finished.message
+    requests.update(10.0)
+    assert requests.drive(10.0) == []
+
+
+def test_two_callers_of_the_same_urgent_goal_are_both_answered():
+    requests = Requests(MavlinkConfig())
+    requests.begin(5, goal(urgent=True), 0.0)
+    requests.drive(0.0)
+    requests.begin(6, goal(urgent=True), 0.1)
+    requests.drive(0.1)
+    ack(requests, ORDER, 0.2)
+    assert sorted(end.finished.token for end in ends(requests)) == [5, 6]
+
+
+GOALS = st.builds(
+    goal,
+    st.sampled_from(["release", "disable", "ask"]),
+    st.sampled_from([ORDER, SET, ASK, Command(1, 162, 208)]),
+    insist=st.booleans(),
+    urgent=st.booleans(),
+    hinders_release=st.booleans(),
+    refresh=st.sampled_from([None, ASK]),
+)
+STEPS = st.one_of(
+    st.tuples(st.just("begin"), GOALS),
+    st.tuples(st.just("ack"), st.sampled_from([ORDER, SET, ASK]), st.integers(0, 12)),
+    st.tuples(st.just("release")),
+    st.tuples(st.just("abandon")),
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.tuples(st.sampled_from([0.0, 0.01, 0.3, 1.0, 7.0]), STEPS), max_size=30))
+def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_past(steps):
+    requests, now, begun, ended = Requests(MavlinkConfig()), 1000.0, [], []
+    for wait, step in steps:
+        now += wait
+        requests.update(now)
+        if step[0] == "begin":
+            begun.append(len(begun) + 1)
+            requests.begin(begun[-1], step[1], now)
+        elif step[0] == "ack":
+            ack(requests, step[1], now, step[2])
+        elif step[0] == "release":
+            requests.make_way_for_release(now)
+        elif begun:
+            requests.abandon(begun[-1], "not wanted", now)
+        requests.drive(now)
+        ended += [end.finished.token for end in ends(requests)]
+        assert requests.next_deadline() > now
+    while (deadline := requests.next_deadline()) < math.inf:
+        now = deadline
+        requests.update(now)
+        requests.drive(now)
+        ended += [end.finished.token for end in ends(requests)]
+        assert now < 2000.0
+    assert sorted(ended) == begun

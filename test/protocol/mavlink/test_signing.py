@@ -1,0 +1,124 @@
+"""Signing: who holds the key may speak; nobody else, and nobody twice."""
+
+import hashlib
+
+import pytest
+
+from chute_ros.errors import SigningKeyError
+from chute_ros.protocol.mavlink import signing
+from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier, key_from_text
+
+KEY, OTHER = bytes(range(32)), bytes(32)
+#: Unix time less monotonic time: the host was started on 2026-01-01.
+OFFSET = 1767225600.0
+NOW = 500.0
+
+
+def clock():
+    return SigningClock(OFFSET)
+
+
+def signed(key=KEY, now=NOW, link=0, ids=(1, 161), signer=None):
+    encoder = FrameEncoder(*ids, signer or Signer(key, clock(), link))
+    return encoder.encode(d.MAVLink_heartbeat_message(37, 8, 0, 0, 3, 3), now)
+
+
+def reader():
+    return FrameDecoder(Verifier(KEY, clock()))
+
+
+def test_a_signature_is_what_the_guide_prescribes():
+    raw = signed(link=7)
+    assert raw[2] == 0x01
+    frame, link, stamp, signature = raw[:-13], raw[-13], raw[-12:-6], raw[-6:]
+    assert link == 7
+    expected = int((NOW + OFFSET - 1420070400) * 100_000)
+    assert int.from_bytes(stamp, "little") == expected
+    digest = hashlib.sha256(KEY + frame + bytes([link]) + stamp).digest()
+    assert signature == digest[:6]
+
+
+def test_a_rightly_signed_frame_is_read_and_marked():
+    (frame,) = reader().feed_datagram(signed(), NOW)
+    assert frame.signed
+
+
+def test_an_unsigned_frame_is_dropped_and_counted():
+    decoder = reader()
+    plain = FrameEncoder(1, 161).encode(d.MAVLink_heartbeat_message(37, 8, 0, 0, 3, 3), NOW)
+    assert decoder.feed_datagram(plain, NOW) == []
+    assert decoder.counts[signing.UNSIGNED] == 1
+
+
+def test_a_radio_may_report_its_status_without_a_key():
+    plain = FrameEncoder(51, 68).encode(d.MAVLink_radio_status_message(*[0] * 7), NOW)
+    assert len(reader().feed_datagram(plain, NOW)) == 1
+
+
+def test_a_wrongly_signed_frame_is_dropped_and_counted():
+    decoder = reader()
+    assert decoder.feed_datagram(signed(key=OTHER), NOW) == []
+    assert decoder.counts[signing.WRONG_SIGNATURE] == 1
+
+
+def test_a_replayed_frame_is_dropped_and_counted():
+    decoder, raw = reader(), signed()
+    assert len(decoder.feed_datagram(raw, NOW)) == 1
+    assert decoder.feed_datagram(raw, NOW + 1.0) == []
+    assert decoder.counts[signing.REPLAYED] == 1
+
+
+def test_a_frame_of_a_minute_ago_does_not_open_a_stream():
+    assert len(reader().feed_datagram(signed(now=NOW - 59.0), NOW)) == 1
+    decoder = reader()
+    assert decoder.feed_datagram(signed(now=NOW - 61.0), NOW) == []
+    assert decoder.counts[signing.REPLAYED] == 1
+
+
+def test_one_forged_frame_with_a_high_time_does_not_shut_out_the_true_sender():
+    decoder = reader()
+    assert decoder.feed_datagram(signed(key=OTHER, now=NOW + 1e6), NOW) == []
+    assert len(decoder.feed_datagram(signed(), NOW)) == 1
+
+
+def test_streams_of_other_links_and_components_have_their_own_time():
+    decoder = reader()
+    assert len(decoder.feed_datagram(signed(now=NOW + 10.0), NOW)) == 1
+    assert len(decoder.feed_datagram(signed(now=NOW, link=1), NOW)) == 1
+    assert len(decoder.feed_datagram(signed(now=NOW, ids=(1, 1)), NOW)) == 1
+
+
+def test_our_own_times_rise_even_within_a_moment():
+    signer = Signer(KEY, clock())
+    times = [signer.next_timestamp(NOW) for _ in range(5)]
+    assert times == sorted(set(times))
+
+
+def test_we_follow_a_clock_that_is_ahead_of_ours():
+    ours = clock()
+    FrameDecoder(Verifier(KEY, ours)).feed_datagram(signed(now=NOW + 30.0), NOW)
+    assert ours.at(NOW) >= clock().at(NOW + 30.0)
+
+
+def test_the_signing_time_goes_by_monotonic_time_whatever_the_wall_clock_does():
+    ours = clock()
+    assert ours.at(NOW + 1.0) - ours.at(NOW) == pytest.approx(100_000, abs=1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [KEY, KEY.hex().encode(), KEY.hex().upper().encode() + b"\n"],
+    ids=["raw", "hex", "HEX"],
+)
+def test_a_key_is_32_bytes_or_64_digits(text):
+    assert key_from_text(text, "key") == KEY
+
+
+@pytest.mark.parametrize(
+    "text", [b"", b"short", KEY + b"\n", b"z" * 64, b"0 " * 32, bytes(64)], ids=repr
+)
+def test_anything_else_is_no_key_and_the_text_says_how_to_make_one(text):
+    with pytest.raises(SigningKeyError, match=r"my\.key holds .* head -c 32"):
+        key_from_text(text, "my.key")
