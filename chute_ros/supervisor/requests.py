@@ -151,10 +151,14 @@ class Requests(Steps):
             if stage is Stage.DEPLOYING:
                 self.move(Stimulus.DEPLOY_FAILED, "the mode was changed")
             block = self.state.block
-            if block is not None and block.decision.action is Action.FLIGHT_BLOCK:
+            if block is not None and (
+                block.decision.action is Action.FLIGHT_BLOCK or block.unreported()
+            ):
                 reasons = (f"mode changes from ACTIVE to {one.mode.name}",)
                 release = Action.FLIGHT_BLOCK_RELEASE
                 self.decide("block", release, "mode", reasons, self.config.links)
+            else:
+                self.state = replace(self.state, block=None)
         else:
             # What was said in the other mode was not sent; what holds now is decided anew.
             self.state = replace(self.state, block=None)

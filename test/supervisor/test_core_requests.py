@@ -189,6 +189,16 @@ def test_leaving_active_between_kill_and_deploy_stops_the_deploy_and_says_so() -
     assert story.decisions(D) == []
 
 
+def test_inhibited_a_node_that_restarts_is_told_nothing() -> None:
+    story = Story().ready()
+    story.at(0.1, story.report(Action.FLIGHT_BLOCK_RELEASE, Outcome.CONFIRMED))
+    story.at(0.2, i.ModeRequest(1, i.Mode.INHIBITED, force=False))
+    count = len(story.decisions())
+    story.seq = -1
+    story.at(0.3, story.heartbeat())
+    assert len(story.decisions()) == count
+
+
 def test_leaving_active_after_the_deploy_left_is_a_fault_that_may_be_tried_again() -> None:
     story = Story().flying()
     story.at(1.0, i.DeployRequest(1, False, "it falls"))

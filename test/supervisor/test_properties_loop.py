@@ -174,7 +174,7 @@ WIRES = (
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(*WIRES, st.floats(0.0, HEAL), st.lists(st.floats(0.0, 6.0), max_size=3))
 def test_a_deploy_gets_through_once_the_wires_heal_and_the_motors_are_stopped(
     seed: int, loss: float, slowness: float, restarts: list[float], when: float, kills: list[float]
@@ -195,7 +195,7 @@ def test_a_deploy_gets_through_once_the_wires_heal_and_the_motors_are_stopped(
     assert all(number in loop.answers for number in range(10, 10 + len(kills)))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32), st.floats(0.0, 0.4), st.floats(0.0, 2.0))
 def test_wires_that_are_only_slow_make_no_device_fire_twice(
     seed: int, slowness: float, when: float
@@ -211,7 +211,7 @@ def test_wires_that_are_only_slow_make_no_device_fire_twice(
         assert actions.count(K) == (node.link in CONFIG.kill_links)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(*WIRES)
 def test_whatever_the_wires_do_nothing_fires_that_nobody_asked_for(
     seed: int, loss: float, slowness: float, restarts: list[float]

@@ -34,7 +34,7 @@ DONE = st.builds(i.ArmDone, st.just(0), st.booleans(), st.booleans(), st.just("d
 ANY = st.one_of(EVIDENCE, RELEASED, REQUESTS, HEALTHY, REPORTS, VEHICLE, DONE)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(WAITS, st.lists(ANY, max_size=5).map(tuple)), max_size=25))
 def test_a_deadline_is_served_when_it_comes_whatever_the_rounding(sequence: list) -> None:
     now, state = START, State(epoch=7, started_at=START)
@@ -52,7 +52,7 @@ def test_a_deadline_is_served_when_it_comes_whatever_the_rounding(sequence: list
         state, _ = update(CONFIG, state, inputs, now)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-5.0, 9.0), st.lists(ANY, max_size=6).map(tuple)), max_size=25),
     st.sampled_from(i.Mode),
@@ -77,7 +77,7 @@ def test_any_number_of_inputs_at_once_and_a_time_that_jumps_raise_nothing(
                 assert killed
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(WAITS, st.one_of(EVIDENCE, HEALTHY, REPORTS, VEHICLE)), max_size=40))
 def test_a_heartbeat_that_fails_alone_never_fires(sequence: list) -> None:
     now, state = START, State(epoch=7, started_at=START)

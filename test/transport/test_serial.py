@@ -60,7 +60,7 @@ def test_unplugged_and_plugged_in_again_at_the_same_path(device, path, await_unt
         os.write(device.master, b"before")
         await_until(lambda: node.link.heard() == b"before", "it is heard")
         device.unplug()
-        await_until(lambda: not node.wire.is_open, "the hang-up is seen")
+        await_until(lambda: not node.changes[-1].is_open, "the hang-up is told")
         assert f"serial:{path}:57600" in node.changes[-1].text
         assert "trying again each 0.5 s" in node.changes[-1].text
         assert None in node.link.ended, "what was half received does not continue"

@@ -183,7 +183,7 @@ class CommandTransactions:
         if sends is None:
             self.unexpected_count += 1
             return
-        others = 0 if transaction is None else sends.of_others(transaction.family, now)
+        others = 0 if transaction is None else self._others_of(key, transaction, now)
         if ack.result == results.IN_PROGRESS:
             sends.in_progress(now, self.limits.in_progress_timeout)
             if transaction is None or others:
@@ -209,7 +209,7 @@ class CommandTransactions:
         for key, transaction in list(self._open.items()):
             if now < transaction.deadline:
                 continue
-            others = self._sends_of(key).of_others(transaction.family, now)
+            others = self._others_of(key, transaction, now)
             if transaction.sends >= min(transaction.tries + others, 256):
                 self._end(key, transaction, results.NO_ACKNOWLEDGEMENT, now)
                 self._start_waiting(key, now)
@@ -247,6 +247,10 @@ class CommandTransactions:
 
     def _sends_of(self, key: _Key) -> UnansweredSends:
         return self._sends.setdefault(key, UnansweredSends(self.limits.late_ack_window))
+
+    def _others_of(self, key: _Key, transaction: _Open, now: float) -> int:
+        # Those that were answered before it began are not waited for again.
+        return min(transaction.others, self._sends_of(key).of_others(transaction.family, now))
 
     def _begin(self, key: _Key, start: _Waiting, now: float) -> None:
         others = self._sends_of(key).of_others(start.family, now)

@@ -270,9 +270,10 @@ class EffectLoop:
     def _what_did_not_come(self, now: float) -> str:
         text = f"{self.goal.name} given up after {now - self._started:.1f} s: "
         if not math.isnan(self._accepted_after):
+            newest = "" if self._result == results.ACCEPTED else f"; newest answer: {self._answer}"
             return text + (
                 f"acknowledged after {self._accepted_after:.2f} s, "
-                f"but the device's own status never showed: {self.goal.effect}"
+                f"but the device's own status never showed: {self.goal.effect}{newest}"
             )
         if not self._sent:
             return f"{text}never sent: an earlier command of the same number was under way"
@@ -289,6 +290,8 @@ class EffectLoop:
             message = f"{message}; {hint}"
         outcome = Outcome.CONFIRMED if success else Outcome.FAILED
         self._reports.append(Report(self.token, outcome, message))
+        # What nobody has fetched yet is not wanted any more.
+        self._commands.clear()
+        self._refreshes.clear()
         accepted = not math.isnan(self._accepted_after)
-        result = results.ACCEPTED if accepted else self._result
-        self.finished = EffectFinished(self.token, success, accepted, result, message)
+        self.finished = EffectFinished(self.token, success, accepted, self._result, message)

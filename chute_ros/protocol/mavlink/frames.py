@@ -192,17 +192,15 @@ class FrameDecoder:
         return Frame(message, system_id, component_id, sequence, version, signed), len(raw)
 
 
+#: The last step of the checksum (CRC-16/MCRF4XX) takes CRC_EXTRA in: what it can add.
+_LAST_STEPS = frozenset(mixed << 8 ^ mixed << 3 ^ mixed >> 4 for mixed in range(256))
+
+
 def _checksum_may_fit(raw: bytes) -> bool:
     """Some CRC_EXTRA makes the checksum right: as for every true frame, and one false in 256."""
     checksum = int.from_bytes(raw[-_CHECKSUM:], "little")
     state: int = dialect.x25crc(raw[1:-_CHECKSUM]).crc
-    # The last step of the checksum (CRC-16/MCRF4XX) takes CRC_EXTRA in.
-    for extra in range(256):
-        mixed = extra ^ (state & 0xFF)
-        mixed = (mixed ^ (mixed << 4)) & 0xFF
-        if checksum == (state >> 8) ^ (mixed << 8) ^ (mixed << 3) ^ (mixed >> 4):
-            return True
-    return False
+    return checksum ^ (state >> 8) in _LAST_STEPS
 
 
 class FrameEncoder:
@@ -222,7 +220,7 @@ class FrameEncoder:
             self._writer.signing.timestamp = self._signer.next_timestamp(now)
         try:
             frame: bytes = message.pack(self._writer)
-        except (struct.error, OverflowError, TypeError) as error:
+        except (struct.error, OverflowError, TypeError, IndexError) as error:
             raise MessageError(f"{message.get_type()} cannot be packed: {error}") from error
         self._writer.seq = (self._writer.seq + 1) % 256
         return frame

@@ -186,6 +186,35 @@ def test_a_cancelled_command_is_neither_sent_again_nor_reported():
     assert bench.commands.next_deadline() == math.inf
 
 
+def test_a_command_that_waits_can_be_cancelled_and_the_others_keep_their_turn():
+    bench = Bench().start(1, DISABLE).start(2, DISABLE).start(3, RELEASE)
+    bench.commands.cancel(2, 0.1)
+    bench.at(0.2).ack(DISABLE).at(0.3).ack(RELEASE)
+    assert [end.token for end in bench.ends()] == [1, 3]
+    assert [one.command for _, one in bench.sent] == [DISABLE, RELEASE]
+
+
+def test_in_progress_extends_the_wait_right_after_an_answered_command_too():
+    bench = Bench(in_progress_timeout=5.0).start(1, DISABLE).at(0.1).ack(DISABLE)
+    bench.at(0.2).start(2, RELEASE).at(0.3).ack(RELEASE, results.IN_PROGRESS)
+    assert bench.commands.next_deadline() == pytest.approx(5.3)
+    assert len(bench.at(5.0).sent) == 2
+
+
+def test_in_progress_of_an_earlier_command_does_not_extend_a_later_one():
+    bench = Bench(tries=1, ack_timeout=0.5).start(1, DISABLE).at(0.5)
+    bench.at(0.6).start(2, RELEASE).at(0.7).ack(DISABLE, results.IN_PROGRESS)
+    assert bench.commands.next_deadline() == pytest.approx(1.1)
+
+
+def test_commands_that_were_answered_add_no_tries_to_a_later_one():
+    bench = Bench(tries=3)
+    for number in (1, 2, 3):
+        bench.start(number, DISABLE).at(bench.now + 0.1).ack(DISABLE)
+    bench.start(9, RELEASE).at(10.0)
+    assert [one.confirmation for _, one in bench.sent[3:]] == [0, 1, 2]
+
+
 def test_a_device_that_never_answers_does_not_make_us_grow():
     bench = Bench(tries=1, ack_timeout=0.01, late_ack_window=60.0)
     for number in range(500):

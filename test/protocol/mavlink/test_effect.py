@@ -4,6 +4,8 @@ import itertools
 import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import Outcome
@@ -200,3 +202,76 @@ def test_what_is_not_wanted_any_more_ends_with_the_reason():
 def test_times_that_make_no_sense_are_refused_by_name(name):
     with pytest.raises(ParameterError, match=name):
         EffectLimits(**{name: 0.0})
+
+
+def test_a_refusal_after_an_acceptance_is_the_answer_that_is_reported():
+    bench = Bench().at(0.1).answer().at(1.7).answer(results.DENIED)
+    assert (bench.end.success, bench.end.accepted, bench.end.result) == (False, True, 2)
+    assert "denied" in bench.end.message
+
+
+def test_time_that_is_up_names_the_newest_answer_too():
+    bench = Bench().at(0.1).answer().at(1.7)
+    while not bench.loop.ended:
+        bench.answer(results.TEMPORARILY_REJECTED).at(bench.now + 0.3)
+    assert "acknowledged after 0.10 s, but the device's own status never" in bench.end.message
+    assert "; newest answer: temporarily rejected" in bench.end.message
+    assert bench.end.result == results.TEMPORARILY_REJECTED
+
+
+def test_superseded_is_tried_again_only_if_urgent():
+    urgent = Bench(urgent=True).at(0.1).answer(results.NO_ACKNOWLEDGEMENT, superseded=True)
+    assert len(urgent.at(0.4).sent) == 2
+    other = Bench().at(0.1).answer(results.NO_ACKNOWLEDGEMENT, superseded=True)
+    assert "for a newer command of the same number" in other.end.message
+
+
+@pytest.mark.parametrize("end", ["shown", "abandoned"])
+def test_an_order_that_nobody_has_fetched_is_not_sent_after_the_end(end):
+    bench = Bench()
+    loop = EffectLoop(1, bench.goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
+    if end == "shown":
+        bench.there = True
+        loop.effect_may_show(0.0)
+    else:
+        loop.abandon("a release was ordered", 0.0)
+    assert loop.take_commands() == []
+
+
+def test_the_status_is_not_asked_for_if_the_acknowledgement_finds_it_shown():
+    bench = Bench().at(0.1)
+    bench.there = True
+    bench.answer()
+    assert bench.end.success
+    assert bench.asked == []
+
+
+def test_a_command_that_never_had_its_turn_says_so():
+    loop = EffectLoop(1, Bench().goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
+    loop.update(5.0)
+    assert "never sent: an earlier command of the same number" in loop.finished.message
+    loop.update(6.0)
+    assert len(loop.take_reports()) == 1
+
+
+STEPS = st.lists(st.tuples(st.floats(0, 1.5), st.integers(-2, 255)), max_size=30)
+
+
+@given(STEPS, st.booleans(), st.booleans())
+def test_whatever_comes_it_ends_once_in_time_and_never_spins(steps, insist, effect):
+    """-2 and -1: the status shows the effect, or not; else: this result is answered."""
+    bench = Bench(effect=effect, insist=insist)
+    for wait, what in steps:
+        bench.at(bench.now + wait)
+        if what == -2:
+            bench.shows()
+        elif what >= 0:
+            bench.answer(what)
+        bench.loop.update(bench.now)
+        bench._collect()
+        assert bench.loop.next_deadline() > bench.now
+    bench.at(bench.now + 5.0)
+    ends = [one for one in bench.reports if one in (Outcome.CONFIRMED, Outcome.FAILED)]
+    assert len(ends) == 1
+    assert bench.reports[-1] is ends[0]
+    assert len(bench.sent) <= 5.0 / 0.25 + 1
