@@ -1,9 +1,12 @@
 """Requests under way: each ends exactly once, and what is not wanted any more is not sent."""
 
 import math
+import random
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from link_bench import Bench, heartbeat
+from link_bench import ack as ack_message
 
 from chute_ros.model import Outcome
 from chute_ros.protocol.mavlink import results
@@ -155,3 +158,63 @@ def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_pa
         ended += [end.finished.token for end in ends(requests)]
         assert now < 2000.0
     assert sorted(ended) == begun
+
+
+def test_what_prepared_a_goal_is_not_sent_again_once_it_is_reached():
+    requests, prepare = Requests(MavlinkConfig()), Command(1, 161, 225)
+    requests.begin(5, Goal("release", (prepare, ORDER), "shown"), 0.0)
+    assert [send.command for send in requests.drive(0.0)] == [prepare, ORDER]
+    ack(requests, ORDER, 0.1)
+    assert ends(requests)[0].finished.success
+    assert requests.next_deadline() == math.inf
+
+
+def test_a_request_that_is_abandoned_while_it_waits_for_its_turn_is_never_sent():
+    requests = Requests(MavlinkConfig())
+    requests.begin(5, goal("first", ORDER), 0.0)
+    requests.drive(0.0)
+    requests.begin(6, goal("second", Command(1, 161, 208)), 0.1)
+    requests.abandon(6, "not wanted", 0.1)
+    assert requests.drive(0.1) == []
+    assert ack(requests, ORDER, 0.2) == []
+    assert {end.finished.token: end.finished.success for end in ends(requests)} == {
+        5: True,
+        6: False,
+    }
+
+
+CHUTE = (1, 161)
+ANSWERS = {0: results.DENIED, 1: results.ACCEPTED}
+
+
+@settings(max_examples=150)
+@given(st.integers(0, 2**32), st.floats(0, 0.8), st.floats(0.001, 4.9), st.booleans())
+def test_copies_of_acknowledgements_settle_no_later_request(seed, loss, slowest, talks):
+    """The device denies 0 and accepts 1; the network loses, delays, swaps and copies answers."""
+    chance, bench, wire, seen = random.Random(seed), Bench(), [], 0
+    bench.hear(CHUTE, heartbeat()).hear(CHUTE, heartbeat())
+    actions = {token: chance.choice([0, 1]) for token in range(1, 9)}
+    for token, action in actions.items():
+        bench.link.parachute_action(token, action, "", bench.now)
+        bench.collect()
+        until = bench.t + chance.choice([0.05, 0.3, 1.0, 6.0])
+        while bench.t < until:
+            for _, order in bench.sent[seen:]:
+                if order.command == 208 and chance.random() >= loss:
+                    answer = ack_message(208, ANSWERS[int(order.param1)])
+                    raw = bench.encoder(CHUTE).encode(answer, bench.now)
+                    copies = chance.choice([0, 1, 1, 2, 3])
+                    wire += [(bench.t + chance.random() * slowest, raw) for _ in range(copies)]
+            seen = len(bench.sent)
+            wire.sort()
+            arrival = wire[0][0] if wire else math.inf
+            bench.at(max(bench.t, min(arrival, bench.link.next_deadline() - 1000.0, until)))
+            if bench.t >= arrival:
+                bench.link.receive(wire.pop(0)[1], bench.now)
+                bench.collect()
+            if talks and chance.random() < 0.2:
+                bench.hear(CHUTE, heartbeat())
+    bench.at(bench.t + 30.0)
+    for token, action in actions.items():
+        result = bench.end(token).finished.result
+        assert result in (results.NO_ACKNOWLEDGEMENT, ANSWERS[action])

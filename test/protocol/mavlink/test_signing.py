@@ -90,6 +90,22 @@ def test_streams_of_other_links_and_components_have_their_own_time():
     assert len(decoder.feed_datagram(signed(now=NOW, ids=(1, 1)), NOW)) == 1
 
 
+@pytest.mark.parametrize("at", range(1, len(signed())))
+def test_one_changed_byte_anywhere_in_a_signed_frame_is_enough_to_drop_it(at):
+    raw = bytearray(signed())
+    raw[at] ^= 0x01
+    decoder = reader()
+    assert decoder.feed_datagram(bytes(raw), NOW) == []
+    assert len(decoder.feed_datagram(signed(), NOW)) == 1
+
+
+def test_a_host_that_thinks_it_is_1970_can_still_sign():
+    encoder = FrameEncoder(1, 191, Signer(KEY, SigningClock(-NOW)))
+    message = d.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+    stamps = [int.from_bytes(encoder.encode(message, NOW)[-12:-6], "little") for _ in range(3)]
+    assert stamps == [1, 2, 3]
+
+
 def test_our_own_times_rise_even_within_a_moment():
     signer = Signer(KEY, clock())
     times = [signer.next_timestamp(NOW) for _ in range(5)]
