@@ -223,6 +223,7 @@ class DeviceNode(Node, ABC):
         message.action, message.outcome = int(decision.action), int(outcome)
         message.link, message.detail = self.get_name(), detail
         message.newest_epoch = self.gate.newest_epoch
+        message.newest_id = self.gate.newest_id
         self._report_publisher.publish(message)
         self._reports.pop((message.epoch, message.id), None)
         self._reports[message.epoch, message.id] = message

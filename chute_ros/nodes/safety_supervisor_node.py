@@ -174,6 +174,7 @@ class SafetySupervisorNode(Node):
                 messages.outcome(message),
                 message.detail,
                 message.newest_epoch,
+                message.newest_id,
             )
         )
 

@@ -183,6 +183,7 @@ def test_no_true_frame_is_held_back_for_longer_than_the_longest_frame_takes(piec
         while (now := decoder.next_deadline()) <= until:
             for frame in decoder.update(now):
                 held.pop(frame.sequence, None)
+            assert decoder.next_deadline() > now
             # What looks like a frame that we do not know is passed over whole: one in 256.
             in_time = all(now - put < frames.LONGEST_FRAME_TIME for put in held.values())
             assert in_time or decoder.counts[frames.UNKNOWN_MESSAGE]
