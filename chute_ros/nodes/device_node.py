@@ -16,10 +16,8 @@ from itertools import count
 from typing import Any
 
 from chute_msgs.msg import (
-    ActionReport,
     LinkHeartbeat,
     ParachuteStatus,
-    SafetyDecision,
     SafetyRequest,
 )
 from chute_msgs.srv import Arm, Deploy
@@ -32,8 +30,8 @@ from rclpy.task import Future
 
 from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.decision_carrier import DecisionCarrier
 from chute_ros.nodes.parameters import Parameter, declare
-from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
 from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
 
 COMMON_PARAMETERS = (
@@ -48,8 +46,6 @@ COMMON_PARAMETERS = (
 )
 #: Our own link's heartbeat stops when the executor was silent for this long, s.
 OWNER_SILENCE = 1.0
-#: So many decisions are remembered with how far they got, to be reported once more.
-MOST_REPORTS = 50
 
 
 @dataclass(frozen=True)
@@ -80,7 +76,7 @@ class DeviceNode(Node, ABC):
         self.add_on_set_parameters_callback(self._parameters_set)
         # The wall clock stamps, whatever use_sim_time says; decisions are as old as it tells.
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
-        self.gate = DecisionGate(name, self.values["max_decision_age"])
+        self.decisions = DecisionCarrier(self, self.values["max_decision_age"], self.carry_out)
         self.wire_text = "not opened yet"
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
         self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
@@ -92,10 +88,7 @@ class DeviceNode(Node, ABC):
         self._tokens = count(1)
         self._waiting: dict[int, Future] = {}
         self._decisions: dict[int, model.Decision] = {}
-        #: The newest report on each of the newest decisions.
-        self._reports: dict[tuple[int, int], ActionReport] = {}
         self._seq = count()
-        self._verdicts: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
         self._loop_faults = 0
         self._summary: Summary | None = None
         self._supervisor_heard = float("nan")
@@ -109,7 +102,6 @@ class DeviceNode(Node, ABC):
         self._request_publisher = self.create_publisher(
             SafetyRequest, "safety/request", qos.STATUS
         )
-        self._report_publisher = self.create_publisher(ActionReport, "safety/action", qos.DECISION)
         self._diagnostics_publisher = self.create_publisher(
             DiagnosticArray, "/diagnostics", qos.STATUS
         )
@@ -117,7 +109,7 @@ class DeviceNode(Node, ABC):
     def begin(self) -> None:
         """Start the link's thread and everything that reacts to it."""
         assert self.loop is not None
-        self.create_subscription(SafetyDecision, "safety/decision", self._decision, qos.DECISION)
+        self.decisions.begin()
         self.create_subscription(
             LinkHeartbeat, "safety/heartbeat", self._heartbeat_heard, qos.STATUS
         )
@@ -213,26 +205,7 @@ class DeviceNode(Node, ABC):
         """A request got a step further; if a decision stands behind it, the supervisor is told."""
         decision = self._decisions.get(token)
         if decision is not None:
-            self.report_on(decision, outcome, detail)
-
-    def report_on(self, decision: model.Decision, outcome: model.Outcome, detail: str) -> None:
-        """Tell the supervisor how far a decision got."""
-        message = ActionReport()
-        message.header.stamp = self.stamp()
-        message.epoch, message.id = decision.epoch, decision.id
-        message.action, message.outcome = int(decision.action), int(outcome)
-        message.link, message.detail = self.get_name(), detail
-        message.newest_epoch = self.gate.newest_epoch
-        message.newest_id = self.gate.newest_id
-        self._report_publisher.publish(message)
-        self._reports.pop((message.epoch, message.id), None)
-        self._reports[message.epoch, message.id] = message
-        while len(self._reports) > MOST_REPORTS:
-            del self._reports[next(iter(self._reports))]
-        self.get_logger().info(
-            f"decision {decision.epoch}.{decision.id} {decision.action.name}: "
-            f"{outcome.name}: {detail}"
-        )
+            self.decisions.report(decision, outcome, detail)
 
     def publish_status(self, status: model.ParachuteStatus) -> None:
         """On parachute/status."""
@@ -303,32 +276,6 @@ class DeviceNode(Node, ABC):
             sent = messages.seconds(message.header.stamp)
             self._supervisor_delay = messages.seconds(self.stamp()) - sent
 
-    def _decision(self, message: SafetyDecision) -> None:
-        decision = messages.decision_from(message)
-        age = messages.seconds(self.stamp()) - messages.seconds(message.header.stamp)
-        verdict = self.gate.judge(decision, age)
-        self._verdicts[verdict] += 1
-        if verdict is Verdict.ACT:
-            self.get_logger().warning(
-                f"decision {decision.epoch}.{decision.id} {decision.action.name} "
-                f"({decision.rule}): {'; '.join(decision.reasons)}"
-            )
-            self.carry_out(decision)
-        elif verdict is Verdict.REPEATED:
-            # The supervisor has not heard our report, perhaps because it was not there yet.
-            report = self._reports.get((decision.epoch, decision.id))
-            if report is not None:
-                self._report_publisher.publish(report)
-        elif verdict is Verdict.OLDER:
-            self.report_on(decision, model.Outcome.FAILED, Verdict.OLDER.value)
-        elif verdict is Verdict.TOO_LATE:
-            limit = self.values["max_decision_age"]
-            self.get_logger().error(
-                f"decision {decision.epoch}.{decision.id} {decision.action.name} is {age:.3f} s "
-                f"old (limit {limit:g} s): not acted on; do the hosts' clocks agree? "
-                f"is this host overloaded?"
-            )
-
     async def _arm(self, request: Arm.Request, response: Arm.Response) -> Arm.Response:
         end = await self.request(lambda link, token, now: self.arm_link(link, token, request, now))
         response.success, response.message = end.finished.success, end.finished.message
@@ -376,8 +323,7 @@ class DeviceNode(Node, ABC):
             text = f"clocks differ: its heartbeat seems {self._supervisor_delay:.3f} s old"
         values = {
             "heartbeat age (s)": age,
-            "newest decision": f"{self.gate.newest_epoch}.{self.gate.newest_id}",
             "exceptions in the link's thread": self._loop_faults,
+            **self.decisions.counts(),
         }
-        values |= {f"decisions: {verdict.value}": n for verdict, n in self._verdicts.items()}
         return diagnostics.status(self.diagnostic_name, "supervisor", level, text, values, "")

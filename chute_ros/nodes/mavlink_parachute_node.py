@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
-from dataclasses import dataclass
 from typing import Any
 
 from chute_msgs.msg import VehicleState
@@ -18,8 +16,14 @@ from chute_msgs.srv import (
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
-from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes import messages, qos
 from chute_ros.nodes.device_node import DeviceNode, Summary
+from chute_ros.nodes.mavlink_diagnostics import (
+    autopilot_task,
+    details_of,
+    link_task,
+    parachute_tasks,
+)
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from, signing_from
 from chute_ros.protocol.mavlink import results
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -43,19 +47,6 @@ from chute_ros.transport.wire import make_wire
 _INFORMATION: int = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
 
 
-@dataclass(frozen=True)
-class Details:
-    """What diagnostics say beside the summary."""
-
-    parachutes: tuple[tuple[model.ParachuteStatus, float, float], ...]
-    vehicle: model.VehicleState
-    doubts: tuple[str, ...]
-    received: int
-    sent: int
-    dropped: Counter[str]
-    late_acknowledgements: int
-
-
 class MavlinkParachuteNode(DeviceNode):
     """The node mavlink_parachute."""
 
@@ -65,7 +56,7 @@ class MavlinkParachuteNode(DeviceNode):
         link = MavlinkLink(config_from(self.values), *signing_from(self.values))
         self.loop = WireLoop(link, make_wire(address), self.deliver)
         self._statuses: dict[str, model.ParachuteStatus] = {}
-        self._rates: dict[str, tuple[int, float]] = {}
+        self._received_at = (0, 0.0)
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
@@ -78,25 +69,12 @@ class MavlinkParachuteNode(DeviceNode):
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         chosen = link.chosen_parachute()
-        vehicle = link.vehicle_state(now)
-        doubts = tuple(link.doubts())
-        details = Details(
-            tuple(
-                (p.status(now), p.status_interval, p.liveness.age(now))
-                for p in link.parachutes.all()
-            ),
-            vehicle,
-            doubts,
-            link.received_count,
-            link.sent_count,
-            Counter(link.counts),
-            link.requests.commands.late_count,
-        )
+        details = details_of(link, now)
         if chosen is None:
             return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
         # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
-        flying = vehicle.armed is model.Armed.ARMED
-        healthy = chosen.status(now).healthy and (flying or not doubts)
+        flying = details.vehicle.armed is model.Armed.ARMED
+        healthy = chosen.status(now).healthy and (flying or not details.doubts)
         return Summary(chosen.liveness.state, healthy, chosen.liveness.age(now), details)
 
     def event(self, event: Any) -> None:
@@ -135,7 +113,7 @@ class MavlinkParachuteNode(DeviceNode):
             assert self.loop is not None
             self.loop.call(lambda link, now: link.flight_block(reason, now))
             text = "arming on the ground is undone" if blocked else "arming is left alone"
-            self.report_on(decision, model.Outcome.CONFIRMED, text)
+            self.decisions.report(decision, model.Outcome.CONFIRMED, text)
 
     def arm_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
         link.arm(token, request.arm, request.triggers, now)
@@ -148,11 +126,19 @@ class MavlinkParachuteNode(DeviceNode):
             self.loop.call(lambda link, now: link.set_autopilot_message_rate(value, now))
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
-        details: Details = summary.details
+        assert self.loop is not None
+        name, details = self.diagnostic_name, summary.details
+        traffic = {
+            "frames received": details.received,
+            "frames received per s": self._rate(details.received),
+            "frames sent": details.sent,
+            "send errors": self.loop.send_errors,
+        }
+        wire = (self.loop.wire.is_open, self.wire_text, self.values["connection"])
         return [
-            self._diagnose_link(details),
-            *self._diagnose_parachutes(details),
-            self._diagnose_autopilot(details.vehicle),
+            link_task(name, details, traffic, *wire),
+            *parachute_tasks(name, details),
+            autopilot_task(name, details.vehicle),
         ]
 
     # -- services -------------------------------------------------------------------------------
@@ -251,82 +237,11 @@ class MavlinkParachuteNode(DeviceNode):
         else:
             log.warning(f"{event.name} is {change.after.name}: silent for {change.silence:.1f} s")
 
-    def _diagnose_link(self, details: Details) -> DiagnosticStatus:
-        assert self.loop is not None
-        open_, dropped = self.loop.wire.is_open, details.dropped
-        level = diagnostics.OK if open_ else diagnostics.ERROR
-        text = self.wire_text
-        if details.doubts:
-            level, text = diagnostics.ERROR, "; ".join(details.doubts)
-        elif open_ and not details.received:
-            level, text = diagnostics.WARN, f"{text}, nothing received yet"
-        values = {
-            "frames received": details.received,
-            "frames received per s": self._rate("received", details.received),
-            "frames sent": details.sent,
-            "send errors": self.loop.send_errors,
-            "acknowledgements that came late": details.late_acknowledgements,
-        }
-        values |= {f"dropped: {reason}": n for reason, n in sorted(dropped.items())}
-        return diagnostics.status(
-            self.diagnostic_name, "link", level, text, values, self.values["connection"]
-        )
-
-    def _diagnose_parachutes(self, details: Details) -> list[DiagnosticStatus]:
-        if not details.parachutes:
-            return [
-                diagnostics.status(
-                    self.diagnostic_name, "parachute", diagnostics.STALE, "never heard", {}, ""
-                )
-            ]
-        return [
-            diagnostics.status(
-                self.diagnostic_name,
-                f"parachute {status.device}",
-                diagnostics.OK if status.healthy else diagnostics.ERROR,
-                "; ".join(status.faults) or status.state.name,
-                {
-                    "link": status.link_state.name,
-                    "state": status.state.name,
-                    "heartbeat age (s)": age,
-                    "PARACHUTE_STATUS interval (s)": interval,
-                    "armed triggers": ", ".join(model.flag_names(status.armed_triggers)),
-                    "errors": ", ".join(model.flag_names(status.error_flags)),
-                    "safety": ", ".join(model.flag_names(status.safety_flags)),
-                    "packed date": status.packed_date,
-                    "uptime (s)": status.uptime,
-                },
-                status.device,
-            )
-            for status, interval, age in details.parachutes
-        ]
-
-    def _diagnose_autopilot(self, vehicle: model.VehicleState) -> DiagnosticStatus:
-        level, text = diagnostics.OK, f"{vehicle.armed.name}, {vehicle.landed_state.name}"
-        if vehicle.link_state is model.LinkState.NEVER_SEEN:
-            level, text = diagnostics.STALE, "never heard"
-        elif vehicle.link_state is not model.LinkState.OK:
-            level, text = diagnostics.ERROR, f"heartbeat {vehicle.link_state.name}"
-        elif vehicle.rebooted_in_flight:
-            level, text = diagnostics.ERROR, "restarted in flight"
-        values = {
-            "heartbeat age (s)": vehicle.armed_age,
-            "height (m)": vehicle.height,
-            "height age (s)": vehicle.height_age,
-            "attitude age (s)": vehicle.attitude_age,
-            "landed state age (s)": vehicle.landed_state_age,
-            "battery (V)": vehicle.battery_voltage,
-            "restarts": vehicle.reboot_count,
-        }
-        return diagnostics.status(
-            self.diagnostic_name, "autopilot", level, text, values, vehicle.source
-        )
-
-    def _rate(self, name: str, value: int) -> float:
+    def _rate(self, received: int) -> float:
         now = self._steady.now().nanoseconds * 1e-9
-        before, when = self._rates.get(name, (value, now))
-        self._rates[name] = (value, now)
-        return (value - before) / (now - when) if now > when else 0.0
+        before, when = self._received_at
+        self._received_at = (received, now)
+        return (received - before) / (now - when) if now > when > 0.0 else 0.0
 
 
 def _fill(response: Any, end: RequestFinished) -> Any:

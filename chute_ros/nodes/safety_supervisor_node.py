@@ -27,15 +27,13 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.parameters import declare
+from chute_ros.nodes.supervisor_messages import decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.core import next_deadline, update
-from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.preflight import block_reasons
-from chute_ros.supervisor.state import LinkEvidence, State
+from chute_ros.supervisor.state import State
 
 HEARTBEAT_INTERVAL = 0.1  # s
 STATE_INTERVAL = 1.0  # s, at the latest
@@ -287,70 +285,11 @@ class SafetySupervisorNode(Node):
 
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL
-        state, config = self.state, self.config
-        reasons = block_reasons(config, state, now)
-        message = SafetyState(
-            epoch=state.epoch,
-            state=int(state.stage),
-            state_text=self._state_text(reasons),
-            mode=int(state.mode),
-            flight_blocked=self._flight_blocked(),
-            block_reasons=list(reasons) if self._flight_blocked() else [],
-            alarms=list(state.alarms),
-        )
-        message.header.stamp = self.wall.now().to_msg()
-        for link in config.links:
-            evidence = state.links.get(link, LinkEvidence())
-            message.links.append(link)
-            message.link_states.append(int(evidence.state(config, now)))
-            message.link_ages.append(now - evidence.heard)
-            message.devices_healthy.append(evidence.device_healthy)
-        newest = max(
-            (p.decision for p in (state.block, state.kill, state.deploy) if p is not None),
-            key=lambda decision: decision.id,
-            default=None,
-        )
-        if newest is not None:
-            message.decision_id = newest.id
-            message.decision_action = int(newest.action)
-            message.decision_rule = newest.rule
-        self._state_publisher.publish(message)
-
-    def _flight_blocked(self) -> bool:
-        block = self.state.block
-        if block is None or block.decision.shadow:
-            return False
-        return block.decision.action is model.Action.FLIGHT_BLOCK
-
-    def _state_text(self, reasons: tuple[str, ...]) -> str:
-        stage = self.state.stage
-        if stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
-            return f"{stage.name}: {'; '.join(reasons)}"
-        if self.state.alarms:
-            return f"{stage.name}: {self.state.alarms[-1]}"
-        return stage.name
+        stamp = self.wall.now().to_msg()
+        self._state_publisher.publish(state_message(self.config, self.state, now, stamp))
 
     def _diagnose(self) -> None:
-        now, name = time.monotonic(), self.diagnostic_name
-        state, config = self.state, self.config
-        reasons = block_reasons(config, state, now)
-        level = diagnostics.OK
-        if state.alarms or state.stage is Stage.FAULT:
-            level = diagnostics.ERROR
-        elif reasons:
-            level = diagnostics.WARN
-        values: dict[str, object] = {
-            "state": state.stage.name,
-            "mode": state.mode.name,
-            "epoch": state.epoch,
-            "decisions": state.next_id - 1,
-            "newest heartbeat late by (s)": self._latest,
-        }
-        for link in config.links:
-            evidence = state.links.get(link, LinkEvidence())
-            values[f"{link}: link"] = evidence.state(config, now).name
-            values[f"{link}: heartbeat age (s)"] = now - evidence.heard
-            values[f"{link}: device healthy"] = evidence.device_healthy
-        text = self._state_text(reasons)
-        task = diagnostics.status(name, "decisions", level, text, values, "")
+        task = decisions_task(
+            self.diagnostic_name, self.config, self.state, time.monotonic(), self._latest
+        )
         self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), [task]))

@@ -97,9 +97,9 @@ def test_the_state_is_what_the_silence_says(steps):
         link.update(now)
         if heard is None:
             assert link.state is LinkState.NEVER_SEEN
-        elif now - heard < LIMITS.stale_after:
+        elif now < heard + LIMITS.stale_after:
             assert link.state is LinkState.OK
-        elif now - heard < LIMITS.lost_after:
+        elif now < heard + LIMITS.lost_after:
             assert link.state is LinkState.STALE
         else:
             assert link.state is LinkState.LOST

@@ -1,0 +1,89 @@
+"""Decisions of the supervisor on their way into a device node, and reports on their way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from chute_msgs.msg import ActionReport, SafetyDecision
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from chute_ros import model
+from chute_ros.nodes import messages, qos
+from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
+
+#: So many decisions are remembered with how far they got, to be reported once more.
+MOST_REPORTS = 50
+
+
+class DecisionCarrier:
+    """Lets decisions through the one gate to carry_out, and reports how far they got."""
+
+    def __init__(
+        self, node: Node, max_decision_age: float, carry_out: Callable[[model.Decision], None]
+    ) -> None:
+        self._node = node
+        self._gate = DecisionGate(node.get_name(), max_decision_age)
+        self._carry_out = carry_out
+        # The age of a decision goes by the wall clock, whatever use_sim_time says.
+        self._wall = Clock(clock_type=ClockType.SYSTEM_TIME)
+        #: The newest report on each of the newest decisions.
+        self._reports: dict[tuple[int, int], ActionReport] = {}
+        self._verdicts: dict[Verdict, int] = dict.fromkeys(Verdict, 0)
+        self._publisher = node.create_publisher(ActionReport, "safety/action", qos.DECISION)
+
+    def begin(self) -> None:
+        """Listen to the supervisor from now on."""
+        self._node.create_subscription(
+            SafetyDecision, "safety/decision", self._decision, qos.DECISION
+        )
+
+    def report(self, decision: model.Decision, outcome: model.Outcome, detail: str) -> None:
+        """Tell the supervisor how far a decision got."""
+        message = ActionReport()
+        message.header.stamp = self._wall.now().to_msg()
+        message.epoch, message.id = decision.epoch, decision.id
+        message.action, message.outcome = int(decision.action), int(outcome)
+        message.link, message.detail = self._node.get_name(), detail
+        message.newest_epoch = self._gate.newest_epoch
+        message.newest_id = self._gate.newest_id
+        self._publisher.publish(message)
+        self._reports.pop((message.epoch, message.id), None)
+        self._reports[message.epoch, message.id] = message
+        while len(self._reports) > MOST_REPORTS:
+            del self._reports[next(iter(self._reports))]
+        self._node.get_logger().info(f"{_name(decision)}: {outcome.name}: {detail}")
+
+    def counts(self) -> dict[str, object]:
+        """What came through the gate and what did not, for diagnostics."""
+        counts: dict[str, object] = {
+            f"decisions: {verdict.value}": n for verdict, n in self._verdicts.items()
+        }
+        counts["newest decision"] = f"{self._gate.newest_epoch}.{self._gate.newest_id}"
+        return counts
+
+    def _decision(self, message: SafetyDecision) -> None:
+        decision, log = messages.decision_from(message), self._node.get_logger()
+        sent = messages.seconds(message.header.stamp)
+        age = messages.seconds(self._wall.now().to_msg()) - sent
+        verdict = self._gate.judge(decision, age)
+        self._verdicts[verdict] += 1
+        if verdict is Verdict.ACT:
+            log.warning(f"{_name(decision)} ({decision.rule}): {'; '.join(decision.reasons)}")
+            self._carry_out(decision)
+        elif verdict is Verdict.REPEATED:
+            # The supervisor has not heard our report, perhaps because it was not there yet.
+            report = self._reports.get((decision.epoch, decision.id))
+            if report is not None:
+                self._publisher.publish(report)
+        elif verdict is Verdict.OLDER:
+            self.report(decision, model.Outcome.FAILED, Verdict.OLDER.value)
+        elif verdict is Verdict.TOO_LATE:
+            log.error(
+                f"{_name(decision)} is {age:.3f} s old (limit {self._gate.max_decision_age:g} s): "
+                "not acted on; do the hosts' clocks agree? is this host overloaded?"
+            )
+
+
+def _name(decision: model.Decision) -> str:
+    return f"decision {decision.epoch}.{decision.id} {decision.action.name}"
