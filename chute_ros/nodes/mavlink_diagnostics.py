@@ -9,8 +9,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
 from chute_ros.nodes import diagnostics
-from chute_ros.protocol.liveness import Liveness
 from chute_ros.protocol.mavlink.link import MavlinkLink
+from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,11 @@ class Details:
 def details_of(link: MavlinkLink, now: float) -> Details:
     """In the link's thread: all that the tasks below say."""
 
-    def parachute(
-        tracker_status: model.ParachuteStatus, interval: float, live: Liveness
-    ) -> ParachuteDetails:
+    def parachute(one: ParachuteTracker) -> ParachuteDetails:
+        live = one.liveness
         return ParachuteDetails(
-            tracker_status,
-            interval,
+            one.status(now),
+            one.status_interval,
             live.age(now),
             now - live.since,
             now - live.regained_at,
@@ -54,10 +53,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
         )
 
     return Details(
-        tuple(
-            parachute(one.status(now), one.status_interval, one.liveness)
-            for one in link.parachutes.all()
-        ),
+        tuple(map(parachute, link.parachutes.all())),
         link.vehicle_state(now),
         tuple(link.doubts()),
         link.received_count,

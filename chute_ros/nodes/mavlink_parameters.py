@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import stat
-import time
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from chute_ros.errors import SigningKeyError
 from chute_ros.model import ErrorFlags, TriggerFlags
 from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.protocol.mavlink.commands import CommandLimits
 from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
 from chute_ros.protocol.mavlink.effect import EffectLimits
 from chute_ros.protocol.mavlink.parachute import StatusLimits
-from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier, key_from_text
+from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.transport.address import FORMS
+from chute_ros.transport.signing_key import signing_from_file
 
 PARAMETERS = (
     Parameter(
@@ -140,15 +137,4 @@ def signing_from(values: Mapping[str, Any]) -> tuple[Signer | None, Verifier | N
     name = values["signing_key_file"]
     if not name:
         return None, None
-    path = Path(name)
-    try:
-        text, mode = path.read_bytes(), path.stat().st_mode
-    except OSError as error:
-        raise SigningKeyError(f"parameter signing_key_file: {name}: {error.strerror}") from None
-    if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise SigningKeyError(
-            f"parameter signing_key_file: {name} may be read by others: chmod 600 {name}"
-        )
-    key = key_from_text(text, f"parameter signing_key_file: {name}")
-    clock = SigningClock(time.time() - time.monotonic())
-    return Signer(key, clock, values["signing_link_id"]), Verifier(key, clock)
+    return signing_from_file(name, values["signing_link_id"], "parameter signing_key_file")

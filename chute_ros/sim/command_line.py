@@ -15,6 +15,7 @@ from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
+from chute_ros.transport.signing_key import signing_from_file
 from chute_ros.transport.wire import make_wire
 
 if TYPE_CHECKING:
@@ -45,6 +46,11 @@ def parser(program: str, text: str, connection: str, actions: str) -> argparse.A
         ("delay", "longest delay of a packet, s"),
     ):
         options.add_argument(f"--{name}", type=float, default=0.0, metavar="X", help=text)
+    options.add_argument(
+        "--signing-key-file",
+        metavar="FILE",
+        help="sign with this key (32 bytes or 64 hexadecimal digits), hear only what is signed",
+    )
     options.add_argument("--seed", type=int, default=1, help="of the random faults (default: 1)")
     options.add_argument("--quiet", action="store_true", help="print nothing")
     return options
@@ -101,6 +107,8 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     """Run device on its wires until SIGINT or SIGTERM; ends with 2 on a user's mistake."""
     for _, action in script_of(options.at):
         _check_action(device, action)
+    if options.signing_key_file:
+        device.sign(*signing_from_file(options.signing_key_file, 0, "--signing-key-file"))
     knobs = FaultKnobs(options.loss, options.duplicate, options.corrupt, options.delay)
     connections = options.connection or [options.default_connection]
     wires = [make_wire(parse_address(text)) for text in connections]

@@ -11,6 +11,7 @@ from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, Verifier
 
 Params = tuple[float, float, float, float, float, float, float]
 #: An action of the command line's --at: what follows "=" comes as the argument.
@@ -52,6 +53,7 @@ class MavlinkDevice:
         self._intervals: dict[int, float] = {}
         self._due: dict[int, float] = {}
         self._encoder = FrameEncoder(system_id, component_id)
+        self._verifier: Verifier | None = None
         self._decoders: dict[Hashable, FrameDecoder] = {}
         self._after_acknowledgement: list[Any] = []
         self._output: list[bytes] = []
@@ -61,7 +63,7 @@ class MavlinkDevice:
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         self.now = now
-        decoder = self._decoders.setdefault(stream, FrameDecoder())
+        decoder = self._decoders.setdefault(stream, FrameDecoder(self._verifier))
         frames = decoder.feed_datagram(data, now) if stream is None else decoder.feed(data, now)
         for frame in frames:
             if frame.message.get_type() == "COMMAND_LONG":
@@ -104,6 +106,12 @@ class MavlinkDevice:
     def take_events(self) -> list[str]:
         events, self._events = self._events, []
         return events
+
+    def sign(self, signer: Signer, verifier: Verifier) -> None:
+        """From now on sign what is sent, and hear only what is signed."""
+        self._encoder = FrameEncoder(self.system_id, self.component_id, signer)
+        self._verifier = verifier
+        self._decoders.clear()
 
     # -- for the subclass -----------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from mavlink_bench import Module, Network
 
 from chute_ros.errors import SigningKeyError
 from chute_ros.model import LinkState
-from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.frames import FrameDecoder
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(32)
@@ -24,9 +24,8 @@ class SigningModule(Module):
     def __init__(self, key):
         super().__init__()
         clock = SigningClock(time.time() - time.monotonic())
-        self._encoder = FrameEncoder(1, 161, Signer(key, clock, 3))
-        self.verified = FrameDecoder(Verifier(key, clock))
-        self._decoders[None] = self.verified
+        self.sign(Signer(key, clock, 3), Verifier(key, clock))
+        self.verified = self._decoders[None] = FrameDecoder(self._verifier)
 
 
 @pytest.fixture

@@ -7,11 +7,13 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.transport.signing_key import signing_from_file
 
 PARACHUTE, AUTOPILOT = "sim_mavlink_parachute", "sim_autopilot"
 BOTH = pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
@@ -143,6 +145,31 @@ def test_it_ends_on_a_termination_too(start, await_until):
     assert running.end(signal.SIGTERM) == 0
 
 
+def test_with_a_key_it_signs_what_it_says_and_hears_only_what_is_signed(
+    start, await_until, tmp_path
+):
+    key = tmp_path / "key"
+    key.write_bytes(bytes(range(32)))
+    key.chmod(0o600)
+    sign = ("--signing-key-file", str(key))
+    running = start(PARACHUTE, "--connection", f"udpin:{LOCAL}:0", *sign)
+    await_until(lambda: running.said("is open"), "it is open")
+    signer, verifier = signing_from_file(str(key), 1, "the test")
+    plain, signed = FrameEncoder(255, 190), FrameEncoder(255, 190, signer)
+    ask = dialect.MAVLink_command_long_message(1, 161, 512, 0, 430, 0, 0, 0, 0, 0, 0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.settimeout(20.0)
+        for encoder in (plain, signed):
+            frame = encoder.encode(ask, time.monotonic())
+            station.sendto(frame, (LOCAL, port_in(running.said("is open"))))
+        decoder, heard = FrameDecoder(verifier), []
+        while not {"COMMAND_ACK", "PARACHUTE_STATUS"} <= set(heard):
+            for frame in decoder.feed_datagram(station.recv(300), time.monotonic()):
+                heard.append(frame.message.get_type())
+    assert heard.count("COMMAND_ACK") == 1, "the unsigned command is not answered"
+    assert not decoder.counts, "each frame bore a good signature"
+
+
 def test_a_busy_port_is_told_and_taken_when_it_is_free(start, await_until):
     holder = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     holder.bind((LOCAL, 0))
@@ -220,6 +247,7 @@ def test_help_names_every_action_and_form(simulator, environment):
         (("--loss", "30"), "loss is 30.0: need 0 to 1"),
         (("--system-id", "300"), "id '300': need 1 to 255"),
         (("--system-id", "one"), "id 'one': need 1 to 255"),
+        (("--signing-key-file", "/no/key"), "--signing-key-file: /no/key: No such file"),
         (("--warp", "9"), "unrecognized arguments: --warp 9"),
     ],
 )

@@ -89,6 +89,7 @@ class Goal:
     that there is to see. refresh: asks the device for the status that shows it.
     insist: no refusal but time ends the tries. urgent: does not queue behind another command.
     hinders_release: makes the parachute less ready; gives way to a release.
+    needs_acknowledgement: the effect alone, which may have come by itself, does not count.
     hint: what may be the cause of a refusal, by what the device says of itself; empty: unknown.
     """
 
@@ -100,6 +101,7 @@ class Goal:
     insist: bool = False
     urgent: bool = False
     hinders_release: bool = False
+    needs_acknowledgement: bool = False
     hint: Callable[[], str] = str
 
 
@@ -188,10 +190,10 @@ class EffectLoop:
         if self.ended:
             return
         shown = self.goal.shown
-        if shown is None:
-            if math.isnan(self._accepted_after):
-                return
-        elif not shown():
+        alone = shown is not None and not self.goal.needs_acknowledgement
+        if not alone and math.isnan(self._accepted_after):
+            return
+        if shown is not None and not shown():
             return
         self._take(Happening.EFFECT_SHOWN)
         seconds = now - self._started
