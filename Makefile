@@ -42,7 +42,7 @@ lock: ## refresh requirements/*.lock
 	@$(UNDERLAY) && exec scripts/lock.sh
 
 clean: ## remove what was built
-	rm -rf build-* install-* log-*
+	rm -rf build-* install-* log-* build install log
 
 distclean: clean ## remove the environments as well
 	rm -rf .venv-*

@@ -52,9 +52,9 @@ PARAMETERS = (
         2**32 - 1,
     ),
     Parameter(
-        "ack_timeout", 0.5, "wait for an acknowledgement before sending again, s", 0.02, 60.0
+        "ack_timeout", 0.2, "wait for an acknowledgement before sending again, s", 0.02, 60.0
     ),
-    Parameter("ack_tries", 3, "how often a command is sent at most", 1, 100),
+    Parameter("ack_tries", 5, "how often a command is sent at most", 1, 100),
     Parameter("in_progress_timeout", 5.0, "wait after an answer IN_PROGRESS, s", 0.1, 600.0),
     Parameter(
         "late_ack_window", 5.0, "how long a late acknowledgement may still come, s", 0.1, 60.0

@@ -46,6 +46,8 @@ class Parameter:
             return "one of " + ", ".join(self.choices)
         if self.minimum is None or self.maximum is None:
             return kind
+        if isinstance(self.default, int):
+            return f"{kind} from {int(self.minimum)} to {int(self.maximum)}"
         return f"{kind} from {self.minimum:g} to {self.maximum:g}"
 
     def descriptor(self) -> ParameterDescriptor:

@@ -62,6 +62,8 @@ class MavlinkDevice:
     # -- as the loop wants it -------------------------------------------------------------------
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+        if math.isnan(self._started_at):
+            self.update(now)
         self.now = now
         decoder = self._decoders.setdefault(stream, FrameDecoder(self._verifier))
         frames = decoder.feed_datagram(data, now) if stream is None else decoder.feed(data, now)

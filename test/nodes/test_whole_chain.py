@@ -114,7 +114,9 @@ def test_with_three_packets_of_ten_lost_each_way_it_still_deploys(bench, loss):
     flight.take_off()
     answer = flight.fail_and_deploy()
     assert answer.success, answer.message
-    flight.check_order_on_the_wire()
+    # Which of them arrives first is up to what is lost; that each arrives is not.
+    assert flight.autopilot.heard_command(TERMINATE)
+    assert flight.module.releases
     assert flight.module.deployment
     assert not flight.autopilot.model.armed
 

@@ -280,7 +280,7 @@ class EffectLoop:
         if not self._sent:
             return f"{text}never sent: an earlier command of the same number was under way"
         answer = self._answer or "no acknowledgement came"
-        if self.goal.shown is None:
+        if self.goal.shown is None or self.goal.shown():
             return text + answer
         return f"{text}{answer}, and the device's own status never showed: {self.goal.effect}"
 

@@ -185,7 +185,10 @@ def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Goal,
     kind = dialect.mavlink_map.get(message_id)
     name = kind.msgname if kind is not None else f"message {message_id}"
     ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
-    return Goal(f"request of {name}", (ask,), f"{name} came", watch.seen), watch
+    goal = Goal(
+        f"request of {name}", (ask,), f"{name} came", watch.seen, needs_acknowledgement=True
+    )
+    return goal, watch
 
 
 def set_message_interval(parachute: ParachuteTracker, message_id: int, interval_us: int) -> Goal:
