@@ -4,19 +4,39 @@ ros2 launch chute_ros vehicle.launch.py namespace:=drone1 connection:=udpin:0.0.
 """
 
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
+
+
+def _nodes(context: LaunchContext) -> list:
+    """Both nodes with one parameter file; a connection that is given overrides the file's."""
+    config = LaunchConfiguration("config").perform(context)
+    namespace = LaunchConfiguration("namespace").perform(context)
+    connection = LaunchConfiguration("connection").perform(context)
+    return [
+        Node(
+            package="chute_ros",
+            executable="mavlink_parachute",
+            namespace=namespace,
+            parameters=[config, *([{"connection": connection}] if connection else [])],
+            output="screen",
+        ),
+        Node(
+            package="chute_ros",
+            executable="safety_supervisor",
+            namespace=namespace,
+            parameters=[config],
+            output="screen",
+        ),
+    ]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Both nodes with one parameter file; connection overrides the file's."""
+    """The arguments, and the nodes that they describe."""
     share = get_package_share_directory("chute_ros")
-    config = LaunchConfiguration("config")
-    namespace = LaunchConfiguration("namespace")
-    connection = {"connection": LaunchConfiguration("connection")}
     return LaunchDescription(
         [
             DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
@@ -27,22 +47,9 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument(
                 "connection",
-                default_value="udppair:127.0.0.1:14541:127.0.0.1:14540",
-                description="where the MAVLink network is (see the parameter's description)",
+                default_value="",
+                description="where the MAVLink network is; empty: as the parameter file says",
             ),
-            Node(
-                package="chute_ros",
-                executable="mavlink_parachute",
-                namespace=namespace,
-                parameters=[config, connection],
-                output="screen",
-            ),
-            Node(
-                package="chute_ros",
-                executable="safety_supervisor",
-                namespace=namespace,
-                parameters=[config],
-                output="screen",
-            ),
+            OpaqueFunction(function=_nodes),
         ]
     )
