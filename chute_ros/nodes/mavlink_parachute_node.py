@@ -25,10 +25,8 @@ from chute_ros.nodes.mavlink_diagnostics import (
     parachute_tasks,
 )
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from, signing_from
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.effect import EffectFinished
-from chute_ros.protocol.mavlink.events import (
+from chute_ros.protocol.effect import EffectFinished
+from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Notice,
     ParachuteChanged,
@@ -37,6 +35,8 @@ from chute_ros.protocol.mavlink.events import (
     Severity,
     VehicleChanged,
 )
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.parachute import component_information
 from chute_ros.transport.address import parse_address

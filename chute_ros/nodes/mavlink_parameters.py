@@ -7,9 +7,9 @@ from typing import Any
 
 from chute_ros.model import ErrorFlags, TriggerFlags
 from chute_ros.nodes.parameters import Parameter, liveness_from
+from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.mavlink.commands import CommandLimits
 from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
-from chute_ros.protocol.mavlink.effect import EffectLimits
 from chute_ros.protocol.mavlink.parachute import StatusLimits
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.transport.address import FORMS

@@ -83,6 +83,11 @@ class CommandFinished:
         """The device accepted the command."""
         return self.result == results.ACCEPTED
 
+    @property
+    def not_now(self) -> bool:
+        """No answer, or one that may be another later: worth another try."""
+        return self.result in (results.TEMPORARILY_REJECTED, results.NO_ACKNOWLEDGEMENT)
+
     def text(self) -> str:
         """What came of it, in words."""
         if self.superseded:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import TriggerFlags
+from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.protocol.mavlink.commands import CommandLimits
-from chute_ros.protocol.mavlink.effect import EffectLimits
 from chute_ros.protocol.mavlink.parachute import StatusLimits
 
 

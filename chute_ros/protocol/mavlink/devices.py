@@ -9,11 +9,7 @@ import math
 from typing import Any
 
 from chute_ros.model import LinkState, VehicleState
-from chute_ros.protocol.liveness import LinkChange
-from chute_ros.protocol.mavlink.autopilot import AutopilotTracker, is_autopilot
-from chute_ros.protocol.mavlink.config import MavlinkConfig
-from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.events import (
+from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Event,
     Notice,
@@ -21,6 +17,10 @@ from chute_ros.protocol.mavlink.events import (
     Severity,
     VehicleChanged,
 )
+from chute_ros.protocol.liveness import LinkChange
+from chute_ros.protocol.mavlink.autopilot import AutopilotTracker, is_autopilot
+from chute_ros.protocol.mavlink.config import MavlinkConfig
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 from chute_ros.protocol.mavlink.roster import DeviceT, Roster
 

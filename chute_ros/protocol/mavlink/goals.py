@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.model import LinkState, TriggerFlags, flag_names
+from chute_ros.protocol.effect import Goal
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Command
 from chute_ros.protocol.mavlink.config import KillMethod
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.effect import Goal
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+
+MavlinkGoal = Goal[Command]
 
 #: param2 of MAV_CMD_COMPONENT_ARM_DISARM that makes the autopilot disarm in flight.
 FORCE_DISARM = 21196.0
@@ -40,7 +42,7 @@ def command(device: ParachuteTracker | AutopilotTracker, number: int, *params: f
 
 def set_triggers(
     parachute: ParachuteTracker, arm: TriggerFlags, select: TriggerFlags, now: float
-) -> Goal:
+) -> MavlinkGoal:
     """Arm the selected trigger sources that are set in arm, disarm the other selected ones."""
 
     def shown() -> bool:
@@ -62,7 +64,7 @@ def set_triggers(
     )
 
 
-def release(parachute: ParachuteTracker, force: bool, now: float) -> Goal:
+def release(parachute: ParachuteTracker, force: bool, now: float) -> MavlinkGoal:
     """Release the parachute; with force its flight-controller trigger is armed on the way.
 
     A status from before the order is believed only while device and status stream are alive: what
@@ -110,7 +112,7 @@ ACTION_NAMES: dict[int, str] = {
 }
 
 
-def parachute_action(parachute: ParachuteTracker, action: int) -> Goal:
+def parachute_action(parachute: ParachuteTracker, action: int) -> MavlinkGoal:
     """MAV_CMD_DO_PARACHUTE disable or enable; the status has no field that shows it."""
     return Goal(
         f"MAV_CMD_DO_PARACHUTE {ACTION_NAMES[action]}",
@@ -120,7 +122,7 @@ def parachute_action(parachute: ParachuteTracker, action: int) -> Goal:
     )
 
 
-def kill(autopilot: AutopilotTracker, method: KillMethod, now: float) -> Goal:
+def kill(autopilot: AutopilotTracker, method: KillMethod, now: float) -> MavlinkGoal:
     """Stop the motors. Always sent: a heartbeat from before the order proves nothing."""
     if method is KillMethod.FLIGHT_TERMINATION:
         order = command(autopilot, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)
@@ -137,7 +139,7 @@ def kill(autopilot: AutopilotTracker, method: KillMethod, now: float) -> Goal:
     )
 
 
-def disarm_on_ground(autopilot: AutopilotTracker, now: float) -> Goal:
+def disarm_on_ground(autopilot: AutopilotTracker, now: float) -> MavlinkGoal:
     """A plain disarm, which an autopilot refuses in flight."""
     return Goal(
         "disarm on the ground",
@@ -165,8 +167,9 @@ class Watch:
     value: int = 0
     message: Any = None
 
-    def offer(self, system_id: int, component_id: int, message: Any) -> None:
-        """A message came: keep it if it is the one."""
+    def offer(self, *said: Any) -> None:
+        """A message came (system id, component id, message): keep it if it is the one."""
+        system_id, component_id, message = said
         if (system_id, component_id) != (self.system_id, self.component_id):
             return
         if message.get_msgId() != self.message_id:
@@ -179,7 +182,7 @@ class Watch:
         return self.message is not None
 
 
-def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Goal, Watch]:
+def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[MavlinkGoal, Watch]:
     """Ask for one message (MAV_CMD_REQUEST_MESSAGE)."""
     watch = Watch(parachute.system_id, parachute.component_id, message_id)
     kind = dialect.mavlink_map.get(message_id)
@@ -191,7 +194,9 @@ def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Goal,
     return goal, watch
 
 
-def set_message_interval(parachute: ParachuteTracker, message_id: int, interval_us: int) -> Goal:
+def set_message_interval(
+    parachute: ParachuteTracker, message_id: int, interval_us: int
+) -> MavlinkGoal:
     """Set the interval of a message (MAV_CMD_SET_MESSAGE_INTERVAL), microseconds."""
     order = command(
         parachute,
@@ -202,7 +207,9 @@ def set_message_interval(parachute: ParachuteTracker, message_id: int, interval_
     return Goal(f"interval of message {message_id}", (order,), "acknowledged")
 
 
-def read_message_interval(parachute: ParachuteTracker, message_id: int) -> tuple[Goal, Watch]:
+def read_message_interval(
+    parachute: ParachuteTracker, message_id: int
+) -> tuple[MavlinkGoal, Watch]:
     """Ask how often a message is sent: a MAV_CMD_REQUEST_MESSAGE of MESSAGE_INTERVAL."""
     watch = Watch(
         parachute.system_id,

@@ -12,20 +12,19 @@ from collections.abc import Hashable
 from dataclasses import replace
 
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
+from chute_ros.protocol.events import Event, Severity
 from chute_ros.protocol.mavlink import goals
 from chute_ros.protocol.mavlink.autopilot import STREAMED_MESSAGES, AutopilotTracker
-from chute_ros.protocol.mavlink.commands import Acknowledgement, Command
+from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.devices import Devices
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.effect import Goal
-from chute_ros.protocol.mavlink.events import Event, Severity
 from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
-from chute_ros.protocol.mavlink.requests import Requests
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
+from chute_ros.protocol.requests import Requests
 
 
 class MavlinkLink:
@@ -41,7 +40,7 @@ class MavlinkLink:
         self._devices = Devices(config)
         self.parachutes = self._devices.parachutes
         self.autopilots = self._devices.autopilots
-        self.requests = Requests(config)
+        self.requests = Requests(CommandTransactions(config.commands), config.effect)
         self._inbox = Inbox(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
@@ -210,7 +209,7 @@ class MavlinkLink:
     def _frame(self, frame: Frame, now: float) -> None:
         message, ids = frame.message, (frame.system_id, frame.component_id)
         self._acknowledgements.heard(frame)
-        self.requests.message(*ids, message)
+        self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
         else:
@@ -247,7 +246,7 @@ class MavlinkLink:
             self.requests.refuse(token, f"{what} was heard on this link (heard: {known})")
         return target
 
-    def _begin(self, token: int, goal: Goal, now: float) -> None:
+    def _begin(self, token: int, goal: goals.MavlinkGoal, now: float) -> None:
         self.requests.begin(token, goal, now)
         self._drive(now)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from chute_ros.protocol.effect import NO_ANSWER
 from chute_ros.protocol.mavlink.dialect import dialect
 
 ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
@@ -11,8 +12,7 @@ UNSUPPORTED: int = dialect.MAV_RESULT_UNSUPPORTED
 FAILED: int = dialect.MAV_RESULT_FAILED
 IN_PROGRESS: int = dialect.MAV_RESULT_IN_PROGRESS
 CANCELLED: int = dialect.MAV_RESULT_CANCELLED
-#: Our own number for "no acknowledgement came", beside the eight bits of MAV_RESULT.
-NO_ACKNOWLEDGEMENT = 255
+NO_ACKNOWLEDGEMENT = NO_ANSWER
 
 _WORDS: dict[int, str] = {
     ACCEPTED: "accepted",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.events import Notice, ParachuteChanged, RequestFinished
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.signing import Signer, Verifier

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import Outcome
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.commands import Command, CommandFinished
-from chute_ros.protocol.mavlink.effect import (
+from chute_ros.protocol.effect import (
     TRANSITIONS,
     EffectLimits,
     EffectLoop,
@@ -20,6 +18,8 @@ from chute_ros.protocol.mavlink.effect import (
     Phase,
     next_phase,
 )
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.commands import Command, CommandFinished
 
 ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
 ASK = Command(1, 161, 512, (430.0, *[0.0] * 6))

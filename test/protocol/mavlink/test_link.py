@@ -6,8 +6,8 @@ import pytest
 from link_bench import START, Bench, ack, copter, heartbeat, landed, status
 
 from chute_ros.model import Armed, LinkState, ParachuteState
+from chute_ros.protocol.events import DeviceLinkChanged, ParachuteChanged
 from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.events import DeviceLinkChanged, ParachuteChanged
 from chute_ros.protocol.mavlink.flight_block import DISARM_INTERVAL
 from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.protocol.mavlink.signing import (

@@ -9,18 +9,23 @@ from link_bench import Bench, heartbeat
 from link_bench import ack as ack_message
 
 from chute_ros.model import Outcome
+from chute_ros.protocol.effect import Goal
+from chute_ros.protocol.events import RequestFinished, RequestReport
 from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.commands import Acknowledgement, Command
+from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.effect import Goal
-from chute_ros.protocol.mavlink.events import RequestFinished, RequestReport
 from chute_ros.protocol.mavlink.goals import Watch
-from chute_ros.protocol.mavlink.requests import Requests
+from chute_ros.protocol.requests import Requests
 
 ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
 SET = Command(1, 161, 511, (430.0, 500000.0, *[0.0] * 5))
 ASK = Command(1, 161, 512, (244.0, 430.0, *[0.0] * 5))
+
+
+def fresh():
+    config = MavlinkConfig()
+    return Requests(CommandTransactions(config.commands), config.effect)
 
 
 def goal(name="release", command=ORDER, **options):
@@ -37,7 +42,7 @@ def ends(requests):
 
 
 def test_a_request_is_sent_acknowledged_and_ends_once():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     requests.begin(5, goal(), 0.0)
     assert [send.command for send in requests.drive(0.0)] == [ORDER]
     assert 5 in requests
@@ -50,7 +55,7 @@ def test_a_request_is_sent_acknowledged_and_ends_once():
 
 
 def test_a_refused_request_reports_and_ends_without_anything_sent():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     requests.refuse(5, "no parachute")
     report, end = requests.take_events()
     assert isinstance(report, RequestReport)
@@ -69,12 +74,12 @@ def interval(requests):
 
 
 def test_a_follow_up_is_asked_after_success_and_its_message_handed_over():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     interval(requests)
     assert ends(requests) == []
-    requests.message(1, 161, d.MAVLink_message_interval_message(33, 1))
-    requests.message(1, 162, d.MAVLink_message_interval_message(430, 2))
-    requests.message(1, 161, d.MAVLink_message_interval_message(430, 500000))
+    requests.heard(1, 161, d.MAVLink_message_interval_message(33, 1))
+    requests.heard(1, 162, d.MAVLink_message_interval_message(430, 2))
+    requests.heard(1, 161, d.MAVLink_message_interval_message(430, 500000))
     requests.effects_may_show(0.2)
     requests.drive(0.2)
     (end,) = ends(requests)
@@ -83,7 +88,7 @@ def test_a_follow_up_is_asked_after_success_and_its_message_handed_over():
 
 
 def test_a_follow_up_that_fails_cannot_turn_success_into_failure():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     interval(requests)
     ack(requests, ASK, 0.2, results.DENIED)
     (end,) = ends(requests)
@@ -94,7 +99,7 @@ def test_a_follow_up_that_fails_cannot_turn_success_into_failure():
 
 
 def test_a_release_makes_way_for_itself():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     requests.begin(5, goal("disable", hinders_release=True), 0.0)
     requests.drive(0.0)
     requests.make_way_for_release(0.1)
@@ -106,7 +111,7 @@ def test_a_release_makes_way_for_itself():
 
 
 def test_two_callers_of_the_same_urgent_goal_are_both_answered():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     requests.begin(5, goal(urgent=True), 0.0)
     requests.drive(0.0)
     requests.begin(6, goal(urgent=True), 0.1)
@@ -135,7 +140,7 @@ STEPS = st.one_of(
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([0.0, 0.01, 0.3, 1.0, 7.0]), STEPS), max_size=30))
 def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_past(steps):
-    requests, now, begun, ended = Requests(MavlinkConfig()), 1000.0, [], []
+    requests, now, begun, ended = fresh(), 1000.0, [], []
     for wait, step in steps:
         now += wait
         requests.update(now)
@@ -161,7 +166,7 @@ def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_pa
 
 
 def test_what_prepared_a_goal_is_not_sent_again_once_it_is_reached():
-    requests, prepare = Requests(MavlinkConfig()), Command(1, 161, 225)
+    requests, prepare = fresh(), Command(1, 161, 225)
     requests.begin(5, Goal("release", (prepare, ORDER), "shown"), 0.0)
     assert [send.command for send in requests.drive(0.0)] == [prepare, ORDER]
     ack(requests, ORDER, 0.1)
@@ -170,7 +175,7 @@ def test_what_prepared_a_goal_is_not_sent_again_once_it_is_reached():
 
 
 def test_a_request_that_is_abandoned_while_it_waits_for_its_turn_is_never_sent():
-    requests = Requests(MavlinkConfig())
+    requests = fresh()
     requests.begin(5, goal("first", ORDER), 0.0)
     requests.drive(0.0)
     requests.begin(6, goal("second", Command(1, 161, 208)), 0.1)

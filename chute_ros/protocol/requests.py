@@ -3,34 +3,104 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Outcome
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.commands import CommandTransactions, SendCommand
-from chute_ros.protocol.mavlink.config import MavlinkConfig
-from chute_ros.protocol.mavlink.effect import EffectFinished, EffectLoop, Goal, Report
-from chute_ros.protocol.mavlink.events import Event, RequestFinished, RequestReport
-from chute_ros.protocol.mavlink.goals import Watch
+from chute_ros.protocol.effect import (
+    NO_ANSWER,
+    Answer,
+    EffectFinished,
+    EffectLimits,
+    EffectLoop,
+    Goal,
+    Report,
+)
+from chute_ros.protocol.events import Event, RequestFinished, RequestReport
+
+
+class Watch(Protocol):
+    """Waits for one message of one device."""
+
+    @property
+    def message(self) -> Any:
+        """It; None: it has not come."""
+
+    def offer(self, *said: Any) -> None:
+        """A device said something, in the link's own terms: keep it if it is the one."""
+
+
+class Finished(Answer, Protocol):
+    """The end of a transaction, with what it belongs to."""
+
+    @property
+    def token(self) -> int:
+        """Number of the transaction."""
+
+    @property
+    def command(self) -> Any:
+        """What was sent."""
+
+
+class Send(Protocol):
+    """Put this on the wire."""
+
+    @property
+    def token(self) -> int | None:
+        """Number of the transaction; None: of none."""
+
+    @property
+    def command(self) -> Any:
+        """What is to be sent."""
+
+
+SendT = TypeVar("SendT", bound=Send)
+
+
+class Transactions(Protocol[SendT]):
+    """Commands of one protocol: sent, resent, answered or given up."""
+
+    def start(self, token: int, command: Any, now: float, urgent: bool, family: int) -> None:
+        """Begin one, at the latest when those before it to the same device have ended."""
+
+    def send_once(self, command: Any, now: float) -> None:
+        """Send one whose answer does not matter."""
+
+    def cancel(self, token: int, now: float) -> None:
+        """It is not needed any more."""
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+
+    def take_finished(self) -> list[Any]:
+        """The ended ones (Finished); each is handed out once."""
+
+    def take_output(self) -> list[SendT]:
+        """What is to be sent; each is handed out once."""
+
+
+TransactionsT = TypeVar("TransactionsT", bound=Transactions[Any])
 
 
 @dataclass(frozen=True)
 class _Running:
-    loop: EffectLoop
+    loop: EffectLoop[Any]
     #: Marks the tries of this goal among the commands.
     family: int
     watch: Watch | None
-    follow_up: tuple[Goal, Watch] | None
+    follow_up: tuple[Goal[Any], Watch] | None
     #: How the goal before this follow-up ended.
     first_end: EffectFinished | None = None
 
 
-class Requests:
+class Requests(Generic[TransactionsT]):
     """Each request has a token of its owner's and ends in exactly one RequestFinished."""
 
-    def __init__(self, config: MavlinkConfig) -> None:
-        self.commands = CommandTransactions(config.commands)
-        self._limits = config.effect
+    def __init__(self, commands: TransactionsT, limits: EffectLimits) -> None:
+        self.commands = commands
+        self._limits = limits
         self._running: dict[int, _Running] = {}
         #: Number of each command under way -> token of its request.
         self._owners: dict[int, int] = {}
@@ -47,10 +117,10 @@ class Requests:
     def begin(
         self,
         token: int,
-        goal: Goal,
+        goal: Goal[Any],
         now: float,
         watch: Watch | None = None,
-        follow_up: tuple[Goal, Watch] | None = None,
+        follow_up: tuple[Goal[Any], Watch] | None = None,
     ) -> None:
         """Go for goal. watch: the message to hand over at the end. follow_up: what to ask after
         success; it adds its message to the answer, but cannot turn success into failure."""
@@ -72,14 +142,14 @@ class Requests:
     def refuse(self, token: int, why: str) -> None:
         """End a request before anything was sent."""
         self._events.append(RequestReport(Report(token, Outcome.FAILED, why)))
-        finished = EffectFinished(token, False, False, results.NO_ACKNOWLEDGEMENT, why)
+        finished = EffectFinished(token, False, False, NO_ANSWER, why)
         self._events.append(RequestFinished(finished))
 
-    def message(self, system_id: int, component_id: int, message: Any) -> None:
-        """A message came: the one that a request waits for?"""
+    def heard(self, *said: Any) -> None:
+        """A device said something: is it what a request waits for?"""
         for running in self._running.values():
             if running.watch is not None:
-                running.watch.offer(system_id, component_id, message)
+                running.watch.offer(*said)
 
     def effects_may_show(self, now: float) -> None:
         """A device said something: look whether it shows an effect."""
@@ -97,9 +167,9 @@ class Requests:
         loops = (running.loop.next_deadline() for running in self._running.values())
         return min((self.commands.next_deadline(), *loops))
 
-    def drive(self, now: float) -> list[SendCommand]:
+    def drive(self, now: float) -> list[Any]:
         """Move what is ready between loops and transactions; returns what is to be sent."""
-        send: list[SendCommand] = []
+        send: list[Any] = []
         moved = True
         while moved:
             moved = False
@@ -138,7 +208,7 @@ class Requests:
         self._last_number += 1
         return self._last_number
 
-    def _loop_of(self, token: int | None) -> EffectLoop | None:
+    def _loop_of(self, token: int | None) -> EffectLoop[Any] | None:
         running = None if token is None else self._running.get(token)
         return None if running is None else running.loop
 

@@ -1,4 +1,4 @@
-"""What a MavlinkLink tells its owner. Times are monotonic seconds."""
+"""What the protocol of a link tells its owner. Times are monotonic seconds."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.model import ParachuteStatus, VehicleState
+from chute_ros.protocol.effect import EffectFinished, Report
 from chute_ros.protocol.liveness import LinkChange
-from chute_ros.protocol.mavlink.effect import EffectFinished, Report
 
 
 class Severity(enum.IntEnum):
@@ -28,7 +28,7 @@ class ParachuteChanged:
 
 @dataclass(frozen=True)
 class VehicleChanged:
-    """The autopilot said something, or its silence grew too long."""
+    """Whoever knows the vehicle said something, or its silence grew too long."""
 
     state: VehicleState
 
@@ -50,7 +50,7 @@ class RequestReport:
 
 @dataclass(frozen=True)
 class RequestFinished:
-    """A request ended. data: what was asked for (a message of the dialect, a number), or None."""
+    """A request ended. data: what was asked for (a message, values), or None."""
 
     finished: EffectFinished
     data: Any = None

@@ -11,11 +11,13 @@ import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import Outcome
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.commands import Command, CommandFinished
+
+#: Result of a command that nobody answered: beside the eight bits of any protocol's results.
+NO_ANSWER = 255
 
 
 class Phase(enum.Enum):
@@ -80,8 +82,35 @@ class EffectLimits:
                 raise ParameterError(f"{name} is {value}: need a time above 0 s")
 
 
+#: A command of the link's protocol; the loop only compares them.
+CommandT = TypeVar("CommandT")
+
+
+class Answer(Protocol):
+    """How the transaction of one command ended, whatever the protocol."""
+
+    @property
+    def accepted(self) -> bool:
+        """The device accepted the command."""
+
+    @property
+    def not_now(self) -> bool:
+        """No answer, or one that may be another later: worth another try."""
+
+    @property
+    def superseded(self) -> bool:
+        """Given up for a newer command."""
+
+    @property
+    def result(self) -> int:
+        """The protocol's result, or NO_ANSWER."""
+
+    def text(self) -> str:
+        """What came of it, in words."""
+
+
 @dataclass(frozen=True)
-class Goal:
+class Goal(Generic[CommandT]):
     """What to send and how to see that it worked.
 
     commands: sent in this order; the last one's acknowledgement counts, those before prepare it.
@@ -94,10 +123,10 @@ class Goal:
     """
 
     name: str
-    commands: tuple[Command, ...]
+    commands: tuple[CommandT, ...]
     effect: str
     shown: Callable[[], bool] | None = None
-    refresh: Command | None = None
+    refresh: CommandT | None = None
     insist: bool = False
     urgent: bool = False
     hinders_release: bool = False
@@ -116,7 +145,7 @@ class Report:
 
 @dataclass(frozen=True)
 class EffectFinished:
-    """The end of a loop. result: MAV_RESULT of the newest answer, or NO_ACKNOWLEDGEMENT."""
+    """The end of a loop. result: the protocol's result of the newest answer, or NO_ANSWER."""
 
     token: int
     success: bool
@@ -125,10 +154,10 @@ class EffectFinished:
     message: str
 
 
-class EffectLoop:
+class EffectLoop(Generic[CommandT]):
     """One goal on its way. The owner sends what take_commands gives and feeds back what comes."""
 
-    def __init__(self, token: int, goal: Goal, limits: EffectLimits, now: float) -> None:
+    def __init__(self, token: int, goal: Goal[CommandT], limits: EffectLimits, now: float) -> None:
         self.token = token
         self.goal = goal
         self.phase = Phase.WAIT_ACKNOWLEDGEMENT
@@ -139,10 +168,11 @@ class EffectLoop:
         self._refresh_at = math.inf
         self._accepted_after = math.nan
         self._sent = False
-        self._result = results.NO_ACKNOWLEDGEMENT
+        self._result = NO_ANSWER
         self._answer = ""
-        self._commands: list[Command] = []
-        self._refreshes: list[Command] = []
+        self._newest_accepted = False
+        self._commands: list[CommandT] = []
+        self._refreshes: list[CommandT] = []
         self._reports: list[Report] = []
         if goal.shown is not None and goal.shown():
             self.phase = Phase.CONFIRMED
@@ -155,20 +185,20 @@ class EffectLoop:
         """Nothing more will come of it."""
         return self.phase in _ENDED
 
-    def command_sent(self, command: Command) -> None:
+    def command_sent(self, command: CommandT) -> None:
         """One of the goal's commands went out (it may have waited for its turn)."""
         if command == self.goal.commands[-1] and not self._sent:
             self._sent = True
             self._reports.append(Report(self.token, Outcome.SENT, f"{self.goal.name} sent"))
 
-    def command_finished(self, finished: CommandFinished, now: float) -> None:
+    def command_finished(self, answer: Answer, now: float) -> None:
         """The transaction of the goal's last command ended."""
         if self.phase is not Phase.WAIT_ACKNOWLEDGEMENT:
             return
-        self._answer = finished.text()
-        if finished.result != results.NO_ACKNOWLEDGEMENT:
-            self._result = finished.result
-        if finished.accepted:
+        self._answer = answer.text()
+        if answer.result != NO_ANSWER:
+            self._result, self._newest_accepted = answer.result, answer.accepted
+        if answer.accepted:
             self._take(Happening.ACCEPTED)
             waited = now - self._started
             if math.isnan(self._accepted_after):
@@ -178,7 +208,7 @@ class EffectLoop:
             self._deadline = now + self._limits.effect_timeout
             self._refresh(now)
             self.effect_may_show(now)
-        elif not self._worth_another_try(finished):
+        elif not self._worth_another_try(answer):
             self._take(Happening.REFUSED)
             self._end(False, f"{self.goal.name} {self._answer}")
         else:
@@ -238,12 +268,12 @@ class EffectLoop:
             return math.inf
         return min(self._started + self._limits.give_up_after, self._deadline, self._refresh_at)
 
-    def take_commands(self) -> list[Command]:
+    def take_commands(self) -> list[CommandT]:
         """Commands to start now, each as a transaction of its own; each is handed out once."""
         commands, self._commands = self._commands, []
         return commands
 
-    def take_refreshes(self) -> list[Command]:
+    def take_refreshes(self) -> list[CommandT]:
         """Commands to send once now, whose acknowledgement does not matter."""
         refreshes, self._refreshes = self._refreshes, []
         return refreshes
@@ -263,16 +293,15 @@ class EffectLoop:
             self._refreshes.append(self.goal.refresh)
             self._refresh_at = now + self._limits.retry_interval
 
-    def _worth_another_try(self, finished: CommandFinished) -> bool:
-        if finished.superseded:
+    def _worth_another_try(self, answer: Answer) -> bool:
+        if answer.superseded:
             return self.goal.urgent
-        not_now = (results.TEMPORARILY_REJECTED, results.NO_ACKNOWLEDGEMENT)
-        return self.goal.insist or finished.result in not_now
+        return self.goal.insist or answer.not_now
 
     def _what_did_not_come(self, now: float) -> str:
         text = f"{self.goal.name} given up after {now - self._started:.1f} s: "
         if not math.isnan(self._accepted_after):
-            newest = "" if self._result == results.ACCEPTED else f"; newest answer: {self._answer}"
+            newest = "" if self._newest_accepted else f"; newest answer: {self._answer}"
             return text + (
                 f"acknowledged after {self._accepted_after:.2f} s, "
                 f"but the device's own status never showed: {self.goal.effect}{newest}"

@@ -1,0 +1,215 @@
+"""DroneCAN transfers: one message, request or response, in one frame or several.
+
+Source: DroneCAN specification, "CAN bus transport layer". What is wrong with a frame never raises:
+it is counted under its reason, and dropped with the transfer that it belongs to.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections import Counter
+from dataclasses import dataclass
+
+from dronecan.dsdl import common
+
+from chute_ros.errors import MessageError
+from chute_ros.protocol.dronecan.can_frame import CanFrame, unpack
+from chute_ros.protocol.dronecan.data_types import DataTypes
+
+_START, _END, _TOGGLE = 0x80, 0x40, 0x20
+TRANSFER_IDS = 32
+_FRAME_PAYLOAD = 7
+#: A transfer whose next frame does not come within this time (s) is given up; after it, the same
+#: transfer id is a new transfer (specification: 2 s).
+TRANSFER_TIMEOUT = 2.0
+#: Most senders and types that are followed at once, so that made-up ids cannot grow us.
+MOST_SESSIONS = 1024
+#: Longest payload that is put together, bytes: more than any standard type has.
+MOST_PAYLOAD = 512
+HIGHEST_NODE_ID = 127
+
+
+class Kind(enum.Enum):
+    """What a transfer is; the value is how data types name its direction."""
+
+    MESSAGE = None
+    REQUEST = "request"
+    RESPONSE = "response"
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """A complete transfer. source 0: anonymous. destination 0: everybody (messages)."""
+
+    kind: Kind
+    type_id: int
+    source: int
+    destination: int
+    transfer_id: int
+    payload: bytes
+    priority: int = 16
+
+
+def frames_of(transfer: Transfer, base_crc: int, discriminator: int = 0) -> list[CanFrame]:
+    """The frames of a transfer, in order. discriminator: 14 bits for an anonymous message."""
+    payload = transfer.payload
+    if len(payload) > _FRAME_PAYLOAD:
+        if transfer.source == 0:
+            raise MessageError(f"{len(payload)} bytes: an anonymous transfer has one frame")
+        crc = common.crc16_from_bytes(payload, initial=base_crc)
+        payload = bytes((crc & 0xFF, crc >> 8)) + payload
+    identifier = _identifier(transfer, discriminator)
+    frames, toggle = [], 0
+    for start in range(0, max(len(payload), 1), _FRAME_PAYLOAD):
+        chunk = payload[start : start + _FRAME_PAYLOAD]
+        tail = transfer.transfer_id % TRANSFER_IDS | toggle
+        tail |= _START if start == 0 else 0
+        tail |= _END if start + _FRAME_PAYLOAD >= len(payload) else 0
+        frames.append(CanFrame(identifier, chunk + bytes((tail,))))
+        toggle ^= _TOGGLE
+    return frames
+
+
+def _identifier(transfer: Transfer, discriminator: int) -> int:
+    common_part = transfer.priority << 24 | transfer.source
+    if transfer.kind is not Kind.MESSAGE:
+        request = transfer.kind is Kind.REQUEST
+        service = transfer.type_id << 16 | request << 15 | transfer.destination << 8 | 0x80
+        return common_part | service
+    if transfer.source == 0:
+        return common_part | (discriminator & 0x3FFF) << 10 | (transfer.type_id & 0x3) << 8
+    return common_part | transfer.type_id << 8
+
+
+@dataclass
+class _Session:
+    """One sender's transfers of one type to one destination."""
+
+    transfer_id: int = -1
+    heard: float = 0.0
+    toggle: int = 0
+    crc: int = 0
+    payload: bytearray | None = None
+    finished: bool = True
+
+
+_SessionKey = tuple[Kind, int, int, int]
+
+
+class Assembler:
+    """Puts frames together again. counts: why something was dropped."""
+
+    def __init__(self, types: DataTypes, counts: Counter[str]) -> None:
+        self._types = types
+        self._counts = counts
+        self._sessions: dict[_SessionKey, _Session] = {}
+
+    def feed(self, data: bytes, node_id: int, now: float) -> Transfer | CanFrame | None:
+        """The transfer that this frame (sixteen bytes, see can_frame) completes; the frame itself
+        if it reports an error of the bus; None: nothing yet. node_id: ours."""
+        frame = unpack(data)
+        if frame is None:
+            return self._drop("no CAN frame")
+        if frame.error:
+            return frame
+        if frame.remote or not frame.extended:
+            return self._drop("frames that are not of DroneCAN")
+        if not frame.data:
+            return self._drop("frames without a tail byte")
+        head = self._head(frame)
+        if head.destination not in (0, node_id):
+            return None
+        if head.kind is not Kind.MESSAGE and 0 in (head.source, head.destination):
+            return self._drop("services from or to nobody")
+        if self._types.by_id(head.type_id, head.kind.value) is None:
+            return self._drop("transfers of types that are not known")
+        if head.source == 0:
+            return self._anonymous(head, frame)
+        return self._next(head, frame, now)
+
+    def _head(self, frame: CanFrame) -> Transfer:
+        """All of a transfer that its identifier says, with an empty payload."""
+        identifier = frame.identifier
+        priority, source = identifier >> 24 & 0x1F, identifier & 0x7F
+        transfer_id = frame.data[-1] % TRANSFER_IDS
+        if identifier & 0x80:
+            kind = Kind.REQUEST if identifier & 0x8000 else Kind.RESPONSE
+            type_id, destination = identifier >> 16 & 0xFF, identifier >> 8 & 0x7F
+            return Transfer(kind, type_id, source, destination, transfer_id, b"", priority)
+        type_id = identifier >> 8 & (0x3 if source == 0 else 0xFFFF)
+        return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, b"", priority)
+
+    def _anonymous(self, head: Transfer, frame: CanFrame) -> Transfer | None:
+        if frame.data[-1] & (_START | _END | _TOGGLE) != _START | _END:
+            return self._drop("anonymous transfers of more than one frame")
+        return self._done(head, frame.data[:-1])
+
+    def _next(self, head: Transfer, frame: CanFrame, now: float) -> Transfer | None:
+        key = (head.kind, head.type_id, head.source, head.destination)
+        session = self._sessions.get(key)
+        if session is None:
+            self._make_room(now)
+            session = self._sessions[key] = _Session()
+        tail, chunk = frame.data[-1], frame.data[:-1]
+        same = session.transfer_id == head.transfer_id and now - session.heard < TRANSFER_TIMEOUT
+        if tail & _START:
+            if same and session.finished:
+                return self._drop("transfers that came twice")
+            if tail & _TOGGLE:
+                return self._drop("toggle bit wrong")
+            if session.payload is not None and not same:
+                self._drop("transfers cut short")
+            if not tail & _END and len(chunk) < _FRAME_PAYLOAD:
+                return self._drop("first frame too short")
+            session.transfer_id, session.heard = head.transfer_id, now
+            session.toggle, session.finished = _TOGGLE, bool(tail & _END)
+            if tail & _END:
+                session.payload = None
+                return self._done(head, chunk)
+            session.crc = chunk[0] | chunk[1] << 8
+            session.payload = bytearray(chunk[2:])
+            return None
+        if session.payload is None or not same:
+            return self._drop("frames without their beginning")
+        if tail & _TOGGLE != session.toggle:
+            # A frame that came twice, or one was lost: the CRC decides in the end.
+            return self._drop("toggle bit wrong")
+        session.toggle ^= _TOGGLE
+        session.heard = now
+        session.payload += chunk
+        if len(session.payload) > MOST_PAYLOAD:
+            session.payload = None
+            return self._drop("transfers that are too long")
+        if not tail & _END:
+            return None
+        payload, session.payload, session.finished = bytes(session.payload), None, True
+        data_type = self._types.by_id(head.type_id, head.kind.value)
+        assert data_type is not None  # feed has looked
+        if common.crc16_from_bytes(payload, initial=data_type.base_crc) != session.crc:
+            # It may be sent again under the same number.
+            session.finished = False
+            return self._drop("CRC of a transfer wrong (or another definition of its type)")
+        return self._done(head, payload)
+
+    def _done(self, head: Transfer, payload: bytes) -> Transfer:
+        return Transfer(
+            head.kind,
+            head.type_id,
+            head.source,
+            head.destination,
+            head.transfer_id,
+            payload,
+            head.priority,
+        )
+
+    def _make_room(self, now: float) -> None:
+        """Forget the sessions that are long over; if that does not help, the oldest one."""
+        if len(self._sessions) < MOST_SESSIONS:
+            return
+        old = [k for k, s in self._sessions.items() if now - s.heard >= TRANSFER_TIMEOUT]
+        for key in old or [min(self._sessions, key=lambda k: self._sessions[k].heard)]:
+            del self._sessions[key]
+
+    def _drop(self, reason: str) -> Transfer | None:
+        self._counts[reason] += 1
+        return None

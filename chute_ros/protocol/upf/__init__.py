@@ -1,0 +1,1 @@
+"""The Flyfire UPF parachute on DroneCAN, seen from the vehicle."""

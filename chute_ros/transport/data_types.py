@@ -1,0 +1,51 @@
+"""The DSDL files that a bus speaks: the standard ones, and those of the parachute."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+
+from chute_ros.errors import NotBuiltError, ParameterError
+from chute_ros.protocol.dronecan.data_types import DataTypes
+
+_STANDARD = "uavcan."
+
+
+def load_data_types(folder: str, named: str) -> DataTypes:
+    """The standard types, and those in folder (empty: the ones that we ship).
+
+    The folder's name is the namespace of its types: it must be "flyfire". ParameterError, with
+    named for where the folder comes from, if it is not there or cannot be read.
+    """
+    # Here: the library reads all its own definitions when it is imported.
+    import dronecan
+    from dronecan.dsdl import DsdlException, parse_namespaces
+
+    path = Path(folder).expanduser() if folder else _shipped()
+    if not path.is_dir():
+        raise ParameterError(f"{named} is {folder!r}: there is no such folder")
+    if path.resolve().name != "flyfire":
+        if (path / "flyfire").is_dir():
+            path = path / "flyfire"
+        else:
+            raise ParameterError(
+                f"{named} is {folder!r}: the folder's name is the namespace of its types and must "
+                "be flyfire, or it must hold a folder of this name"
+            )
+    standard = [one for name, one in dronecan.TYPENAMES.items() if name.startswith(_STANDARD)]
+    try:
+        own = parse_namespaces([str(path)])
+    except DsdlException as error:
+        raise ParameterError(f"{named} is {folder!r}: {error}") from None
+    return DataTypes([*standard, *own])
+
+
+def _shipped() -> Path:
+    try:
+        share = get_package_share_directory("chute_msgs")
+    except PackageNotFoundError:
+        raise NotBuiltError(
+            "the DroneCAN data types cannot be found: build chute_msgs and source the result"
+        ) from None
+    return Path(share) / "dsdl" / "flyfire"
