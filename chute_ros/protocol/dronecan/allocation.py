@@ -1,0 +1,144 @@
+"""Node ids for nodes that have none: a centralized allocator.
+
+A node asks without a node id, in three parts of its unique id (6 + 6 + 4 bytes); each part is
+echoed, and the last one answered with the node id. The table of unique id to node id must be kept
+before the answer leaves: after a crash between the two the same id could be given to two nodes.
+Source: DroneCAN specification, "Dynamic node ID allocation", centralized allocator;
+uavcan.protocol.dynamic_node_id.Allocation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+MESSAGE = "uavcan.protocol.dynamic_node_id.Allocation"
+UNIQUE_ID_LENGTH = 16
+#: How many bytes each of the three requests carries (specification: at most 6).
+_PARTS = (6, 6, 4)
+#: A request whose next part does not come within this time starts anew (FOLLOWUP_TIMEOUT_MS), s.
+FOLLOWUP_TIMEOUT = 0.5
+#: While another allocator was heard so lately (s), nothing is given out: a bus has only one.
+OTHER_ALLOCATOR_TIMEOUT = 10.0
+#: Node ids that may be given out; 126 and 127 belong to tools (specification).
+LOWEST, HIGHEST = 1, 125
+#: Units that are remembered at most: more than node ids exist cannot be served.
+MOST_ENTRIES = HIGHEST
+
+Table = Mapping[bytes, int]
+
+
+@dataclass(frozen=True)
+class KeepTable:
+    """The table has a new entry: keep it, then say so to Allocator.kept with this number."""
+
+    number: int
+    table: Table
+
+
+class Allocator:
+    """Gives out node ids. never: ids that are not given out, whoever asks for them."""
+
+    def __init__(self, table: Table, never: Collection[int]) -> None:
+        self.table: dict[bytes, int] = dict(table)
+        self.given_count = 0
+        #: Another allocator was heard, as its node id, at this monotonic time (s).
+        self.other = 0
+        self.other_heard = -math.inf
+        #: Why the newest request was not served; empty: it was.
+        self.refusal = ""
+        self._never = frozenset(never)
+        self._query = b""
+        self._query_at = -math.inf
+        self._keeping: dict[int, tuple[bytes, int]] = {}
+        self._last_number = 0
+        self._answers: list[dict[str, Any]] = []
+        self._keep: list[KeepTable] = []
+
+    def heard(
+        self,
+        source: int,
+        values: Mapping[str, Any],
+        in_use: Mapping[int, bytes],
+        all_discovered: bool,
+        now: float,
+    ) -> None:
+        """An Allocation message came. in_use: node id -> unique id (empty: not known)."""
+        if source != 0:
+            self.other, self.other_heard = source, now
+            return
+        if self.another_is_there(now):
+            self.refusal = f"node {self.other} allocates as well"
+            return
+        if now - self._query_at > FOLLOWUP_TIMEOUT:
+            self._query = b""
+        part = bytes(values["unique_id"])
+        if values["first_part_of_unique_id"]:
+            self._query = b""
+        stage = {0: 0, 6: 1, 12: 2}.get(len(self._query))
+        first = bool(values["first_part_of_unique_id"])
+        if stage is None or first != (stage == 0) or len(part) != _PARTS[stage]:
+            return  # a part of somebody else's request, or one that was cut short
+        self._query += part
+        self._query_at = now
+        if len(self._query) < UNIQUE_ID_LENGTH:
+            self._answer(self._query, 0)
+            return
+        unique_id, self._query = self._query, b""
+        if not all_discovered:
+            self.refusal = "not every node has said who it is yet"
+            return
+        self._allocate(unique_id, int(values["node_id"]), in_use)
+
+    def kept(self, number: int) -> None:
+        """The table of this KeepTable is safe: the node may have its id."""
+        if number in self._keeping:
+            self._answer(*self._keeping.pop(number))
+            self.given_count += 1
+
+    def another_is_there(self, now: float) -> bool:
+        """Another allocator was heard of late."""
+        return now - self.other_heard < OTHER_ALLOCATOR_TIMEOUT
+
+    def take_answers(self) -> list[dict[str, Any]]:
+        """Allocation messages to broadcast; each is handed out once."""
+        answers, self._answers = self._answers, []
+        return answers
+
+    def take_keep(self) -> list[KeepTable]:
+        """Tables to keep; each is handed out once."""
+        keep, self._keep = self._keep, []
+        return keep
+
+    def _allocate(self, unique_id: bytes, wanted: int, in_use: Mapping[int, bytes]) -> None:
+        self.refusal = ""
+        known = self.table.get(unique_id)
+        if known is not None and known not in self._never:
+            owner = in_use.get(known, unique_id)
+            if owner in (unique_id, b""):
+                self._answer(unique_id, known)
+                self.given_count += 1
+                return
+            # Somebody else sits there now, with an id that nobody gave it.
+        free = self._free(wanted, in_use)
+        if free is None:
+            self.refusal = "no node id is free"
+            return
+        self.table[unique_id] = free
+        self._last_number += 1
+        self._keeping[self._last_number] = (unique_id, free)
+        self._keep.append(KeepTable(self._last_number, dict(self.table)))
+
+    def _free(self, wanted: int, in_use: Mapping[int, bytes]) -> int | None:
+        """The wanted id or the next free one above it, else the highest free one."""
+        taken = self._never | set(in_use) | set(self.table.values())
+        upwards = range(wanted, HIGHEST + 1) if wanted else range(0)
+        candidates = [*upwards, *range(HIGHEST, LOWEST - 1, -1)]
+        return next((one for one in candidates if one not in taken), None)
+
+    def _answer(self, unique_id: bytes, node_id: int) -> None:
+        self._answers.append(
+            {"unique_id": unique_id, "node_id": node_id, "first_part_of_unique_id": False}
+        )

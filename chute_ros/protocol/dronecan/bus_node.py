@@ -1,0 +1,265 @@
+"""The vehicle's node on a DroneCAN bus: its status, the others, node ids, the time.
+
+What comes for it by the standard types is served here; everything else is handed on. Source:
+DroneCAN specification, "Application level functions"; uavcan.protocol.*.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from chute_ros.protocol.dronecan import allocation, time_sync
+from chute_ros.protocol.dronecan.allocation import Allocator, KeepTable
+from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits
+from chute_ros.protocol.dronecan.data_types import DataTypes
+from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
+from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
+from chute_ros.protocol.dronecan.scripts import Script, Scripts
+from chute_ros.protocol.dronecan.time_sync import TimeMaster
+from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.events import Notice, Severity
+
+NODE_STATUS = "uavcan.protocol.NodeStatus"
+GET_NODE_INFO = "uavcan.protocol.GetNodeInfo"
+NODE_STATUS_INTERVAL = 0.5  # s, at most 1 by MAX_BROADCASTING_PERIOD_MS
+#: No node id is given out before the bus was listened to for this long (s): NodeStatus comes at
+#: least once a second.
+LISTEN_TIME = 1.2
+#: Somebody who sent under our node id so lately (s) is there.
+_OWN_ID_WINDOW = 5.0
+_SOFTWARE_VERSION = (0, 1)
+_REFUSED = ("uavcan.protocol.RestartNode", "uavcan.protocol.param.ExecuteOpcode")
+
+
+@dataclass(frozen=True)
+class BusNodeConfig:
+    """Who we are on the bus, and which of its offices we hold."""
+
+    node_id: int
+    name: str
+    unique_id: bytes
+    calls: CallLimits = field(default=CallLimits())
+    allocator: bool = True
+    table: Mapping[bytes, int] = field(default_factory=dict)
+    #: Node ids that are never given out, besides our own.
+    never: tuple[int, ...] = ()
+    time_master: bool = True
+    utc_offset: float = 0.0
+
+
+class BusNode:
+    """One node; the owner feeds frames in and sends what take_output gives."""
+
+    def __init__(self, types: DataTypes, config: BusNodeConfig) -> None:
+        self.config = config
+        self.endpoint = Endpoint(types, config.node_id)
+        self.nodes = NodeMonitor()
+        self.scripts = Scripts(config.calls)
+        self.allocator = Allocator(config.table, (config.node_id, *config.never))
+        self.time = TimeMaster(config.node_id, config.utc_offset)
+        self._started = math.nan
+        self._status_at = -math.inf
+        self._alive_until = -math.inf
+        self._troubles: dict[str, str] = {}
+        self._ended: list[tuple[object, object]] = []
+        self._events: list[Notice | KeepTable] = []
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Why something was dropped -> how often."""
+        return self.endpoint.counts + self.scripts.calls.counts
+
+    def owner_alive(self, until: float) -> None:
+        """We may seem alive until this time: a hung owner must look dead from outside."""
+        self._alive_until = until
+
+    def receive(self, data: bytes, now: float) -> Heard | None:
+        """Bytes of a frame came; what the owner should know of, or None."""
+        heard = self.endpoint.receive(data, now)
+        if heard is None:
+            return None
+        if heard.kind is Kind.RESPONSE:
+            if heard.name.startswith("uavcan."):
+                self.scripts.calls.response(
+                    heard.source, heard.name, heard.transfer_id, heard.values, now
+                )
+                self._drive(now)
+                return None
+        elif heard.kind is Kind.REQUEST:
+            if heard.name.startswith("uavcan."):
+                self._serve(heard, now)
+                return None
+        elif heard.name == allocation.MESSAGE:
+            self._allocation(heard, now)
+        elif heard.name == time_sync.MESSAGE:
+            self.time.heard(heard.source, now)
+        elif heard.name == NODE_STATUS and heard.source:
+            self.nodes.status(heard.source, heard.values, now)
+        return heard
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        if math.isnan(self._started):
+            self._started = now
+        self.scripts.update(now)
+        self.nodes.forget_gone(now)
+        if now < self._alive_until:
+            self._speak(now)
+        for node_id in self.nodes.to_ask(now):
+            self.scripts.begin(("who is", node_id), _who_is(node_id), now)
+        self._drive(now)
+        self._look_for_trouble(now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do."""
+        deadlines = [self.scripts.calls.next_deadline(), self.nodes.next_deadline()]
+        if self._status_at < self._alive_until:
+            deadlines.append(self._status_at)
+            if self.config.time_master:
+                deadlines.append(self.time.next_deadline())
+        return min(deadlines)
+
+    def begin(self, token: object, script: Script, now: float) -> None:
+        """Run an errand; its result comes from take_ended."""
+        self.scripts.begin(token, script, now)
+        self._drive(now)
+
+    def table_kept(self, number: int) -> None:
+        """The allocation table of this KeepTable is safe."""
+        self.allocator.kept(number)
+        self._answer_allocations()
+
+    def take_ended(self) -> list[tuple[object, object]]:
+        """(token, result) of the errands that ended; each is handed out once."""
+        ended, self._ended = self._ended, []
+        return ended
+
+    def take_events(self) -> list[Notice | KeepTable]:
+        """What happened; each is handed out once."""
+        events, self._events = self._events, []
+        return events
+
+    def take_output(self) -> list[bytes]:
+        """Frames to send, oldest first; each is handed out once."""
+        return self.endpoint.take_output()
+
+    def troubles(self) -> list[str]:
+        """What is wrong on the bus, in words."""
+        return list(self._troubles.values())
+
+    def uptime(self, now: float) -> int:
+        """Whole seconds since the first update."""
+        return 0 if math.isnan(self._started) else int(now - self._started)
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _speak(self, now: float) -> None:
+        if now >= self._status_at:
+            self._status_at = now + NODE_STATUS_INTERVAL
+            self.endpoint.broadcast(NODE_STATUS, {"uptime_sec": self.uptime(now)})
+        if self.config.time_master:
+            stamp = self.time.update(now)
+            if stamp is not None:
+                self.endpoint.broadcast(time_sync.MESSAGE, stamp, priority=8)
+
+    def _drive(self, now: float) -> None:
+        self.scripts.drive(now)
+        for send in self.scripts.take_output():
+            call = send.command
+            self.endpoint.request(
+                call.server, call.service, send.transfer_id, call.values, call.priority
+            )
+        for token, result in self.scripts.take_ended():
+            if isinstance(token, tuple) and token[0] == "who is":
+                if result is not None:
+                    self.nodes.information(token[1], result, now)
+            else:
+                self._ended.append((token, result))
+
+    def _serve(self, request: Heard, now: float) -> None:
+        """The standard services of ours."""
+        if request.name == GET_NODE_INFO:
+            self.endpoint.respond(request, self._information(now))
+        elif request.name == "uavcan.protocol.GetTransportStats":
+            stats = {
+                "transfers_tx": self.endpoint.sent_count,
+                "transfers_rx": self.endpoint.received_count,
+                "transfer_errors": sum(self.endpoint.counts.values()),
+            }
+            self.endpoint.respond(request, stats)
+        elif request.name in _REFUSED:
+            # Nobody on the bus restarts a safety node; its parameters are those of ROS.
+            self.endpoint.respond(request, {"ok": False})
+        elif request.name == "uavcan.protocol.param.GetSet":
+            self.endpoint.respond(request, {})
+        else:
+            self.endpoint.counts["requests that we do not serve"] += 1
+
+    def _information(self, now: float) -> dict[str, object]:
+        major, minor = _SOFTWARE_VERSION
+        return {
+            "status": {"uptime_sec": self.uptime(now)},
+            "software_version": {"major": major, "minor": minor},
+            "hardware_version": {"unique_id": self.config.unique_id},
+            "name": self.config.name.encode(),
+        }
+
+    def _allocation(self, heard: Heard, now: float) -> None:
+        if not self.config.allocator:
+            return
+        in_use = {entry.node_id: entry.unique_id for entry in self.nodes.all()}
+        in_use[self.config.node_id] = self.config.unique_id
+        # Every node has spoken once by then, whatever its id.
+        listened = now - self._started >= LISTEN_TIME
+        discovered = listened and self.nodes.all_discovered(now)
+        self.allocator.heard(heard.source, heard.values, in_use, discovered, now)
+        self._answer_allocations()
+
+    def _answer_allocations(self) -> None:
+        for answer in self.allocator.take_answers():
+            self.endpoint.broadcast(allocation.MESSAGE, answer)
+        self._events += self.allocator.take_keep()
+
+    def _look_for_trouble(self, now: float) -> None:
+        """Say what is wrong when it begins, and when it is over."""
+        now_wrong = self._find_trouble(now)
+        for key, text in now_wrong.items():
+            if key not in self._troubles:
+                self._events.append(Notice(Severity.ERROR, text))
+        for key, text in self._troubles.items():
+            if key not in now_wrong:
+                self._events.append(Notice(Severity.INFO, f"over: {text}"))
+        self._troubles = now_wrong
+
+    def _find_trouble(self, now: float) -> dict[str, str]:
+        found = {
+            f"conflict {node_id}": f"two nodes use node id {node_id}: give one of them another"
+            for node_id in self.nodes.conflicts(now)
+        }
+        endpoint, own = self.endpoint, self.config.node_id
+        if now - endpoint.own_id_heard < _OWN_ID_WINDOW:
+            found["own id"] = f"another node uses our node id {own}: set node_id to a free one"
+        if endpoint.bus_off:
+            found["bus-off"] = (
+                "the CAN controller is bus-off (wiring, bit rate, resistor?); "
+                "a restart time brings it back: ip link set canX type can restart-ms 100"
+            )
+        if self.config.allocator and self.allocator.another_is_there(now):
+            found["allocator"] = (
+                f"node {self.allocator.other} gives out node ids as well: switch one of the two "
+                "off (parameter allocator); ours is silent"
+            )
+        if self.config.time_master and self.time.contested(now):
+            found["time"] = (
+                f"node {self.time.other} is a time master as well and should yield to us ({own}): "
+                "switch one of the two off (parameter time_master)"
+            )
+        return found
+
+
+def _who_is(node_id: int) -> Script:
+    answer: CallFinished = yield Call(node_id, GET_NODE_INFO, {}, priority=24)
+    return answer.values

@@ -1,0 +1,210 @@
+"""DroneCAN service calls as transactions: sent, sent again, answered or given up.
+
+A service call has a transfer id of five bits, one count for each server and service, and its
+response carries the same. Each try is a new transfer; a late response to an earlier try of the
+same call counts. Source: DroneCAN specification, "CAN bus transport layer", service transfers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from chute_ros.errors import ParameterError
+from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS
+from chute_ros.protocol.effect import NO_ANSWER
+
+#: Calls to one server and service that wait at the same time: far below the 32 transfer ids, so
+#: that a late response never meets another call.
+MOST_AT_ONCE = 4
+
+
+@dataclass(frozen=True)
+class CallLimits:
+    """How long a response may take (s), and how often a call is sent."""
+
+    timeout: float = 0.25
+    tries: int = 3
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.timeout < math.inf:
+            raise ParameterError(f"timeout is {self.timeout}: need a time above 0 s")
+        if not 1 <= self.tries < TRANSFER_IDS // MOST_AT_ONCE:
+            raise ParameterError(f"tries is {self.tries}: need 1 to 7")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A request to node server. service: full name of its type; values: fields of the request."""
+
+    server: int
+    service: str
+    values: Mapping[str, Any]
+    #: 0, the most urgent, to 31.
+    priority: int = 16
+
+
+@dataclass(frozen=True)
+class SendCall:
+    """Put this request on the bus now."""
+
+    command: Call
+    transfer_id: int
+    #: Of the transaction that it belongs to; None: of none.
+    token: int | None
+
+
+@dataclass(frozen=True)
+class CallFinished:
+    """A call ended. values: of the response, None: there was none."""
+
+    token: int
+    command: Call
+    values: Mapping[str, Any] | None
+    sends: int
+    seconds: float
+    #: What the response means, as the reader of the calls says.
+    accepted: bool = True
+    not_now: bool = False
+    result: int = 0
+    words: str = ""
+    superseded: bool = False
+
+    def text(self) -> str:
+        """What came of it, in words."""
+        if self.superseded:
+            return f"given up after {self.seconds:.2f} s for a newer call"
+        if self.values is None:
+            return f"no acknowledgement after {self.sends} sends in {self.seconds:.2f} s"
+        return f"{self.words or 'answered'} (after {self.seconds:.2f} s)"
+
+
+_Key = tuple[int, str]
+
+
+@dataclass
+class _Open:
+    token: int
+    call: Call
+    begun: float
+    transfer_ids: list[int] = field(default_factory=list)
+    send_at: float = -math.inf
+
+
+class ServiceCalls:
+    """All calls of one node. The owner sends what take_output gives and feeds responses back."""
+
+    def __init__(
+        self, limits: CallLimits, read: Callable[[CallFinished], CallFinished] | None = None
+    ) -> None:
+        self.limits = limits
+        #: Says of an answered call what its response means.
+        self._read = read or (lambda finished: finished)
+        #: Responses that no call waited for, and calls that nobody answered.
+        self.counts: Counter[str] = Counter()
+        self._next_id: dict[_Key, int] = {}
+        self._open: dict[int, _Open] = {}
+        self._waiting: deque[_Open] = deque()
+        self._out: list[SendCall] = []
+        self._finished: list[CallFinished] = []
+
+    def start(
+        self, token: int, command: Call, now: float, urgent: bool = False, family: int = 0
+    ) -> None:
+        """Begin a call. An urgent one does not wait for those before it."""
+        opened = _Open(token, command, now)
+        if urgent or self._free(_key(command)):
+            self._open[token] = opened
+            self._send(opened, now)
+        else:
+            self._waiting.append(opened)
+
+    def send_once(self, command: Call, now: float) -> None:
+        """Send a request whose response does not matter."""
+        self._out.append(SendCall(command, self._take_id(_key(command)), None))
+
+    def cancel(self, token: int, now: float) -> None:
+        """It is not needed any more; nothing is said of it."""
+        self._waiting = deque(one for one in self._waiting if one.token != token)
+        if self._open.pop(token, None) is not None:
+            self._out = [send for send in self._out if send.token != token]
+            self._begin_waiting(now)
+
+    def response(
+        self, server: int, service: str, transfer_id: int, values: Mapping[str, Any], now: float
+    ) -> None:
+        """A response came."""
+        for one in self._open.values():
+            if _key(one.call) == (server, service) and transfer_id in one.transfer_ids:
+                self._end(one, values, now)
+                return
+        self.counts["responses that nobody waited for"] += 1
+
+    def update(self, now: float) -> None:
+        """Look at the clock: send again, give up."""
+        for one in list(self._open.values()):
+            if now < one.send_at:
+                continue
+            if len(one.transfer_ids) >= self.limits.tries:
+                self.counts["calls without an answer"] += 1
+                self._end(one, None, now)
+            else:
+                self._send(one, now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return min((one.send_at for one in self._open.values()), default=math.inf)
+
+    def take_output(self) -> list[SendCall]:
+        """Requests to send now; each is handed out once."""
+        out, self._out = self._out, []
+        return out
+
+    def take_finished(self) -> list[CallFinished]:
+        """Calls that ended; each is handed out once."""
+        finished, self._finished = self._finished, []
+        return finished
+
+    def _free(self, key: _Key) -> bool:
+        return sum(_key(one.call) == key for one in self._open.values()) < MOST_AT_ONCE
+
+    def _take_id(self, key: _Key) -> int:
+        number = self._next_id.get(key, 0)
+        self._next_id[key] = (number + 1) % TRANSFER_IDS
+        return number
+
+    def _send(self, one: _Open, now: float) -> None:
+        number = self._take_id(_key(one.call))
+        one.transfer_ids.append(number)
+        one.send_at = now + self.limits.timeout
+        self._out.append(SendCall(one.call, number, one.token))
+
+    def _end(self, one: _Open, values: Mapping[str, Any] | None, now: float) -> None:
+        del self._open[one.token]
+        answered = values is not None
+        finished = CallFinished(
+            one.token,
+            one.call,
+            values,
+            len(one.transfer_ids),
+            now - one.begun,
+            accepted=answered,
+            not_now=not answered,
+            result=0 if answered else NO_ANSWER,
+        )
+        self._finished.append(self._read(finished) if answered else finished)
+        self._begin_waiting(now)
+
+    def _begin_waiting(self, now: float) -> None:
+        for one in list(self._waiting):
+            if self._free(_key(one.call)):
+                self._waiting.remove(one)
+                self._open[one.token] = one
+                self._send(one, now)
+
+
+def _key(call: Call) -> _Key:
+    return (call.server, call.service)

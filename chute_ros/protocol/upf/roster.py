@@ -1,0 +1,194 @@
+"""The UPF devices on the bus: who they are and what they say. It only listens.
+
+A node that broadcasts ParachuteStatus is a controller, one that broadcasts TriggerStatus a
+trigger; one node may be both. Source: Flyfire UPF UAVCAN protocol V1.0, "system architecture".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from chute_ros.model import LinkState, ParachuteStatus
+from chute_ros.protocol.events import DeviceLinkChanged, Event, Notice, ParachuteChanged, Severity
+from chute_ros.protocol.liveness import LinkChange
+from chute_ros.protocol.upf.config import UpfConfig
+from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.protocol.upf.devices import Controller, Device, Trigger
+from chute_ros.protocol.upf.events import TriggerChanged
+
+DeviceT = TypeVar("DeviceT", bound=Device)
+#: More devices of one kind than this are not followed: made-up node ids must not grow us.
+MOST_DEVICES = 8
+
+
+class UpfDevices:
+    """Follows the controllers and triggers that are ours."""
+
+    def __init__(self, config: UpfConfig, definitions: Definitions) -> None:
+        self._config = config
+        self._definitions = definitions
+        self.controllers: dict[int, Controller] = {}
+        self.triggers: dict[int, Trigger] = {}
+        #: Devices that were not followed: not ours by a parameter, or too many.
+        self.refused_count = 0
+        #: Controllers whose parameters are to be read anew.
+        self.to_read: list[Controller] = []
+        self._events: list[Event | TriggerChanged] = []
+
+    # -- who -------------------------------------------------------------------------------------
+
+    def controller(self, node_id: int = 0) -> Controller | None:
+        """The one with this node id; 0: the first that is not lost, or the first."""
+        if node_id:
+            return self.controllers.get(node_id)
+        return _first_alive(self.controllers)
+
+    def trigger(self) -> Trigger | None:
+        """The first that is not lost, or the first."""
+        return _first_alive(self.triggers)
+
+    def alive_triggers(self) -> list[Trigger]:
+        """Those that are heard."""
+        return [trigger for trigger in self.triggers.values() if trigger.alive]
+
+    def picture(self, now: float) -> ParachuteStatus | None:
+        """The parachute, as this link sees it; None: there is none yet."""
+        controller = self.controller()
+        if controller is not None:
+            return self.picture_of(controller, now)
+        trigger = self.trigger()
+        if trigger is not None and self._config.without_controller:
+            return trigger.parachute_status(now)
+        return None
+
+    def picture_of(self, controller: Controller, now: float) -> ParachuteStatus:
+        """One controller; with several, only its own word counts, as nobody says which trigger
+        is whose."""
+        alone = len(self.controllers) == 1
+        return controller.status(now, list(self.triggers.values()) if alone else [])
+
+    # -- what they say ---------------------------------------------------------------------------
+
+    def parachute_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
+        """A ParachuteStatus came."""
+        controller = self._admit(node_id, self._config.controller_node_id, self.controllers)
+        if controller is None:
+            return
+        jumps = controller.unknown_jumps
+        before = controller.state
+        self._changed(controller, controller.status_message(values, now))
+        if controller.unknown_jumps > jumps:
+            self.notice(
+                Severity.WARNING,
+                f"controller {node_id} went from {controller.newest_unknown_jump}, "
+                "which its document does not know",
+            )
+        elif controller.state is not before:
+            text = f"controller {node_id}: {before.name} to {controller.state.name}"
+            self.notice(Severity.INFO, text)
+        self._events.append(ParachuteChanged(self.picture_of(controller, now)))
+
+    def trigger_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
+        """A TriggerStatus came."""
+        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
+        if trigger is not None:
+            fired = trigger.launched
+            self._changed(trigger, trigger.status_message(values, now))
+            if trigger.launched and not fired:
+                self.notice(Severity.WARNING, f"trigger {node_id} has fired")
+            self._trigger_changed(trigger, now)
+
+    def node_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
+        """A NodeStatus of anybody."""
+        for device in self._all():
+            if device.node_id == node_id:
+                self._changed(device, device.node_status(values, now))
+
+    def restarted(self, node_id: int) -> None:
+        """A node started anew: what it was told before may be gone."""
+        for device in self._all():
+            if device.node_id == node_id:
+                device.restart_count += 1
+        controller = self.controllers.get(node_id)
+        if controller is not None:
+            controller.parameters.clear()
+            self.to_read.append(controller)
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        for controller in self.controllers.values():
+            changes, picture_changed = controller.update(now)
+            self._changed(controller, changes)
+            if picture_changed:
+                self._events.append(ParachuteChanged(self.picture_of(controller, now)))
+        for trigger in self.triggers.values():
+            changes, picture_changed = trigger.update(now)
+            self._changed(trigger, changes)
+            if picture_changed:
+                self._trigger_changed(trigger, now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return min((device.next_deadline() for device in self._all()), default=math.inf)
+
+    def take_events(self) -> list[Event | TriggerChanged]:
+        """What happened, oldest first; each is handed out once."""
+        events, self._events = self._events, []
+        return events
+
+    def notice(self, severity: Severity, text: str) -> None:
+        """Put a notice among the events."""
+        self._events.append(Notice(severity, text))
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _all(self) -> list[Device]:
+        return [*self.controllers.values(), *self.triggers.values()]
+
+    def _admit(self, node_id: int, wanted: int, known: dict[int, DeviceT]) -> DeviceT | None:
+        """The device with this node id, if it is ours."""
+        found = known.get(node_id)
+        if found is not None or node_id == 0:
+            return found
+        if wanted not in (0, node_id) or len(known) >= MOST_DEVICES:
+            self.refused_count += 1
+            return None
+        made: Device
+        if known is self.controllers:
+            made = Controller(node_id, self._config, self._definitions)
+            self.to_read.append(made)
+            self.controllers[node_id] = made
+        else:
+            made = Trigger(node_id, self._config, self._definitions)
+            self.triggers[node_id] = made
+        return known[node_id]
+
+    def _changed(self, device: Device, changes: list[LinkChange]) -> None:
+        name = f"{device.kind} {device.node_id}"
+        self._events += [DeviceLinkChanged(name, change) for change in changes]
+
+    def _trigger_changed(self, trigger: Trigger, now: float) -> None:
+        self._events.append(TriggerChanged(trigger.node_id, trigger_picture(trigger, now)))
+        if self._config.without_controller and not self.controllers:
+            self._events.append(ParachuteChanged(trigger.parachute_status(now)))
+
+
+def trigger_picture(trigger: Trigger, now: float) -> Mapping[str, Any]:
+    """What chute_msgs/TriggerStatus tells, by its field names; state in words."""
+    flags = trigger.values.get("error_flags", 0)
+    return {
+        "node_id": trigger.node_id,
+        "link_state": trigger.liveness.state,
+        "state": trigger.state,
+        "launched": trigger.launched,
+        "supply_voltage": trigger.number("supply_voltage"),
+        "error_flags": flags if isinstance(flags, int) else 0,
+        "faults": tuple(trigger.faults(now)),
+    }
+
+
+def _first_alive(known: Mapping[int, DeviceT]) -> DeviceT | None:
+    alive = (one for one in known.values() if one.liveness.state is not LinkState.LOST)
+    return next(alive, next(iter(known.values()), None))

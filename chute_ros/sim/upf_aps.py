@@ -1,0 +1,67 @@
+"""The simulated automatic deployment (APS): does what is felt look like an accident?
+
+Not the vendor's algorithm, which is not public: three plain conditions, each with a time for which
+it must hold.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a controller feels: m above take-off, m/s up positive, rad, m/s^2."""
+
+    height: float = 0.0
+    vertical_speed: float = 0.0
+    tilt: float = 0.0
+    acceleration: float = 9.80665
+
+    @property
+    def at_rest(self) -> bool:
+        """Nothing moves."""
+        return abs(self.vertical_speed) < 0.2 and abs(self.acceleration - 9.80665) < 1.5
+
+
+@dataclass(frozen=True)
+class ApsLimits:
+    """When it fires: sinks faster, weighs less or tilts more than this, for so long."""
+
+    sink_speed: float = 8.0  # m/s
+    free_fall: float = 3.0  # m/s^2
+    tilt: float = 1.2  # rad
+    hold: float = 0.3  # s
+    minimum_height: float = 8.0  # m
+
+
+class AutomaticDeployment:
+    """Fed with motion while it is armed."""
+
+    def __init__(self, limits: ApsLimits) -> None:
+        self.limits = limits
+        self._since: dict[str, float] = {}
+
+    def reset(self) -> None:
+        """Forget what was felt."""
+        self._since.clear()
+
+    def accident(self, motion: Motion, now: float) -> str:
+        """What has held for long enough, in words; empty: nothing."""
+        limits = self.limits
+        felt = {
+            f"sinks faster than {limits.sink_speed:g} m/s": -motion.vertical_speed
+            > limits.sink_speed,
+            f"free fall, less than {limits.free_fall:g} m/s^2": motion.acceleration
+            < limits.free_fall,
+            f"tilted more than {math.degrees(limits.tilt):.0f} degrees": motion.tilt > limits.tilt,
+        }
+        for what, so in felt.items():
+            if not so:
+                self._since.pop(what, None)
+                continue
+            held = now - self._since.setdefault(what, now) >= limits.hold
+            if held and motion.height >= limits.minimum_height:
+                return what
+        return ""
