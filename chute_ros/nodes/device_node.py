@@ -31,7 +31,16 @@ from rclpy.task import Future
 from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.decision_carrier import DecisionCarrier
+from chute_ros.nodes.link_log import log_event
 from chute_ros.nodes.parameters import Parameter, declare
+from chute_ros.nodes.request_desk import CallFailed, RequestDesk
+from chute_ros.protocol.events import (
+    DeviceLinkChanged,
+    Notice,
+    ParachuteChanged,
+    RequestFinished,
+    RequestReport,
+)
 from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
 
 COMMON_PARAMETERS = (
@@ -58,14 +67,6 @@ class Summary:
     details: Any
 
 
-@dataclass(frozen=True)
-class CallFailed:
-    """A request could not even be begun, by a mistake of ours."""
-
-    token: int
-    text: str
-
-
 class DeviceNode(Node, ABC):
     """Base of the nodes that speak to a device. The subclass makes self.loop and calls begin."""
 
@@ -85,9 +86,10 @@ class DeviceNode(Node, ABC):
         self._service_group = ReentrantCallbackGroup()
         self._inbox: deque[Any] = deque()
         self._guard = self.create_guard_condition(self._drain)
-        self._tokens = count(1)
-        self._waiting: dict[int, Future] = {}
-        self._decisions: dict[int, model.Decision] = {}
+        self.desk = RequestDesk(self.in_link, self.deliver, self.decisions.report)
+        #: The newest picture of each device.
+        self.statuses: dict[str, model.ParachuteStatus] = {}
+        self._received_at = (0, 0.0)
         self._seq = count()
         self._loop_faults = 0
         self._summary: Summary | None = None
@@ -138,8 +140,8 @@ class DeviceNode(Node, ABC):
         """In the link's thread: how the device is."""
 
     @abstractmethod
-    def event(self, event: Any) -> None:
-        """In the executor: one event of the link."""
+    def link_event(self, event: Any) -> None:
+        """In the executor: one event that only this kind of link has."""
 
     @abstractmethod
     def failed_end(self, token: int, text: str) -> Any:
@@ -164,48 +166,16 @@ class DeviceNode(Node, ABC):
     def parameter_changed(self, name: str, value: Any) -> None:
         """A changeable parameter has a new value."""
 
-    # -- requests to the link -------------------------------------------------------------------
+    # -- what the subclass may use ---------------------------------------------------------------
 
     def request(self, begin: Callable[[Any, int, float], None]) -> Future:
         """Have begin(link, token, now) called in the link's thread; the future is its end."""
-        token = next(self._tokens)
-        self._waiting[token] = future = Future()
-        self._call(token, begin)
-        return future
+        return self.desk.request(begin)
 
-    def request_for(
-        self, decision: model.Decision, begin: Callable[[Any, int, float], None]
-    ) -> None:
-        """The same on behalf of a decision: its steps are reported on safety/action."""
-        token = next(self._tokens)
-        self._decisions[token] = decision
-        self._call(token, begin)
-
-    def _call(self, token: int, begin: Callable[[Any, int, float], None]) -> None:
+    def in_link(self, function: Callable[[Any, float], None]) -> None:
+        """Have function(link, now) called in the link's thread."""
         assert self.loop is not None
-
-        def begin_or_say(link: Any, now: float) -> None:
-            try:
-                begin(link, token, now)
-            except Exception as error:
-                # Whoever waits must get an answer; the loop reports the mistake itself.
-                self.deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
-                raise
-
-        self.loop.call(begin_or_say)
-
-    def finished(self, token: int, end: Any) -> None:
-        """A request ended: its caller gets end."""
-        self._decisions.pop(token, None)
-        future = self._waiting.pop(token, None)
-        if future is not None:
-            future.set_result(end)
-
-    def report(self, token: int, outcome: model.Outcome, detail: str) -> None:
-        """A request got a step further; if a decision stands behind it, the supervisor is told."""
-        decision = self._decisions.get(token)
-        if decision is not None:
-            self.decisions.report(decision, outcome, detail)
+        self.loop.call(function)
 
     def publish_status(self, status: model.ParachuteStatus) -> None:
         """On parachute/status."""
@@ -219,6 +189,13 @@ class DeviceNode(Node, ABC):
         )
         message.header.stamp = self.stamp()
         self._request_publisher.publish(message)
+
+    def rate(self, received: int) -> float:
+        """How often something counted came since this was last asked, 1/s."""
+        now = time.monotonic()
+        before, when = self._received_at
+        self._received_at = (received, now)
+        return (received - before) / (now - when) if now > when > 0.0 else 0.0
 
     def stamp(self) -> Any:
         """The wall clock, for headers."""
@@ -244,19 +221,31 @@ class DeviceNode(Node, ABC):
                 self._loop_faults += 1
                 self.get_logger().error(event.text, throttle_duration_sec=1.0)
             elif isinstance(event, CallFailed):
-                self.report(event.token, model.Outcome.FAILED, event.text)
-                self.finished(event.token, self.failed_end(event.token, event.text))
+                self.desk.report(event.token, model.Outcome.FAILED, event.text)
+                self.desk.finished(event.token, self.failed_end(event.token, event.text))
             else:
-                self.event(event)
+                self._event(event)
+
+    def _event(self, event: Any) -> None:
+        if isinstance(event, ParachuteChanged):
+            self.statuses[event.status.device] = event.status
+            self.publish_status(event.status)
+        elif isinstance(event, RequestReport):
+            report = event.report
+            self.desk.report(report.token, report.outcome, report.detail)
+        elif isinstance(event, RequestFinished):
+            self.desk.finished(event.finished.token, event)
+        elif isinstance(event, (DeviceLinkChanged, Notice)):
+            log_event(self.get_logger(), event)
+        else:
+            self.link_event(event)
 
     def _beat(self) -> None:
-        assert self.loop is not None
-
         def answer(link: Any, now: float) -> None:
             link.owner_alive(now + OWNER_SILENCE)
             self.deliver([self.summarise(link, now)])
 
-        self.loop.call(answer)
+        self.in_link(answer)
 
     def _publish_heartbeat(self, summary: Summary) -> None:
         self._summary = summary

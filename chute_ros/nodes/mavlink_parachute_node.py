@@ -27,12 +27,7 @@ from chute_ros.nodes.mavlink_diagnostics import (
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from, signing_from
 from chute_ros.protocol.effect import EffectFinished
 from chute_ros.protocol.events import (
-    DeviceLinkChanged,
-    Notice,
-    ParachuteChanged,
     RequestFinished,
-    RequestReport,
-    Severity,
     VehicleChanged,
 )
 from chute_ros.protocol.mavlink import results
@@ -55,8 +50,6 @@ class MavlinkParachuteNode(DeviceNode):
         address = parse_address(self.values["connection"])
         link = MavlinkLink(config_from(self.values), *signing_from(self.values))
         self.loop = WireLoop(link, make_wire(address), self.deliver)
-        self._statuses: dict[str, model.ParachuteStatus] = {}
-        self._received_at = (0, 0.0)
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
@@ -77,25 +70,9 @@ class MavlinkParachuteNode(DeviceNode):
         healthy = chosen.status(now).healthy and (flying or not details.doubts)
         return Summary(chosen.liveness.state, healthy, chosen.liveness.age(now), details)
 
-    def event(self, event: Any) -> None:
-        if isinstance(event, ParachuteChanged):
-            self._statuses[event.status.device] = event.status
-            self.publish_status(event.status)
-        elif isinstance(event, VehicleChanged):
+    def link_event(self, event: Any) -> None:
+        if isinstance(event, VehicleChanged):
             self._vehicle_publisher.publish(messages.vehicle_state(event.state, self.stamp()))
-        elif isinstance(event, RequestReport):
-            self.report(event.report.token, event.report.outcome, event.report.detail)
-        elif isinstance(event, RequestFinished):
-            self.finished(event.finished.token, event)
-        elif isinstance(event, DeviceLinkChanged):
-            self._log_link_change(event)
-        elif isinstance(event, Notice):
-            log = self.get_logger()
-            {
-                Severity.INFO: log.info,
-                Severity.WARNING: log.warning,
-                Severity.ERROR: log.error,
-            }[event.severity](event.text)
 
     def failed_end(self, token: int, text: str) -> RequestFinished:
         finished = EffectFinished(token, False, False, results.NO_ACKNOWLEDGEMENT, text)
@@ -104,9 +81,11 @@ class MavlinkParachuteNode(DeviceNode):
     def carry_out(self, decision: model.Decision) -> None:
         force = self.values["deploy_arms_trigger"]
         if decision.action is model.Action.KILL:
-            self.request_for(decision, lambda link, token, now: link.kill(token, now))
+            self.desk.request_for(decision, lambda link, token, now: link.kill(token, now))
         elif decision.action is model.Action.DEPLOY:
-            self.request_for(decision, lambda link, token, now: link.deploy(token, force, now))
+            self.desk.request_for(
+                decision, lambda link, token, now: link.deploy(token, force, now)
+            )
         elif decision.action is not model.Action.NONE:
             blocked = decision.action is model.Action.FLIGHT_BLOCK
             reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""
@@ -130,7 +109,7 @@ class MavlinkParachuteNode(DeviceNode):
         name, details = self.diagnostic_name, summary.details
         traffic = {
             "frames received": details.received,
-            "frames received per s": self._rate(details.received),
+            "frames received per s": self.rate(details.received),
             "frames sent": details.sent,
             "send errors": self.loop.send_errors,
         }
@@ -222,26 +201,9 @@ class MavlinkParachuteNode(DeviceNode):
 
     def _armed_triggers(self, device: str) -> int:
         """By the newest status that was published."""
-        statuses = [self._statuses[device]] if device in self._statuses else []
-        statuses += [] if device else list(self._statuses.values())
+        statuses = [self.statuses[device]] if device in self.statuses else []
+        statuses += [] if device else list(self.statuses.values())
         return next((int(status.armed_triggers) for status in statuses), 0)
-
-    def _log_link_change(self, event: DeviceLinkChanged) -> None:
-        change, log = event.change, self.get_logger()
-        if change.before is model.LinkState.NEVER_SEEN:
-            log.info(f"{event.name} heard for the first time")
-        elif change.regained:
-            log.warning(f"{event.name} regained after {change.silence:.1f} s of silence")
-        elif change.after is model.LinkState.OK:
-            log.info(f"{event.name} is OK again after {change.silence:.1f} s of silence")
-        else:
-            log.warning(f"{event.name} is {change.after.name}: silent for {change.silence:.1f} s")
-
-    def _rate(self, received: int) -> float:
-        now = self._steady.now().nanoseconds * 1e-9
-        before, when = self._received_at
-        self._received_at = (received, now)
-        return (received - before) / (now - when) if now > when > 0.0 else 0.0
 
 
 def _fill(response: Any, end: RequestFinished) -> Any:

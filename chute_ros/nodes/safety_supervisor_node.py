@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from itertools import count
+from operator import attrgetter
 from typing import Any
 
 from chute_msgs.msg import (
@@ -28,6 +29,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
@@ -37,8 +39,8 @@ from chute_ros.supervisor.state import State
 
 HEARTBEAT_INTERVAL = 0.1  # s
 STATE_INTERVAL = 1.0  # s, at the latest
-#: A device node's arm service that has not answered by then is given up, s.
-ARM_TIMEOUT = 10.0
+#: Links of which it is said that they ask for what does not exist: made-up names must not grow us.
+MOST_MISASKED = 64
 
 
 class SafetySupervisorNode(Node):
@@ -58,7 +60,8 @@ class SafetySupervisorNode(Node):
         self.state = State(epoch, now, mode=inputs.Mode[self.values["mode"]])
         self._tokens = count(1)
         self._waiting: dict[int, Future] = {}
-        self._arming: dict[int, tuple[inputs.ArmDevices, dict[str, tuple[bool, str]], float]] = {}
+        self._misasked: set[str] = set()
+        self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
         self._seq = count()
         self._beat_at = now
         self._state_at = now
@@ -82,9 +85,6 @@ class SafetySupervisorNode(Node):
             (SafetyRequest, "safety/request", self._device_request, qos.STATUS),
         ):
             self.create_subscription(kind, topic, callback, profile)
-        self._arm_clients = {
-            link: self.create_client(Arm, f"{link}/arm") for link in self.config.deploy_links
-        }
         # A service that awaits its outcome must not keep the decision loop from running.
         group = ReentrantCallbackGroup()
         for kind, name, callback in (
@@ -107,7 +107,7 @@ class SafetySupervisorNode(Node):
         self.state, outputs = update(self.config, self.state, new, now)
         for output in outputs:
             self._do(output, now)
-        self._give_up_arming(now)
+        self._arming.give_up(now)
         if now >= self._beat_at:
             self._beat(now)
         if self._changed() or now >= self._state_at:
@@ -124,7 +124,7 @@ class SafetySupervisorNode(Node):
             if future is not None:
                 future.set_result(output)
         elif isinstance(output, inputs.ArmDevices):
-            self._arm_devices(output, now)
+            self._arming.begin(output, now)
         else:
             log = self.get_logger()
             log.error(output.text) if output.alarm else log.info(output.text)
@@ -177,9 +177,18 @@ class SafetySupervisorNode(Node):
         )
 
     def _device_request(self, message: SafetyRequest) -> None:
+        device, reason = f"{message.link} {message.device}".strip(), message.reason
         if message.request == SafetyRequest.KILL:
-            by = f"{message.link} {message.device}".strip()
-            self._turn(inputs.KillRequest(0, by, message.reason))
+            self._turn(inputs.KillRequest(0, device, reason))
+        elif message.request in (SafetyRequest.FLIGHT_BLOCK, SafetyRequest.FLIGHT_BLOCK_RELEASE):
+            block = message.request == SafetyRequest.FLIGHT_BLOCK
+            self._turn(inputs.BlockRequest(message.link, message.device, block, reason))
+        elif message.link not in self._misasked and len(self._misasked) < MOST_MISASKED:
+            self._misasked.add(message.link)
+            self.get_logger().error(
+                f"{device} asks for {message.request}: need KILL 1, FLIGHT_BLOCK 2 or "
+                "FLIGHT_BLOCK_RELEASE 3 (said once for each link)"
+            )
 
     # -- services -------------------------------------------------------------------------------
 
@@ -222,42 +231,6 @@ class SafetySupervisorNode(Node):
         response.success, response.message = end.success, end.message
         return response
 
-    # -- arming through the device nodes --------------------------------------------------------
-
-    def _arm_devices(self, order: inputs.ArmDevices, now: float) -> None:
-        self._arming[order.token] = (order, {}, now + ARM_TIMEOUT)
-        request = Arm.Request(arm=order.arm, triggers=order.triggers)
-        for link in order.links:
-            client = self._arm_clients[link]
-            if not client.service_is_ready():
-                self._armed(order.token, link, False, f"its service {link}/arm is not there")
-                continue
-            future = client.call_async(request)
-
-            def answered(future: Future, link: str = link) -> None:
-                answer = future.result()
-                self._armed(order.token, link, answer.success, answer.message)
-
-            future.add_done_callback(answered)
-
-    def _armed(self, token: int, link: str, success: bool, message: str) -> None:
-        if token not in self._arming:
-            return
-        order, answers, _ = self._arming[token]
-        answers[link] = (success, message)
-        if len(answers) < len(order.links):
-            return
-        del self._arming[token]
-        text = "; ".join(f"{name}: {answers[name][1]}" for name in order.links)
-        success = all(answer[0] for answer in answers.values())
-        self._turn(inputs.ArmDone(token, order.arm, success, text))
-
-    def _give_up_arming(self, now: float) -> None:
-        for token, (order, answers, until) in list(self._arming.items()):
-            if now >= until:
-                for link in [link for link in order.links if link not in answers]:
-                    self._armed(token, link, False, f"no answer within {ARM_TIMEOUT:g} s")
-
     # -- outputs --------------------------------------------------------------------------------
 
     def _beat(self, now: float) -> None:
@@ -276,12 +249,8 @@ class SafetySupervisorNode(Node):
 
     def _changed(self) -> bool:
         before, now = self._published, self.state
-        return before is None or (before.stage, before.mode, before.next_id, before.alarms) != (
-            now.stage,
-            now.mode,
-            now.next_id,
-            now.alarms,
-        )
+        told = attrgetter("stage", "mode", "next_id", "alarms", "device_blocks")
+        return before is None or told(before) != told(now)
 
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL

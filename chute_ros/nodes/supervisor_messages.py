@@ -25,6 +25,7 @@ def state_message(config: SupervisorConfig, state: State, now: float, stamp: Tim
         mode=int(state.mode),
         flight_blocked=blocked,
         block_reasons=list(reasons) if blocked else [],
+        device_blocks=sorted(state.device_blocks),
         alarms=list(state.alarms),
     )
     message.header.stamp = stamp

@@ -3,33 +3,53 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import signal
 import sys
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
 
 from chute_ros.errors import ChuteError, ParameterError
 from chute_ros.sim.bundle import WireBundle
+from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.transport.address import FORMS, parse_address
-from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
+from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
+from chute_ros.transport.can_wire import make_can_wire
+from chute_ros.transport.loop import LoopFault, ProtocolLink, WireChange, WireLoop
 from chute_ros.transport.signing_key import signing_from_file
-from chute_ros.transport.wire import make_wire
+from chute_ros.transport.wire import Wire, make_wire
 
 if TYPE_CHECKING:
     from chute_ros.sim.mavlink_device import MavlinkDevice
 
 
-def parser(program: str, text: str, connection: str, actions: str) -> argparse.ArgumentParser:
-    """Options that every simulator has."""
+_FAULTS = (
+    ("loss", "probability that a packet is lost, 0 to 1, each way"),
+    ("duplicate", "probability that a packet comes twice"),
+    ("corrupt", "probability that a byte of a packet is wrong"),
+    ("delay", "longest delay of a packet, s"),
+)
+_CAN_FAULTS = (
+    ("reorder", "probability that a frame is overtaken by the next"),
+    ("toggle", "probability that a frame's toggle bit is wrong"),
+    ("half", "probability that only the first frame of a transfer comes"),
+)
+
+
+def parser(
+    program: str, text: str, connection: str, actions: str, can: bool = False
+) -> argparse.ArgumentParser:
+    """Options that every simulator has. can: it is on a CAN bus, not on a MAVLink network."""
     options = argparse.ArgumentParser(program, description=text)
     options.add_argument(
         "--connection",
         action="append",
         metavar="WIRE",
-        help=f"{FORMS}; may be given more than once (default: {connection})",
+        help=f"{CAN_FORMS if can else FORMS}; may be given more than once (default: {connection})",
     )
     options.set_defaults(default_connection=connection)
     options.add_argument(
@@ -39,18 +59,17 @@ def parser(program: str, text: str, connection: str, actions: str) -> argparse.A
         metavar="SECONDS:ACTION",
         help=f"do this so long after the start; ACTION is one of {actions}",
     )
-    for name, text in (
-        ("loss", "probability that a packet is lost, 0 to 1, each way"),
-        ("duplicate", "probability that a packet comes twice"),
-        ("corrupt", "probability that a byte of a packet is wrong"),
-        ("delay", "longest delay of a packet, s"),
-    ):
+    for name, text in (*_FAULTS, *(_CAN_FAULTS if can else ())):
         options.add_argument(f"--{name}", type=float, default=0.0, metavar="X", help=text)
-    options.add_argument(
-        "--signing-key-file",
-        metavar="FILE",
-        help="sign with this key (32 bytes or 64 hexadecimal digits), hear only what is signed",
-    )
+    if can:
+        options.add_argument("--bitrate", type=number("bit/s", 0, 8_000_000), default=0)
+    else:
+        options.add_argument(
+            "--signing-key-file",
+            metavar="FILE",
+            help="sign with this key (32 bytes or 64 hexadecimal digits), hear only what is "
+            "signed",
+        )
     options.add_argument("--seed", type=int, default=1, help="of the random faults (default: 1)")
     options.add_argument("--quiet", action="store_true", help="print nothing")
     return options
@@ -86,7 +105,19 @@ def number(name: str, lowest: int, highest: int) -> Any:
     return convert
 
 
-def _check_action(device: MavlinkDevice, action: str) -> None:
+class Acting(ProtocolLink, Protocol):
+    """A simulated device with actions: see MavlinkDevice and UpfBus."""
+
+    @property
+    def actions(self) -> Mapping[str, Callable[[str], None]]:
+        """What --at can have it do."""
+
+    @property
+    def arguments(self) -> Mapping[str, Callable[[str], Any]]:
+        """What turns the argument of an action from text."""
+
+
+def _check_action(device: Acting, action: str) -> None:
     name, equals, argument = action.partition("=")
     if name not in device.actions:
         known = ", ".join(sorted(device.actions))
@@ -105,13 +136,46 @@ def _check_action(device: MavlinkDevice, action: str) -> None:
 
 def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     """Run device on its wires until SIGINT or SIGTERM; ends with 2 on a user's mistake."""
-    for _, action in script_of(options.at):
-        _check_action(device, action)
     if options.signing_key_file:
         device.sign(*signing_from_file(options.signing_key_file, 0, "--signing-key-file"))
     knobs = FaultKnobs(options.loss, options.duplicate, options.corrupt, options.delay)
-    connections = options.connection or [options.default_connection]
-    wires = [make_wire(parse_address(text)) for text in connections]
+    link = FaultyLink(device, knobs, options.seed)
+    wires = [make_wire(parse_address(text)) for text in _connections(options)]
+    _run_link(device, link, wires, options)
+
+
+def run_on_can(
+    device: Acting,
+    options: argparse.Namespace,
+    beside: Callable[[], contextlib.AbstractContextManager[Any]],
+) -> None:
+    """The same on CAN buses. beside: what else runs meanwhile."""
+    knobs = CanFaultKnobs(
+        options.loss,
+        options.duplicate,
+        options.corrupt,
+        options.delay,
+        options.reorder,
+        options.toggle,
+        options.half,
+    )
+    link = CanFaultyLink(device, knobs, options.seed)
+    wires: list[Wire] = [
+        make_can_wire(parse_can_address(text, options.bitrate)) for text in _connections(options)
+    ]
+    with beside():
+        _run_link(device, link, wires, options)
+
+
+def _connections(options: argparse.Namespace) -> list[str]:
+    return options.connection or [options.default_connection]
+
+
+def _run_link(
+    device: Acting, link: ProtocolLink, wires: list[Wire], options: argparse.Namespace
+) -> None:
+    for _, action in script_of(options.at):
+        _check_action(device, action)
     started = time.monotonic()
 
     def show(events: list[Any]) -> None:
@@ -123,7 +187,6 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     ended = threading.Event()
     for number_ in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number_, lambda *_: ended.set())
-    link = FaultyLink(device, knobs, options.seed)
     loop = WireLoop(link, WireBundle(wires), show)
     loop.start()
     ended.wait()

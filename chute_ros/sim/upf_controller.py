@@ -150,7 +150,9 @@ class UpfController(UpfNode):
         """ParachuteStatus as it is now."""
         known = names_of_errors(self.definitions)
         bits = {known[name] for name in self.errors if name in known}
-        return {
+        # Data types that have a field for each error instead of flags.
+        single = {f"error_{name.lower()}": True for name in self.errors}
+        return single | {
             "state": self.definitions.state_number(self.state),
             "is_vehicle_connected": self.vehicle_connected,
             "is_enable_auto_launch": self.switch(p.ENABLE_APS),
@@ -241,7 +243,7 @@ class UpfController(UpfNode):
 
     def _ask_vehicle(self, type_name: str) -> int:
         """Request something of the vehicle; number of the call, 0: no vehicle is known."""
-        if not self._vehicle_node:
+        if not self._vehicle_node or not self.node_id:
             return 0
         values = self.definitions.request(names.VEHICLE_SERVICE, type_name)
         priority = 2 if type_name == machine.LAUNCH_REQUEST else 16

@@ -78,6 +78,8 @@ class _Update(Reports):
             self.arm_done(one)
         elif isinstance(one, i.KillRequest):
             self.kill_request(one)
+        elif isinstance(one, i.BlockRequest):
+            self.block_request(one)
         elif isinstance(one, i.DeployRequest):
             self.deploy_request(one)
         elif isinstance(one, i.ResetRequest):

@@ -88,6 +88,16 @@ class KillRequest:
 
 
 @dataclass(frozen=True)
+class BlockRequest:
+    """A device wants flight blocked for reason, or (block false) does not want it any more."""
+
+    link: str
+    device: str
+    block: bool
+    reason: str
+
+
+@dataclass(frozen=True)
 class DeployRequest:
     """A person wants the parachute out."""
 
@@ -120,6 +130,7 @@ Input = (
     | ArmRequest
     | ArmDone
     | KillRequest
+    | BlockRequest
     | DeployRequest
     | ResetRequest
     | ModeRequest

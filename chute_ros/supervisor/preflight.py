@@ -48,6 +48,9 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
         if all(problem[link] for link in links):
             against += links
     reasons = [problem[link] for link in dict.fromkeys(against)]
+    reasons += [
+        f"{device} asks to block flight: {why}" for device, why in state.device_blocks.items()
+    ]
     if config.require_vehicle_state and (text := _vehicle_problem(config, state, now)):
         reasons.append(text)
     if state.stage in (Stage.DEPLOYED, Stage.FAULT):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 
 from chute_ros.model import Action
 from chute_ros.supervisor import inputs as i
@@ -11,6 +12,8 @@ from chute_ros.supervisor.preflight import arm_reasons
 from chute_ros.supervisor.steps import Steps
 
 ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
+#: Devices whose wish to block flight is remembered: made-up names must not grow us.
+MOST_DEVICE_BLOCKS = 64
 _DEPLOY_ALLOWED = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
 
 
@@ -69,6 +72,22 @@ class Requests(Steps):
             return self._kill_under_way()
         wait = self.config.kill_timeout if kill.confirmed else self.config.resend_interval
         return self.now < kill.decided_at + wait
+
+    def block_request(self, one: i.BlockRequest) -> None:
+        """Blocks flight on the ground as an unhealthy link does; in the air it is remembered."""
+        blocks, device = dict(self.state.device_blocks), f"{one.link} {one.device}".strip()
+        if not one.block:
+            blocks.pop(device, None)
+        elif device in blocks or len(blocks) < MOST_DEVICE_BLOCKS:
+            blocks[device] = one.reason or "no reason given"
+        elif not self.state.block_refused:
+            self.state = replace(self.state, block_refused=True)
+            text = f"not remembered, {len(blocks)} devices do already"
+            self.outputs.append(i.Say(f"{device} asks to block flight: {text}", alarm=True))
+        if blocks != self.state.device_blocks:
+            full = self.state.block_refused and len(blocks) >= MOST_DEVICE_BLOCKS
+            kept = MappingProxyType(blocks)
+            self.state = replace(self.state, device_blocks=kept, block_refused=full)
 
     def deploy_request(self, one: i.DeployRequest) -> None:
         """Refused on the ground unless forced; one that is under way is joined."""
@@ -131,6 +150,9 @@ class Requests(Steps):
                 deploy=None,
                 flown=False,
                 alarms=(),
+                # A device that still wants it asks again; one that was exchanged cannot.
+                device_blocks=MappingProxyType({}),
+                block_refused=False,
             )
             self.note_released()
             self.finish(one.token, True, True, "back to the start")

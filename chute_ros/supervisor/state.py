@@ -135,6 +135,10 @@ class State:
     flown: bool = False
     #: (link, device) that were released before the flight: they say nothing of what happens in it.
     released_before: frozenset[tuple[str, str]] = frozenset()
+    #: "link device" of those that asked to block flight and have not released it -> why.
+    device_blocks: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    #: It was said that no more of them are remembered.
+    block_refused: bool = False
     #: Who waits for the outcome.
     kill_tokens: tuple[int, ...] = ()
     deploy_tokens: tuple[int, ...] = ()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
@@ -23,9 +25,11 @@ def load_data_types(folder: str, named: str) -> DataTypes:
     from dronecan.dsdl import DsdlException, parse_namespaces
 
     path = Path(folder).expanduser() if folder else _shipped()
+    # As the parser takes it: not where a link points to.
+    path = Path(os.path.abspath(path))
     if not path.is_dir():
         raise ParameterError(f"{named} is {folder!r}: there is no such folder")
-    if path.resolve().name != "flyfire":
+    if path.name != "flyfire":
         if (path / "flyfire").is_dir():
             path = path / "flyfire"
         else:
@@ -35,10 +39,15 @@ def load_data_types(folder: str, named: str) -> DataTypes:
             )
     standard = [one for name, one in dronecan.TYPENAMES.items() if name.startswith(_STANDARD)]
     try:
-        own = parse_namespaces([str(path)])
-    except DsdlException as error:
+        own = parse_namespaces([str(path)], [str(_standard_folder(dronecan))])
+        return DataTypes([*standard, *own])
+    except (DsdlException, ParameterError) as error:
         raise ParameterError(f"{named} is {folder!r}: {error}") from None
-    return DataTypes([*standard, *own])
+
+
+def _standard_folder(library: Any) -> Path:
+    """Where types of the vendor find the standard ones that they are made of."""
+    return Path(library.__file__).parent / "dsdl_specs" / "uavcan"
 
 
 def _shipped() -> Path:

@@ -6,9 +6,10 @@ The words in which its core explains itself are the business of test/supervisor.
 from __future__ import annotations
 
 import pytest
-from chute_msgs.msg import LinkHeartbeat, SafetyState
+from chute_msgs.msg import LinkHeartbeat, SafetyRequest, SafetyState
 from chute_msgs.srv import Arm, Deploy, Kill, SetMode
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import Log
 from std_srvs.srv import Trigger
 from supervisor_bench import QUICK, Scene
 
@@ -68,6 +69,85 @@ def test_what_becomes_unhealthy_blocks_and_what_recovers_releases(ready, why):
     ready.await_decision(Action.FLIGHT_BLOCK)
     ready.link.healthy, ready.link.state, ready.link.beating = True, LinkState.OK, True
     ready.await_stage(SafetyState.READY)
+
+
+# What devices ask for
+
+
+def request(scene, number, link="upf_can", reason="ABNORMAL"):
+    """A device asks through its node."""
+    message = SafetyRequest(link=link, device="33", request=number, reason=reason)
+    scene.bench.publish(message, "safety/request")
+
+
+def test_a_device_that_asks_blocks_flight_until_it_lets_go(ready):
+    released = len(ready.decided(Action.FLIGHT_BLOCK_RELEASE))
+    request(ready, SafetyRequest.FLIGHT_BLOCK)
+    state = ready.await_stage(SafetyState.BLOCKED)
+    assert list(state.device_blocks) == ["upf_can 33"]
+    assert state.flight_blocked
+    assert list(state.block_reasons) == ["upf_can 33 asks to block flight: ABNORMAL"]
+    ready.bench.until(lambda: list(block_reasons(ready)) == list(state.block_reasons), "decided")
+    answer = ready.call(Arm, "arm", arm=True)
+    assert not answer.success
+    assert "upf_can 33 asks to block flight: ABNORMAL" in answer.message
+    assert ready.link.arm_requests == []
+    request(ready, SafetyRequest.FLIGHT_BLOCK_RELEASE, reason="READY")
+    state = ready.await_stage(SafetyState.READY)
+    assert list(state.device_blocks) == []
+    assert not state.flight_blocked
+    ready.bench.until(
+        lambda: len(ready.decided(Action.FLIGHT_BLOCK_RELEASE)) > released, "it is released"
+    )
+
+
+def block_reasons(scene):
+    """The reasons of the newest flight block."""
+    decided = scene.decided(Action.FLIGHT_BLOCK)
+    return decided[-1].reasons if decided else []
+
+
+def test_whom_it_remembers_is_published_at_once_though_nothing_else_changes(ready):
+    # The second device changes neither the stage nor a decision.
+    request(ready, SafetyRequest.FLIGHT_BLOCK)
+    ready.await_stage(SafetyState.BLOCKED)
+    before = ready.supervisor._state_at
+    request(ready, SafetyRequest.FLIGHT_BLOCK, link="another")
+    both = ["another 33", "upf_can 33"]
+    ready.bench.until(lambda: list(ready.supervisor.state.device_blocks) == both[::-1], "heard")
+    assert ready.supervisor._state_at > before
+    ready.bench.until(lambda: list(ready.states[-1].device_blocks) == both, "it is published")
+
+
+def test_a_device_that_asks_for_a_kill_gets_it(ready):
+    request(ready, SafetyRequest.KILL, reason="about to launch")
+    kill = ready.await_decision(Action.KILL)
+    assert kill.rule == "upf_can 33"
+    assert "about to launch" in kill.reasons[0]
+
+
+def test_what_no_device_may_ask_for_is_logged_once_for_each_link_and_nothing_else(ready):
+    said = ready.bench.follow(Log, "/rosout")
+    name = f"{ready.bench.namespace.strip('/')}.safety_supervisor"
+
+    def complaints():
+        return [log.msg for log in said if log.name == name and "need KILL 1" in log.msg]
+
+    before = len(ready.decided(Action.FLIGHT_BLOCK)), ready.states[-1].decision_id
+    for number in (SafetyRequest.NONE, 200, 200):
+        request(ready, number)
+    request(ready, 4, link="another")
+    # Only after all of them does this one come.
+    request(ready, SafetyRequest.FLIGHT_BLOCK, link="last")
+    state = ready.await_stage(SafetyState.BLOCKED)
+    assert list(state.device_blocks) == ["last 33"]
+    ready.bench.until(lambda: len(complaints()) >= 2, "it is logged")
+    assert [text.split(":")[0] for text in complaints()] == [
+        "upf_can 33 asks for 0",
+        "another 33 asks for 4",
+    ]
+    assert state.decision_id == before[1] + 1, "nothing but the block was decided"
+    assert len(ready.decided(Action.FLIGHT_BLOCK)) <= before[0] + 1
 
 
 # Its own heartbeat and diagnostics

@@ -37,21 +37,41 @@ _SHOWN_BY: dict[str, tuple[ParachuteState, ...]] = {
 }
 
 
-def read_answer(definitions: Definitions) -> Callable[[CallFinished], CallFinished]:
-    """Says of an answered call of the flyfire services what its result means."""
+#: Forced or not -> the request.
+_DEPLOYS = {False: "TYPE_DEPLOY", True: "TYPE_DEPLOY_FORCE"}
+DEPLOY_PREFIX = "TYPE_DEPLOY"
+#: Every request of ParachuteService.
+REQUESTS = (*_SHOWN_BY, *_DEPLOYS.values())
+
+
+def read_answer(
+    definitions: Definitions, deploy_answered: Callable[[int], None] = lambda _: None
+) -> Callable[[CallFinished], CallFinished]:
+    """Says of an answered call of the flyfire services what its result means. deploy_answered:
+    is told the node id of a controller that answered a deploy."""
 
     def read(finished: CallFinished) -> CallFinished:
         assert finished.values is not None
-        name = definitions.result_name(finished.command.service, finished.values)
+        call = finished.command
+        name = definitions.result_name(call.service, finished.values)
+        if definitions.type_name(call.service, call.values) in _DEPLOYS.values():
+            deploy_answered(call.server)
         return replace(
             finished,
             accepted=name == "SUCCESS",
             not_now="TEMPORARILY" in name or "BUSY" in name,
             result=int(finished.values["result"]),
-            words=name.lower().replace("_", " "),
+            words=_words(name),
         )
 
     return read
+
+
+def _words(result: str) -> str:
+    """A result as it is told: every refusal that is final says that it failed."""
+    words = result.lower().replace("_", " ")
+    final = result != "SUCCESS" and "TEMPORARILY" not in result and "BUSY" not in result
+    return f"failed: {words}" if final and words != "failed" else words
 
 
 def excluded(controller: Controller, type_name: str) -> str:
@@ -101,7 +121,7 @@ def deploy(
             return True
         return any(_fired(trigger, now) for trigger in triggers())
 
-    type_name = "TYPE_DEPLOY_FORCE" if force else "TYPE_DEPLOY"
+    type_name = _DEPLOYS[force]
     return Goal(
         DEPLOY,
         (_call(controller, definitions, type_name, FIRE_PRIORITY),),

@@ -1,0 +1,75 @@
+"""Requests to a link's thread: each has a token, and whoever waits for it gets its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from rclpy.task import Future
+
+from chute_ros import model
+
+Begin = Callable[[Any, int, float], None]
+
+
+@dataclass(frozen=True)
+class CallFailed:
+    """A request could not even be begun, by a mistake of ours."""
+
+    token: int
+    text: str
+
+
+class RequestDesk:
+    """call: has a function called in the link's thread; deliver: hands events to the executor;
+    report: tells the supervisor how far a decision got."""
+
+    def __init__(
+        self,
+        call: Callable[[Callable[[Any, float], None]], None],
+        deliver: Callable[[list[Any]], None],
+        report: Callable[[model.Decision, model.Outcome, str], None],
+    ) -> None:
+        self._in_link, self._deliver, self._report = call, deliver, report
+        self._tokens = count(1)
+        self._waiting: dict[int, Future] = {}
+        self._decisions: dict[int, model.Decision] = {}
+
+    def request(self, begin: Begin) -> Future:
+        """Have begin(link, token, now) called in the link's thread; the future is its end."""
+        token = next(self._tokens)
+        self._waiting[token] = future = Future()
+        self._call(token, begin)
+        return future
+
+    def request_for(self, decision: model.Decision, begin: Begin) -> None:
+        """The same on behalf of a decision: its steps are reported on safety/action."""
+        token = next(self._tokens)
+        self._decisions[token] = decision
+        self._call(token, begin)
+
+    def finished(self, token: int, end: Any) -> None:
+        """A request ended: its caller gets end."""
+        self._decisions.pop(token, None)
+        future = self._waiting.pop(token, None)
+        if future is not None:
+            future.set_result(end)
+
+    def report(self, token: int, outcome: model.Outcome, detail: str) -> None:
+        """A request got a step further; if a decision stands behind it, the supervisor is told."""
+        decision = self._decisions.get(token)
+        if decision is not None:
+            self._report(decision, outcome, detail)
+
+    def _call(self, token: int, begin: Begin) -> None:
+        def begin_or_say(link: Any, now: float) -> None:
+            try:
+                begin(link, token, now)
+            except Exception as error:
+                # Whoever waits must get an answer; the loop reports the mistake itself.
+                self._deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
+                raise
+
+        self._in_link(begin_or_say)

@@ -1,0 +1,72 @@
+"""The table of unique id to node id on the disk. It survives a crash in the middle of writing."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from chute_ros.errors import ParameterError
+from chute_ros.protocol.dronecan.allocation import HIGHEST, LOWEST, UNIQUE_ID_LENGTH
+
+
+class AllocationFile:
+    """path: of the file; empty: under ROS_HOME (~/.ros), named after the node."""
+
+    def __init__(self, path: str, node_name: str) -> None:
+        self.path = Path(path).expanduser() if path else _default_path(node_name)
+
+    def load(self) -> dict[bytes, int]:
+        """The table; empty if there is no file. ParameterError if it cannot be believed: to begin
+        anew could give a node id of one device to another."""
+        try:
+            text = self.path.read_text()
+        except FileNotFoundError:
+            return {}
+        except (OSError, UnicodeDecodeError) as error:
+            raise self._unusable(str(error)) from None
+        try:
+            entries = json.loads(text)
+            table = {bytes.fromhex(unique_id): int(n) for unique_id, n in entries.items()}
+        except (ValueError, AttributeError, TypeError):
+            raise self._unusable("it holds no table of unique id to node id") from None
+        for unique_id, node_id in table.items():
+            if len(unique_id) != UNIQUE_ID_LENGTH or not LOWEST <= node_id <= HIGHEST:
+                raise self._unusable(f"{unique_id.hex()}: {node_id} is no allocation")
+        if len(set(table.values())) < len(table):
+            raise self._unusable("it gives one node id to two devices")
+        return table
+
+    def save(self, table: Mapping[bytes, int]) -> None:
+        """Write all beside the file, then put it in its place; OSError if that fails."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        beside = self.path.with_name(f"{self.path.name}.{os.getpid()}.new")
+        text = json.dumps({key.hex(): n for key, n in sorted(table.items())}, indent=1) + "\n"
+        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        try:
+            with os.fdopen(descriptor, "w") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(self.path)
+        except OSError:
+            beside.unlink(missing_ok=True)
+            raise
+        # The new name itself must be on the disk before anybody gets the node id.
+        folder = os.open(self.path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+    def _unusable(self, why: str) -> ParameterError:
+        return ParameterError(
+            f"parameter allocation_table_file: {self.path} cannot be used: {why}; repair it, or "
+            "move it away to begin anew with no device on the bus"
+        )
+
+
+def _default_path(node_name: str) -> Path:
+    home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
+    return home / "chute_ros" / f"{node_name.strip('/').replace('/', '.')}.node_ids.json"

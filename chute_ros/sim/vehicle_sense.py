@@ -1,0 +1,95 @@
+"""How a simulated UPF feels the simulated vehicle, and how the vehicle feels its canopy.
+
+A real controller has sensors of its own. Here it asks the simulated autopilot, over a MAVLink wire
+that only the two share, and tells it when the canopy is out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.sim.mavlink_device import MavlinkDevice
+from chute_ros.sim.upf_aps import Motion
+
+_COMPONENT_ID = 192  # MAV_COMP_ID_ONBOARD_COMPUTER2
+_AUTOPILOT = 1
+#: How often what is felt is asked for, s; silence after which it is asked again, s.
+_INTERVAL, _SILENCE = 0.05, 1.0
+_FELT = (
+    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    dialect.MAVLINK_MSG_ID_ATTITUDE,
+    dialect.MAVLINK_MSG_ID_SCALED_IMU,
+)
+_MILLI_G = 9.80665e-3
+
+
+class VehicleSense(MavlinkDevice):
+    """felt: gets the motion; released: says whether the canopy is out."""
+
+    def __init__(
+        self, system_id: int, felt: Callable[[Motion], None], released: Callable[[], bool]
+    ) -> None:
+        super().__init__(system_id, _COMPONENT_ID, [])
+        self._felt, self._released = felt, released
+        self._values = {"height": 0.0, "speed": 0.0, "tilt": 0.0, "acceleration": 9.80665}
+        self._heard = -math.inf
+        self._asked = -math.inf
+        self.streams = {
+            dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
+            dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS: self._status,
+        }
+        self.default_intervals = {
+            dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+            dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS: 0.05,
+        }
+
+    def step(self, now: float) -> None:
+        """Ask for what is not told often enough."""
+        if now - self._heard > _SILENCE and now - self._asked > _SILENCE:
+            self._asked = now
+            for message_id in _FELT:
+                number, interval_us = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, _INTERVAL * 1e6
+                self.send(
+                    dialect.MAVLink_command_long_message(
+                        *(self.system_id, _AUTOPILOT, number, 0),
+                        *(float(message_id), interval_us, 0.0, 0.0, 0.0, 0.0, 0.0),
+                    )
+                )
+
+    def heard(self, frame: Frame) -> None:
+        """The autopilot tells how the vehicle moves."""
+        message = frame.message
+        if frame.system_id != self.system_id or frame.component_id != _AUTOPILOT:
+            return
+        kind = message.get_type()
+        if kind == "GLOBAL_POSITION_INT":
+            self._values["height"] = message.relative_alt / 1000.0
+            self._values["speed"] = -message.vz / 100.0
+        elif kind == "ATTITUDE":
+            self._heard = self.now
+            upright = math.cos(message.roll) * math.cos(message.pitch)
+            self._values["tilt"] = math.acos(max(-1.0, min(1.0, upright)))
+        elif kind == "SCALED_IMU":
+            length = math.hypot(message.xacc, message.yacc, message.zacc)
+            self._values["acceleration"] = length * _MILLI_G
+        else:
+            return
+        values = self._values
+        self._felt(
+            Motion(values["height"], values["speed"], values["tilt"], values["acceleration"])
+        )
+
+    def _heartbeat(self) -> object:
+        return dialect.MAVLink_heartbeat_message(
+            dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3
+        )
+
+    def _status(self) -> object:
+        trigger = DeploymentTrigger.ATS if self._released() else DeploymentTrigger.NONE
+        return dialect.MAVLink_parachute_status_message(
+            self.boot_ms(), 0, 0, int(trigger), 0, 0, b""
+        )
