@@ -8,6 +8,8 @@ SHELL := /bin/bash
 PYTHON ?= python3
 DISTRO ?=
 DEMO_ARGS ?=
+# What the vehicle of the demo carries: mavlink, upf or both.
+PARACHUTE ?= mavlink
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -23,8 +25,8 @@ LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
-demo: build ## fly one simulated flight with the real nodes
-	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo $(DEMO_ARGS)
+demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both)
+	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo --parachute $(PARACHUTE) $(DEMO_ARGS)
 
 test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh

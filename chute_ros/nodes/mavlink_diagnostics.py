@@ -82,9 +82,9 @@ def link_task(
     return diagnostics.status(name, "link", level, text, values, connection)
 
 
-def parachute_tasks(name: str, details: Details) -> list[DiagnosticStatus]:
+def parachute_tasks(name: str, details: Details, expected: bool) -> list[DiagnosticStatus]:
     """One task for each parachute of ours."""
-    if not details.parachutes:
+    if not details.parachutes and expected:
         stale = diagnostics.STALE
         return [diagnostics.status(name, "parachute", stale, "never heard", {}, "")]
     return [_parachute_task(name, one) for one in details.parachutes]

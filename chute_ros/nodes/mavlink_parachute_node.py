@@ -63,6 +63,9 @@ class MavlinkParachuteNode(DeviceNode):
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         chosen = link.chosen_parachute()
         details = details_of(link, now)
+        if not self.values["expect_parachute"]:
+            state, age = details.vehicle.link_state, details.vehicle.armed_age
+            return Summary(state, state is model.LinkState.OK, age, details)
         if chosen is None:
             return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
         # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
@@ -116,7 +119,7 @@ class MavlinkParachuteNode(DeviceNode):
         wire = (self.loop.wire.is_open, self.wire_text, self.values["connection"])
         return [
             link_task(name, details, traffic, *wire),
-            *parachute_tasks(name, details),
+            *parachute_tasks(name, details, self.values["expect_parachute"]),
             autopilot_task(name, details.vehicle),
         ]
 

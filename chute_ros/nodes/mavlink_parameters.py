@@ -24,6 +24,12 @@ PARAMETERS = (
     Parameter("system_id", 1, "our own MAVLink system id: the vehicle's", 1, 255),
     Parameter("component_id", 191, "our own MAVLink component id", 1, 255),
     Parameter(
+        "expect_parachute",
+        True,
+        "a parachute is on this network; false: it is on another link, and this one's heartbeat "
+        "stands for the autopilot",
+    ),
+    Parameter(
         "parachute_system_id", 0, "system id of our parachutes; 0: of the first one heard", 0, 255
     ),
     Parameter("parachute_component_id", 0, "component id of our parachute; 0: any", 0, 255),

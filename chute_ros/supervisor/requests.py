@@ -152,7 +152,6 @@ class Requests(Steps):
                 alarms=(),
                 # A device that still wants it asks again; one that was exchanged cannot.
                 device_blocks=MappingProxyType({}),
-                block_refused=False,
             )
             self.note_released()
             self.finish(one.token, True, True, "back to the start")

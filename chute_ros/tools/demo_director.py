@@ -31,7 +31,10 @@ class Director:
         self._started = time.monotonic()
         self._failure_at: float | None = None
         self.vehicle = VehicleState()
-        self.parachute = ParachuteStatus()
+        #: The newest status of each link's parachute.
+        self.parachutes: dict[str, ParachuteStatus] = {}
+        #: When a parachute's own status first said deployed; 0: not yet.
+        self.deployed_at = 0.0
         self.safety = SafetyState()
         self.decisions: list[tuple[float, SafetyDecision]] = []
         self.reports: list[tuple[float, ActionReport]] = []
@@ -92,6 +95,10 @@ class Director:
         """The supervisor says that the vehicle is in this stage."""
         return lambda: self.safety.state == stage
 
+    def all_parachutes(self, condition: Callable[[ParachuteStatus], bool]) -> bool:
+        """Every link's parachute that was heard meets condition, and there is one."""
+        return bool(self.parachutes) and all(map(condition, self.parachutes.values()))
+
     def outcome(self, action: model.Action, outcome: model.Outcome) -> ActionReport | None:
         """The first report of this outcome of this action."""
         for _, report in self.reports:
@@ -124,7 +131,9 @@ class Director:
             self.track.append((time.monotonic(), message.height))
 
     def _parachute(self, message: ParachuteStatus) -> None:
-        self.parachute = message
+        self.parachutes[message.link] = message
+        if message.deployed and not self.deployed_at:
+            self.deployed_at = time.monotonic()
 
     def _safety(self, message: SafetyState) -> None:
         self.safety = message

@@ -10,6 +10,8 @@ from chute_ros.model import Action, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
 from chute_ros.supervisor.state import State
 
 LINKS = st.sampled_from([LINK, "upf_can", "stranger"])
@@ -31,6 +33,13 @@ EVIDENCE = st.one_of(
     ),
     st.builds(
         i.ParachuteReport, LINKS, st.sampled_from(["1/161", "33"]), st.just(False), st.just(())
+    ),
+    st.builds(
+        i.BlockRequest,
+        LINKS,
+        st.sampled_from(["33", "34"]),
+        st.booleans(),
+        st.sampled_from(["", "ABNORMAL"]),
     ),
 )
 RELEASED = st.builds(i.ParachuteReport, LINKS, st.just("1/161"), st.just(True), st.just(()))
@@ -83,6 +92,8 @@ class Run:
             elif isinstance(output, i.ArmDevices):
                 self.arming.append(output)
         assert next_deadline(CONFIG, self.state, self.now) > self.now
+        if self.state.stage in (Stage.READY, Stage.ARMED, Stage.LANDED):
+            assert not self.state.device_blocks, "a device that asks blocks flight on the ground"
         return outputs
 
     def answer_arming(self, success: bool) -> None:
@@ -153,3 +164,20 @@ def test_the_same_inputs_give_the_same_decisions(sequence: list) -> None:
     first, second = Run(sequence), Run(sequence)
     assert first.state == second.state
     assert first.decisions == second.decisions
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(
+        st.builds(i.BlockRequest, LINKS, st.text(max_size=3), st.booleans(), st.text(max_size=3)),
+        max_size=200,
+    ),
+    st.integers(0, 2 * MOST_DEVICE_BLOCKS),
+)
+def test_made_up_names_do_not_grow_it_and_releases_leave_nothing(asked: list, more: int) -> None:
+    asked += [i.BlockRequest("stranger", f"made up {n}", True, "") for n in range(more)]
+    run = Run([(0.001, one) for one in asked])
+    assert len(run.state.device_blocks) <= MOST_DEVICE_BLOCKS
+    releases = [i.BlockRequest(one.link, one.device, False, "") for one in asked]
+    run.update(tuple(releases))
+    assert dict(run.state.device_blocks) == {}

@@ -1,6 +1,6 @@
 """The demo flies end to end, and fails loudly where a step cannot happen.
 
-Both run at the same time, which also shows that two runs side by side do not meet.
+All run at the same time, which also shows that runs side by side do not meet.
 """
 
 import os
@@ -24,13 +24,17 @@ def start(*arguments):
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """(exit code, stdout, stderr, folder of the logs) of a good run and of a spoiled one."""
-    good, bad = (tmp_path_factory.mktemp(name) for name in ("good", "bad"))
+    good, bad, upf, both = (
+        tmp_path_factory.mktemp(name) for name in ("good", "bad", "upf", "both")
+    )
     children = (
         start("--logs", str(good)),
         start("--logs", str(bad), "--fault", "parachute-mute"),
+        start("--logs", str(upf), "--parachute", "upf"),
+        start("--logs", str(both), "--parachute", "both"),
     )
     ends = []
-    for child, folder in zip(children, (good, bad), strict=True):
+    for child, folder in zip(children, (good, bad, upf, both), strict=True):
         out, err = child.communicate(timeout=120.0)
         ends.append((child.returncode, out, err, folder))
     return ends
@@ -75,6 +79,34 @@ def test_it_keeps_the_logs_where_it_is_told_to(runs):
     assert "RELEASED by" in logs["parachute.log"]
     assert "FLIGHT TERMINATION" in logs["autopilot.log"]
     assert not any("Traceback" in text for text in logs.values())
+
+
+def test_with_a_upf_parachute_its_own_algorithm_fires_after_the_kill(runs):
+    code, out, err, folder = runs[2]
+    assert code == 0, out + err
+    story = [
+        "upf_can 33 heard",
+        "upf_can 33 armed",
+        "MOTOR FAILURE at",
+        "KILL (upf_can 33: it is about to launch (TYPE_KILLSWITCH))",
+        "KILL CONFIRMED",
+        "its own status says deployed",
+        "CANOPY OPEN",
+        "DEMO PASSED",
+    ]
+    places = [out.find(step) for step in story]
+    assert -1 not in places, out
+    assert places == sorted(places), "in this order"
+    log = (folder / "upf.log").read_text()
+    assert log.index("TYPE_KILLSWITCH answered: SUCCESS") < log.index("FIRED by")
+
+
+def test_with_both_parachutes_the_operators_deploy_goes_to_both(runs):
+    code, out, err, folder = runs[3]
+    assert code == 0, out + err
+    assert "mavlink_parachute DEPLOY CONFIRMED" in out
+    assert "RELEASED by" in (folder / "parachute.log").read_text()
+    assert "FIRED by" in (folder / "upf.log").read_text()
 
 
 def test_where_a_step_cannot_happen_it_fails_loudly(runs):

@@ -1,0 +1,123 @@
+"""What a simulated flight consists of: the processes for each parachute, and their wires."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chute_ros.tools.isolation import free_udp_ports
+from chute_ros.tools.processes import Processes
+
+MAVLINK, UPF = "mavlink_parachute", "upf_can"
+#: Links that have the parachute, by the name of the rig.
+KINDS: dict[str, tuple[str, ...]] = {
+    "mavlink": (MAVLINK,),
+    "upf": (UPF,),
+    "both": (MAVLINK, UPF),
+}
+#: What --fault adds to the command line of the simulated parachute.
+FAULTS = {"parachute-silent": ("--at", "0:silent"), "parachute-mute": ("--at", "0:mute")}
+_LOCAL = "127.0.0.1"
+#: The operator arms it on the ground: nothing that would do so by itself is on.
+_BY_COMMAND = ("Enable Auto-Takeoff", "Enable Auto-Arm", "Enable Auto-Disarm", "Enable Auto-Land")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """One vehicle with its nodes. kind: one of KINDS; fault: one of FAULTS, or empty."""
+
+    kind: str
+    fault: str
+    namespace: str
+    processes: Processes
+    node_port: int
+    vehicle_port: int
+    bus_port: int
+
+    @classmethod
+    def on_free_ports(cls, kind: str, fault: str, namespace: str, processes: Processes) -> Rig:
+        """With wires that nobody else uses."""
+        return cls(kind, fault, namespace, processes, *free_udp_ports(3))
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The links that have a parachute."""
+        return KINDS[self.kind]
+
+    @property
+    def pilot(self) -> str:
+        """Where the pilot reaches the autopilot."""
+        return f"udpout:{_LOCAL}:{self.vehicle_port}"
+
+    @property
+    def automatic(self) -> bool:
+        """The parachute's own algorithm fires, not the operator."""
+        return self.kind == "upf"
+
+    def start_vehicle(self) -> None:
+        """Everything but the parachute."""
+        node = ("--ros-args", "-r", f"__ns:={self.namespace}")
+        links = ", ".join(dict.fromkeys((MAVLINK, *self.links)))
+        start = self.processes.start
+        start(
+            "supervisor",
+            "chute_ros.nodes.safety_supervisor",
+            *node,
+            *_parameter("required_links", f"[{links}]"),
+            *_parameter("deploy_links", f"[{', '.join(self.links)}]"),
+        )
+        start(
+            "mavlink",
+            "chute_ros.nodes.mavlink_parachute",
+            *node,
+            *_parameter("connection", f"udpin:{_LOCAL}:{self.node_port}"),
+            *_parameter("expect_parachute", str(MAVLINK in self.links).lower()),
+        )
+        if UPF in self.links:
+            start(
+                "upf_can",
+                "chute_ros.nodes.upf_can",
+                *node,
+                *_parameter("connection", self._bus),
+                *_parameter("allocator", "false"),
+            )
+        start(
+            "autopilot",
+            "chute_ros.sim.sim_autopilot",
+            *(
+                "--connection",
+                self._network,
+                "--connection",
+                f"udpin:{_LOCAL}:{self.vehicle_port}",
+            ),
+        )
+
+    def start_parachute(self) -> None:
+        """Plug it in."""
+        fault = FAULTS.get(self.fault, ())
+        if MAVLINK in self.links:
+            wires = ("--connection", self._network, "--connection", self.pilot)
+            self.processes.start(
+                "parachute", "chute_ros.sim.sim_mavlink_parachute", *wires, *fault
+            )
+        if UPF in self.links:
+            off = [*_BY_COMMAND, *(() if self.automatic else ("Enable APS",))]
+            parameters = [part for name in off for part in ("--parameter", f"{name}=false")]
+            self.processes.start(
+                "upf",
+                "chute_ros.sim.sim_upf",
+                *("--connection", self._bus, "--vehicle", self.pilot),
+                *parameters,
+                *fault,
+            )
+
+    @property
+    def _network(self) -> str:
+        return f"udpout:{_LOCAL}:{self.node_port}"
+
+    @property
+    def _bus(self) -> str:
+        return f"mcast:0:{self.bus_port}"
+
+
+def _parameter(name: str, value: str) -> tuple[str, str]:
+    return ("-p", f"{name}:={value}")

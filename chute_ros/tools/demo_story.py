@@ -1,0 +1,189 @@
+"""The story of the simulated flight: block, arm, climb, motor failure, kill, deploy, touchdown."""
+
+from __future__ import annotations
+
+import time
+
+from chute_ros.model import Action, Outcome, TriggerFlags, flag_names
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.chart import chart
+from chute_ros.tools.demo_director import Director, StepFailedError
+from chute_ros.tools.demo_rig import Rig
+from chute_ros.tools.pilot import Pilot
+
+FAILURE_HEIGHT = 60.0  # m
+#: The operator presses the button when it sinks faster than this, m/s.
+OPERATOR_SINK = -4.0
+#: What counts as carried by the canopy, and as a soft touchdown, m/s.
+CANOPY_SINK = -6.5
+
+
+def fly(rig: Rig, director: Director, pilot: Pilot) -> None:
+    """All of it; StepFailedError where a step does not happen in its time."""
+    director.say("demo", f"real nodes over real wires, in {rig.namespace}, on this host only")
+    rig.start_vehicle()
+    _preflight(director, pilot, rig)
+    _climb(director, pilot)
+    _fail(director, pilot)
+    if rig.automatic:
+        _automatic_deployment(director)
+    else:
+        _operator_deploys(director)
+    _descend(director)
+    _summary(director, rig)
+
+
+def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
+    director.until("the supervisor speaks", 20.0, lambda: bool(director.safety.links))
+    director.until("the autopilot is heard", 20.0, lambda: director.vehicle.armed != 0)
+    director.say("vehicle", f"autopilot {director.vehicle.source} heard, disarmed, on the ground")
+    director.until("flight is blocked", 20.0, lambda: director.safety.flight_blocked)
+    director.say("demo", f"no parachute yet: {'; '.join(director.safety.block_reasons)}")
+
+    director.say("pilot", "tries to arm the motors all the same")
+    pilot.arm()
+    arm = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+    director.until("the autopilot arms", 5.0, lambda: pilot.accepted(arm))
+    director.until("it is seen armed", 5.0, lambda: director.vehicle.armed == 2)
+    director.until("it is disarmed again", 5.0, lambda: director.vehicle.armed == 1)
+    director.say("vehicle", "armed, and disarmed at once: flight is blocked")
+
+    director.say("demo", "plugs the parachute in")
+    rig.start_parachute()
+
+    def all_heard() -> bool:
+        heard = director.all_parachutes(lambda one: one.link_state == 1)
+        return heard and set(director.parachutes) == set(rig.links)
+
+    director.until("the parachute is heard", 15.0, all_heard)
+    for link, one in director.parachutes.items():
+        director.say("parachute", f"{link} {one.device} heard")
+    director.until("flight is released", 15.0, director.stage(Stage.READY))
+    director.say("supervisor", "READY: every required link is healthy")
+
+    director.say("operator", "arms the parachute")
+    answer = director.ask_arm()
+    director.until("arming is answered", 10.0, answer.done)
+    if not answer.result().success:
+        raise StepFailedError(f"arming: {answer.result().message}")
+    director.until("it is seen armed", 5.0, lambda: director.all_parachutes(lambda p: p.armed))
+    for link, one in director.parachutes.items():
+        names = ", ".join(flag_names(TriggerFlags(one.armed_triggers)))
+        director.say("parachute", f"{link} {one.device} armed, its own status says: {names}")
+
+
+def _climb(director: Director, pilot: Pilot) -> None:
+    director.say("pilot", f"arms the motors and takes off to {FAILURE_HEIGHT:g} m")
+    pilot.arm()
+    director.until("the motors are armed", 5.0, lambda: director.vehicle.armed == 2)
+    pilot.take_off(FAILURE_HEIGHT)
+    director.until("the supervisor sees the take-off", 10.0, director.stage(Stage.IN_FLIGHT))
+    director.say("supervisor", "IN_FLIGHT")
+    for height in (20.0, 40.0, FAILURE_HEIGHT - 0.5):
+
+        def reached(height: float = height) -> bool:
+            return bool(director.vehicle.height >= height)
+
+        director.until(f"{height:g} m", 20.0, reached)
+        state = director.vehicle
+        director.say("vehicle", f"{state.height:5.1f} m, {state.vertical_speed:+5.1f} m/s")
+
+
+def _fail(director: Director, pilot: Pilot) -> None:
+    director.failure_now()
+    director.say("vehicle", f"MOTOR FAILURE at {director.vehicle.height:.1f} m")
+    pilot.fail_motor()
+
+
+def _operator_deploys(director: Director) -> None:
+    director.until("it falls", 5.0, lambda: director.vehicle.vertical_speed < OPERATOR_SINK)
+    director.say("operator", f"sees {director.vehicle.vertical_speed:.1f} m/s and calls deploy")
+    answer = director.ask_deploy("it falls")
+    director.until("the deploy is answered", 15.0, answer.done)
+    result = answer.result()
+    director.say(
+        "operator", f"success={result.success} accepted={result.accepted}: {result.message}"
+    )
+    if not result.success:
+        raise StepFailedError(f"deploy: {result.message}")
+    for step in (Outcome.ACCEPTED, Outcome.CONFIRMED):
+
+        def reported(step: Outcome = step) -> bool:
+            return director.outcome(Action.DEPLOY, step) is not None
+
+        director.until(f"the deploy is reported {step.name}", 5.0, reported)
+
+
+def _automatic_deployment(director: Director) -> None:
+    """The controller feels the fall, asks for the kill, and launches once it is done."""
+
+    def killed() -> bool:
+        return director.outcome(Action.KILL, Outcome.CONFIRMED) is not None
+
+    director.until("the parachute asks for the kill, and gets it", 5.0, killed)
+    director.say("upf_can", "the motors are off: the kill switch is answered with success")
+    director.until("the parachute is out", 5.0, lambda: bool(director.deployed_at))
+    director.say("parachute", "its own status says deployed")
+
+
+def _descend(director: Director) -> None:
+    fastest = {"sink": 0.0}
+
+    def carried() -> bool:
+        fastest["sink"] = min(fastest["sink"], director.vehicle.vertical_speed)
+        slow = director.vehicle.vertical_speed > CANOPY_SINK
+        return slow and fastest["sink"] < CANOPY_SINK
+
+    director.until("the canopy carries", 15.0, carried)
+    state = director.vehicle
+    director.say(
+        "vehicle", f"CANOPY OPEN: {state.vertical_speed:+.1f} m/s at {state.height:.1f} m"
+    )
+    last = {"speed": 0.0}
+
+    def landed() -> bool:
+        if director.vehicle.height > 0.5:
+            last["speed"] = director.vehicle.vertical_speed
+        return bool(director.vehicle.landed_state == 1)
+
+    director.until("touchdown", 30.0, landed)
+    director.say("vehicle", f"TOUCHDOWN at {last['speed']:+.1f} m/s")
+    if last["speed"] < CANOPY_SINK:
+        raise StepFailedError(f"touchdown at {last['speed']:.1f} m/s (limit {CANOPY_SINK} m/s)")
+    director.until("the supervisor says deployed", 5.0, director.stage(Stage.DEPLOYED))
+
+
+def _summary(director: Director, rig: Rig) -> None:
+    """Times since the failure, and the flight as a picture."""
+    steps = [
+        ("kill decided", _decided(director, Action.KILL)),
+        ("kill on the wire", director.when(Action.KILL, Outcome.SENT)),
+        ("kill confirmed", director.when(Action.KILL, Outcome.CONFIRMED)),
+    ]
+    release = director.deployed_at
+    if not rig.automatic:
+        release = director.when(Action.DEPLOY, Outcome.SENT)
+        steps += [
+            ("deploy decided", _decided(director, Action.DEPLOY)),
+            ("release on the wire", release),
+            ("release acknowledged", director.when(Action.DEPLOY, Outcome.ACCEPTED)),
+        ]
+    steps.append(("parachute's own status: deployed", director.deployed_at))
+    times = dict(steps)
+    order = [times["kill on the wire"], times.get("deploy decided", release), release]
+    if order != sorted(order):
+        raise StepFailedError(f"the kill did not go before the deploy: {times}")
+    print("\n  since the failure")
+    for name, when in steps:
+        print(f"    {director.since_failure(when):7.3f} s  {name}")
+    marks = [(times["kill decided"], "K"), (release, "D")]
+    failure = time.monotonic() - director.since_failure(time.monotonic())
+    print("\n  height over time (F failure, K kill, D deploy)")
+    for line in chart(director.track, [(failure, "F"), *marks], width=64, rows=11):
+        print("  " + line)
+    print("\nDEMO PASSED: every step happened, the kill before the deploy")
+
+
+def _decided(director: Director, action: Action) -> float:
+    return next(when for when, decision in director.decisions if decision.action == action)
