@@ -1,9 +1,9 @@
 """One simulated vehicle: the nodes of vehicle.launch.py, an autopilot and a parachute.
 
-ros2 launch chute_ros simulation.launch.py namespace:=drone1 port:=14600
+ros2 launch chute_ros simulation.launch.py namespace:=drone1 port:=14600 parachute:=upf
 
 Only on this host: the simulators speak over loopback. Two vehicles need two namespaces and two
-ports; port + 1 is used as well.
+ports; port + 1 and port + 2 are used as well.
 """
 
 from ament_index_python.packages import get_package_share_directory
@@ -26,22 +26,34 @@ def _vehicle(context: LaunchContext) -> list:
     namespace = LaunchConfiguration("namespace").perform(context)
     port = int(LaunchConfiguration("port").perform(context))
     network, air = f"udpout:127.0.0.1:{port}", f"127.0.0.1:{port + 1}"
+    bus = f"mcast:0:{port + 2}"
+    parachute = LaunchConfiguration("parachute").perform(context)
+    parachutes = []
+    if parachute != "upf":
+        parachutes.append(_simulator("sim_mavlink_parachute", network, f"udpout:{air}"))
+    if parachute != "mavlink":
+        feel = ("--vehicle", f"udpout:{air}")
+        parachutes.append(_simulator("sim_upf", bus, arguments=feel))
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
             launch_arguments={
                 "namespace": namespace,
                 "connection": f"udpin:127.0.0.1:{port}",
+                "parachute": parachute,
+                "bus": bus,
             }.items(),
         ),
         _simulator("sim_autopilot", network, f"udpin:{air}"),
-        _simulator("sim_mavlink_parachute", network, f"udpout:{air}"),
+        *parachutes,
     ]
 
 
-def _simulator(executable: str, *connections: str) -> ExecuteProcess:
+def _simulator(
+    executable: str, *connections: str, arguments: list | None = None
+) -> ExecuteProcess:
     # Not a Node: launch_ros would add --ros-args, and a simulator knows nothing of ROS.
-    command: list = [ExecutableInPackage(executable, "chute_ros")]
+    command: list = [ExecutableInPackage(executable, "chute_ros"), *arguments]
     for connection in connections:
         command += ["--connection", connection]
     return ExecuteProcess(cmd=command, name=executable, output="screen")
@@ -54,6 +66,12 @@ def generate_launch_description() -> LaunchDescription:
             # A simulation must never meet a real vehicle on the network.
             SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
             DeclareLaunchArgument("namespace", default_value="sim", description="of the vehicle"),
+            DeclareLaunchArgument(
+                "parachute",
+                default_value="mavlink",
+                choices=["mavlink", "upf", "both"],
+                description="what the vehicle carries",
+            ),
             DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
             OpaqueFunction(function=_vehicle),
         ]

@@ -1,6 +1,7 @@
-"""One vehicle: mavlink_parachute and safety_supervisor, under a namespace of its own.
+"""One vehicle: its device nodes and safety_supervisor, under a namespace of its own.
 
 ros2 launch chute_ros vehicle.launch.py namespace:=drone1 connection:=udpin:0.0.0.0:14550
+ros2 launch chute_ros vehicle.launch.py namespace:=drone1 parachute:=upf bus:=socketcan:can0
 """
 
 from ament_index_python.packages import get_package_share_directory
@@ -12,11 +13,15 @@ from launch import LaunchContext, LaunchDescription
 
 
 def _nodes(context: LaunchContext) -> list:
-    """Both nodes with one parameter file; a connection that is given overrides the file's."""
+    """The nodes with one parameter file; a connection that is given overrides the file's."""
+    share = get_package_share_directory("chute_ros")
+    parachute = LaunchConfiguration("parachute").perform(context)
     config = LaunchConfiguration("config").perform(context)
+    config = config or share + f"/config/{parachute}_vehicle.yaml"
     namespace = LaunchConfiguration("namespace").perform(context)
     connection = LaunchConfiguration("connection").perform(context)
-    return [
+    bus = LaunchConfiguration("bus").perform(context)
+    nodes = [
         Node(
             package="chute_ros",
             executable="mavlink_parachute",
@@ -32,23 +37,44 @@ def _nodes(context: LaunchContext) -> list:
             output="screen",
         ),
     ]
+    if parachute != "mavlink":
+        nodes.append(
+            Node(
+                package="chute_ros",
+                executable="upf_can",
+                namespace=namespace,
+                parameters=[config, *([{"connection": bus}] if bus else [])],
+                output="screen",
+            )
+        )
+    return nodes
 
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments, and the nodes that they describe."""
-    share = get_package_share_directory("chute_ros")
     return LaunchDescription(
         [
             DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
             DeclareLaunchArgument(
+                "parachute",
+                default_value="mavlink",
+                choices=["mavlink", "upf", "both"],
+                description="what the vehicle carries",
+            ),
+            DeclareLaunchArgument(
                 "config",
-                default_value=f"{share}/config/mavlink_vehicle.yaml",
-                description="parameter file of both nodes",
+                default_value="",
+                description="parameter file of all nodes; empty: the one of this parachute",
             ),
             DeclareLaunchArgument(
                 "connection",
                 default_value="",
                 description="where the MAVLink network is; empty: as the parameter file says",
+            ),
+            DeclareLaunchArgument(
+                "bus",
+                default_value="",
+                description="where the CAN bus of a UPF is; empty: as the parameter file says",
             ),
             OpaqueFunction(function=_nodes),
         ]

@@ -2,14 +2,20 @@
 
 from pathlib import Path
 
+import pytest
+
 from chute_ros.tools import parameter_docs
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def test_the_config_file_is_up_to_date() -> None:
-    text = (ROOT / parameter_docs.CONFIG).read_text()
-    assert text == parameter_docs.config_text(), "run: make docs"
+@pytest.mark.parametrize("path", parameter_docs.CONFIGS, ids=str)
+def test_each_config_file_is_up_to_date(path: Path) -> None:
+    assert (ROOT / path).read_text() == parameter_docs.config_text(path), "run: make docs"
+
+
+def test_every_config_file_is_written_from_the_tables() -> None:
+    assert {*ROOT.glob("config/*.yaml")} == {ROOT / path for path in parameter_docs.CONFIGS}
 
 
 def test_the_tables_of_the_readme_are_up_to_date() -> None:

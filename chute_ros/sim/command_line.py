@@ -18,7 +18,6 @@ from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
-from chute_ros.transport.can_wire import make_can_wire
 from chute_ros.transport.loop import LoopFault, ProtocolLink, WireChange, WireLoop
 from chute_ros.transport.signing_key import signing_from_file
 from chute_ros.transport.wire import Wire, make_wire
@@ -150,6 +149,9 @@ def run_on_can(
     beside: Callable[[], contextlib.AbstractContextManager[Any]],
 ) -> None:
     """The same on CAN buses. beside: what else runs meanwhile."""
+    # Here: the simulators on MAVLink do without the library of DroneCAN.
+    from chute_ros.transport.can_wire import make_can_wire
+
     knobs = CanFaultKnobs(
         options.loss,
         options.duplicate,

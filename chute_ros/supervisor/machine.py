@@ -30,7 +30,7 @@ class Stimulus(enum.Enum):
     """What can move the vehicle from one stage to another."""
 
     LINKS_HEALTHY = "every required link is healthy"
-    LINKS_UNHEALTHY = "a required link is not healthy"
+    LINKS_UNHEALTHY = "a required link is not healthy, or a device asks to block flight"
     ARMED = "the parachute was armed"
     DISARMED = "the parachute was disarmed"
     TAKEN_OFF = "the vehicle is in the air"

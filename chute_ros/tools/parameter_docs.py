@@ -1,6 +1,6 @@
 """Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
 
-config/mavlink_vehicle.yaml and the tables between the marks in README.md. With --check it only
+The files in config/ and the tables between the marks in README.md. With --check it only
 says which of them is out of date.
 """
 
@@ -13,32 +13,62 @@ from pathlib import Path
 
 from chute_ros.nodes.device_node import COMMON_PARAMETERS
 from chute_ros.nodes.mavlink_parameters import PARAMETERS as MAVLINK_PARAMETERS
-from chute_ros.nodes.parameters import Parameter
+from chute_ros.nodes.parameters import Parameter, Value
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
+from chute_ros.nodes.upf_parameters import PARAMETERS as UPF_PARAMETERS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
     "mavlink_parachute": (*MAVLINK_PARAMETERS, *COMMON_PARAMETERS),
+    "upf_can": (*UPF_PARAMETERS, *COMMON_PARAMETERS),
     "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
-CONFIG = Path("config/mavlink_vehicle.yaml")
 README = Path("README.md")
+_MAVLINK, _UPF, _SUPERVISOR = NODES
+_BOTH_LINKS = [_MAVLINK, _UPF]
+#: File -> what its vehicle carries, its nodes, and what differs from the defaults.
+CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] = {
+    Path("config/mavlink_vehicle.yaml"): (
+        "a MAVLink parachute, all as delivered",
+        (_MAVLINK, _SUPERVISOR),
+        {},
+    ),
+    Path("config/upf_vehicle.yaml"): (
+        "a UPF parachute on DroneCAN and a MAVLink autopilot",
+        (_MAVLINK, _UPF, _SUPERVISOR),
+        {
+            (_MAVLINK, "expect_parachute"): False,
+            (_SUPERVISOR, "required_links"): _BOTH_LINKS,
+            (_SUPERVISOR, "deploy_links"): [_UPF],
+        },
+    ),
+    Path("config/both_vehicle.yaml"): (
+        "a MAVLink parachute and a UPF parachute on DroneCAN",
+        (_MAVLINK, _UPF, _SUPERVISOR),
+        {
+            (_SUPERVISOR, "required_links"): _BOTH_LINKS,
+            (_SUPERVISOR, "deploy_links"): _BOTH_LINKS,
+        },
+    ),
+}
 _HEAD = """\
-# Parameters of one vehicle with a MAVLink parachute, as delivered. The keys match the nodes in any
-# namespace. Give this file with --params-file, or as config:= of vehicle.launch.py.
-# Written by `make docs` from the tables in chute_ros/nodes.
+# Parameters of one vehicle with {}. The keys
+# match the nodes in any namespace. Give this file with --params-file, or as config:= of
+# vehicle.launch.py. Written by `make docs` from the tables in chute_ros/nodes.
 """
 _BEGIN, _END = "<!-- parameters of {} -->", "<!-- end of parameters of {} -->"
 
 
-def config_text() -> str:
-    """The whole of config/mavlink_vehicle.yaml."""
-    lines = [_HEAD]
-    for node, parameters in NODES.items():
+def config_text(path: Path) -> str:
+    """The whole of one file of CONFIGS."""
+    what, nodes, differs = CONFIGS[path]
+    lines = [_HEAD.format(what)]
+    for node in nodes:
         lines += [f"/**/{node}:", "  ros__parameters:"]
-        for parameter in parameters:
+        for parameter in NODES[node]:
             text = f"{parameter.description}; {_allowed(parameter)}"
             lines += [f"    # {line}" for line in textwrap.wrap(text, 92)]
-            lines.append(f"    {parameter.name}: {_yaml(parameter.default)}")
+            value = differs.get((node, parameter.name), parameter.default)
+            lines.append(f"    {parameter.name}: {_yaml(value)}")
         lines.append("")
     return "\n".join(lines)
 
@@ -61,12 +91,13 @@ def readme_text(before: str) -> str:
 
 
 def main() -> None:
-    """Write, or check, both files of the repository in the present folder."""
+    """Write, or check, the files of the repository in the present folder."""
     options = argparse.ArgumentParser("parameter_docs", description=__doc__)
     options.add_argument("--check", action="store_true", help="write nothing")
     check = options.parse_args().check
-    texts = {CONFIG: config_text(), README: readme_text(README.read_text())}
-    old = [str(path) for path, text in texts.items() if path.read_text() != text]
+    texts = {path: config_text(path) for path in CONFIGS}
+    texts[README] = readme_text(README.read_text())
+    old = [str(p) for p, text in texts.items() if not p.is_file() or p.read_text() != text]
     if check and old:
         sys.exit(f"out of date: {', '.join(old)}; run: make docs")
     if not check:

@@ -52,8 +52,8 @@ def test_it_starts_what_setup_installs(file):
 
 def test_both_together_start_nodes_and_simulators():
     names = set().union(*map(started, FILES))
-    assert names >= {"mavlink_parachute", "safety_supervisor"}
-    assert names >= {"sim_autopilot", "sim_mavlink_parachute"}
+    assert names >= {"mavlink_parachute", "upf_can", "safety_supervisor"}
+    assert names >= {"sim_autopilot", "sim_mavlink_parachute", "sim_upf"}
 
 
 @EVERY
@@ -76,6 +76,14 @@ def test_the_files_that_they_name_are_installed():
                     assert (ROOT / text.removeprefix("{share}/")).is_file(), text
 
 
+@pytest.mark.parametrize("file", ["simulation", "vehicle"])
+def test_every_parachute_that_can_be_chosen_has_a_parameter_file(file):
+    (one,) = [path for path in FILES if path.name.startswith(file)]
+    (argument,) = [c for c in calls(one, "DeclareLaunchArgument") if c[0] == "'parachute'"]
+    for parachute in ast.literal_eval(argument["choices"]):
+        assert (ROOT / "config" / f"{parachute}_vehicle.yaml").is_file()
+
+
 def test_the_simulation_stays_on_this_host():
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
     (variable,) = calls(simulation, "SetEnvironmentVariable")
@@ -87,6 +95,8 @@ def test_the_simulation_stays_on_this_host():
 def test_the_simulators_take_the_options_that_are_given_to_them():
     options = parser("any", "", "udpin:127.0.0.1:0", "")
     known = {text for action in options._actions for text in action.option_strings}
+    # Of sim_upf alone.
+    known |= {"--vehicle"}
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
     texts = [
         node.value
