@@ -8,12 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
+from chute_ros.protocol.dronecan.bus_node import BusNodeConfig
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
 
 #: As delivered (document, "node discovery"); never given out by the allocator.
 CONTROLLER_NODE_ID, TRIGGER_NODE_ID = 33, 34
+#: Of a node's name (uavcan.protocol.GetNodeInfo).
+MOST_NAME_BYTES = 80
 
 
 class Policy(enum.Enum):
@@ -60,6 +63,12 @@ class UpfConfig:
     utc_offset: float = 0.0
 
     def __post_init__(self) -> None:
+        if len(self.unique_id) != 16:
+            raise ParameterError(f"unique_id has {len(self.unique_id)} bytes: need 16")
+        if not 1 <= len(self.node_name.encode("utf-8", "replace")) <= MOST_NAME_BYTES:
+            raise ParameterError(
+                f"node_name is {self.node_name!r}: need 1 to {MOST_NAME_BYTES} bytes"
+            )
         if not 1 <= self.node_id <= 127:
             raise ParameterError(f"node_id is {self.node_id}: need 1 to 127")
         for name in ("controller_node_id", "trigger_node_id"):
@@ -80,3 +89,23 @@ class UpfConfig:
         ):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ParameterError(f"{name} is {getattr(self, name)}: need a time above 0 s")
+
+    def bus(self) -> BusNodeConfig:
+        """Who we are on the bus."""
+        never = (
+            CONTROLLER_NODE_ID,
+            TRIGGER_NODE_ID,
+            self.controller_node_id,
+            self.trigger_node_id,
+        )
+        return BusNodeConfig(
+            node_id=self.node_id,
+            name=self.node_name,
+            unique_id=self.unique_id,
+            calls=self.calls,
+            allocator=self.allocator,
+            table=self.allocation_table,
+            never=never,
+            time_master=self.time_master,
+            utc_offset=self.utc_offset,
+        )

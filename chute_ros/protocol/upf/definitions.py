@@ -39,6 +39,8 @@ class _Need:
     constants: tuple[str, ...]
     #: Only told: absent reads as not known.
     told: tuple[str, ...] = ()
+    #: Known, and left as it is: 0.
+    unused: tuple[str, ...] = ()
 
 
 _RESULTS = ("RESULT_SUCCESS", "RESULT_REJECTED")
@@ -84,7 +86,7 @@ _NEEDS = (
     ),
     _Need(TRIGGER_SERVICE, "request", ("magic_number", "type"), (MAGIC, "TYPE_LAUNCH")),
     _Need(TRIGGER_SERVICE, "response", ("result",), _RESULTS),
-    _Need(TRIGGER_LAUNCH, None, ("magic_number",), (MAGIC,)),
+    _Need(TRIGGER_LAUNCH, None, ("magic_number",), (MAGIC,), unused=("node_id",)),
     _Need(TRIGGER_STATUS, None, (), (), ("state", "is_launched", "error_flags", "supply_voltage")),
 )
 
@@ -113,7 +115,7 @@ class Definitions:
                 f"{where} constant {name}" for name in need.constants if name not in kind.constants
             ]
             self.absent += tuple(f"{need.name}.{n}" for n in need.told if n not in kind.fields)
-            known = (*need.fields, *need.told)
+            known = (*need.fields, *need.told, *need.unused)
             self.new += tuple(f"{need.name}.{n}" for n in kind.fields if n not in known)
         if missing:
             raise ParameterError(
@@ -121,9 +123,13 @@ class Definitions:
                 + ", ".join(missing)
             )
         status = types.message(PARACHUTE_STATUS)
-        self._states: dict[int, ParachuteState] = {
-            status.constants[f"STATE_{one.name}"]: one for one in _STATES
-        }
+        self._states: dict[int, ParachuteState] = {}
+        for one in _STATES:
+            number = status.constants[f"STATE_{one.name}"]
+            if number in self._states:
+                both = f"{self._states[number].name} and {one.name}"
+                raise ParameterError(f"{PARACHUTE_STATUS}: the states {both} are both {number}")
+            self._states[number] = one
         self._numbers: dict[ParachuteState, int] = {
             state: number for number, state in self._states.items()
         }

@@ -74,7 +74,9 @@ class Device:
         self.status_received = now
         self._overdue = False
         self.values = values
-        new = [one.rpartition(".")[2] for one in self.definitions.new if one.startswith(name)]
+        new = [
+            one.rpartition(".")[2] for one in self.definitions.new if one.startswith(f"{name}.")
+        ]
         self.unknown_fields = {field: values[field] for field in new if field in values}
         return self.liveness.heard(now)
 
@@ -92,8 +94,6 @@ class Device:
     def next_deadline(self) -> float:
         """When the picture changes by itself; infinity: never."""
         overdue = math.inf if self._overdue else self.status_received + self._timeout
-        if math.isnan(overdue):
-            overdue = math.inf
         return min(self.liveness.next_deadline(), overdue)
 
     @property
@@ -144,6 +144,14 @@ class Trigger(Device):
     def launched(self) -> bool:
         """It says that it has fired."""
         return bool(self.values.get("is_launched")) or self.state == "LAUNCHED"
+
+    @property
+    def sound(self) -> bool:
+        """Heard in time and able to fire, by all that it says."""
+        whole = not self.definitions.faults(names.TRIGGER_STATUS, self.values)
+        heard = self.liveness.state is LinkState.OK and not self._overdue
+        able = self.state in ("", "READY") and not self.launched
+        return heard and whole and able and not self.unhealthy
 
     def faults(self, now: float) -> list[str]:
         """What is wrong, in words."""
@@ -237,7 +245,8 @@ class Controller(Device):
         told = self.definitions.faults(names.PARACHUTE_STATUS, self.values)
         flags = ErrorFlags(0)
         for one in told:
-            flags |= _FLAGS.get(one, ErrorFlags(0))
+            # By a bit's name (IMU) or by that of a field of its own (error_imu).
+            flags |= _FLAGS.get(one.upper().removeprefix("ERROR_"), ErrorFlags(0))
         fired = any(trigger.launched for trigger in triggers)
         faults = self.faults(now)
         for trigger in triggers:

@@ -6,8 +6,8 @@ uavcan.protocol.param.GetSet, param.ExecuteOpcode, GetTransportStats, GetNodeInf
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from chute_ros.errors import ParameterError
@@ -53,19 +53,26 @@ Errand = Generator[Call, CallFinished, ErrandDone]
 
 def get_parameter(node_id: int, name: str) -> Errand:
     """Read one by name."""
+    if why := _bad_name(name):
+        return ErrandDone(False, why, node_id)
     answer = yield _get(node_id, name)
     found = _read(answer)
-    if found is None or not found.kind:
+    if found is None or not found.kind or found.name != name:
         return ErrandDone(False, _no_parameter(answer, name), node_id)
     text = f"{name} is {p.words(found.value)}{_range(found)}"
     return ErrandDone(True, text, node_id, (found,))
 
 
-def set_parameter(node_id: int, name: str, text: str) -> Errand:
-    """Read one for its type and range, set it, and read it back."""
+def set_parameter(
+    node_id: int, name: str, text: str, auto_save: Callable[[], bool | None] = lambda: None
+) -> Errand:
+    """Read one for its type and range, set it, and read it back. auto_save: whether the device
+    keeps a change by itself; None: not known."""
+    if why := _bad_name(name):
+        return ErrandDone(False, why, node_id)
     answer = yield _get(node_id, name)
     before = _read(answer)
-    if before is None or not before.kind:
+    if before is None or not before.kind or before.name != name:
         return ErrandDone(False, _no_parameter(answer, name), node_id)
     try:
         wanted = p.parse(text, before.kind, name)
@@ -76,17 +83,39 @@ def set_parameter(node_id: int, name: str, text: str) -> Errand:
     if number and (_below(wanted, low) or _below(high, wanted)):
         why = f"{name} cannot be {text}: need {p.words(low)} to {p.words(high)}; nothing was sent"
         return ErrandDone(False, why, node_id, (before,))
-    answer = yield Call(node_id, GET_SET, {"name": name.encode(), "value": p.union_of(wanted)})
+    values = {"name": _encoded(name), "value": p.union_of(wanted)}
+    answer = yield Call(node_id, GET_SET, values)
+    unknown = replace(before, value=None)
     if answer.values is None:
-        return ErrandDone(False, f"{name} may be set or not: {answer.text()}", node_id, (before,))
+        return ErrandDone(False, f"{name} may be set or not: {answer.text()}", node_id, (unknown,))
     answer = yield _get(node_id, name)
     after = _read(answer)
-    if after is None:
+    if after is None or after.name != name:
         why = f"{name} was sent, but not read back: {answer.text()}"
-        return ErrandDone(False, why, node_id, (before,))
-    good = _same(after.value, wanted)
-    verb = "is" if good else "was not taken: it still is"
-    return ErrandDone(good, f"{name} {verb} {p.words(after.value)}", node_id, (after,))
+        return ErrandDone(False, why, node_id, (unknown,))
+    if not _same(after.value, wanted):
+        why = f"{name} was not taken: it still is {p.words(after.value)}"
+        return ErrandDone(False, why, node_id, (after,))
+    keeps = p.as_switch(after.value) if name == p.AUTO_SAVE else auto_save()
+    what_follows = [f"{name} is {p.words(after.value)}", *_when(after), *_kept(keeps)]
+    return ErrandDone(True, "; ".join(what_follows), node_id, (after,))
+
+
+def _when(after: DeviceParameter) -> list[str]:
+    """When a new value begins to count, if it is not at once."""
+    if after.name != p.STATIC_NODE_ID:
+        return []
+    asks = "" if after.value else " (0: asks for a node id at each start)"
+    return [f"takes effect at the next start{asks}"]
+
+
+def _kept(keeps: bool | None) -> list[str]:
+    """Whether a new value survives a restart."""
+    if keeps is None:
+        return []
+    if keeps:
+        return ["kept"]
+    return [f"not kept over a restart until ~/save_params: {p.AUTO_SAVE} is off"]
 
 
 def list_parameters(node_id: int) -> Errand:
@@ -144,7 +173,19 @@ def _plain(node_id: int, service: str, what: str) -> Errand:
 
 
 def _get(node_id: int, name: str) -> Call:
-    return Call(node_id, GET_SET, {"name": name.encode()})
+    return Call(node_id, GET_SET, {"name": _encoded(name)})
+
+
+def _encoded(name: str) -> bytes:
+    return name.encode("utf-8", "replace")
+
+
+def _bad_name(name: str) -> str:
+    """What is wrong with the name of a parameter; empty: nothing."""
+    # An empty one would be a question by index, and set whatever has index 0.
+    if 1 <= len(_encoded(name)) <= p.MOST_NAME_BYTES:
+        return ""
+    return f"{name!r} is no parameter's name: need 1 to {p.MOST_NAME_BYTES} bytes"
 
 
 def _read(answer: CallFinished) -> DeviceParameter | None:

@@ -1,8 +1,8 @@
-"""A deploy that the controller does not acknowledge goes to the triggers directly.
+"""A deploy that the controller does not answer goes to the triggers directly.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "system architecture": the trigger is usually driven by
-the controller, but open to the vehicle. A controller that answers, and be it with a refusal, is
-not gone round.
+the controller, but open to the vehicle. A controller that refuses is not gone round; one that
+accepts and then falls silent is.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 @dataclass
 class _Watched:
-    due: float
+    node_id: int
     fire_at: float
     begun: bool = False
+    accepted: bool = False
 
 
 class LastResort:
@@ -25,12 +26,32 @@ class LastResort:
         self._interval = interval
         self._watched: dict[int, _Watched] = {}
 
-    def watch(self, token: int, due: float) -> None:
-        """The deploy with this token must be acknowledged by due."""
-        self._watched[token] = _Watched(due, due)
+    def watch(self, token: int, node_id: int, due: float, begun: bool = False) -> None:
+        """The controller with this node id must answer the deploy with this token by due.
+        begun: the triggers are fired anyway; it is only repeated."""
+        self._watched[token] = _Watched(node_id, due, begun)
+
+    def answered(self, node_id: int, accepted: bool) -> None:
+        """This controller answered a deploy. One that accepted may yet fall silent."""
+        for token in [t for t, one in self._watched.items() if one.node_id == node_id]:
+            if accepted:
+                self._watched[token].accepted = True
+                self._watched[token].fire_at = math.inf
+            else:
+                del self._watched[token]
+
+    def accepted_by(self) -> set[int]:
+        """Node ids of the controllers that have accepted a deploy which has not ended."""
+        return {one.node_id for one in self._watched.values() if one.accepted}
+
+    def silent(self, node_id: int, now: float) -> None:
+        """This controller is not heard any more."""
+        for one in self._watched.values():
+            if one.node_id == node_id and one.accepted:
+                one.accepted, one.fire_at = False, now
 
     def over(self, token: int) -> None:
-        """It was acknowledged, answered or ended."""
+        """It ended."""
         self._watched.pop(token, None)
 
     def update(self, now: float) -> tuple[list[int], bool]:

@@ -77,24 +77,44 @@ EXCLUDES: Mapping[str, str] = {
 PROTECTION = (ENABLE_PARACHUTE, ENABLE_APS)
 
 _TRUE, _FALSE = ("true", "on", "yes", "1"), ("false", "off", "no", "0")
+#: What uavcan.protocol.param.Value can hold.
+_LARGEST_INTEGER, _LARGEST_REAL, MOST_TEXT_BYTES = 2**63 - 1, 3.4028234e38, 128
+#: Of a name (uavcan.protocol.param.GetSet).
+MOST_NAME_BYTES = 92
+
+
+def switches_on(text: str) -> bool:
+    """text surely switches something on; whatever else it is may switch it off."""
+    return text.strip().lower() in _TRUE
 
 
 def parse(text: str, kind: str, name: str) -> Value:
     """The value in text for a parameter of this kind of GetSet ("integer", "real", "boolean",
     "string"); ParameterError with what is needed if it is none."""
-    word = text.strip()
     if kind == "string":
+        if len(text.encode("utf-8", "replace")) > MOST_TEXT_BYTES:
+            raise ParameterError(
+                f"{name} cannot be {text!r}: need at most {MOST_TEXT_BYTES} bytes"
+            )
         return text
+    word = text.strip().lower()
+    documented = BY_NAME.get(name)
+    if kind == "boolean" or (documented is not None and documented.kind is bool):
+        if word not in _TRUE + _FALSE:
+            raise ParameterError(f"{name} cannot be {text!r}: need true or false")
+        on = word in _TRUE
+        # A device may keep a switch as a number.
+        return on if kind == "boolean" else int(on) if kind == "integer" else float(on)
+    number: int | float
     try:
-        if kind == "integer":
-            return int(word, 0)
-        if kind == "real":
-            return float(word)
+        number, largest = (
+            (int(word, 0), _LARGEST_INTEGER) if kind == "integer" else (float(word), _LARGEST_REAL)
+        )
     except ValueError:
         raise ParameterError(f"{name} cannot be {text!r}: need a number ({kind})") from None
-    if word.lower() in _TRUE + _FALSE:
-        return word.lower() in _TRUE
-    raise ParameterError(f"{name} cannot be {text!r}: need true or false")
+    if not -largest <= number <= largest:
+        raise ParameterError(f"{name} cannot be {text!r}: no parameter can hold it")
+    return number
 
 
 def value_of(union: Mapping[str, Any]) -> Value | None:
@@ -118,7 +138,7 @@ def union_of(value: Value) -> dict[str, Any]:
         return {"integer_value": value}
     if isinstance(value, float):
         return {"real_value": value}
-    return {"string_value": value.encode()}
+    return {"string_value": value.encode("utf-8", "replace")}
 
 
 def kind_of(union: Mapping[str, Any]) -> str:
@@ -136,6 +156,6 @@ def words(value: Value | None) -> str:
 
 def as_switch(value: Value | None) -> bool | None:
     """A switch's value, which a device may send as a number as well; None: not known."""
-    if isinstance(value, (bool, int)):
+    if isinstance(value, (bool, int, float)):
         return bool(value)
     return None

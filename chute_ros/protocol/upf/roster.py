@@ -28,7 +28,7 @@ class UpfDevices:
 
     def __init__(self, config: UpfConfig, definitions: Definitions) -> None:
         self._config = config
-        self._definitions = definitions
+        self.definitions = definitions
         self.controllers: dict[int, Controller] = {}
         self.triggers: dict[int, Trigger] = {}
         #: Devices that were not followed: not ours by a parameter, or too many.
@@ -52,6 +52,14 @@ class UpfDevices:
     def alive_triggers(self) -> list[Trigger]:
         """Those that are heard."""
         return [trigger for trigger in self.triggers.values() if trigger.alive]
+
+    def no_controller(self, node_id: int) -> str:
+        """Why a request ends that needs the controller with this node id (0: any)."""
+        known = ", ".join(map(str, self.controllers)) or "none"
+        what = f"no controller {node_id}" if node_id else "no controller"
+        triggers = ", ".join(map(str, self.triggers))
+        beside = f"; triggers heard: {triggers}" if triggers else ""
+        return f"{what} was heard on this link (heard: {known}{beside})"
 
     def picture(self, now: float) -> ParachuteStatus | None:
         """The parachute, as this link sees it; None: there is none yet."""
@@ -96,9 +104,10 @@ class UpfDevices:
         if trigger is not None:
             fired = trigger.launched
             self._changed(trigger, trigger.status_message(values, now))
+            self._trigger_changed(trigger, now)
             if trigger.launched and not fired:
                 self.notice(Severity.WARNING, f"trigger {node_id} has fired")
-            self._trigger_changed(trigger, now)
+                self._controllers_changed(now)
 
     def node_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A NodeStatus of anybody."""
@@ -128,6 +137,7 @@ class UpfDevices:
             self._changed(trigger, changes)
             if picture_changed:
                 self._trigger_changed(trigger, now)
+                self._controllers_changed(now)
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
@@ -157,17 +167,26 @@ class UpfDevices:
             return None
         made: Device
         if known is self.controllers:
-            made = Controller(node_id, self._config, self._definitions)
+            made = Controller(node_id, self._config, self.definitions)
             self.to_read.append(made)
             self.controllers[node_id] = made
         else:
-            made = Trigger(node_id, self._config, self._definitions)
+            made = Trigger(node_id, self._config, self.definitions)
             self.triggers[node_id] = made
         return known[node_id]
 
     def _changed(self, device: Device, changes: list[LinkChange]) -> None:
         name = f"{device.kind} {device.node_id}"
         self._events += [DeviceLinkChanged(name, change) for change in changes]
+        if isinstance(device, Controller) and any(change.regained for change in changes):
+            # Nobody knows what was done to it meanwhile.
+            self.to_read.append(device)
+
+    def _controllers_changed(self, now: float) -> None:
+        """What a trigger says is part of the picture of the only controller."""
+        if len(self.controllers) == 1:
+            (controller,) = self.controllers.values()
+            self._events.append(ParachuteChanged(self.picture_of(controller, now)))
 
     def _trigger_changed(self, trigger: Trigger, now: float) -> None:
         self._events.append(TriggerChanged(trigger.node_id, trigger_picture(trigger, now)))

@@ -84,7 +84,10 @@ class VehicleService:
         self._standing: frozenset[str] = frozenset()
         self._blocked = False
         self._said_at: dict[str, float] = {}
+        #: Controllers -> the newest state that has a name.
         self._states: dict[str, ParachuteState] = {}
+        #: Devices that have asked for a release since we started.
+        self._released: set[str] = set()
         self._asks: list[AskSupervisor] = []
         self._responses: list[Response] = []
 
@@ -129,11 +132,13 @@ class VehicleService:
         """A controller's state: what it should have asked for when it entered it."""
         if self._config.flight_block_policy is Policy.REJECT:
             return
+        if state is ParachuteState.UNKNOWN:
+            return
         before, self._states[device] = self._states.get(device), state
         if state in BLOCKING:
             if device not in self._blocks:
                 self._want(device, f"it is {state.name}", now)
-        elif state is not ParachuteState.UNKNOWN and device in self._blocks:
+        elif device in self._blocks:
             # A request that was sent again may come after the release that followed it.
             entered = before is not state
             if entered or now - self._said_at[device] >= _BELIEVE_STATE_AFTER:
@@ -155,7 +160,9 @@ class VehicleService:
         """Flight is blocked or not, and the devices whose wish for it the supervisor knows."""
         self._blocked, self._standing = blocked, frozenset(standing)
         for device in sorted(set(self._blocks) ^ self._standing):
-            if now - self._said_at.get(device, -math.inf) >= _SAY_AGAIN:
+            # Of a device that has not said anything yet, a block from before we started stands.
+            heard = device in self._blocks or device in self._released or device in self._states
+            if heard and now - self._said_at.get(device, -math.inf) >= _SAY_AGAIN:
                 # It has not heard, or has started anew since.
                 self._want(device, self._blocks.get(device, ""), now)
         self._answer_what_is_so(now)
@@ -194,6 +201,7 @@ class VehicleService:
             self._asks.append(AskSupervisor(Ask.FLIGHT_BLOCK, device, reason))
         else:
             self._blocks.pop(device, None)
+            self._released.add(device)
             text = "it does not ask for it any more"
             self._asks.append(AskSupervisor(Ask.FLIGHT_BLOCK_RELEASE, device, text))
 

@@ -9,11 +9,79 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from chute_ros.model import NAN, LandedState, LinkState, VehicleState
+from chute_ros.errors import MessageError
+from chute_ros.model import NAN, Armed, LandedState, LinkState, ParachuteState, VehicleState
+from chute_ros.protocol.dronecan.endpoint import Endpoint
+from chute_ros.protocol.events import Severity
+from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.definitions import VEHICLE_STATUS, Definitions
+from chute_ros.protocol.upf.roster import UpfDevices
 
 #: Largest number that a float16 carries with sense, m or m/s.
 _LARGEST = 60000.0
+_FLYING = (ParachuteState.TAKEOFF, ParachuteState.ARMED)
+
+
+class Vehicle:
+    """Keeps what the vehicle says of itself, and tells it to the controllers."""
+
+    def __init__(self, config: UpfConfig, devices: UpfDevices, endpoint: Endpoint) -> None:
+        self._config = config
+        self._devices = devices
+        self._endpoint = endpoint
+        self._definitions = devices.definitions
+        self._state, self._received = VehicleState(), -math.inf
+        self._tell_at = -math.inf
+        self._owner_until = -math.inf
+        self._unsendable = False
+
+    def take(self, state: VehicleState, now: float) -> None:
+        """A vehicle/state came."""
+        self._state, self._received = state, now
+
+    def owner_alive(self, until: float) -> None:
+        """We may seem alive until this time."""
+        self._owner_until = until
+
+    def in_air(self, now: float) -> bool:
+        """By the vehicle or by the controller."""
+        vehicle, passed = self._state, now - self._received
+        limit = self._config.vehicle_state_age
+        flies = vehicle.landed_state not in (LandedState.UNKNOWN, LandedState.ON_GROUND)
+        if flies and vehicle.landed_state_age + passed <= limit:
+            return True
+        if vehicle.armed is Armed.ARMED and vehicle.armed_age + passed <= limit:
+            return True
+        controllers = self._devices.controllers.values()
+        return any(one.alive and one.state in _FLYING for one in controllers)
+
+    def update(self, now: float) -> None:
+        """Tell it, if it is time to."""
+        if now < self._tell_at:
+            return
+        if now >= self._owner_until:
+            # Silent, and at once again when the owner is back.
+            self._tell_at = self._owner_until
+            return
+        self._tell_at = now + self._config.vehicle_status_interval
+        connected = any(one.alive for one in self._devices.controllers.values())
+        age = self._config.vehicle_state_age
+        try:
+            values = vehicle_status(
+                self._definitions, self._state, self._received, age, connected, now
+            )
+            self._endpoint.broadcast(VEHICLE_STATUS, values)
+        except MessageError as error:
+            # The vendor's types have no way to say "not known": then nothing is said at all.
+            if not self._unsendable:
+                self._unsendable = True
+                self._devices.notice(
+                    Severity.WARNING, f"VehicleStatus is not sent while it is so: {error}"
+                )
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return self._tell_at if self._tell_at < self._owner_until else math.inf
 
 
 def vehicle_status(
@@ -24,7 +92,10 @@ def vehicle_status(
     parachute_connected: bool,
     now: float,
 ) -> dict[str, Any]:
-    """The fields that the types in use have. received: of vehicle, monotonic s; limit: s."""
+    """The fields that the types in use have. received: of vehicle, monotonic s; limit: s.
+
+    MessageError if the state is not known and the types cannot say so.
+    """
     passed = now - received
     lost = vehicle.link_state is LinkState.LOST
 
@@ -36,14 +107,24 @@ def vehicle_status(
     if known:
         on_ground = vehicle.landed_state is LandedState.ON_GROUND
         name = "STATE_ON_GROUND" if on_ground else "STATE_IN_AIR"
-    number = definitions.constant(VEHICLE_STATUS, name)
     values = {
-        "state": 0 if number is None else number,
+        "state": _number(definitions, name),
         "is_parachute_connected": parachute_connected,
         "height_of_home": _told(vehicle.height, fresh(vehicle.height_age)),
         "vz": _told(vehicle.vertical_speed, fresh(vehicle.vertical_speed_age)),
     }
-    return definitions.present(VEHICLE_STATUS, values)
+    present = definitions.present(VEHICLE_STATUS, values)
+    if present.get("state", 0) is None:
+        raise MessageError(f"{VEHICLE_STATUS} has no {name}, and 0 means another state")
+    return present
+
+
+def _number(definitions: Definitions, name: str) -> Any:
+    """The number of a state; one that has none is told as 0, unless that is another; None."""
+    number = definitions.constant(VEHICLE_STATUS, name)
+    if number is None and not definitions.state_name(VEHICLE_STATUS, {"state": 0}):
+        return 0
+    return number
 
 
 def _told(value: float, fresh: bool) -> float:

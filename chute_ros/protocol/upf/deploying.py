@@ -1,0 +1,109 @@
+"""Deploying: through the controller, or the triggers where it is silent or there is none.
+
+Source: Flyfire UPF UAVCAN protocol V1.0, "global working state" (TYPE_DEPLOY*) and "system
+architecture" (TriggerService, TriggerLaunch).
+"""
+
+from __future__ import annotations
+
+from chute_ros.model import Outcome
+from chute_ros.protocol.dronecan.calls import ServiceCalls
+from chute_ros.protocol.dronecan.endpoint import Endpoint
+from chute_ros.protocol.effect import Report
+from chute_ros.protocol.events import RequestReport, Severity
+from chute_ros.protocol.requests import Requests
+from chute_ros.protocol.upf import definitions as names
+from chute_ros.protocol.upf import goals
+from chute_ros.protocol.upf.config import UpfConfig
+from chute_ros.protocol.upf.devices import Controller, Trigger
+from chute_ros.protocol.upf.last_resort import LastResort
+from chute_ros.protocol.upf.roster import UpfDevices
+
+
+class Deploying:
+    """Begins deploys among the requests, and fires the triggers when it is time to."""
+
+    def __init__(
+        self,
+        config: UpfConfig,
+        devices: UpfDevices,
+        requests: Requests[ServiceCalls],
+        endpoint: Endpoint,
+        last_resort: LastResort,
+    ) -> None:
+        self._config = config
+        self._definitions = devices.definitions
+        self._devices = devices
+        self._requests = requests
+        self._endpoint = endpoint
+        self._last_resort = last_resort
+        self._reports: list[RequestReport] = []
+
+    def deploy(self, token: int, force: bool, node_id: int, now: float) -> None:
+        """Deploy through this controller; 0: the chosen one, or the trigger if there is none."""
+        controller = self._devices.controller(node_id)
+        trigger = self._devices.trigger()
+        if controller is not None:
+            self._by_controller(token, controller, force, now)
+        elif trigger is not None and not node_id:
+            self._by_trigger(token, trigger, now)
+        else:
+            self._requests.refuse(token, self._devices.no_controller(node_id))
+
+    def update(self, now: float) -> bool:
+        """Look at the clock; whether something was put among the calls."""
+        for node_id in self._last_resort.accepted_by():
+            controller = self._devices.controllers[node_id]
+            if not controller.alive or controller.overdue(now):
+                self._last_resort.silent(node_id, now)
+        begun, fire = self._last_resort.update(now)
+        for token in begun:
+            text = "the controller does not answer: firing the triggers directly"
+            self._devices.notice(Severity.ERROR, text)
+            self._reports.append(RequestReport(Report(token, Outcome.SENT, text)))
+        if fire:
+            for trigger in self._devices.triggers.values():
+                call = goals.trigger_call(trigger, self._definitions)
+                self._requests.commands.send_once(call, now)
+            self._broadcast()
+        return fire
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return self._last_resort.next_deadline()
+
+    def over(self, token: int) -> None:
+        """The request with this token ended."""
+        self._last_resort.over(token)
+
+    def take_reports(self) -> list[RequestReport]:
+        """Steps that were reached; each is handed out once."""
+        reports, self._reports = self._reports, []
+        return reports
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _by_controller(self, token: int, controller: Controller, force: bool, now: float) -> None:
+        self._requests.make_way_for_release(now)
+        triggers = self._devices.alive_triggers
+        goal = goals.deploy(controller, triggers, self._definitions, force, now)
+        self._requests.begin(token, goal, now)
+        if self._config.last_resort:
+            wait = self._config.last_resort_after if controller.alive else 0.0
+            self._last_resort.watch(token, controller.node_id, now + wait)
+
+    def _by_trigger(self, token: int, trigger: Trigger, now: float) -> None:
+        goal = goals.fire_trigger(trigger, self._definitions, now)
+        out = goal.shown is not None and goal.shown()
+        self._requests.begin(token, goal, now)
+        if not out:
+            self._broadcast()
+            # Every trigger, again and again, until one says that it has fired.
+            interval = self._config.effect.retry_interval
+            self._last_resort.watch(token, 0, now + interval, begun=True)
+
+    def _broadcast(self) -> None:
+        """TriggerLaunch: for every trigger."""
+        constants = self._definitions.types.message(names.TRIGGER_LAUNCH).constants
+        values = {"magic_number": constants[names.MAGIC]}
+        self._endpoint.broadcast(names.TRIGGER_LAUNCH, values, goals.FIRE_PRIORITY)

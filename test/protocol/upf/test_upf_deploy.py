@@ -1,0 +1,313 @@
+"""Deploying: through the controller, round a silent one, and without any."""
+
+import pytest
+from upf_link_bench import BY_REQUEST
+
+from chute_ros.protocol.upf import parameters as p
+
+SERVICE, TRIGGER, LAUNCH = (
+    "flyfire.ParachuteService",
+    "flyfire.TriggerService",
+    "flyfire.TriggerLaunch",
+)
+
+
+def deploy(story, force=False, token=1, node_id=0):
+    story.link.deploy(token, force, story.now, node_id)
+    return story.step()
+
+
+def armed(story):
+    """A made-up controller, armed, and a trigger."""
+    return story.trigger_status().status("ARMED").at(0.1).clear()
+
+
+def fired_at(story):
+    """Whether the triggers were fired directly."""
+    return bool(story.requests(TRIGGER) or story.messages(LAUNCH))
+
+
+# -- through the controller -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_deploy_is_done_when_the_controller_says_launched(bench, force):
+    story = deploy(bench().in_flight(), force).after(3.0)
+    name = "TYPE_DEPLOY_FORCE" if force else "TYPE_DEPLOY"
+    assert story.controller.requests_heard == [name]
+    assert story.steps(1) == ["SENT", "ACCEPTED", "CONFIRMED"]
+    assert story.trigger.fired
+    assert not fired_at(story)
+    assert ("KILL", "33") in story.asked()
+
+
+def test_forced_deploy_works_on_the_ground_where_a_plain_one_does_not(bench):
+    story = deploy(bench().ready()).after(1.0)
+    assert not story.end(1).success
+    assert "its state is READY: force sends TYPE_DEPLOY_FORCE" in story.end(1).message
+    assert deploy(story, True, token=2).after(2.0).end(2).success
+
+
+def test_deploy_through_the_service_is_the_same(bench):
+    story = bench().in_flight()
+    story.link.service(1, "TYPE_DEPLOY", 0, story.now)
+    assert story.after(2.0).end(1).success
+    story = bench().ready()
+    story.link.service(1, "TYPE_DEPLOY_FORCE", 33, story.now)
+    assert story.after(2.0).end(1).success
+
+
+def test_deploy_is_urgent_on_the_bus(bench):
+    story = armed(bench(""))
+    story.link.deploy(1, False, story.now)
+    story.link.update(story.now)
+    identifiers = [int.from_bytes(data[:4], "little") for data in story.link.take_output()]
+    assert 2 in [(identifier >> 24) & 0x1F for identifier in identifiers]
+
+
+def test_deploy_that_is_lost_is_sent_again(bench):
+    story = bench().in_flight()
+    story.loses = lambda from_link, data: from_link
+    deploy(story).after(0.4)
+    story.loses = lambda from_link, data: False
+    assert story.after(2.0).end(1).success
+    assert story.controller.requests_heard == ["TYPE_DEPLOY"]
+    assert not fired_at(story)
+
+
+def test_deploy_whose_answers_are_lost_is_done_by_the_status(bench):
+    story = deploy(armed(bench(""))).at(0.3).status("LAUNCHED")
+    assert (story.end(1).success, story.end(1).accepted) == (True, False)
+    assert not fired_at(story.at(9.0))
+
+
+def test_deploy_is_done_when_a_trigger_says_so(bench):
+    story = deploy(armed(bench(""))).at(0.3).trigger_status("LAUNCHED")
+    assert story.end(1).success
+
+
+@pytest.mark.parametrize("state", ["LAUNCHED", "TOUCHDOWN"])
+def test_deploy_of_a_parachute_that_is_out_sends_nothing(bench, state):
+    story = deploy(bench("").status(state).clear())
+    assert story.end(1).success
+    assert "nothing was sent" in story.end(1).message
+    assert story.requests(SERVICE) == []
+    assert not fired_at(story.at(9.0))
+
+
+def test_deploy_believes_no_status_from_before_a_loss(bench):
+    story = deploy(bench("").status("LAUNCHED").at(9.0).clear())
+    assert len(story.requests(SERVICE)) == 1
+    assert story.ends(1) == []
+    assert story.status("LAUNCHED").ends(1) == []  # of the same moment
+    assert story.after(0.01).status("LAUNCHED").end(1).success
+
+
+def test_deploy_can_name_its_controller(bench):
+    story = armed(bench("")).status("ARMED", 35).clear()
+    assert deploy(story, node_id=35).status("LAUNCHED", 33).ends(1) == []
+    assert story.after(0.1).status("LAUNCHED", 35).end(1).success
+    assert "no controller 77" in deploy(story, token=2, node_id=77).end(2).message
+
+
+# -- refusals ---------------------------------------------------------------------------------
+
+
+def test_refused_deploy_fails_and_is_not_gone_round(bench):
+    story = deploy(armed(bench("")))
+    story.answer_result(story.requests(SERVICE)[0], "REJECTED").at(9.0)
+    assert not story.end(1).success
+    assert "rejected" in story.end(1).message
+    assert not fired_at(story)
+
+
+def test_refused_forced_deploy_is_tried_again_but_not_gone_round(bench):
+    """A disabled parachute does not deploy, not even by force (document, Enable Parachute)."""
+    story = bench(parameters={**BY_REQUEST, p.ENABLE_PARACHUTE: False}).in_flight()
+    deploy(story, True).after(8.0)
+    assert not story.end(1).success
+    assert len(story.controller.requests_heard) > 5
+    assert "Enable Parachute is off: it never deploys, not even by force" in story.end(1).message
+    assert not fired_at(story)
+    assert not story.trigger.fired
+
+
+def test_deploy_that_is_not_possible_yet_goes_on_until_it_is_and_is_not_gone_round(bench):
+    story = bench(settings={"minimum_height": 5.0}).in_flight()
+    deploy(story).after(2.0)
+    assert story.ends(1) == []
+    assert not fired_at(story)
+    story.controller.motion = type(story.controller.motion)(height=20.0)
+    assert story.after(1.5).end(1).success
+
+
+def test_acknowledged_deploy_that_is_never_shown_is_a_failure_that_says_so(bench):
+    story = bench().in_flight()
+    story.trigger.stuck = True
+    deploy(story).after(8.0)
+    assert not story.end(1).success
+    assert "never showed: ParachuteStatus says LAUNCHED" in story.end(1).message
+
+
+def test_answer_to_another_request_is_no_answer_to_a_deploy(bench):
+    story = armed(bench("").status("READY"))
+    story.link.service(2, "TYPE_DISARM", 33, story.now)
+    (disarm,) = story.step().requests(SERVICE)
+    deploy(story).answer_result(disarm, "REJECTED")
+    assert fired_at(story.at(1.3))
+
+
+# -- the last resort --------------------------------------------------------------------------
+
+
+def test_silent_controller_is_gone_round_after_a_while(bench):
+    story = deploy(armed(bench("")))
+    assert not fired_at(story.at(1.0))
+    story.at(1.15)
+    assert len(story.requests(TRIGGER, "TYPE_LAUNCH")) == 1
+    assert len(story.messages(LAUNCH)) == 1
+    text = "the controller does not answer: firing the triggers directly"
+    assert text in story.notices()
+    constants = story.layout.types.message(LAUNCH).constants
+    assert story.messages(LAUNCH)[0]["magic_number"] == constants["MAGIC_NUMBER"]
+
+
+def test_triggers_are_fired_again_until_one_says_that_it_has(bench):
+    story = deploy(armed(bench(""))).at(2.0)
+    assert 4 <= len(story.messages(LAUNCH)) <= 5
+    assert len(story.requests(TRIGGER)) == len(story.messages(LAUNCH))
+    story.trigger_status("LAUNCHED")
+    assert story.end(1).success
+    count = len(story.messages(LAUNCH))
+    assert len(story.at(9.0).messages(LAUNCH)) == count
+    assert (
+        story.notices().count("the controller does not answer: firing the triggers directly") == 1
+    )
+
+
+def test_real_trigger_is_fired_round_a_mute_controller(bench):
+    story = bench().in_flight()
+    story.controller.mute = True
+    assert deploy(story).after(2.0).end(1).success
+    assert story.trigger.fired
+
+
+def test_lost_controller_is_gone_round_at_once(bench):
+    story = armed(bench("")).at(5.0).trigger_status().clear()
+    assert fired_at(deploy(story))
+
+
+def test_triggers_that_never_say_so_end_the_request_in_time(bench):
+    story = deploy(armed(bench(""))).at(9.0)
+    assert not story.end(1).success
+    count = len(story.messages(LAUNCH))
+    assert len(story.at(20.0).messages(LAUNCH)) == count
+
+
+def test_triggers_nobody_has_heard_are_told_by_broadcast(bench):
+    story = deploy(bench("").status("ARMED").clear()).at(2.0)
+    assert story.messages(LAUNCH)
+    assert not story.requests(TRIGGER)
+
+
+def test_controller_that_answers_late_stops_the_last_resort(bench):
+    story = deploy(armed(bench(""))).at(1.3)
+    count = len(story.messages(LAUNCH))
+    story.answer_result(story.requests(SERVICE)[-1], "REJECTED").at(9.0)
+    assert len(story.messages(LAUNCH)) == count
+
+
+def test_controller_that_accepts_and_then_falls_silent_is_gone_round(bench):
+    story = deploy(armed(bench("")))
+    story.answer_result(story.requests(SERVICE)[0], "SUCCESS").at(1.4).trigger_status()
+    assert not fired_at(story), "its last status is not too old yet"
+    assert fired_at(story.at(1.8))
+    assert story.trigger_status("LAUNCHED").end(1).success
+
+
+def test_controller_that_accepts_and_goes_on_speaking_is_not_gone_round(bench):
+    story = deploy(armed(bench("")))
+    story.answer_result(story.requests(SERVICE)[0], "SUCCESS")
+    while story.t < 4.0:
+        story.after(0.1).status("ARMED").trigger_status()
+    assert not fired_at(story)
+
+
+def test_last_resort_can_be_switched_off(bench):
+    story = deploy(armed(bench("", last_resort=False))).at(9.0)
+    assert not fired_at(story)
+    assert not story.end(1).success
+
+
+def test_last_resort_waits_as_long_as_it_is_told(bench):
+    story = deploy(armed(bench("", last_resort_after=0.3)))
+    assert not fired_at(story.at(0.39))
+    assert fired_at(story.at(0.41))
+
+
+# -- without a controller ---------------------------------------------------------------------
+
+
+def test_trigger_is_fired_where_there_is_no_controller(bench):
+    story = deploy(bench("trigger", without_controller=True).ready()).after(1.0)
+    assert story.end(1).success
+    assert story.end(1).message.startswith("TriggerStatus of 34 says launched")
+    assert story.trigger.fired
+    assert story.picture().deployed
+
+
+def test_trigger_that_does_not_hear_is_asked_again(bench):
+    story = deploy(bench("").trigger_status().clear()).at(1.5)
+    assert len(story.requests(TRIGGER, "TYPE_LAUNCH")) >= 4
+    assert story.trigger_status("LAUNCHED").end(1).success
+
+
+def test_every_trigger_is_fired_again_and_again_where_there_is_no_controller(bench):
+    story = deploy(bench("").trigger_status().trigger_status(node_id=36).clear()).at(1.5)
+    assert len(story.messages(LAUNCH)) >= 4
+    assert len(story.requests(TRIGGER)) > 1.5 * len(story.messages(LAUNCH)), "both are asked"
+    assert story.trigger_status("LAUNCHED", 36).end(1).success
+
+
+def test_trigger_that_refuses_is_asked_until_time_is_up(bench):
+    story = deploy(bench("").trigger_status().clear())
+    answered = 0
+    while story.t < 8.0:
+        for request in story.requests(TRIGGER)[answered:]:
+            story.answer_result(request, "REJECTED", 34)
+            answered += 1
+        story.after(0.1).trigger_status()
+    assert answered > 5
+    assert not story.end(1).success
+
+
+def test_trigger_that_has_fired_is_not_fired_again(bench):
+    story = deploy(bench("").trigger_status("LAUNCHED").clear())
+    assert story.end(1).success
+    assert not fired_at(story.at(9.0))
+
+
+def test_deploy_without_anybody_is_refused(bench):
+    story = deploy(bench(""))
+    assert story.end(1).message == "no controller was heard on this link (heard: none)"
+    assert not fired_at(story)
+
+
+# -- what may not come between ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("type_name", ["TYPE_DISARM", "TYPE_LAND"])
+def test_nothing_makes_the_parachute_less_ready_during_a_deploy(bench, type_name):
+    story = deploy(armed(bench("")))
+    story.link.service(2, type_name, 0, story.now)
+    assert "a deploy is under way" in story.step().end(2).message
+    assert len(story.requests(SERVICE)) == 1
+
+
+@pytest.mark.parametrize("type_name", ["TYPE_DISARM", "TYPE_LAND"])
+def test_what_makes_it_less_ready_gives_way_to_a_deploy(bench, type_name):
+    story = armed(bench(""))
+    story.link.service(2, type_name, 0, story.now)
+    deploy(story.step())
+    assert not story.end(2).success
+    assert "given up: a release was ordered" in story.end(2).message

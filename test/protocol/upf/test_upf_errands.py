@@ -1,0 +1,466 @@
+"""What is asked of a device besides flying: over a link with simulated and made-up devices."""
+
+import pytest
+from upf_link_bench import flying, landed
+
+from chute_ros.protocol.dronecan.calls import CallFinished
+from chute_ros.protocol.upf import errands
+from chute_ros.protocol.upf import parameters as p
+
+GET_SET, OPCODE = errands.GET_SET, errands.EXECUTE_OPCODE
+
+
+def parameter(name, union, **more):
+    return {"name": name.encode(), "value": union, **more}
+
+
+def set_it(story, name, text, force=False, node_id=0, token=1):
+    story.link.set_parameter(token, node_id, name, text, force, story.now)
+    return story.after(0.5)
+
+
+# -- one parameter ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", list(p.BY_NAME))
+def test_each_parameter_of_the_document_can_be_read(bench, name):
+    story = bench().ready()
+    story.link.errand(1, 0, lambda node_id: errands.get_parameter(node_id, name), story.now)
+    done = story.after(0.5).errand(1)
+    known = p.words(story.controller.values[name])
+    assert done.success
+    assert done.message.startswith(f"{name} is {known}")
+    assert done.parameters[0].default == story.controller.settings.values[name]
+
+
+@pytest.mark.parametrize("one", p.PARAMETERS, ids=lambda one: one.name)
+def test_each_parameter_of_the_document_can_be_set_and_is_read_back(bench, one):
+    story = bench().ready()
+    wanted = 50 if one.kind is int else not story.controller.values[one.name]
+    done = set_it(story, one.name, p.words(wanted)).errand(1)
+    assert done.success, done.message
+    assert story.controller.values[one.name] == wanted
+    assert done.parameters[0].value == wanted
+    assert story.link.devices.controllers[33].parameters[one.name] == wanted
+
+
+def test_parameter_that_the_device_does_not_have_is_said_with_the_known_ones(bench):
+    story = bench().ready()
+    story.link.errand(1, 0, lambda one: errands.get_parameter(one, "Enable Music"), story.now)
+    set_it(story, "Enable Music", "true", token=2)
+    for token in (1, 2):
+        done = story.errand(token)
+        assert not done.success
+        assert "no parameter 'Enable Music'" in done.message
+        assert "Static Node ID" in done.message
+
+
+@pytest.mark.parametrize("name", ["", "x" * 93])
+def test_name_that_no_parameter_can_have_is_refused_before_anything_is_sent(bench, name):
+    """An empty one asks by index: it would set whatever comes first, the node id."""
+    story = bench().ready()
+    story.link.errand(1, 0, lambda node_id: errands.get_parameter(node_id, name), story.now)
+    set_it(story, name, "50", token=2)
+    assert "need 1 to 92 bytes" in story.errand(1).message
+    assert "need 1 to 92 bytes" in story.errand(2).message
+    assert not story.requests(GET_SET)
+    assert story.controller.values[p.STATIC_NODE_ID] == 33
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "why"),
+    [
+        (p.LIGHT, "maybe", "need true or false"),
+        (p.STATIC_NODE_ID, "many", "need a number (integer)"),
+        (p.STATIC_NODE_ID, "126", "need 0 to 125"),
+        (p.NODE_STATUS_INTERVAL, "1", "need 2 to 1000"),
+        (p.PARACHUTE_STATUS_INTERVAL, "60001", "need 2 to 60000"),
+        (p.PARACHUTE_STATUS_INTERVAL, "9" * 30, "no parameter can hold it"),
+    ],
+)
+def test_value_that_does_not_fit_is_refused_before_it_is_sent(bench, name, text, why):
+    story = bench().ready()
+    before = dict(story.controller.values)
+    done = set_it(story, name, text).errand(1)
+    assert not done.success
+    assert why in done.message
+    assert "nothing was sent" in done.message
+    assert story.controller.values == before
+
+
+def test_limits_of_the_document_count_where_the_device_has_none(bench):
+    story = bench("").status("READY").clear()
+    story.link.set_parameter(1, 33, p.STATIC_NODE_ID, "126", False, story.now)
+    (question,) = story.step().requests(GET_SET)
+    story.answer_values(question, parameter(p.STATIC_NODE_ID, {"integer_value": 33}), 33)
+    assert "need 0 to 125" in story.errand(1).message
+
+
+def test_number_of_a_device_with_its_own_range(bench):
+    story = bench("").status("READY").clear()
+    story.link.set_parameter(1, 33, "Gain", "2.5", False, story.now)
+    limits = {"min_value": {"real_value": 0.0}, "max_value": {"real_value": 2.0}}
+    (question,) = story.step().requests(GET_SET)
+    story.answer_values(question, parameter("Gain", {"real_value": 1.0}, **limits), 33)
+    assert "need 0.0 to 2.0" in story.errand(1).message
+    story.clear().link.set_parameter(2, 33, "Gain", "0.1", False, story.now)
+    for now_is in (1.0, 0.1, 0.1):
+        answer = parameter("Gain", {"real_value": now_is}, **limits)
+        story.answer_values(story.step().requests(GET_SET)[-1], answer, 33)
+    assert story.errand(2).success  # as near as 32 bits come
+
+
+def test_device_that_answers_for_another_parameter_has_none_of_this_name(bench):
+    story = bench("").status("READY").clear()
+    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    (question,) = story.step().requests(GET_SET)
+    story.answer_values(question, parameter("Enable Music", {"boolean_value": 0}), 33)
+    assert "no parameter 'Enable Light'" in story.errand(1).message
+
+
+def test_device_that_does_not_take_a_value_is_believed(bench):
+    story = bench("").status("READY").clear()
+    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    for _ in range(3):
+        off = parameter(p.LIGHT, {"boolean_value": 0})
+        story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
+    assert story.errand(1).message == "Enable Light was not taken: it still is false"
+    assert not story.errand(1).success
+
+
+def test_device_that_answers_late_is_asked_again_and_heard(bench):
+    story = bench().ready()
+    story.controller.mute = True
+    story.link.set_parameter(1, 33, p.LIGHT, "false", False, story.now)
+    story.after(0.4)
+    story.controller.mute = False
+    assert story.after(1.0).errand(1).success
+
+
+@pytest.mark.parametrize(
+    ("answered", "text"),
+    [
+        (0, "Enable Light: no acknowledgement"),
+        (1, "Enable Light may be set or not: no acknowledgement"),
+        (2, "Enable Light was sent, but not read back: no acknowledgement"),
+    ],
+)
+def test_device_that_falls_silent_on_the_way_leaves_what_is_not_known_open(bench, answered, text):
+    story = bench("").status("READY")
+    controller = story.link.devices.controllers[33]
+    controller.parameters[p.LIGHT] = False
+    story.after(1.0).clear()
+    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    for _ in range(answered):
+        off = parameter(p.LIGHT, {"boolean_value": 0})
+        story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
+    done = story.after(2.0).errand(1)
+    assert not done.success
+    assert done.message.startswith(text)
+    assert controller.switch(p.LIGHT) is (False if answered == 0 else None)
+
+
+def test_text_parameter(bench):
+    story = bench("").status("READY").clear()
+    story.link.set_parameter(1, 33, "Owner", "us", False, story.now)
+    for now_is in (b"them", b"us", b"us"):
+        answer = parameter("Owner", {"string_value": now_is})
+        story.answer_values(story.step().requests(GET_SET)[-1], answer, 33)
+    assert story.errand(1).message == "Owner is us"
+
+
+# -- what becomes of it -----------------------------------------------------------------------
+
+
+def test_value_is_kept_where_auto_save_is_on(bench):
+    done = set_it(bench().ready(), p.LIGHT, "false").errand(1)
+    assert done.message == "Enable Light is false; kept"
+
+
+def test_value_is_not_kept_where_auto_save_is_off(bench):
+    story = bench(parameters={p.AUTO_SAVE: False}).ready()
+    done = set_it(story, p.LIGHT, "false").errand(1)
+    assert done.message == (
+        "Enable Light is false; not kept over a restart until ~/save_params: "
+        "Enable Auto-Save is off"
+    )
+    story.link.errand(2, 0, errands.restart, story.now)
+    story.after(1.0)
+    assert story.controller.values[p.LIGHT] is True
+
+
+def test_value_that_was_saved_survives(bench):
+    story = set_it(bench(parameters={p.AUTO_SAVE: False}).ready(), p.LIGHT, "false")
+    story.link.errand(2, 0, lambda one: errands.execute_opcode(one, 0), story.now)
+    assert story.after(0.5).errand(2).message == "save: done"
+    story.link.errand(3, 0, errands.restart, story.now)
+    story.after(1.0)
+    assert story.controller.values[p.LIGHT] is False
+
+
+def test_nothing_is_said_of_what_is_kept_where_auto_save_is_not_known(bench):
+    story = bench().ready()
+    done = set_it(story, p.LIGHT, "false", node_id=34).errand(1)
+    assert done.message == "Enable Light is false"
+    assert done.node_id == 34
+
+
+def test_auto_save_tells_of_itself(bench):
+    story = bench().ready()
+    assert "not kept" in set_it(story, p.AUTO_SAVE, "false").errand(1).message
+    done = set_it(story, p.AUTO_SAVE, "true", token=2).errand(2)
+    assert done.message == "Enable Auto-Save is true; kept"
+
+
+def test_node_id_takes_effect_at_the_next_start(bench):
+    done = set_it(bench().ready(), p.STATIC_NODE_ID, "40").errand(1)
+    assert done.message == "Static Node ID is 40; takes effect at the next start; kept"
+
+
+def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
+    story = set_it(bench().ready(), p.STATIC_NODE_ID, "0")
+    assert story.errand(1).message == (
+        "Static Node ID is 0; takes effect at the next start "
+        "(0: asks for a node id at each start); kept"
+    )
+    story.link.errand(2, 33, errands.restart, story.now)
+    story.after(6.0)
+    (given,) = [node_id for node_id in story.link.devices.controllers if node_id != 33]
+    assert story.controller.node_id == given
+    assert 1 <= given <= 125
+
+
+# -- the list ---------------------------------------------------------------------------------
+
+
+def test_list_has_all_twelve(bench):
+    story = bench().ready()
+    story.link.errand(1, 0, errands.list_parameters, story.now)
+    done = story.after(0.5).errand(1)
+    assert (done.success, done.message) == (True, "12 parameters")
+    assert [one.name for one in done.parameters] == list(p.BY_NAME)
+
+
+def test_list_is_read_from_a_new_controller_unasked(bench):
+    story = bench().ready()
+    known = story.link.devices.controllers[33].parameters
+    assert known == story.controller.values
+
+
+def test_list_of_a_device_that_falls_silent_tells_how_far_it_came(bench):
+    story = bench("").trigger_status().clear()
+    story.link.errand(1, 0, errands.list_parameters, story.now)
+    story.answer_values(
+        story.step().requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 34
+    )
+    done = story.after(3.0).errand(1)
+    assert not done.success
+    assert done.message.startswith("stopped after 1 parameters: no acknowledgement")
+    assert [one.name for one in done.parameters] == [p.LIGHT]
+
+
+def test_list_that_never_ends_is_ended(bench):
+    story = bench("").trigger_status().clear()
+    story.link.errand(1, 0, errands.list_parameters, story.now)
+    for _ in range(errands.MOST_PARAMETERS):
+        story.answer_values(
+            story.step().requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 34
+        )
+    done = story.errand(1)
+    assert not done.success
+    assert done.message == "stopped after 128 parameters: the device does not end its list"
+
+
+def test_controller_that_did_not_tell_its_parameters_is_asked_again(bench):
+    story = bench()
+    story.loses = lambda from_link, data: from_link
+    story.at(5.0)
+    assert not story.link.devices.controllers[33].parameters
+    story.loses = lambda from_link, data: False
+    assert story.at(20.0).link.devices.controllers[33].parameters == story.controller.values
+
+
+def test_controller_that_is_lost_is_not_asked_again_until_it_is_back(bench):
+    story = bench("").status("READY").at(30.0)
+    assert story.link._desk.next_deadline() == float("inf")
+    count = len(story.requests(GET_SET))
+    story.status("READY")
+    assert len(story.requests(GET_SET)) > count
+
+
+def test_list_of_a_controller_that_never_ends_is_not_begun_again(bench):
+    story = bench("").status("READY")
+    for _ in range(errands.MOST_PARAMETERS):
+        story.answer_values(
+            story.requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 33
+        )
+    story.clear()
+    for _ in range(40):
+        story.after(0.5).status("READY")
+    assert not story.requests(GET_SET)
+
+
+# -- memory, restart, who it is ---------------------------------------------------------------
+
+
+def test_erased_parameters_are_those_of_delivery_after_a_restart(bench):
+    story = set_it(bench().ready(), p.LIGHT, "false")
+    story.link.disturb(2, 0, False, lambda one: errands.execute_opcode(one, 1), story.now)
+    assert story.after(0.5).errand(2).message == "erase: done"
+    story.link.disturb(3, 0, False, errands.restart, story.now)
+    done = story.after(3.0).errand(3)
+    assert (done.success, done.message) == (True, "restart: the device answered that it will")
+    assert story.controller.values[p.LIGHT] is True
+    assert "node 33 restarted" in story.notices()
+    assert story.link.devices.controllers[33].restart_count == 1
+    assert story.link.devices.controllers[33].parameters == story.controller.values
+
+
+def test_restart_carries_the_magic_number_of_its_type(bench):
+    story = bench("").status("READY").clear()
+    story.link.errand(1, 0, errands.restart, story.now)
+    (request,) = story.step().requests(errands.RESTART_NODE)
+    assert request.values == {"magic_number": 0xACCE551B1E}
+    story.answer_values(request, {"ok": False}, 33)
+    assert story.errand(1).message == "restart: the device answered that it will not"
+
+
+def test_opcode_that_the_device_refuses(bench):
+    story = bench().ready()
+    story.link.errand(1, 0, lambda one: errands.execute_opcode(one, 7), story.now)
+    done = story.after(0.5).errand(1)
+    assert done.message == "erase: the device answered that it did not"
+    assert not done.success
+
+
+@pytest.mark.parametrize(
+    ("make", "what"),
+    [
+        (lambda one: errands.execute_opcode(one, 0), "save"),
+        (errands.restart, "restart"),
+        (errands.node_info, "node information"),
+        (errands.transport_stats, "transport statistics"),
+        (lambda one: errands.get_parameter(one, p.LIGHT), p.LIGHT),
+    ],
+)
+def test_device_that_does_not_answer_ends_the_errand(bench, make, what):
+    story = bench("").status("READY").after(3.0).clear()
+    story.link.errand(1, 33, make, story.now)
+    done = story.after(2.0).errand(1)
+    assert not done.success
+    assert done.message.startswith(f"{what}: no acknowledgement after 3 sends")
+
+
+def test_node_information_and_statistics(bench):
+    story = bench().ready()
+    story.link.errand(1, 0, errands.node_info, story.now)
+    story.link.errand(2, 34, errands.transport_stats, story.now)
+    story.after(0.5)
+    assert bytes(story.errand(1).values["name"]) == b"upf.controller"
+    assert story.errand(2).values["transfers_tx"] > 0
+    assert story.errand(2).node_id == 34
+
+
+def test_errand_goes_to_the_trigger_where_there_is_no_controller(bench):
+    story = bench("trigger").ready()
+    story.link.errand(1, 0, errands.node_info, story.now)
+    assert bytes(story.after(0.5).errand(1).values["name"]) == b"upf.trigger"
+
+
+@pytest.mark.parametrize(
+    ("node_id", "why"), [(0, "no UPF device was heard"), (128, "there is no node id 128")]
+)
+def test_errand_without_a_device_ends_at_once(bench, node_id, why):
+    story = bench("")
+    story.link.errand(1, node_id, errands.node_info, story.now)
+    done = story.step().errand(1)
+    assert not done.success
+    assert done.message == f"{why} on this link; name a node id from 1 to 127"
+
+
+# -- in the air -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", p.PROTECTION)
+@pytest.mark.parametrize("text", ["false", "0", "0x0", "OFF"])
+def test_protection_is_not_switched_off_in_the_air(bench, name, text):
+    story = bench().in_flight()
+    done = set_it(story, name, text).errand(1)
+    assert not done.success
+    assert "force does it all the same" in done.message
+    assert not story.requests(GET_SET)
+    assert story.controller.values[name] is True
+
+
+@pytest.mark.parametrize("name", p.PROTECTION)
+def test_protection_is_switched_off_in_the_air_by_force_and_said_loudly(bench, name):
+    story = set_it(bench().in_flight(), name, "false", force=True)
+    assert story.errand(1).success
+    assert f"{name} is being switched off" in story.notices()
+    assert any(f"{name} is off" in fault for fault in story.picture().faults)
+
+
+@pytest.mark.parametrize("name", p.PROTECTION)
+def test_protection_is_switched_off_on_the_ground_and_on_anywhere(bench, name):
+    story = set_it(bench().ready(), name, "false")
+    assert story.errand(1).success
+    story.link.vehicle(flying(), story.now)
+    story.clear()
+    assert set_it(story, name, "true", token=2).errand(2).success
+    assert not story.notices()
+
+
+@pytest.mark.parametrize(
+    "make", [errands.restart, lambda one: errands.execute_opcode(one, errands.OPCODE_ERASE)]
+)
+def test_device_is_not_taken_away_in_the_air_unless_forced(bench, make):
+    story = bench("").status("ARMED").clear()
+    story.link.disturb(1, 0, False, make, story.now)
+    assert "refused while the vehicle is in the air" in story.step().errand(1).message
+    assert not story.requests(OPCODE) + story.requests(errands.RESTART_NODE)
+    story.link.disturb(2, 0, True, make, story.now)
+    assert story.step().requests(OPCODE) + story.requests(errands.RESTART_NODE)
+
+
+def test_vehicle_is_in_the_air_by_its_own_word_or_the_controllers(bench):
+    story = bench("")
+    said = [
+        (flying(), True),
+        (flying(landed_state_age=2.0), True),  # armed
+        (flying(landed_state_age=2.0, armed_age=2.0), False),  # too old
+        (landed(), False),
+        (landed(armed=flying().armed), True),
+    ]
+    for state, in_air in said:
+        story.link.vehicle(state, story.now)
+        assert story.link.in_air(story.now) is in_air
+    assert not story.link.in_air(story.now + 1.1)
+    for name, in_air in {
+        "READY": False,
+        "TAKEOFF": True,
+        "ARMED": True,
+        "LAUNCHED": False,
+    }.items():
+        story.status(name)
+        assert story.link.in_air(story.now + 1.1) is in_air
+    story.status("NOT_READY").status("READY").status("TAKEOFF").after(4.0)
+    assert not story.link.in_air(story.now)  # lost: its word is too old
+
+
+def test_errands_are_generators_that_know_no_bus():
+    """The golden order of a change: read, set, read back."""
+    errand = errands.set_parameter(33, p.LIGHT, "on")
+    told = {"name": b"Enable Light", "min_value": {"empty": {}}, "max_value": {"empty": {}}}
+    told |= {"default_value": {"empty": {}}, "value": {"boolean_value": 1}}
+    calls = [next(errand)]
+    for _ in range(2):
+        calls.append(errand.send(CallFinished(1, calls[-1], told, 1, 0.0)))
+    with pytest.raises(StopIteration) as end:
+        errand.send(CallFinished(1, calls[-1], told, 1, 0.0))
+    assert end.value.value.success
+    assert [call.values for call in calls] == [
+        {"name": b"Enable Light"},
+        {"name": b"Enable Light", "value": {"boolean_value": 1}},
+        {"name": b"Enable Light"},
+    ]
+    assert {(call.server, call.service) for call in calls} == {(33, GET_SET)}

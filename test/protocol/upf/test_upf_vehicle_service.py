@@ -1,0 +1,296 @@
+"""flyfire.VehicleService: what devices ask of the vehicle is answered by what really happened."""
+
+import pytest
+from upf_link_bench import Bench, flying, landed, layout_of
+
+from chute_ros.protocol.upf.config import Policy
+from chute_ros.protocol.upf.vehicle_service import KILL_MEMORY, MOST_PENDING
+
+KILL, BLOCK, RELEASE = "TYPE_KILLSWITCH", "TYPE_FLIGHT_BLOCK", "TYPE_FLIGHT_BLOCK_RELEASE"
+
+
+@pytest.fixture
+def alone(bench):
+    """A link without devices, whose supervisor does nothing by itself."""
+
+    def make(**config):
+        story = bench("", **config).step()
+        story.supervised = False
+        return story.clear()
+
+    return make
+
+
+def failed(story):
+    """The result for what was wanted but did not happen, in these types."""
+    return {"ours": "FAILED", "other": "REJECTED"}[story.layout.name]
+
+
+# -- kill switch ------------------------------------------------------------------------------
+
+
+def test_kill_is_answered_with_success_once_the_motors_are_off(alone):
+    story = alone().ask(KILL)
+    assert story.asked() == [("KILL", "33")]
+    assert story.at(0.3).answers() == []
+    story.link.kill_confirmed(story.now)
+    assert story.step().answers() == ["SUCCESS"]
+    assert story.link.vehicle_service.newest_answer == "TYPE_KILLSWITCH of 33: SUCCESS"
+    assert story.at(5.0).answers() == ["SUCCESS"]
+
+
+def test_kill_that_does_not_happen_is_answered_with_a_failure_in_time(alone):
+    story = alone().ask(KILL).at(0.79)
+    assert story.answers() == []
+    assert story.at(0.81).answers() == [failed(story)]
+    story.link.kill_confirmed(story.now)
+    assert story.step().answers() == [failed(story)]
+    assert story.link.counts["KILL not done in time"] == 1
+
+
+def test_limit_of_an_answer_is_a_parameter(alone):
+    story = alone(vehicle_service_timeout=2.0).ask(KILL).at(1.9)
+    assert story.answers() == []
+    assert story.at(2.1).answers() == [failed(story)]
+
+
+def test_kill_of_a_moment_ago_answers_a_request_that_comes_after_it(alone):
+    story = alone()
+    story.link.kill_confirmed(story.now)
+    assert story.at(KILL_MEMORY - 0.1).ask(KILL).answers() == ["SUCCESS"]
+    assert story.at(KILL_MEMORY + 0.1).ask(KILL, number=1).at(9.0).answers() == [
+        "SUCCESS",
+        failed(story),
+    ]
+
+
+def test_vehicle_that_is_armed_again_has_forgotten_the_kill(alone):
+    story = alone()
+    story.link.vehicle(flying(), story.now)
+    story.link.kill_confirmed(story.now)
+    story.at(0.5).link.vehicle(flying(armed_age=0.6), story.now)  # said before the kill
+    assert story.ask(KILL, number=1).answers() == ["SUCCESS"]
+    story.at(1.0).link.vehicle(landed(), story.now)
+    assert story.ask(KILL, number=2).answers() == ["SUCCESS"] * 2
+    story.at(1.5).link.vehicle(flying(), story.now)
+    assert story.ask(KILL, number=3).at(3.0).answers() == ["SUCCESS", "SUCCESS", failed(story)]
+
+
+def test_every_repetition_of_a_kill_is_answered(alone):
+    story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1)
+    story.link.kill_confirmed(story.now)
+    assert story.step().answers() == ["SUCCESS"] * 2
+    assert story.asked() == [("KILL", "33")] * 2
+
+
+# -- flight block -----------------------------------------------------------------------------
+
+
+def test_block_is_answered_once_the_supervisor_says_so_for_this_device(alone):
+    story = alone().ask(BLOCK)
+    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+    story.link.supervisor_said(True, {"34"}, story.now)  # blocked, but for another
+    assert story.step().answers() == []
+    story.link.supervisor_said(False, {"33"}, story.now)  # known, but not in force
+    assert story.step().answers() == []
+    story.link.supervisor_said(True, {"33"}, story.now)
+    assert story.step().answers() == ["SUCCESS"]
+
+
+def test_block_that_does_not_happen_is_answered_with_a_failure(alone):
+    story = alone().ask(BLOCK).at(2.0)
+    assert story.answers() == [failed(story)]
+
+
+def test_release_is_answered_once_the_supervisor_has_let_go(alone):
+    story = alone().ask(BLOCK)
+    story.link.supervisor_said(True, {"33"}, story.now)
+    story.at(1.0).ask(RELEASE, number=1)
+    assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
+    assert story.answers() == ["SUCCESS"]
+    story.link.supervisor_said(False, set(), story.now)
+    assert story.step().answers() == ["SUCCESS"] * 2
+
+
+def test_supervisor_that_has_not_heard_is_asked_again(alone):
+    story = alone().ask(BLOCK)
+    story.at(0.1).link.supervisor_said(False, set(), story.now)
+    assert len(story.step().asked()) == 1  # too soon to wonder
+    story.at(0.6).link.supervisor_said(False, set(), story.now)
+    assert story.step().asked() == [("FLIGHT_BLOCK", "33")] * 2
+
+
+def test_supervisor_that_started_anew_is_told_what_stands(bench):
+    story = bench("").status("ABNORMAL").at(2.0).clear()
+    assert story.standing == {"33"}
+    story.standing.clear()
+    story.supervisor_says().step()
+    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+    assert story.standing == {"33"}
+
+
+def test_supervisor_that_missed_a_release_is_told_again(alone):
+    story = alone().ask(BLOCK).at(0.1).ask(RELEASE, number=1).clear()
+    story.at(1.0).link.supervisor_said(True, {"33"}, story.now)
+    assert story.step().asked() == [("FLIGHT_BLOCK_RELEASE", "33")]
+
+
+def test_block_from_before_we_started_stands_until_its_device_says_something(alone):
+    """A link that starts anew knows nothing: that is no reason to let the vehicle fly."""
+    story = alone()
+    for t in (0.0, 1.0, 2.0):
+        story.at(t).link.supervisor_said(True, {"33"}, story.now)
+    assert story.step().asked() == []
+    story.status("ABNORMAL").after(1.0).link.supervisor_said(True, {"33"}, story.now)
+    assert ("FLIGHT_BLOCK_RELEASE", "33") not in story.asked()
+
+
+def test_block_from_before_we_started_ends_when_its_device_is_ready(alone):
+    story = alone().status("READY")
+    story.link.supervisor_said(True, {"33"}, story.now)
+    assert story.step().asked() == [("FLIGHT_BLOCK_RELEASE", "33")]
+
+
+# -- the state says what a request should have said -------------------------------------------
+
+
+@pytest.mark.parametrize("state", ["NOT_READY", "ABNORMAL"])
+def test_block_follows_the_state_when_its_request_was_lost(alone, state):
+    story = alone().status(state)
+    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+    assert story.asks[0][1].reason == f"it is {state}"
+    story.at(0.1).status(state)
+    assert len(story.asked()) == 1
+
+
+@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "ARMED", "LAUNCHED", "TOUCHDOWN"])
+def test_release_follows_the_state_when_its_request_was_lost(alone, state):
+    story = alone().status("ABNORMAL").at(0.1).status(state)
+    assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
+
+
+def test_state_without_a_name_changes_nothing(alone):
+    story = alone().status("ABNORMAL").clear()
+    free = next(n for n in range(8) if story.definitions.state(n) is None)
+    story.puppet(33).broadcast("flyfire.ParachuteStatus", {"state": free})
+    story.deliver(story.puppet(33)).after(0.5).supervisor_says()
+    assert ("FLIGHT_BLOCK_RELEASE", "33") not in story.asked()
+
+
+def test_late_repetition_of_a_block_does_not_stay_when_the_state_is_ready(alone):
+    story = alone().status("NOT_READY").at(0.5).status("READY").at(0.6).ask(BLOCK).clear()
+    for tenth in range(7, 30):
+        story.at(tenth / 10).status("READY")
+    ((t, ask),) = story.asks
+    assert ask.ask.name == "FLIGHT_BLOCK_RELEASE"
+    assert 1.5 <= t <= 1.7
+
+
+def test_request_that_the_state_has_said_before_is_not_passed_on_twice(alone):
+    story = alone().status("NOT_READY").ask(BLOCK)
+    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+    story.link.supervisor_said(True, {"33"}, story.now)
+    assert story.step().answers() == ["SUCCESS"]
+
+
+def test_two_controllers_block_each_for_itself(alone):
+    story = alone().status("ABNORMAL").status("ABNORMAL", 35).at(1.0).status("READY")
+    assert story.asked() == [
+        ("FLIGHT_BLOCK", "33"),
+        ("FLIGHT_BLOCK", "35"),
+        ("FLIGHT_BLOCK_RELEASE", "33"),
+    ]
+
+
+# -- policies ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
+def test_policy_accept_answers_at_once_and_passes_it_on(alone, type_name):
+    policies = {"kill_policy": Policy.ACCEPT, "flight_block_policy": Policy.ACCEPT}
+    story = alone(**policies).ask(type_name)
+    assert story.answers() == ["SUCCESS"]
+    assert len(story.asked()) == 1
+
+
+@pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
+def test_policy_reject_answers_at_once_and_tells_nobody(alone, type_name):
+    policies = {"kill_policy": Policy.REJECT, "flight_block_policy": Policy.REJECT}
+    story = alone(**policies).ask(type_name).status("ABNORMAL")
+    assert story.answers() == ["REJECTED"]
+    assert story.asked() == []
+
+
+@pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
+def test_policy_forward_passes_it_on_and_waits(alone, type_name):
+    story = alone().ask(BLOCK)
+    story.link.supervisor_said(True, {"33"}, story.now)
+    story.at(1.0).clear().ask(type_name, number=5)
+    if type_name == BLOCK:
+        assert story.answers() == ["SUCCESS"]  # it stands
+    else:
+        assert story.answers() == []
+        assert len(story.asked()) == 1
+
+
+def test_one_policy_does_not_touch_the_other(alone):
+    story = alone(kill_policy=Policy.REJECT).ask(KILL).ask(BLOCK, number=1)
+    assert story.answers() == ["REJECTED"]
+    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+
+
+# -- what makes no sense ----------------------------------------------------------------------
+
+
+def test_bad_magic_number_is_rejected_and_counted(alone):
+    story = alone().ask(KILL, magic_number=1)
+    wanted = {"ours": "BAD_MAGIC_NUMBER", "other": "REJECTED"}[story.layout.name]
+    assert story.answers() == [wanted]
+    assert story.asked() == []
+    assert story.link.counts["requests with a bad magic number"] == 1
+
+
+def test_type_that_is_not_known_is_rejected_and_counted(alone):
+    story = alone().ask(KILL, type=99)
+    assert story.answers() == ["REJECTED"]
+    assert story.asked() == []
+    assert story.link.counts["requests of a type that is not known"] == 1
+    assert story.link.vehicle_service.newest_answer == "bad request of 33: REJECTED"
+
+
+def test_service_that_the_vehicle_does_not_offer_is_counted(alone):
+    story = alone()
+    puppet = story.puppet(33)
+    puppet.request(10, "flyfire.TriggerService", 0, {}, 16)
+    story.deliver(puppet)
+    assert story.link.counts["requests that we do not serve"] == 1
+
+
+def test_flood_of_requests_is_bounded_and_answered(alone):
+    story = alone()
+    for number in range(100):
+        story.ask(KILL, node_id=40 + number % 50, number=number % 32)
+    assert story.answers() == [failed(story)] * (100 - MOST_PENDING)
+    assert story.link.counts["requests refused: too many at once"] == 100 - MOST_PENDING
+    assert len(story.asked()) == 100  # the supervisor hears of each all the same
+    story.link.kill_confirmed(story.now)
+    assert story.step().answers().count("SUCCESS") == MOST_PENDING
+
+
+# -- with the simulated controller ------------------------------------------------------------
+
+
+def test_controller_blocks_while_it_starts_and_releases_when_it_is_ready(bench):
+    story = bench("controller").at(2.0)
+    assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
+    assert set(story.answers()) == {"SUCCESS"}
+    assert story.standing == set()
+
+
+def test_controller_that_fails_blocks_until_it_is_whole():
+    story = Bench(layout_of("ours"), "controller").ready()
+    story.devices.act("error=IMU")
+    assert story.after(0.2).standing == {"33"}
+    assert story.picture().state.name == "ABNORMAL"
+    story.devices.act("clear-errors")
+    assert story.after(0.2).standing == set()

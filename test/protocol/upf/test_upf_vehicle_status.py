@@ -1,0 +1,154 @@
+"""flyfire.VehicleStatus: ten times a second, and nothing old in it."""
+
+import math
+
+import pytest
+from upf_link_bench import LAYOUTS, Bench, Layout, flying, landed, types_of
+
+from chute_ros.model import LandedState, LinkState, VehicleState
+from chute_ros.protocol.upf.definitions import VEHICLE_STATUS, Definitions
+
+KINDS = [
+    (LandedState.ON_GROUND, "ON_GROUND"),
+    (LandedState.IN_AIR, "IN_AIR"),
+    (LandedState.TAKING_OFF, "IN_AIR"),
+    (LandedState.LANDING, "IN_AIR"),
+    (LandedState.UNKNOWN, ""),
+]
+
+
+def told(story, state=None, passed=0.0):
+    """The VehicleStatus that follows; state as its name, empty: not known."""
+    if state is not None:
+        story.link.vehicle(state, story.now)
+    story.after(passed).clear().after(0.11)
+    values = story.messages(VEHICLE_STATUS)[-1]
+    name = story.definitions.state_name(VEHICLE_STATUS, values)
+    return {**values, "state": "" if name == "UNKNOWN" else name}
+
+
+def test_it_is_sent_ten_times_a_second(bench):
+    story = bench("").step()
+    story.link.vehicle(flying(), story.now)
+    assert 99 <= len(story.clear().at(10.0).messages(VEHICLE_STATUS)) <= 101
+
+
+def test_it_stops_when_the_owner_hangs_and_goes_on_when_it_is_back(bench):
+    story = bench("").at(1.0)
+    story.owner_lives = False
+    story.at(2.05).clear().at(5.0)
+    assert story.messages(VEHICLE_STATUS) == []
+    story.owner_lives = True
+    assert len(story.at(6.0).messages(VEHICLE_STATUS)) >= 9
+
+
+@pytest.mark.parametrize(("state", "name"), KINDS)
+def test_landed_state_by_its_name(bench, state, name):
+    assert told(bench(""), flying(landed_state=state))["state"] == name
+
+
+def test_measured_values_are_told_while_they_are_fresh(bench):
+    values = told(bench(""), flying())
+    assert values["height_of_home"] == 50.0
+    assert values["vz"] == -1.5
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "unknown"),
+    [
+        ({"landed_state_age": 1.1}, "state", ""),
+        ({"landed_state_age": math.nan}, "state", ""),
+        ({"height_age": 1.1}, "height_of_home", math.nan),
+        ({"height_age": math.nan}, "height_of_home", math.nan),
+        ({"height": math.nan}, "height_of_home", math.nan),
+        ({"height": math.inf}, "height_of_home", math.nan),
+        ({"height": 70000.0}, "height_of_home", math.nan),
+        ({"vertical_speed_age": 1.1}, "vz", math.nan),
+        ({"vertical_speed": math.nan}, "vz", math.nan),
+    ],
+)
+def test_field_that_is_missing_or_old_is_told_as_not_known(bench, change, field, unknown):
+    values = told(bench(""), flying(**change))
+    if unknown == "":
+        assert values[field] == ""
+    else:
+        assert math.isnan(values[field])
+    others = {"state": "IN_AIR", "height_of_home": 50.0, "vz": -1.5}
+    assert all(values[name] == value for name, value in others.items() if name != field)
+
+
+@pytest.mark.parametrize("state", [None, VehicleState(), flying(link_state=LinkState.LOST)])
+def test_vehicle_that_is_not_known_or_lost_has_no_values(bench, state):
+    values = told(bench(""), state)
+    assert values["state"] == ""
+    assert math.isnan(values["height_of_home"])
+    assert math.isnan(values["vz"])
+
+
+def test_values_grow_old_when_nothing_comes_any_more(bench):
+    story = bench("")
+    assert told(story, flying(), passed=0.7)["state"] == "IN_AIR"
+    values = told(story, passed=0.3)
+    assert values["state"] == ""
+    assert math.isnan(values["height_of_home"])
+
+
+def test_parachute_is_connected_while_it_is_heard(bench):
+    story = bench("")
+    assert not told(story)["is_parachute_connected"]
+    assert told(story.status("READY"))["is_parachute_connected"]
+    assert not told(story.after(4.0))["is_parachute_connected"]
+
+
+def test_controller_sees_the_vehicle(bench):
+    story = bench("controller").ready()
+    assert story.controller.vehicle_connected
+    assert "the controller does not receive our VehicleStatus" not in story.picture().faults
+    story.loses = lambda from_link, data: from_link
+    story.after(2.0)
+    assert "the controller does not receive our VehicleStatus" in story.picture().faults
+
+
+# -- types that cannot say "not known" --------------------------------------------------------
+
+
+@pytest.fixture
+def changed(tmp_path):
+    """A bench with our types, in which old is replaced in VehicleStatus."""
+
+    def make(*pairs):
+        folder = tmp_path / "flyfire"
+        folder.mkdir()
+        for one in LAYOUTS["ours"].iterdir():
+            text = one.read_text()
+            for old, new in pairs if "VehicleStatus" in one.name else ():
+                assert old in text
+                text = text.replace(old, new)
+            (folder / one.name).write_text(text)
+        types = types_of(folder)
+        return Bench(Layout("changed", types, Definitions(types)), "")
+
+    return make
+
+
+def test_nothing_is_said_while_the_only_numbers_mean_something_else(changed):
+    story = changed(("uint3 STATE_UNKNOWN = 0", ""), ("ON_GROUND = 1", "ON_GROUND = 0")).at(1.0)
+    assert story.messages(VEHICLE_STATUS) == []
+    (notice,) = [text for text in story.notices() if "not sent while" in text]
+    assert "has no STATE_UNKNOWN, and 0 means another state" in notice
+    assert told(story, landed())["state"] == "ON_GROUND"
+
+
+def test_nothing_is_said_while_a_whole_number_cannot_hold_what_is_not_known(changed):
+    story = changed(("float16 vz", "int16 vz")).at(1.0)
+    assert story.messages(VEHICLE_STATUS) == []
+    assert len([text for text in story.notices() if "not sent while" in text]) == 1
+    assert told(story, flying(vertical_speed=-2))["vz"] == -2
+
+
+def test_types_without_a_state_still_tell_the_rest(changed):
+    story = changed(("uint3 state ", "uint3 other_state "))
+    story.link.vehicle(flying(), story.now)
+    (values,) = story.step().messages(VEHICLE_STATUS)[-1:]
+    assert "state" not in values
+    assert values["height_of_home"] == 50.0
