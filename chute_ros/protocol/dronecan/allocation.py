@@ -14,6 +14,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.errors import ParameterError
+
 MESSAGE = "uavcan.protocol.dynamic_node_id.Allocation"
 UNIQUE_ID_LENGTH = 16
 #: How many bytes each of the three requests carries (specification: at most 6).
@@ -24,8 +26,6 @@ FOLLOWUP_TIMEOUT = 0.5
 OTHER_ALLOCATOR_TIMEOUT = 10.0
 #: Node ids that may be given out; 126 and 127 belong to tools (specification).
 LOWEST, HIGHEST = 1, 125
-#: Units that are remembered at most: more than node ids exist cannot be served.
-MOST_ENTRIES = HIGHEST
 
 Table = Mapping[bytes, int]
 
@@ -39,9 +39,13 @@ class KeepTable:
 
 
 class Allocator:
-    """Gives out node ids. never: ids that are not given out, whoever asks for them."""
+    """Gives out node ids. table: as kept last. never: ids that are not given out, whoever asks.
+
+    ParameterError for a table that nobody can have kept.
+    """
 
     def __init__(self, table: Table, never: Collection[int]) -> None:
+        _check(table)
         self.table: dict[bytes, int] = dict(table)
         self.given_count = 0
         #: Another allocator was heard, as its node id, at this monotonic time (s).
@@ -52,7 +56,8 @@ class Allocator:
         self._never = frozenset(never)
         self._query = b""
         self._query_at = -math.inf
-        self._keeping: dict[int, tuple[bytes, int]] = {}
+        #: Unique ids whose entry may not be safe -> the first KeepTable that holds it.
+        self._unkept: dict[bytes, int] = {}
         self._last_number = 0
         self._answers: list[dict[str, Any]] = []
         self._keep: list[KeepTable] = []
@@ -93,10 +98,10 @@ class Allocator:
         self._allocate(unique_id, int(values["node_id"]), in_use)
 
     def kept(self, number: int) -> None:
-        """The table of this KeepTable is safe: the node may have its id."""
-        if number in self._keeping:
-            self._answer(*self._keeping.pop(number))
-            self.given_count += 1
+        """The table of this KeepTable is safe: the nodes in it may have their ids."""
+        for unique_id in [one for one, first in self._unkept.items() if first <= number]:
+            del self._unkept[unique_id]
+            self._give(unique_id)
 
     def another_is_there(self, now: float) -> bool:
         """Another allocator was heard of late."""
@@ -115,21 +120,30 @@ class Allocator:
     def _allocate(self, unique_id: bytes, wanted: int, in_use: Mapping[int, bytes]) -> None:
         self.refusal = ""
         known = self.table.get(unique_id)
-        if known is not None and known not in self._never:
-            owner = in_use.get(known, unique_id)
-            if owner in (unique_id, b""):
-                self._answer(unique_id, known)
-                self.given_count += 1
-                return
-            # Somebody else sits there now, with an id that nobody gave it.
+        mine = known is not None and in_use.get(known, unique_id) == unique_id
+        if mine and known not in self._never:
+            if unique_id in self._unkept:
+                # It was not kept yet, or could not be: once more.
+                self._hand_out_table()
+            else:
+                self._give(unique_id)
+            return
+        # It has none, or somebody else sits there now, with an id that nobody gave it.
         free = self._free(wanted, in_use)
         if free is None:
             self.refusal = "no node id is free"
             return
         self.table[unique_id] = free
+        self._hand_out_table()
+        self._unkept[unique_id] = self._last_number
+
+    def _hand_out_table(self) -> None:
         self._last_number += 1
-        self._keeping[self._last_number] = (unique_id, free)
         self._keep.append(KeepTable(self._last_number, dict(self.table)))
+
+    def _give(self, unique_id: bytes) -> None:
+        self._answer(unique_id, self.table[unique_id])
+        self.given_count += 1
 
     def _free(self, wanted: int, in_use: Mapping[int, bytes]) -> int | None:
         """The wanted id or the next free one above it, else the highest free one."""
@@ -142,3 +156,14 @@ class Allocator:
         self._answers.append(
             {"unique_id": unique_id, "node_id": node_id, "first_part_of_unique_id": False}
         )
+
+
+def _check(table: Table) -> None:
+    for unique_id, node_id in table.items():
+        if len(unique_id) != UNIQUE_ID_LENGTH or not LOWEST <= node_id <= HIGHEST:
+            raise ParameterError(
+                f"table of node ids: {unique_id.hex()} has {node_id}; need {UNIQUE_ID_LENGTH} "
+                f"bytes and {LOWEST} to {HIGHEST}"
+            )
+    if len(set(table.values())) < len(table):
+        raise ParameterError("table of node ids: two units have the same node id")

@@ -11,15 +11,16 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from chute_ros.errors import MessageError, ParameterError
 from chute_ros.protocol.dronecan import allocation, time_sync
 from chute_ros.protocol.dronecan.allocation import Allocator, KeepTable
-from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits
+from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits, SendCall
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
 from chute_ros.protocol.dronecan.scripts import Script, Scripts
 from chute_ros.protocol.dronecan.time_sync import TimeMaster
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind
 from chute_ros.protocol.events import Notice, Severity
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
@@ -31,6 +32,8 @@ LISTEN_TIME = 1.2
 #: Somebody who sent under our node id so lately (s) is there.
 _OWN_ID_WINDOW = 5.0
 _SOFTWARE_VERSION = (0, 1)
+#: Bytes of a node's name (uavcan.protocol.GetNodeInfo).
+_LONGEST_NAME = 80
 _REFUSED = ("uavcan.protocol.RestartNode", "uavcan.protocol.param.ExecuteOpcode")
 
 
@@ -48,6 +51,18 @@ class BusNodeConfig:
     never: tuple[int, ...] = ()
     time_master: bool = True
     utc_offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.node_id <= HIGHEST_NODE_ID:
+            raise ParameterError(f"node_id is {self.node_id}: need 1 to {HIGHEST_NODE_ID}")
+        if not 1 <= len(self.name.encode()) <= _LONGEST_NAME:
+            raise ParameterError(f"name is {self.name!r}: need 1 to {_LONGEST_NAME} bytes")
+        if len(self.unique_id) != allocation.UNIQUE_ID_LENGTH:
+            raise ParameterError(
+                f"unique_id has {len(self.unique_id)} bytes: need {allocation.UNIQUE_ID_LENGTH}"
+            )
+        if not math.isfinite(self.utc_offset):
+            raise ParameterError(f"utc_offset is {self.utc_offset}: need a number of seconds")
 
 
 class BusNode:
@@ -108,6 +123,9 @@ class BusNode:
         self.nodes.forget_gone(now)
         if now < self._alive_until:
             self._speak(now)
+        else:
+            # What was due until then is not said any more.
+            self._status_at = max(self._status_at, self._alive_until)
         for node_id in self.nodes.to_ask(now):
             self.scripts.begin(("who is", node_id), _who_is(node_id), now)
         self._drive(now)
@@ -167,17 +185,25 @@ class BusNode:
 
     def _drive(self, now: float) -> None:
         self.scripts.drive(now)
-        for send in self.scripts.take_output():
-            call = send.command
-            self.endpoint.request(
-                call.server, call.service, send.transfer_id, call.values, call.priority
-            )
+        while sends := self.scripts.take_output():
+            for send in sends:
+                self._send(send, now)
+            self.scripts.drive(now)
         for token, result in self.scripts.take_ended():
             if isinstance(token, tuple) and token[0] == "who is":
                 if result is not None:
                     self.nodes.information(token[1], result, now)
             else:
                 self._ended.append((token, result))
+
+    def _send(self, send: SendCall, now: float) -> None:
+        call = send.command
+        try:
+            self.endpoint.request(
+                call.server, call.service, send.transfer_id, call.values, call.priority
+            )
+        except MessageError as error:
+            self.scripts.calls.unsendable(send, str(error), now)
 
     def _serve(self, request: Heard, now: float) -> None:
         """The standard services of ours."""

@@ -14,12 +14,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS
+from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, TRANSFER_TIMEOUT
 from chute_ros.protocol.effect import NO_ANSWER
 
-#: Calls to one server and service that wait at the same time: far below the 32 transfer ids, so
-#: that a late response never meets another call.
+#: Calls to one server and service that wait at the same time, urgent ones aside.
 MOST_AT_ONCE = 4
+#: A transfer id that was not answered is not used again for this long (s), so that a late response
+#: never meets another call.
+_UNANSWERED = TRANSFER_TIMEOUT
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,8 @@ class CallFinished:
         """What came of it, in words."""
         if self.superseded:
             return f"given up after {self.seconds:.2f} s for a newer call"
+        if self.values is None and self.words:
+            return self.words
         if self.values is None:
             return f"no acknowledgement after {self.sends} sends in {self.seconds:.2f} s"
         return f"{self.words or 'answered'} (after {self.seconds:.2f} s)"
@@ -90,7 +94,9 @@ class _Open:
     token: int
     call: Call
     begun: float
-    transfer_ids: list[int] = field(default_factory=list)
+    #: Of the tries so far.
+    transfer_ids: set[int] = field(default_factory=set)
+    sends: int = 0
     send_at: float = -math.inf
 
 
@@ -106,6 +112,8 @@ class ServiceCalls:
         #: Responses that no call waited for, and calls that nobody answered.
         self.counts: Counter[str] = Counter()
         self._next_id: dict[_Key, int] = {}
+        #: Transfer ids whose response has not come yet -> when they were sent.
+        self._unanswered: dict[_Key, dict[int, float]] = {}
         self._open: dict[int, _Open] = {}
         self._waiting: deque[_Open] = deque()
         self._out: list[SendCall] = []
@@ -124,7 +132,7 @@ class ServiceCalls:
 
     def send_once(self, command: Call, now: float) -> None:
         """Send a request whose response does not matter."""
-        self._out.append(SendCall(command, self._take_id(_key(command)), None))
+        self._out.append(SendCall(command, self._take_id(_key(command), now), None))
 
     def cancel(self, token: int, now: float) -> None:
         """It is not needed any more; nothing is said of it."""
@@ -137,18 +145,25 @@ class ServiceCalls:
         self, server: int, service: str, transfer_id: int, values: Mapping[str, Any], now: float
     ) -> None:
         """A response came."""
+        self._unanswered.get((server, service), {}).pop(transfer_id, None)
         for one in self._open.values():
             if _key(one.call) == (server, service) and transfer_id in one.transfer_ids:
                 self._end(one, values, now)
                 return
         self.counts["responses that nobody waited for"] += 1
 
+    def unsendable(self, send: SendCall, why: str, now: float) -> None:
+        """What take_output gave cannot be put on the bus: the call ends."""
+        one = None if send.token is None else self._open.get(send.token)
+        if one is not None:
+            self._end(one, None, now, f"not sent: {why}")
+
     def update(self, now: float) -> None:
         """Look at the clock: send again, give up."""
         for one in list(self._open.values()):
             if now < one.send_at:
                 continue
-            if len(one.transfer_ids) >= self.limits.tries:
+            if one.sends >= self.limits.tries:
                 self.counts["calls without an answer"] += 1
                 self._end(one, None, now)
             else:
@@ -171,29 +186,41 @@ class ServiceCalls:
     def _free(self, key: _Key) -> bool:
         return sum(_key(one.call) == key for one in self._open.values()) < MOST_AT_ONCE
 
-    def _take_id(self, key: _Key) -> int:
-        number = self._next_id.get(key, 0)
+    def _take_id(self, key: _Key, now: float) -> int:
+        """The next transfer id whose response is not awaited; of none the one sent first."""
+        unanswered = self._unanswered.setdefault(key, {})
+        begin = self._next_id.get(key, 0)
+        in_order = [(begin + step) % TRANSFER_IDS for step in range(TRANSFER_IDS)]
+        number = min(in_order, key=lambda one: _awaited_since(unanswered, one, now))
         self._next_id[key] = (number + 1) % TRANSFER_IDS
+        unanswered[number] = now
+        for one in self._open.values():
+            if _key(one.call) == key:
+                one.transfer_ids.discard(number)
         return number
 
     def _send(self, one: _Open, now: float) -> None:
-        number = self._take_id(_key(one.call))
-        one.transfer_ids.append(number)
+        number = self._take_id(_key(one.call), now)
+        one.transfer_ids.add(number)
+        one.sends += 1
         one.send_at = now + self.limits.timeout
         self._out.append(SendCall(one.call, number, one.token))
 
-    def _end(self, one: _Open, values: Mapping[str, Any] | None, now: float) -> None:
+    def _end(
+        self, one: _Open, values: Mapping[str, Any] | None, now: float, why: str = ""
+    ) -> None:
         del self._open[one.token]
         answered = values is not None
         finished = CallFinished(
             one.token,
             one.call,
             values,
-            len(one.transfer_ids),
+            one.sends,
             now - one.begun,
             accepted=answered,
             not_now=not answered,
             result=0 if answered else NO_ANSWER,
+            words=why,
         )
         self._finished.append(self._read(finished) if answered else finished)
         self._begin_waiting(now)
@@ -204,6 +231,12 @@ class ServiceCalls:
                 self._waiting.remove(one)
                 self._open[one.token] = one
                 self._send(one, now)
+
+
+def _awaited_since(unanswered: Mapping[int, float], number: int, now: float) -> float:
+    """When the transfer whose response may still come was sent; -infinity: there is none."""
+    at = unanswered.get(number, -math.inf)
+    return at if now - at < _UNANSWERED else -math.inf
 
 
 def _key(call: Call) -> _Key:

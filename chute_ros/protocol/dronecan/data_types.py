@@ -7,17 +7,24 @@ language"; the parser and the bit layout are those of pydronecan.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from dronecan.dsdl import common, parser
-from dronecan.transport import CompoundValue, bits_from_bytes, bytes_from_bits
+from dronecan.transport import (
+    ArrayValue,
+    BaseValue,
+    CompoundValue,
+    PrimitiveValue,
+    bits_from_bytes,
+    bytes_from_bits,
+)
 
-from chute_ros.errors import MessageError
+from chute_ros.errors import MessageError, ParameterError
 
 Values = Mapping[str, Any]
-_FLOAT_EXTREMES = ("nan", "inf", "-inf")
 _MISFITS = (AttributeError, IndexError, KeyError, TypeError, ValueError, OverflowError)
 
 
@@ -50,14 +57,7 @@ class DataType:
         value = CompoundValue(self._type, _mode=self._mode)
         try:
             _fill(value, values)
-        except (
-            AttributeError,
-            IndexError,
-            KeyError,
-            TypeError,
-            ValueError,
-            OverflowError,
-        ) as error:
+        except _MISFITS as error:
             raise MessageError(f"{self.name} cannot carry {dict(values)}: {error}") from None
         return bytes(bytes_from_bits(value._pack()))
 
@@ -73,7 +73,7 @@ class DataType:
 
 
 class DataTypes:
-    """The types that a bus speaks."""
+    """The types that a bus speaks. ParameterError: two of them have the same id."""
 
     def __init__(self, dsdl_types: Iterable[Any]) -> None:
         self._by_name: dict[tuple[str, str | None], DataType] = {}
@@ -84,6 +84,12 @@ class DataTypes:
                 continue
             for mode in ("request", "response") if service else (None,):
                 made = DataType(one, mode)
+                other = self._by_id.get((made.id, mode), made)
+                if (other.name, other.base_crc) != (made.name, made.base_crc):
+                    raise ParameterError(
+                        f"data type id {made.id} belongs to {other.name} and to {made.name}: "
+                        "one of the two must have another"
+                    )
                 self._by_name[one.full_name, mode] = made
                 self._by_id[one.default_dtid, mode] = made
 
@@ -110,43 +116,89 @@ class DataTypes:
 
 def _fill(value: Any, values: Values) -> None:
     """Set the fields of a compound value of the library."""
+    if value._is_union and len(values) > 1:
+        raise ValueError("a union has one field")
     for name, one in values.items():
-        field = value._fields[name]
-        if isinstance(one, Mapping):
-            if value._is_union:
-                value._union_field = name
-            _fill(field, one)
-        elif isinstance(one, (bytes, bytearray)):
-            if value._is_union:
-                value._union_field = name
-            if len(one) > field._type.max_size:
-                raise ValueError(f"{name}: {len(one)} bytes, need at most {field._type.max_size}")
-            field.from_bytes(one)
-        else:
-            _check_range(name, field._type, one)
-            setattr(value, name, one)
+        if name not in value._fields:
+            raise ValueError(f"there is no field {name}")
+        if value._is_union:
+            value._union_field = name
+        _set(name, value._fields[name], one)
+
+
+def _set(name: str, field: Any, one: Any) -> None:
+    """Set one field, or one item of an array."""
+    if isinstance(field, PrimitiveValue):
+        _check_range(name, field._type, one)
+        field.value = one
+    elif isinstance(field, CompoundValue):
+        if not isinstance(one, Mapping):
+            raise TypeError(f"{name} is {one!r}, need its fields by name")
+        _fill(field, one)
+    elif isinstance(field, ArrayValue):
+        _set_array(name, field, one)
+    else:
+        raise ValueError(f"{name} is padding")
+
+
+def _set_array(name: str, field: Any, items: Any) -> None:
+    kind, most = field._type, field._type.max_size
+    if isinstance(items, (bytes, bytearray)) != _is_bytes(kind) or isinstance(items, str):
+        raise TypeError(f"{name} is {items!r}, need {'bytes' if _is_bytes(kind) else 'a list'}")
+    fixed = kind.mode == kind.MODE_STATIC
+    if len(items) > most or (fixed and len(items) < most):
+        need = most if fixed else f"at most {most}"
+        raise ValueError(f"{name} has {len(items)} items, need {need}")
+    made = []
+    for item in items:
+        made.append(field.new_item())
+        _set(name, made[-1], item)
+    # The library's own insert takes plain numbers, and would cut them to size.
+    field._ArrayValue__items = made
+
+
+def _is_bytes(kind: Any) -> bool:
+    item = kind.value_type
+    return (
+        isinstance(item, parser.PrimitiveType)
+        and item.kind == item.KIND_UNSIGNED_INT
+        and item.bitlen == 8
+    )
 
 
 def _check_range(name: str, kind: Any, value: Any) -> None:
-    if not isinstance(kind, parser.PrimitiveType) or kind.kind == kind.KIND_BOOLEAN:
-        return
-    low, high = kind.value_range
-    if kind.kind == kind.KIND_FLOAT:
-        if not low <= value <= high and str(float(value)) not in _FLOAT_EXTREMES:
-            raise ValueError(f"{name} is {value}, need {low:g} to {high:g}")
-    elif kind.cast_mode == kind.CAST_MODE_SATURATED and not low <= value <= high:
+    low, high = _range(kind)
+    if not low <= value <= high and not (kind.kind == kind.KIND_FLOAT and _fits(kind, value)):
         raise ValueError(f"{name} is {value}, need {low} to {high}")
+
+
+def _range(kind: Any) -> tuple[float, float]:
+    """The library's own is off by one for signed integers of more than 53 bits."""
+    if kind.kind == kind.KIND_FLOAT:
+        low, high = kind.value_range
+        return low, high
+    if kind.kind == kind.KIND_SIGNED_INT:
+        half = 1 << (kind.bitlen - 1)
+        return -half, half - 1
+    return 0, (1 << kind.bitlen) - 1
+
+
+def _fits(kind: Any, value: float) -> bool:
+    """NaN always; infinity where the library does not make the largest number of it."""
+    infinite_too = kind.cast_mode == kind.CAST_MODE_TRUNCATED
+    return math.isnan(value) or (infinite_too and math.isinf(value))
 
 
 def _plain(value: Any) -> Any:
     """A value of the library as plain Python."""
     if isinstance(value, CompoundValue):
         fields = value._fields
-        names = [value._union_field or next(iter(fields))] if value._is_union else list(fields)
+        names = [value._union_field] if value._is_union else list(fields)
         return {name: _plain(fields[name]) for name in names if not name.startswith("_void_")}
-    if hasattr(value, "to_bytes"):
-        kind = value._type.value_type
-        if isinstance(kind, parser.PrimitiveType) and kind.bitlen == 8:
+    if isinstance(value, ArrayValue):
+        if len(value) > value._type.max_size:
+            raise ValueError("more items than the type has")
+        if _is_bytes(value._type):
             return value.to_bytes()
-        return [_plain(one) if hasattr(one, "_type") else one for one in value]
+        return [_plain(one) if isinstance(one, BaseValue) else one for one in value]
     return value.value

@@ -80,7 +80,6 @@ class Endpoint:
         """Send a message."""
         data_type = self.types.message(name)
         number = self._next_ids.get(name, 0)
-        self._next_ids[name] = (number + 1) % TRANSFER_IDS
         payload = data_type.encode(values)
         kind, source = Kind.MESSAGE, self.node_id
         transfer = Transfer(kind, data_type.id, source, 0, number, payload, priority)
@@ -89,6 +88,7 @@ class Endpoint:
             # Told apart by what is said, as the specification suggests.
             discriminator = sum(byte * (i + 1) * 131 for i, byte in enumerate(payload)) & 0x3FFF
         self._send(transfer, data_type.base_crc, discriminator)
+        self._next_ids[name] = (number + 1) % TRANSFER_IDS
 
     def request(
         self,
@@ -132,8 +132,8 @@ class Endpoint:
         return output
 
     def _send(self, transfer: Transfer, base_crc: int, discriminator: int = 0) -> None:
-        self.sent_count += 1
         self._output += [pack(frame) for frame in frames_of(transfer, base_crc, discriminator)]
+        self.sent_count += 1
 
     def _bus_error(self, classes: int) -> None:
         if classes & ERROR_BUS_OFF:

@@ -35,6 +35,7 @@ class NodeEntry:
     uptime: int = 0
     restarts: int = 0
     information: Mapping[str, Any] | None = None
+    #: How often it was asked; one more once it did not answer the last time.
     questions: int = 0
     asked: float = -math.inf
     conflict_heard: float = -math.inf
@@ -58,7 +59,11 @@ class NodeEntry:
     @property
     def discovered(self) -> bool:
         """It said who it is, or will not."""
-        return self.information is not None or self.questions >= _MOST_QUESTIONS
+        return self.information is not None or self.questions > _MOST_QUESTIONS
+
+    def alive(self, now: float) -> bool:
+        """It was heard of late."""
+        return now < self.heard + OFFLINE_TIMEOUT
 
     def conflict(self, now: float) -> bool:
         """Two nodes use this id, by what was heard of late."""
@@ -75,7 +80,7 @@ class NodeMonitor:
     def status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A NodeStatus of node_id (not 0) came."""
         entry = self._nodes.get(node_id)
-        if entry is None:
+        if entry is None or not entry.alive(now):
             entry = self._nodes[node_id] = NodeEntry(node_id, now)
         entry.heard = now
         entry.health, entry.mode = values["health"], values["mode"]
@@ -97,18 +102,18 @@ class NodeMonitor:
         """Nodes to ask for GetNodeInfo now; each is told once an interval."""
         due = []
         for entry in self._alive(now):
-            if not entry.discovered and now - entry.asked >= _ASK_INTERVAL:
+            if not entry.discovered and now >= entry.asked + _ASK_INTERVAL:
                 entry.asked = now
                 entry.questions += 1
-                due.append(entry.node_id)
+                if not entry.discovered:
+                    due.append(entry.node_id)
         return due
 
     def next_deadline(self) -> float:
-        """When to_ask has something to say; infinity: never."""
-        return min(
-            (e.asked + _ASK_INTERVAL for e in self._nodes.values() if not e.discovered),
-            default=math.inf,
-        )
+        """When to_ask or forget_gone has something to do; infinity: never."""
+        questions = [e.asked + _ASK_INTERVAL for e in self._nodes.values() if not e.discovered]
+        ends = [e.heard + OFFLINE_TIMEOUT for e in self._nodes.values()]
+        return min([*questions, *ends], default=math.inf)
 
     def forget_gone(self, now: float) -> None:
         """Forget the nodes that are gone: whoever comes under this id again may be another."""
@@ -138,7 +143,7 @@ class NodeMonitor:
         return restarted
 
     def _alive(self, now: float) -> list[NodeEntry]:
-        return [e for e in self._nodes.values() if now - e.heard < OFFLINE_TIMEOUT]
+        return [e for e in self._nodes.values() if e.alive(now)]
 
     def _watch_start(self, entry: NodeEntry, now: float) -> None:
         start = now - entry.uptime

@@ -7,8 +7,8 @@ it is counted under its reason, and dropped with the transfer that it belongs to
 from __future__ import annotations
 
 import enum
-from collections import Counter
-from dataclasses import dataclass
+from collections import Counter, OrderedDict, deque
+from dataclasses import dataclass, field
 
 from dronecan.dsdl import common
 
@@ -27,6 +27,12 @@ MOST_SESSIONS = 1024
 #: Longest payload that is put together, bytes: more than any standard type has.
 MOST_PAYLOAD = 512
 HIGHEST_NODE_ID = 127
+_HIGHEST_PRIORITY = 31
+#: A frame that was overtaken comes at most so late (s): within it a transfer that has the id of
+#: one of the last so many is the same again; after it, only one that has the id of the newest.
+#: Longer would make a device that restarted, and counts from 0 again, go unheard.
+_OVERTAKEN = 0.1
+_REMEMBERED = 8
 
 
 class Kind(enum.Enum):
@@ -51,7 +57,9 @@ class Transfer:
 
 
 def frames_of(transfer: Transfer, base_crc: int, discriminator: int = 0) -> list[CanFrame]:
-    """The frames of a transfer, in order. discriminator: 14 bits for an anonymous message."""
+    """The frames of a transfer, in order. discriminator: 14 bits for an anonymous message.
+    MessageError for a transfer that cannot be."""
+    _check(transfer)
     payload = transfer.payload
     if len(payload) > _FRAME_PAYLOAD:
         if transfer.source == 0:
@@ -68,6 +76,20 @@ def frames_of(transfer: Transfer, base_crc: int, discriminator: int = 0) -> list
         frames.append(CanFrame(identifier, chunk + bytes((tail,))))
         toggle ^= _TOGGLE
     return frames
+
+
+def _check(transfer: Transfer) -> None:
+    service = transfer.kind is not Kind.MESSAGE
+    anonymous = transfer.source == 0
+    for name, value, low, high in (
+        ("priority", transfer.priority, 0, _HIGHEST_PRIORITY),
+        ("source", transfer.source, int(service), HIGHEST_NODE_ID),
+        ("destination", transfer.destination, int(service), HIGHEST_NODE_ID if service else 0),
+        ("type_id", transfer.type_id, 0, 0xFF if service else 0x3 if anonymous else 0xFFFF),
+    ):
+        if not low <= value <= high:
+            what = "an anonymous message" if anonymous and not service else transfer.kind.name
+            raise MessageError(f"{name} of {what} is {value}: need {low} to {high}")
 
 
 def _identifier(transfer: Transfer, discriminator: int) -> int:
@@ -89,8 +111,16 @@ class _Session:
     heard: float = 0.0
     toggle: int = 0
     crc: int = 0
+    #: What came so far of a transfer of several frames; None: there is none under way.
     payload: bytearray | None = None
-    finished: bool = True
+    #: (transfer id, when) of the newest complete transfers.
+    done: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
+
+    def came_before(self, transfer_id: int, now: float) -> bool:
+        """It is one of the newest complete ones again."""
+        if self.done and self.done[-1][0] == transfer_id:
+            return now - self.done[-1][1] < TRANSFER_TIMEOUT
+        return any(one == transfer_id and now - at < _OVERTAKEN for one, at in self.done)
 
 
 _SessionKey = tuple[Kind, int, int, int]
@@ -102,7 +132,8 @@ class Assembler:
     def __init__(self, types: DataTypes, counts: Counter[str]) -> None:
         self._types = types
         self._counts = counts
-        self._sessions: dict[_SessionKey, _Session] = {}
+        #: The one that was heard last is the last.
+        self._sessions: OrderedDict[_SessionKey, _Session] = OrderedDict()
 
     def feed(self, data: bytes, node_id: int, now: float) -> Transfer | CanFrame | None:
         """The transfer that this frame (sixteen bytes, see can_frame) completes; the frame itself
@@ -146,25 +177,25 @@ class Assembler:
 
     def _next(self, head: Transfer, frame: CanFrame, now: float) -> Transfer | None:
         key = (head.kind, head.type_id, head.source, head.destination)
-        session = self._sessions.get(key)
-        if session is None:
-            self._make_room(now)
-            session = self._sessions[key] = _Session()
+        session = self._sessions.pop(key, None) or _Session()
+        self._sessions[key] = session
+        if len(self._sessions) > MOST_SESSIONS:
+            self._sessions.popitem(last=False)
         tail, chunk = frame.data[-1], frame.data[:-1]
         same = session.transfer_id == head.transfer_id and now - session.heard < TRANSFER_TIMEOUT
         if tail & _START:
-            if same and session.finished:
+            if session.came_before(head.transfer_id, now):
                 return self._drop("transfers that came twice")
             if tail & _TOGGLE:
                 return self._drop("toggle bit wrong")
-            if session.payload is not None and not same:
-                self._drop("transfers cut short")
             if not tail & _END and len(chunk) < _FRAME_PAYLOAD:
                 return self._drop("first frame too short")
-            session.transfer_id, session.heard = head.transfer_id, now
-            session.toggle, session.finished = _TOGGLE, bool(tail & _END)
+            if session.payload is not None and not same:
+                self._drop("transfers cut short")
+            session.transfer_id, session.heard, session.toggle = head.transfer_id, now, _TOGGLE
             if tail & _END:
                 session.payload = None
+                session.done.append((head.transfer_id, now))
                 return self._done(head, chunk)
             session.crc = chunk[0] | chunk[1] << 8
             session.payload = bytearray(chunk[2:])
@@ -182,13 +213,13 @@ class Assembler:
             return self._drop("transfers that are too long")
         if not tail & _END:
             return None
-        payload, session.payload, session.finished = bytes(session.payload), None, True
+        payload, session.payload = bytes(session.payload), None
         data_type = self._types.by_id(head.type_id, head.kind.value)
         assert data_type is not None  # feed has looked
         if common.crc16_from_bytes(payload, initial=data_type.base_crc) != session.crc:
             # It may be sent again under the same number.
-            session.finished = False
             return self._drop("CRC of a transfer wrong (or another definition of its type)")
+        session.done.append((head.transfer_id, now))
         return self._done(head, payload)
 
     def _done(self, head: Transfer, payload: bytes) -> Transfer:
@@ -201,14 +232,6 @@ class Assembler:
             payload,
             head.priority,
         )
-
-    def _make_room(self, now: float) -> None:
-        """Forget the sessions that are long over; if that does not help, the oldest one."""
-        if len(self._sessions) < MOST_SESSIONS:
-            return
-        old = [k for k, s in self._sessions.items() if now - s.heard >= TRANSFER_TIMEOUT]
-        for key in old or [min(self._sessions, key=lambda k: self._sessions[k].heard)]:
-            del self._sessions[key]
 
     def _drop(self, reason: str) -> Transfer | None:
         self._counts[reason] += 1

@@ -93,7 +93,7 @@ class Deploying:
             self._last_resort.watch(token, controller.node_id, now + wait)
 
     def _by_trigger(self, token: int, trigger: Trigger, now: float) -> None:
-        goal = goals.fire_trigger(trigger, self._definitions, now)
+        goal = goals.fire_trigger(trigger, self._devices.alive_triggers, self._definitions, now)
         out = goal.shown is not None and goal.shown()
         self._requests.begin(token, goal, now)
         if not out:

@@ -133,13 +133,19 @@ def deploy(
     )
 
 
-def fire_trigger(trigger: Trigger, definitions: Definitions, now: float) -> UpfGoal:
-    """Deploy through a trigger: the architecture without a controller."""
+def fire_trigger(
+    trigger: Trigger,
+    triggers: Callable[[], list[Trigger]],
+    definitions: Definitions,
+    now: float,
+) -> UpfGoal:
+    """Deploy through a trigger: the architecture without a controller. Any one that has fired is
+    enough."""
     return Goal(
         DEPLOY,
         (trigger_call(trigger, definitions),),
         f"TriggerStatus of {trigger.node_id} says launched",
-        lambda: _fired(trigger, now),
+        lambda: any(_fired(one, now) for one in (trigger, *triggers())),
         insist=True,
         urgent=True,
     )

@@ -1,0 +1,176 @@
+"""Who is on the bus: found, asked, restarted, doubled, gone."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chute_ros.protocol.dronecan.node_monitor import OFFLINE_TIMEOUT, NodeMonitor
+
+UID = bytes(range(16))
+
+
+def status(uptime, health=0):
+    return {"uptime_sec": uptime, "health": health, "mode": 0, "vendor_specific_status_code": 7}
+
+
+def info(unique_id=UID, name=b"org.test.parachute"):
+    return {"hardware_version": {"unique_id": unique_id}, "name": name}
+
+
+def speak(monitor, begin, end, booted, node_id=33, every=1.0):
+    """Statuses of a node that was switched on at booted."""
+    now = begin
+    while now <= end:
+        monitor.status(node_id, status(int(now - booted)), now)
+        now += every
+
+
+def test_a_new_node_is_asked_who_it_is_and_known_once_it_answers():
+    monitor = NodeMonitor()
+    assert monitor.next_deadline() == math.inf
+    assert monitor.all_discovered(0.0)
+    monitor.status(33, status(100, health=1), 0.0)
+    entry = monitor.get(33)
+    assert (entry.health, entry.uptime, entry.vendor_status) == (1, 100, 7)
+    assert (entry.unique_id, entry.name, entry.discovered) == (b"", "", False)
+    assert not monitor.all_discovered(0.0)
+    assert monitor.to_ask(0.0) == [33]
+    assert monitor.to_ask(0.0) == []
+    monitor.information(33, info(), 0.1)
+    assert (entry.unique_id, entry.name) == (UID, "org.test.parachute")
+    assert monitor.all_discovered(0.1)
+    assert monitor.next_deadline() == OFFLINE_TIMEOUT
+
+
+def test_a_name_that_is_no_text_is_shown_as_far_as_it_is():
+    monitor = NodeMonitor()
+    monitor.status(33, status(0), 0.0)
+    monitor.information(33, info(name=b"a\xffb"), 0.0)
+    assert monitor.get(33).name == "a\ufffdb"
+
+
+def test_a_node_that_never_tells_is_asked_five_times_and_taken_as_it_is():
+    monitor, asked = NodeMonitor(), []
+    for tick in range(100):
+        now = tick / 10
+        monitor.status(33, status(int(now)), now)
+        asked += [now for _ in monitor.to_ask(now)]
+        # After the fifth question it has the time for an answer.
+        assert monitor.all_discovered(now) == (now >= 5.0)
+    assert asked == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_an_answer_of_a_node_that_is_not_there_says_nothing():
+    monitor = NodeMonitor()
+    monitor.information(33, info(), 0.0)
+    assert monitor.all() == []
+
+
+def test_a_restart_is_told_once_and_the_node_is_asked_again():
+    monitor = NodeMonitor()
+    speak(monitor, 0.0, 10.0, booted=-100.0)
+    monitor.to_ask(10.0)
+    monitor.information(33, info(), 10.0)
+    speak(monitor, 12.0, 15.0, booted=11.5)
+    assert monitor.take_restarted() == [33]
+    assert monitor.take_restarted() == []
+    entry = monitor.get(33)
+    assert (entry.restarts, entry.information) == (1, None)
+    assert monitor.to_ask(15.0) == [33]
+    assert monitor.conflicts(15.0) == []
+
+
+def test_a_node_that_only_counts_roughly_has_not_restarted():
+    monitor = NodeMonitor()
+    for now, uptime in ((0.0, 50), (1.0, 51), (2.0, 51), (2.9, 54), (3.9, 54), (4.9, 55)):
+        monitor.status(33, status(uptime), now)
+    assert monitor.take_restarted() == []
+    assert monitor.conflicts(5.0) == []
+
+
+def test_two_nodes_under_one_id_are_found_by_their_clocks():
+    monitor = NodeMonitor()
+    for tick in range(4):
+        speak(monitor, tick, tick, booted=-100.0)
+        assert monitor.conflicts(tick) == ([33] if tick else [])
+        speak(monitor, tick + 0.5, tick + 0.5, booted=-7.0)
+    # One of them goes: five seconds later nothing is wrong any more.
+    speak(monitor, 4.0, 9.0, booted=-100.0)
+    assert monitor.conflicts(8.9) == [33]
+    assert monitor.conflicts(9.1) == []
+    assert len(monitor.take_restarted()) <= 1
+
+
+def test_the_older_of_two_under_one_id_may_come_last():
+    monitor = NodeMonitor()
+    speak(monitor, 0.0, 3.0, booted=-7.0)
+    speak(monitor, 3.5, 3.5, booted=-100.0)
+    assert monitor.take_restarted() == []
+    speak(monitor, 4.0, 4.0, booted=-7.0)
+    assert monitor.conflicts(4.0) == [33]
+
+
+def test_two_unique_ids_under_one_node_id_are_a_conflict():
+    monitor = NodeMonitor()
+    monitor.status(33, status(5), 0.0)
+    monitor.information(33, info(), 0.0)
+    monitor.information(33, info(), 0.1)
+    assert monitor.conflicts(0.1) == []
+    monitor.information(33, info(b"\x55" * 16), 0.2)
+    assert monitor.conflicts(0.2) == [33]
+
+
+def test_a_silent_node_is_forgotten_and_may_be_another_when_it_comes_back():
+    monitor = NodeMonitor()
+    monitor.status(33, status(5), 0.0)
+    monitor.status(34, status(5), 2.0)
+    monitor.information(33, info(), 0.0)
+    monitor.forget_gone(2.999)
+    assert [entry.node_id for entry in monitor.all()] == [33, 34]
+    monitor.forget_gone(3.0)
+    assert [entry.node_id for entry in monitor.all()] == [34]
+    monitor.status(33, status(1), 4.0)
+    assert monitor.get(33).information is None
+    assert monitor.take_restarted() == []
+
+
+@pytest.mark.parametrize("passed", [3.0, 60.0])
+def test_a_node_that_is_back_before_anybody_looked_may_be_another_as_well(passed):
+    monitor = NodeMonitor()
+    monitor.status(33, status(5), 0.0)
+    monitor.information(33, info(), 0.0)
+    monitor.status(33, status(5 + int(passed)), passed)
+    assert monitor.get(33).information is None
+    assert not monitor.all_discovered(passed)
+
+
+def test_a_gone_node_that_nobody_has_forgotten_yet_is_not_waited_for():
+    monitor = NodeMonitor()
+    monitor.status(33, status(5), 0.0)
+    assert monitor.all_discovered(3.0)
+    assert monitor.to_ask(3.0) == []
+
+
+@given(
+    st.floats(0, 1e6),
+    st.lists(st.tuples(st.floats(0, 4), st.integers(1, 4), st.integers(0, 9)), max_size=40),
+)
+def test_every_deadline_is_served_and_in_the_end_everybody_is_gone(now, steps):
+    monitor = NodeMonitor()
+
+    def serve(now):
+        monitor.forget_gone(now)
+        monitor.to_ask(now)
+        assert monitor.next_deadline() > now
+
+    for pause, node_id, uptime in steps:
+        now += pause
+        monitor.status(node_id, status(uptime), now)
+        serve(now)
+    for _ in range(40):
+        if monitor.next_deadline() == math.inf:
+            break
+        serve(monitor.next_deadline())
+    assert monitor.all() == []
