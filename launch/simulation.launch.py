@@ -50,7 +50,7 @@ def _vehicle(context: LaunchContext) -> list:
 
 
 def _simulator(
-    executable: str, *connections: str, arguments: list | None = None
+    executable: str, *connections: str, arguments: tuple[str, ...] = ()
 ) -> ExecuteProcess:
     # Not a Node: launch_ros would add --ros-args, and a simulator knows nothing of ROS.
     command: list = [ExecutableInPackage(executable, "chute_ros"), *arguments]

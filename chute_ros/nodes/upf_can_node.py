@@ -32,7 +32,7 @@ from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.upf.errands import ErrandDone
 from chute_ros.protocol.upf.events import ErrandFinished, TriggerChanged
 from chute_ros.protocol.upf.link import UpfLink
-from chute_ros.protocol.upf.vehicle_service import AskSupervisor
+from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
 from chute_ros.transport.can_address import parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
 from chute_ros.transport.data_types import load_data_types
@@ -93,9 +93,11 @@ class UpfCanNode(DeviceNode):
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):
-            self.get_logger().warning(
-                f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
-            )
+            text = f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
+            if event.ask is Ask.FLIGHT_BLOCK_RELEASE:
+                self.get_logger().info(text)
+            else:
+                self.get_logger().warning(text)
             self.ask_supervisor(int(event.ask), event.device, event.reason)
         elif isinstance(event, ErrandFinished):
             self.desk.finished(event.token, event)

@@ -6,8 +6,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-
 from chute_ros.errors import NotBuiltError, ParameterError
 from chute_ros.protocol.dronecan.data_types import DataTypes
 
@@ -51,10 +49,16 @@ def _standard_folder(library: Any) -> Path:
 
 
 def _shipped() -> Path:
+    # Here: who names a folder needs no ROS.
     try:
-        share = get_package_share_directory("chute_msgs")
-    except PackageNotFoundError:
+        from ament_index_python.packages import get_package_share_directory
+
+        folder = Path(get_package_share_directory("chute_msgs")) / "dsdl" / "flyfire"
+    except (ImportError, LookupError):
+        folder = Path()
+    if folder.name != "flyfire" or not folder.is_dir():
         raise NotBuiltError(
-            "the DroneCAN data types cannot be found: build chute_msgs and source the result"
-        ) from None
-    return Path(share) / "dsdl" / "flyfire"
+            "the DroneCAN data types cannot be found: build chute_msgs and source the result, or "
+            "name a folder that has them"
+        )
+    return folder

@@ -2,7 +2,10 @@
 
 import ast
 import importlib.util
+import sys
+import types
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -113,6 +116,46 @@ def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
     for node in calls(vehicle, "Node"):
         assert node["namespace"] == "namespace"
         assert "config" in node["parameters"]
+
+
+class Recorded:
+    """Stands for whatever a launch file imports: remembers what it was made with."""
+
+    made: ClassVar[list] = []
+    chosen: ClassVar[dict] = {}
+
+    def __init__(self, *args, **options):
+        self.args, self.options = args, options
+        Recorded.made.append(self)
+
+    def perform(self, context):
+        return Recorded.chosen.get(self.args[0], "")
+
+
+@pytest.mark.parametrize("parachute", ["mavlink", "upf", "both"])
+@EVERY
+def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
+    file, parachute, monkeypatch
+):
+    """Run for real, with stand-ins where `launch` is not there."""
+    for name in {"launch", "launch.actions", "launch.substitutions", "launch_ros.actions"} | {
+        "launch.launch_description_sources",
+        "launch_ros",
+        "launch_ros.substitutions",
+    }:
+        module = types.ModuleType(name)
+        module.__getattr__ = lambda wanted: type(wanted, (Recorded,), {})
+        monkeypatch.setitem(sys.modules, name, module)
+    Recorded.made.clear()
+    chosen = {"parachute": parachute, "port": "14600", "namespace": "drone1"}
+    monkeypatch.setattr(Recorded, "chosen", chosen)
+    space = {}
+    exec(compile(file.read_text(), str(file), "exec"), space)
+    function = space.get("_nodes") or space["_vehicle"]
+    function(context=None)
+    names = {one.options.get("executable") or one.options.get("name") for one in Recorded.made}
+    upf = {"upf_can"} if file.name.startswith("vehicle") else {"sim_upf"}
+    assert upf <= names if parachute != "mavlink" else not upf & names
 
 
 @EVERY
