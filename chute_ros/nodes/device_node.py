@@ -34,6 +34,7 @@ from chute_ros.nodes.decision_carrier import DecisionCarrier
 from chute_ros.nodes.link_log import log_event
 from chute_ros.nodes.parameters import Parameter, declare
 from chute_ros.nodes.request_desk import CallFailed, RequestDesk
+from chute_ros.nodes.supervisor_watch import SupervisorWatch
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Notice,
@@ -93,8 +94,7 @@ class DeviceNode(Node, ABC):
         self._seq = count()
         self._loop_faults = 0
         self._summary: Summary | None = None
-        self._supervisor_heard = float("nan")
-        self._supervisor_delay = float("nan")
+        self._supervisor = SupervisorWatch(self.values["max_decision_age"], self.wall)
         self._status_publisher = self.create_publisher(
             ParachuteStatus, "parachute/status", qos.STATUS
         )
@@ -113,7 +113,7 @@ class DeviceNode(Node, ABC):
         assert self.loop is not None
         self.decisions.begin()
         self.create_subscription(
-            LinkHeartbeat, "safety/heartbeat", self._heartbeat_heard, qos.STATUS
+            LinkHeartbeat, "safety/heartbeat", self._supervisor.heartbeat, qos.STATUS
         )
         self.serve(Arm, "~/arm", self._arm)
         self.serve(Deploy, "~/deploy", self._deploy)
@@ -259,12 +259,6 @@ class DeviceNode(Node, ABC):
         message.header.stamp = self.stamp()
         self._heartbeat_publisher.publish(message)
 
-    def _heartbeat_heard(self, message: LinkHeartbeat) -> None:
-        if message.supervisor:
-            self._supervisor_heard = time.monotonic()
-            sent = messages.seconds(message.header.stamp)
-            self._supervisor_delay = messages.seconds(self.stamp()) - sent
-
     async def _arm(self, request: Arm.Request, response: Arm.Response) -> Arm.Response:
         end = await self.request(lambda link, token, now: self.arm_link(link, token, request, now))
         response.success, response.message = end.finished.success, end.finished.message
@@ -296,23 +290,6 @@ class DeviceNode(Node, ABC):
             statuses.append(diagnostics.status(name, "link", diagnostics.ERROR, text, {}, ""))
         if summary is not None:
             statuses += self.diagnose(summary)
-        statuses.append(self._diagnose_supervisor())
+        faults = {"exceptions in the link's thread": self._loop_faults}
+        statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
         self._diagnostics_publisher.publish(diagnostics.array(self.stamp(), statuses))
-
-    def _diagnose_supervisor(self) -> DiagnosticStatus:
-        age = time.monotonic() - self._supervisor_heard
-        limit = self.values["max_decision_age"]
-        level, text = diagnostics.OK, "heard"
-        if age != age:
-            level, text = diagnostics.STALE, "never heard"
-        elif age > OWNER_SILENCE:
-            level, text = diagnostics.ERROR, f"silent for {age:.1f} s"
-        elif abs(self._supervisor_delay) > limit / 2:
-            level = diagnostics.ERROR
-            text = f"clocks differ: its heartbeat seems {self._supervisor_delay:.3f} s old"
-        values = {
-            "heartbeat age (s)": age,
-            "exceptions in the link's thread": self._loop_faults,
-            **self.decisions.counts(),
-        }
-        return diagnostics.status(self.diagnostic_name, "supervisor", level, text, values, "")

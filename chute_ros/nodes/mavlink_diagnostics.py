@@ -36,6 +36,7 @@ class Details:
     sent: int
     dropped: Counter[str]
     late_acknowledgements: int
+    not_followed: int
 
 
 def details_of(link: MavlinkLink, now: float) -> Details:
@@ -60,6 +61,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
         link.sent_count,
         Counter(link.counts),
         link.requests.commands.late_count,
+        link.parachutes.refused_count + link.autopilots.refused_count,
     )
 
 
@@ -77,7 +79,11 @@ def link_task(
         level, text = diagnostics.ERROR, "; ".join(details.doubts)
     elif is_open and not details.received:
         level, text = diagnostics.WARN, f"{text}, nothing received yet"
-    values = {**traffic, "acknowledgements that came late": details.late_acknowledgements}
+    values = {
+        **traffic,
+        "acknowledgements that came late": details.late_acknowledgements,
+        "heartbeats of devices beyond the sixteen that are followed": details.not_followed,
+    }
     values |= {f"dropped: {reason}": n for reason, n in sorted(details.dropped.items())}
     return diagnostics.status(name, "link", level, text, values, connection)
 

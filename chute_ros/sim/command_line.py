@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 _FAULTS = (
     ("loss", "probability that a packet is lost, 0 to 1, each way"),
     ("duplicate", "probability that a packet comes twice"),
-    ("corrupt", "probability that a byte of a packet is wrong"),
+    ("corrupt", "probability that a byte of a packet (of a CAN frame: of its data) is wrong"),
     ("delay", "longest delay of a packet, s"),
 )
 _CAN_FAULTS = (
-    ("reorder", "probability that a frame is overtaken by the next"),
+    ("reorder", "probability that a frame is overtaken by those of the next 2 ms"),
     ("toggle", "probability that a frame's toggle bit is wrong"),
     ("half", "probability that only the first frame of a transfer comes"),
 )

@@ -31,6 +31,18 @@ def _run() -> None:
             help=f"static node id; 0: asks for one (default: {default})",
         )
         options.add_argument(f"--no-{which}", action="store_true", help=f"there is no {which}")
+    options.add_argument(
+        "--name",
+        default="upf",
+        help="of its nodes, from which their unique ids are made (default: upf)",
+    )
+    options.add_argument(
+        "--error",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="of the controller at the start; may be given more than once",
+    )
     options.add_argument("--dsdl-path", default="", help="folder flyfire with other data types")
     options.add_argument(
         "--parameter",
@@ -48,13 +60,14 @@ def _run() -> None:
     options.add_argument("--system-id", type=number("id", 1, 255), default=1, help="of --vehicle")
     chosen = options.parse_args()
 
-    from chute_ros.protocol.upf.definitions import Definitions
+    from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, Definitions
     from chute_ros.sim.upf_bus import UpfBus
     from chute_ros.sim.upf_controller import (
         CONTROLLER_PARAMETERS,
         ControllerSettings,
         UpfController,
     )
+    from chute_ros.sim.upf_errors import error_places
     from chute_ros.sim.upf_node import NodeSettings, UpfNode
     from chute_ros.sim.upf_trigger import TRIGGER_PARAMETERS, UpfTrigger
     from chute_ros.transport.data_types import load_data_types
@@ -62,14 +75,20 @@ def _run() -> None:
     definitions = Definitions(load_data_types(chosen.dsdl_path, "--dsdl-path"))
     values = {**CONTROLLER_PARAMETERS, p.STATIC_NODE_ID: chosen.controller_node_id}
     values |= _parameters(chosen.parameter)
+    places = error_places(definitions, PARACHUTE_STATUS)
+    for name in chosen.error:
+        if name not in places:
+            raise ParameterError(f"--error {name!r}: need one of {', '.join(places)}")
     settings = ControllerSettings(
-        NodeSettings("upf.controller", values), minimum_height=chosen.minimum_height
+        NodeSettings(f"{chosen.name}.controller", values),
+        minimum_height=chosen.minimum_height,
+        errors=frozenset(chosen.error),
     )
     controller = UpfController(definitions, settings)
     trigger = UpfTrigger(
         definitions,
         replace(
-            NodeSettings("upf.trigger", TRIGGER_PARAMETERS),
+            NodeSettings(f"{chosen.name}.trigger", TRIGGER_PARAMETERS),
             values={**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: chosen.trigger_node_id},
         ),
     )

@@ -27,10 +27,12 @@ class Motion:
 
 @dataclass(frozen=True)
 class ApsLimits:
-    """When it fires: sinks faster, weighs less or tilts more than this, for so long."""
+    """When it fires: sinks faster, weighs less while it sinks, or tilts more, for so long."""
 
     sink_speed: float = 8.0  # m/s
     free_fall: float = 3.0  # m/s^2
+    #: Whoever weighs less but still rises has only stopped to climb, m/s.
+    free_fall_sink_speed: float = 1.0
     tilt: float = 1.2  # rad
     hold: float = 0.3  # s
     minimum_height: float = 8.0  # m
@@ -54,7 +56,8 @@ class AutomaticDeployment:
             f"sinks faster than {limits.sink_speed:g} m/s": -motion.vertical_speed
             > limits.sink_speed,
             f"free fall, less than {limits.free_fall:g} m/s^2": motion.acceleration
-            < limits.free_fall,
+            < limits.free_fall
+            and -motion.vertical_speed > limits.free_fall_sink_speed,
             f"tilted more than {math.degrees(limits.tilt):.0f} degrees": motion.tilt > limits.tilt,
         }
         for what, so in felt.items():

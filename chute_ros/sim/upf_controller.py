@@ -17,34 +17,27 @@ from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import machine
 from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import CONTROLLER_NODE_ID
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.protocol.upf.machine import Stimulus
 from chute_ros.sim.upf_aps import ApsLimits, AutomaticDeployment, Motion
+from chute_ros.sim.upf_automatic import AutomaticFunctions, AutomaticLimits
+from chute_ros.sim.upf_errors import error_places, told_errors
+from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
 from chute_ros.sim.upf_node import NodeSettings, UpfNode
+from chute_ros.sim.upf_peers import Peers
 
-#: The document gives no defaults but the static node id and the resistor; the others are chosen.
-CONTROLLER_PARAMETERS: dict[str, p.Value] = {
-    p.STATIC_NODE_ID: CONTROLLER_NODE_ID,
-    p.AUTO_SAVE: True,
-    p.CANBUS_RESISTER: False,
-    p.ENABLE_PARACHUTE: True,
-    p.ENABLE_APS: True,
-    p.AUTO_TAKEOFF: True,
-    p.AUTO_ARM: True,
-    p.AUTO_DISARM: True,
-    p.AUTO_LAND: True,
-    p.LIGHT: True,
-    p.NODE_STATUS_INTERVAL: 1000,
-    p.PARACHUTE_STATUS_INTERVAL: 100,
-}
-#: The vehicle is connected while its VehicleStatus is younger, s.
-VEHICLE_TIMEOUT = 1.0
-#: The trigger is connected while its TriggerStatus is younger, s.
-TRIGGER_TIMEOUT = 1.0
+#: A trigger that has not fired is told again by itself after this time at the earliest, s.
+FIRE_AGAIN = 1.0
 _STEP = 0.02  # s
 
 _S = ParachuteState
+#: The state that a request asks for.
+_ASKED_FOR = {
+    Stimulus.TAKEOFF: _S.TAKEOFF,
+    Stimulus.ARM: _S.ARMED,
+    Stimulus.DISARM: _S.TAKEOFF,
+    Stimulus.LAND: _S.READY,
+}
 
 
 @dataclass(frozen=True)
@@ -53,10 +46,9 @@ class ControllerSettings:
 
     node: NodeSettings = field(default=NodeSettings("upf.controller", CONTROLLER_PARAMETERS))
     self_test: float = 0.5  # s
-    takeoff_height: float = 1.0  # m
-    arm_height: float = 10.0  # m
-    disarm_height: float = 8.0  # m
-    land_time: float = 2.0  # s at rest on the ground
+    #: Errors that it starts with, by the names of ParachuteStatus without ERROR_.
+    errors: frozenset[str] = frozenset()
+    automatic: AutomaticLimits = field(default=AutomaticLimits())
     #: The kill switch is waited for this long before it launches all the same, s.
     kill_wait: float = 0.5
     #: Below it TYPE_DEPLOY is temporarily rejected, m; 0: never.
@@ -77,16 +69,14 @@ class UpfController(UpfNode):
         self.errors: set[str] = set()
         #: TYPE_* of every ParachuteService request that came with the right magic number.
         self.requests_heard: list[str] = []
+        self._error_places = error_places(definitions, names.PARACHUTE_STATUS)
         self._aps = AutomaticDeployment(self.how.aps)
-        self._ready_at = math.nan
-        self._rest_since = math.nan
-        self._launch_at = math.nan
-        self._trigger_fired = False
-        self._vehicle_node, self._vehicle_heard = 0, -math.inf
-        self._trigger_node, self._trigger_heard = 0, -math.inf
-        self._call_number = 0
-        self._kill_call = 0
-        self._entry_call = 0
+        self._automatic = AutomaticFunctions(self.how.automatic)
+        #: When the self test ends, the trigger is to be told, and was told last; NaN: not.
+        self._ready_at = self._launch_at = self._fired_at = math.nan
+        self._launch_by_aps = False
+        self._peers = Peers()
+        self._call_number = self._kill_call = self._entry_call = 0
         self._step_at = -math.inf
         self.services[names.PARACHUTE_SERVICE] = self._parachute_service
         self.messages |= {
@@ -102,17 +92,17 @@ class UpfController(UpfNode):
             "clear-errors": lambda _: self._set_errors(set()),
             "deploy": lambda _: self.launch("a person at the device"),
         }
-        self.arguments |= {"error": lambda name: names_of_errors(self.definitions)[name]}
+        self.arguments |= {"error": self._error_places.__getitem__}
 
     # -- the world -------------------------------------------------------------------------------
 
     def reboot(self) -> None:
         """NOT_READY, then the self test; a trigger that has fired stays so."""
         super().reboot()
-        self.errors = set()
+        self.errors = set(self.how.errors)
         self._aps.reset()
-        self._launch_at = self._rest_since = math.nan
-        self._trigger_fired = False
+        self._launch_at = self._fired_at = math.nan
+        self._peers = Peers()
         self._ready_at = self.now + self.how.self_test
         self._enter(_S.NOT_READY)
 
@@ -122,12 +112,17 @@ class UpfController(UpfNode):
         if self.state is _S.NOT_READY and now >= self._ready_at:
             passed = not self.errors
             self._move(Stimulus.SELF_TEST_PASSED if passed else Stimulus.SELF_TEST_FAILED)
-        self._rest(now)
-        self._automatic(now)
+        self._automatic.feel(self.motion, now)
+        wish = self._automatic.wish(self.state, self.motion, self.switch, now)
+        if wish is not None:
+            self._move(wish)
+        at_rest = self._automatic.at_rest_for(now) >= machine.REST_TIME
+        if self.state is _S.LAUNCHED and at_rest:
+            self._move(Stimulus.AT_REST)
         if self.state is _S.ARMED and self.switch(p.ENABLE_APS):
             accident = self._aps.accident(self.motion, now)
             if accident:
-                self.launch(f"APS: {accident}")
+                self.launch(f"APS: {accident}", by_aps=True)
         else:
             self._aps.reset()
         if now >= self._launch_at:
@@ -137,35 +132,53 @@ class UpfController(UpfNode):
         """Soon."""
         return self._step_at
 
-    def launch(self, cause: str) -> None:
+    def launch(self, cause: str, by_aps: bool = False) -> None:
         """Ask for the kill switch, wait a little for the answer, then fire the trigger."""
-        out = self.state in machine.DEPLOYED or not math.isnan(self._launch_at)
-        if out or not self.switch(p.ENABLE_PARACHUTE):
+        if self.state in machine.DEPLOYED or not self.switch(p.ENABLE_PARACHUTE):
+            return
+        if not math.isnan(self._launch_at):
+            self._launch_by_aps &= by_aps
+            return
+        if by_aps and self.now - self._fired_at < FIRE_AGAIN:
+            return
+        if not self.node_id:
+            self.say(f"cannot launch by {cause}: has no node id")
             return
         self.say(f"LAUNCH by {cause} at {self.motion.height:.1f} m")
+        self._launch_by_aps = by_aps
         self._kill_call = self._ask_vehicle(machine.LAUNCH_REQUEST)
         self._launch_at = self.now + (self.how.kill_wait if self._kill_call else 0.0)
 
+    def parameter_changed(self, name: str) -> None:
+        """Call off a launch that may not be any more."""
+        super().parameter_changed(name)
+        self.send_soon(names.PARACHUTE_STATUS)
+        by_aps = self._launch_by_aps and not self.switch(p.ENABLE_APS)
+        if not math.isnan(self._launch_at) and (by_aps or not self.switch(p.ENABLE_PARACHUTE)):
+            self.say("launch called off")
+            self._launch_at = math.nan
+            self.calls.cancel(self._kill_call, self.now)
+
     def status(self) -> dict[str, Any]:
-        """ParachuteStatus as it is now."""
-        known = names_of_errors(self.definitions)
-        bits = {known[name] for name in self.errors if name in known}
-        # Data types that have a field for each error instead of flags.
-        single = {f"error_{name.lower()}": True for name in self.errors}
-        return single | {
+        """ParachuteStatus as it is now. That others are missing, or that it may not deploy, is
+        told as an error, but moves no state."""
+        errors = self.errors | self._peers.errors(self.now)
+        if not self.switch(p.ENABLE_PARACHUTE):
+            errors.add("PARACHUTE_DISABLED")
+        return {
             "state": self.definitions.state_number(self.state),
             "is_vehicle_connected": self.vehicle_connected,
             "is_enable_auto_launch": self.switch(p.ENABLE_APS),
-            "error_flags": sum(bits),
             "height_of_home": self.motion.height,
             "vz": self.motion.vertical_speed,
             "backup_power_voltage": 8.2,
+            **told_errors(self._error_places, errors),
         }
 
     @property
     def vehicle_connected(self) -> bool:
         """VehicleStatus is heard."""
-        return self.now - self._vehicle_heard < VEHICLE_TIMEOUT
+        return self._peers.vehicle_connected(self.now)
 
     # -- states ----------------------------------------------------------------------------------
 
@@ -176,7 +189,8 @@ class UpfController(UpfNode):
         if state is not self.state or state is _S.NOT_READY:
             self.say(state.name)
         self.state = state
-        self._rest_since = math.nan
+        self.initializing = state is _S.NOT_READY
+        self._automatic.entered(state)
         self.send_soon(names.PARACHUTE_STATUS)
         # What the state before asked for must not be asked again after what this one asks for.
         self.calls.cancel(self._entry_call, self.now)
@@ -188,67 +202,41 @@ class UpfController(UpfNode):
 
     def _set_errors(self, errors: set[str]) -> None:
         self.errors = errors
+        self.send_soon(names.PARACHUTE_STATUS)
         stimulus = Stimulus.FAULT if errors else Stimulus.FAULT_CLEARED
         if self._possible(stimulus):
             self._move(stimulus)
 
-    def _rest(self, now: float) -> None:
-        if not self.motion.at_rest:
-            self._rest_since = math.nan
-        elif math.isnan(self._rest_since):
-            self._rest_since = now
-        rested = now - self._rest_since
-        if self.state is _S.LAUNCHED and rested >= machine.REST_TIME:
-            self._move(Stimulus.AT_REST)
-
-    def _automatic(self, now: float) -> None:
-        how, height = self.how, self.motion.height
-        if self.state is _S.READY and self.switch(p.AUTO_TAKEOFF):
-            if height >= how.takeoff_height:
-                self._move(Stimulus.TAKEOFF)
-        elif self.state is _S.TAKEOFF:
-            landed = now - self._rest_since >= how.land_time and height < 0.5
-            if height >= how.arm_height and self.switch(p.AUTO_ARM):
-                self._move(Stimulus.ARM)
-            elif landed and self.switch(p.AUTO_LAND):
-                self._move(Stimulus.LAND)
-        elif self.state is _S.ARMED and self.switch(p.AUTO_DISARM):
-            calm = self.motion.vertical_speed > -self.how.aps.sink_speed / 2
-            if height < how.disarm_height and calm:
-                self._move(Stimulus.DISARM)
-
     # -- launching -------------------------------------------------------------------------------
 
     def _fire(self, now: float) -> None:
-        self._launch_at = math.nan
+        self._launch_at, self._fired_at = math.nan, now
         self.calls.cancel(self._kill_call, now)
         values = self.definitions.request(names.TRIGGER_SERVICE, "TYPE_LAUNCH")
-        if self._trigger_node:
-            self._start(Call(self._trigger_node, names.TRIGGER_SERVICE, values, 2))
+        for node_id in self._peers.triggers:
+            self._start(Call(node_id, names.TRIGGER_SERVICE, values, 2))
         constants = self.definitions.types.message(names.TRIGGER_LAUNCH).constants
         self.broadcast(names.TRIGGER_LAUNCH, {"magic_number": constants[names.MAGIC]}, 2)
 
     def answered(self) -> None:
-        """The vehicle answered the kill switch: launch now."""
+        """Say what vehicle and trigger answered; after the kill switch, launch."""
         for finished in self.calls.take_finished():
-            if finished.command.service != names.VEHICLE_SERVICE:
-                continue
+            service, values = finished.command.service, finished.command.values
             result = "no answer"
             if finished.values is not None:
-                result = self.definitions.result_name(names.VEHICLE_SERVICE, finished.values)
-            service, values = names.VEHICLE_SERVICE, finished.command.values
+                result = self.definitions.result_name(service, finished.values)
             self.say(f"{self.definitions.type_name(service, values)} answered: {result}")
             if finished.token == self._kill_call and not math.isnan(self._launch_at):
                 self._fire(self.now)
 
     def _ask_vehicle(self, type_name: str) -> int:
         """Request something of the vehicle; number of the call, 0: no vehicle is known."""
-        if not self._vehicle_node or not self.node_id:
+        if not self._peers.vehicle or not self.node_id:
             return 0
         values = self.definitions.request(names.VEHICLE_SERVICE, type_name)
         priority = 2 if type_name == machine.LAUNCH_REQUEST else 16
         self.say(f"asks for {type_name}")
-        return self._start(Call(self._vehicle_node, names.VEHICLE_SERVICE, values, priority))
+        return self._start(Call(self._peers.vehicle, names.VEHICLE_SERVICE, values, priority))
 
     def _start(self, call: Call) -> int:
         self._call_number += 1
@@ -258,19 +246,20 @@ class UpfController(UpfNode):
     # -- what comes ------------------------------------------------------------------------------
 
     def _vehicle_status(self, source: int, values: Mapping[str, Any]) -> None:
-        first = self._vehicle_node != source or not self.vehicle_connected
-        self._vehicle_node, self._vehicle_heard = source, self.now
+        if not self.node_id:
+            return
+        first = self._peers.vehicle_status(source, self.now)
         wanted = machine.ENTRY_REQUESTS.get(self.state)
         if first and wanted is not None:
             # It was not there when the state was entered.
+            self.calls.cancel(self._entry_call, self.now)
             self._entry_call = self._ask_vehicle(wanted)
 
     def _trigger_status(self, source: int, values: Mapping[str, Any]) -> None:
-        self._trigger_node, self._trigger_heard = source, self.now
+        self._peers.triggers[source] = self.now
         name = self.definitions.state_name(names.TRIGGER_STATUS, values)
         fired = bool(values.get("is_launched")) or name == "LAUNCHED"
-        if fired and not self._trigger_fired and self._possible(Stimulus.TRIGGER_FIRED):
-            self._trigger_fired = True
+        if fired and self._possible(Stimulus.TRIGGER_FIRED):
             self._move(Stimulus.TRIGGER_FIRED)
 
     def _parachute_service(self, request: Heard) -> dict[str, Any]:
@@ -288,6 +277,9 @@ class UpfController(UpfNode):
             if self.switch(switch):
                 return "REJECTED"
             stimulus = Stimulus[name.removeprefix("TYPE_")]
+            if self.state is _ASKED_FOR[stimulus]:
+                # Asked once more, because the first answer was lost.
+                return "SUCCESS"
             if not self._possible(stimulus):
                 return "FAILED"
             self._move(stimulus)
@@ -305,9 +297,3 @@ class UpfController(UpfNode):
                 return "TEMPORARILY_REJECTED"
         self.launch(name)
         return "SUCCESS"
-
-
-def names_of_errors(definitions: Definitions) -> dict[str, int]:
-    """ERROR_* of ParachuteStatus without the prefix -> its bit."""
-    constants = definitions.types.message(names.PARACHUTE_STATUS).constants
-    return {n.removeprefix("ERROR_"): b for n, b in constants.items() if n.startswith("ERROR_")}

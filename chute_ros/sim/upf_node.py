@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
-from chute_ros.protocol.dronecan.allocation import FOLLOWUP_TIMEOUT
+from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.calls import CallLimits, ServiceCalls
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
@@ -21,11 +21,12 @@ from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.upf import errands
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.sim.upf_clock import BusClock
+from chute_ros.sim.upf_dna import NodeIdClient
+from chute_ros.sim.upf_memory import ParameterMemory
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
-#: Between two requests for a node id, s (MIN_REQUEST_PERIOD_MS 600 to MAX 1000).
-_DNA_PERIOD = 0.7
-_PARTS = (6, 6, 4)
+_CALLS = CallLimits(0.3, 3)
 
 
 @dataclass(frozen=True)
@@ -50,14 +51,14 @@ class UpfNode:
         self.settings = settings
         self.now = 0.0
         self.booted_at = math.nan
-        #: Reads, but answers no request.
+        #: Reads, but obeys and answers no request.
         self.mute = False
         #: Sends nothing at all.
         self.silent = False
         self.health = settings.health
-        #: Non-volatile memory, and what is in use.
-        self.saved: dict[str, p.Value] = dict(settings.values)
-        self.values: dict[str, p.Value] = dict(settings.values)
+        #: NodeStatus.mode is MODE_INITIALIZATION.
+        self.initializing = False
+        self.memory = ParameterMemory(settings.values)
         #: Message type -> what it does with (source, values).
         self.messages: dict[str, Callable[[int, Mapping[str, Any]], None]] = {}
         #: Service type -> what it answers to a request.
@@ -81,11 +82,11 @@ class UpfNode:
         }
         #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
         self.arguments: dict[str, Callable[[str], Any]] = {}
-        self.calls = ServiceCalls(CallLimits(0.3, 3))
+        self.calls = ServiceCalls(_CALLS)
         self.endpoint = Endpoint(definitions.types, 0)
+        self.clock = BusClock()
+        self._dna = NodeIdClient(settings.unique_id)
         self._due: dict[str, float] = {}
-        self._dna_due = math.inf
-        self._dna_confirmed = 0
         self._events: list[str] = []
         #: The answer to a restart, which is sent before it.
         self._last_words: list[bytes] = []
@@ -94,6 +95,16 @@ class UpfNode:
     def node_id(self) -> int:
         """0: it has none yet."""
         return self.endpoint.node_id
+
+    @property
+    def values(self) -> dict[str, p.Value]:
+        """The parameters in use."""
+        return self.memory.values
+
+    @property
+    def saved(self) -> dict[str, p.Value]:
+        """The parameters that a restart brings back."""
+        return self.memory.saved
 
     # -- as the bus wants it --------------------------------------------------------------------
 
@@ -110,7 +121,13 @@ class UpfNode:
         elif heard.kind is Kind.REQUEST:
             self._serve(heard)
         elif heard.name == ALLOCATION:
-            self._allocation(heard)
+            self._dna.heard(heard.source, heard.values, now)
+            if self._dna.node_id and not self.node_id:
+                self.endpoint.node_id = self._dna.node_id
+                self.say(f"was given node id {self.node_id}")
+        elif heard.name == time_sync.MESSAGE:
+            stamp = heard.values["previous_transmission_timestamp_usec"]
+            self.clock.heard(heard.source, heard.transfer_id, stamp, now)
         elif heard.name in self.messages:
             self.messages[heard.name](heard.source, heard.values)
 
@@ -125,28 +142,19 @@ class UpfNode:
         self.start(now)
         self.now = now
         self.calls.update(now)
-        if not self.node_id:
-            if now >= self._dna_due:
-                self._ask_for_id(0)
-        else:
-            self.step(now)
-            for name, (interval, make) in self.broadcasts.items():
-                if now >= self._due.get(name, -math.inf):
-                    self._due[name] = now + interval()
-                    self.broadcast(name, make())
-        for send in self.calls.take_output():
-            call = send.command
-            self.endpoint.request(
-                call.server, call.service, send.transfer_id, call.values, call.priority
-            )
-        self.answered()
+        if self.node_id:
+            self._run(now)
+            return
+        self._dna.update(now)
+        for values in self._dna.take_requests():
+            self.endpoint.broadcast(ALLOCATION, values)
 
     def next_deadline(self) -> float:
         """When update has something to do."""
         if math.isnan(self.booted_at):
             return 0.0
         if not self.node_id:
-            return self._dna_due
+            return self._dna.next_deadline()
         due = [self._due.get(name, -math.inf) for name in self.broadcasts]
         return min([*due, self.calls.next_deadline(), self.next_step()])
 
@@ -177,20 +185,25 @@ class UpfNode:
     def reboot(self) -> None:
         """Start anew with what was saved."""
         self.booted_at = self.now
+        if self.silent:
+            self.take_output()
         self.mute = self.silent = False
         self.health = self.settings.health
-        self.values = dict(self.saved)
-        self.calls = ServiceCalls(CallLimits(0.3, 3))
+        self.memory.restart()
+        self.calls = ServiceCalls(_CALLS)
         node_id = int(self.values[p.STATIC_NODE_ID])
         self.endpoint = Endpoint(self.definitions.types, node_id)
+        self.clock = BusClock()
         self._due = {}
-        self._dna_due = self.now if node_id == 0 else math.inf
-        self._dna_confirmed = 0
+        self._dna = NodeIdClient(self.settings.unique_id)
+        if node_id == 0:
+            self._dna.start(self.now)
         self.say(f"started as node {node_id}" if node_id else "started without a node id")
 
     def broadcast(self, name: str, values: Mapping[str, Any], priority: int = 16) -> None:
-        """Send a message, of which the types in use may lack some fields."""
-        self.endpoint.broadcast(name, self.definitions.present(name, values), priority)
+        """Send a message, of which the types in use may lack some fields; only with a node id."""
+        if self.node_id:
+            self.endpoint.broadcast(name, self.definitions.present(name, values), priority)
 
     def send_soon(self, name: str) -> None:
         """This broadcast is news."""
@@ -210,6 +223,22 @@ class UpfNode:
         """A parameter that switches something."""
         return bool(self.values[name])
 
+    def _run(self, now: float) -> None:
+        """All that a node with an id does by itself."""
+        self.step(now)
+        for name, (interval, make) in self.broadcasts.items():
+            due = self._due.get(name, -math.inf)
+            if now >= due:
+                following = due + interval()
+                self._due[name] = following if following > now else now + interval()
+                self.broadcast(name, make())
+        self.answered()
+        for send in self.calls.take_output():
+            call = send.command
+            self.endpoint.request(
+                call.server, call.service, send.transfer_id, call.values, call.priority
+            )
+
     # -- services -------------------------------------------------------------------------------
 
     def _serve(self, request: Heard) -> None:
@@ -226,11 +255,9 @@ class UpfNode:
     def _interval(self, name: str) -> float:
         return float(self.values[name]) / 1000.0
 
-    def _uptime(self) -> int:
-        return int(self.now - self.booted_at)
-
     def _node_status(self) -> dict[str, Any]:
-        return {"uptime_sec": self._uptime(), "health": self.health}
+        uptime = int(self.now - self.booted_at)
+        return {"uptime_sec": uptime, "health": self.health, "mode": int(self.initializing)}
 
     def _get_node_info(self, request: Heard) -> dict[str, Any]:
         return {
@@ -251,81 +278,22 @@ class UpfNode:
         return {"ok": request.values["magic_number"] == errands.RESTART_MAGIC}
 
     def _get_set(self, request: Heard) -> dict[str, Any]:
-        name = bytes(request.values["name"]).decode("utf-8", "replace")
-        names = list(self.values)
-        if not name and request.values["index"] < len(names):
-            name = names[request.values["index"]]
-        if name not in self.values:
-            return {}
+        name = self.memory.name_of(request.values)
         wanted = p.value_of(request.values["value"])
-        if wanted is not None:
-            self._set(name, wanted)
-        documented = p.BY_NAME[name]
-        answer: dict[str, Any] = {
-            "name": name.encode(),
-            "value": p.union_of(self.values[name]),
-            "default_value": p.union_of(self.settings.values[name]),
-        }
-        if documented.kind is int:
-            answer["min_value"] = {"integer_value": documented.minimum}
-            answer["max_value"] = {"integer_value": documented.maximum}
-        return answer
+        if name and wanted is not None and self.memory.set(name, wanted):
+            self.say(f"{name} = {p.words(self.values[name])}")
+            self.parameter_changed(name)
+        return self.memory.answer(name)
 
-    def _set(self, name: str, wanted: p.Value) -> None:
-        """Take a value if it is of the right kind and in range; keep it, if that is wanted."""
-        documented = p.BY_NAME[name]
-        if documented.kind is bool:
-            if isinstance(wanted, str):
-                return
-            self.values[name] = bool(wanted)
-        elif isinstance(wanted, (int, float)) and not isinstance(wanted, bool):
-            number = int(wanted)
-            if not documented.minimum <= number <= documented.maximum:
-                return
-            self.values[name] = number
-        else:
-            return
-        self.say(f"{name} = {p.words(self.values[name])}")
-        if self.switch(p.AUTO_SAVE) or name == p.AUTO_SAVE:
-            self.saved[name] = self.values[name]
-        self.parameter_changed(name)
+    def _execute_opcode(self, request: Heard) -> dict[str, Any]:
+        before = dict(self.values)
+        done = self.memory.execute(request.values["opcode"])
+        for name, value in self.values.items():
+            if value != before[name]:
+                self.parameter_changed(name)
+        return {"ok": done}
 
     def parameter_changed(self, name: str) -> None:
         """A parameter has a new value."""
-
-    def _execute_opcode(self, request: Heard) -> dict[str, Any]:
-        opcode = request.values["opcode"]
-        if opcode == errands.OPCODE_SAVE:
-            self.saved = dict(self.values)
-        elif opcode == errands.OPCODE_ERASE:
-            # Takes effect at the next start, as the standard type's comment allows.
-            self.saved = dict(self.settings.values)
-        else:
-            return {"ok": False}
-        return {"ok": True}
-
-    # -- node id --------------------------------------------------------------------------------
-
-    def _ask_for_id(self, known: int) -> None:
-        """Send the part of the unique id that follows the known bytes."""
-        part = _PARTS[known // 6]
-        unique_id = self.settings.unique_id[known : known + part]
-        self._dna_due = self.now + (_DNA_PERIOD if known == 0 else FOLLOWUP_TIMEOUT)
-        values = {"first_part_of_unique_id": known == 0, "unique_id": unique_id}
-        self.endpoint.broadcast(ALLOCATION, values)
-
-    def _allocation(self, heard: Heard) -> None:
-        if self.node_id or heard.source == 0:
-            return
-        said = bytes(heard.values["unique_id"])
-        if not said or not self.settings.unique_id.startswith(said):
-            # Somebody else is being served: try again later.
-            self._dna_due = self.now + _DNA_PERIOD
-        elif len(said) == len(self.settings.unique_id):
-            node_id = heard.values["node_id"]
-            if node_id:
-                self.endpoint.node_id = node_id
-                self._dna_due = math.inf
-                self.say(f"was given node id {node_id}")
-        elif len(said) in (6, 12):
-            self._ask_for_id(len(said))
+        if name == p.NODE_STATUS_INTERVAL:
+            self.send_soon(NODE_STATUS)

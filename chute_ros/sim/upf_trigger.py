@@ -14,6 +14,7 @@ from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.config import TRIGGER_NODE_ID
 from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.sim.upf_errors import error_places, told_errors
 from chute_ros.sim.upf_node import NodeSettings, UpfNode
 
 STATUS_INTERVAL = 0.1  # s
@@ -40,15 +41,18 @@ class UpfTrigger(UpfNode):
         self.fired = False
         #: Says yes, but nothing comes out.
         self.stuck = False
-        self.errors = 0
+        #: By the names of TriggerStatus without ERROR_.
+        self.errors: set[str] = set()
         self.status_interval = STATUS_INTERVAL
         self._on_fire = on_fire
+        self._error_places = error_places(definitions, names.TRIGGER_STATUS)
         self.services[names.TRIGGER_SERVICE] = self._trigger_service
         self.messages[names.TRIGGER_LAUNCH] = self._trigger_launch
         self.broadcasts[names.TRIGGER_STATUS] = (lambda: self.status_interval, self.status)
         self.actions |= {
-            "trigger-error": lambda _: setattr(self, "errors", 1),
+            "trigger-error": lambda _: self._set_errors({"CIRCUIT_OPEN"}),
             "trigger-stuck": lambda _: setattr(self, "stuck", True),
+            "clear-errors": lambda _: self._set_errors(set()),
         }
 
     def fire(self, cause: str) -> None:
@@ -68,9 +72,13 @@ class UpfTrigger(UpfNode):
         return {
             "state": self.definitions.constant(names.TRIGGER_STATUS, name) or 0,
             "is_launched": self.fired,
-            "error_flags": self.errors,
             "supply_voltage": 12.0,
+            **told_errors(self._error_places, self.errors),
         }
+
+    def _set_errors(self, errors: set[str]) -> None:
+        self.errors = errors
+        self.send_soon(names.TRIGGER_STATUS)
 
     def _trigger_service(self, request: Heard) -> dict[str, Any]:
         service = names.TRIGGER_SERVICE
@@ -78,7 +86,7 @@ class UpfTrigger(UpfNode):
             return self.definitions.result(service, "BAD_MAGIC_NUMBER")
         name = self.definitions.type_name(service, request.values)
         if name == "TYPE_LAUNCH":
-            if self.errors:
+            if self.errors and not self.fired:
                 return self.definitions.result(service, "FAILED")
             self.fire(f"TriggerService of node {request.source}")
         elif name == "TYPE_SELF_TEST":
