@@ -43,8 +43,9 @@ def run(name: str, class_name: str) -> None:
         sys.exit(2)
     node = None
     try:
-        node = node_class()
+        # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
         executor = SingleThreadedExecutor()
+        node = node_class()
         executor.add_node(node)
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
