@@ -20,7 +20,7 @@ OVERLAY := $(SET_UP) && . "$$venv/env.sh"
 # A simulation must not reach other machines, nor a vehicle on them.
 LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test build lint docs lock clean distclean
+.PHONY: help demo test bench build lint docs lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -30,6 +30,9 @@ demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both)
 
 test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
+
+bench: build ## measure against bare scripts, write docs/bench.md
+	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench.kill_switch
 
 build: ## build both packages
 	@$(UNDERLAY) && exec scripts/build.sh

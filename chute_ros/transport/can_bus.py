@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import logging
-import select
 import socket
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from operator import index
 from typing import Any
 
 from chute_ros.protocol.dronecan.can_frame import SIZE, CanFrame, pack, unpack
 from chute_ros.transport.can_address import CanAddress
+from chute_ros.transport.can_failures import bad_frame, is_full, reason
 
 #: Interfaces whose descriptor is their whole queue: they are read directly. All others have
 #: buffers of their own, or no descriptor: a thread waits for them.
 _DIRECT = ("socketcan", "udp_multicast")
+#: Frames taken at once, so that a flood cannot keep the loop from its deadlines.
 _BURST = 64
-#: A frame that comes back later than this is not our echo, s.
-_ECHO_WINDOW = 1.0
-#: How long the reading thread waits at once, s: it ends when the wire is closed.
-_WAIT = 0.2
+#: How long the reading thread waits at once, s: so long may closing take.
+_WAIT = 0.1
+#: How long an adapter may take to accept a frame, s.
+_WRITE_TIMEOUT = 0.005
+#: So many failures, and neither a frame nor a pause between them: not bad frames, a broken driver.
+_MOST_FAILURES = 100
+_MOST_DATA = 8
 
 
 class CanBusWire:
@@ -32,8 +38,8 @@ class CanBusWire:
         self._address = address
         self._bus: Any = None
         self._reader: _Reader | None = None
-        #: Frames sent, with their time: this interface hears itself.
-        self._echoes: deque[tuple[float, bytes]] | None = None
+        self._echoes: Echoes | None = None
+        self._failures = 0
         #: Why a frame was dropped -> how often.
         self.counts: Counter[str] = Counter()
 
@@ -45,33 +51,29 @@ class CanBusWire:
         # Here: the import takes longer than all other wires need to open.
         import can
 
-        # What it has to say comes as exceptions; its log would repeat it at every try.
-        logging.getLogger("can").setLevel(logging.CRITICAL)
-        address = self._address
-        options: dict[str, Any] = {"interface": address.interface, "channel": address.channel}
-        if address.bitrate:
-            options["bitrate"] = address.bitrate
-        if address.interface == "udp_multicast":
-            options |= {"port": address.port, "hop_limit": 0, "fd": False}
+        _quieten()
         try:
-            bus = can.Bus(**options)
-        except (can.CanError, OSError, ImportError, ValueError, AttributeError) as error:
-            raise OSError(f"{_reason(error)}{self._advice()}") from None
+            # The user's own configuration file of the library could make it hear itself.
+            bus = can.Bus(ignore_config=True, **self._options())
+            if self._address.interface == "socketcan":
+                _check_is_up(bus)
+        except Exception as error:  # noqa: BLE001
+            # Drivers raise whatever their vendor's library does, and if there is none.
+            raise OSError(f"{reason(error)}{self._advice(error)}") from None
         self._bus = bus
-        self._echoes = deque() if address.interface == "udp_multicast" else None
-        if address.interface not in _DIRECT:
-            self._reader = _Reader(bus, self._convert)
+        if self._address.interface == "udp_multicast":
+            self._echoes = Echoes()
+        if self._address.interface not in _DIRECT:
+            self._reader = _Reader(self._take_one, self.describe())
 
     def close(self) -> None:
-        bus, self._bus = self._bus, None
+        # The thread first: it must not use a descriptor that is somebody else's by then.
         reader, self._reader = self._reader, None
         if reader is not None:
             reader.stop()
+        bus, self._bus = self._bus, None
         if bus is not None:
-            with contextlib.suppress(Exception):
-                bus.shutdown()
-        if reader is not None:
-            reader.join()
+            _shut_down(bus)
 
     def files(self) -> list[int]:
         if self._bus is None:
@@ -83,12 +85,11 @@ class CanBusWire:
             return [(frame, None) for frame in self._reader.take()]
         frames: list[tuple[bytes, Hashable]] = []
         for _ in range(_BURST):
-            if not select.select([file], [], [], 0)[0]:
+            found = self._take_one(0.0)
+            if found is None:
                 break
-            frame = _receive(self._bus, 0.0, self.counts)
-            converted = None if frame is None else self._convert(frame)
-            if converted is not None:
-                frames.append((converted, None))
+            # Nothing: a bad frame, or one that is not for us.
+            frames += [(found, None)] if found else []
         return frames
 
     def write(self, data: bytes) -> None:
@@ -97,76 +98,144 @@ class CanBusWire:
         frame = unpack(data)
         assert frame is not None  # the protocol makes them
         message = can.Message(
-            arbitration_id=frame.identifier, data=frame.data, is_extended_id=frame.extended
+            arbitration_id=frame.identifier,
+            is_extended_id=frame.extended,
+            is_remote_frame=frame.remote,
+            data=None if frame.remote else frame.data,
+            dlc=len(frame.data),
         )
-        if self._echoes is not None:
-            self._echoes.append((time.monotonic(), data))
         try:
-            # socketcan tells a full queue apart by its time-out; others send or block a moment.
-            self._bus.send(message, timeout=0.0 if self._address.interface in _DIRECT else 0.1)
-        except can.CanError as error:
-            if _is_medium(error):
-                raise ConnectionError(f"{_reason(error)}") from None
-            raise BlockingIOError(f"{_reason(error)}") from None
-        except OSError as error:
-            raise ConnectionError(f"{error}") from None
+            # No time at all would let pyserial send half a line; the direct ones need none.
+            direct = self._address.interface in _DIRECT
+            self._bus.send(message, timeout=0.0 if direct else _WRITE_TIMEOUT)
+        except Exception as error:  # noqa: BLE001
+            # Drivers raise whatever their vendor's library does.
+            kind = BlockingIOError if is_full(error) else ConnectionError
+            raise kind(f"{reason(error)}{self._advice(error)}") from None
+        if self._echoes is not None:
+            self._echoes.sent(data, time.monotonic())
 
     def describe(self) -> str:
         address = self._address
-        port = f":{address.port}" if address.port else ""
+        # The port stands behind IPv4 groups only: it could not be told from the last part of
+        # others, which take none.
+        port = f":{address.port}" if address.port and ":" not in address.channel else ""
         rate = f" at {address.bitrate} bit/s" if address.bitrate else ""
         return f"{address.interface}:{address.channel}{port}{rate}"
 
-    def _convert(self, message: Any) -> bytes | None:
-        """The sixteen bytes of a message of the library; None, and counted, if it has none."""
-        if message.is_fd or len(message.data) > 8:
-            self.counts["CAN FD frames"] += 1
-            return None
-        if message.is_error_frame:
-            return pack(CanFrame(message.arbitration_id, b"", False, error=True))
-        remote = message.is_remote_frame
-        data = b"" if remote else bytes(message.data)
-        highest = 0x1FFFFFFF if message.is_extended_id else 0x7FF
-        if not 0 <= message.arbitration_id <= highest:
-            self.counts["identifiers that no CAN frame has"] += 1
-            return None
-        frame = pack(CanFrame(message.arbitration_id, data, message.is_extended_id, remote))
-        return None if self._is_echo(frame) else frame
+    def _options(self) -> dict[str, Any]:
+        address = self._address
+        options: dict[str, Any] = {"interface": address.interface, "channel": address.channel}
+        if address.bitrate:
+            options["bitrate"] = address.bitrate
+        if address.interface == "udp_multicast":
+            # Not beyond this host: a simulated parachute must not meet somebody else's vehicle.
+            options |= {"port": address.port, "hop_limit": 0}
+        if address.interface == "slcan":
+            # By default two seconds, for boards that start anew when they are opened: the loop
+            # would stand still. And a time-out of a millisecond, which is polling.
+            options |= {"sleep_after_open": 0.0, "timeout": _WAIT}
+        return options
 
-    def _is_echo(self, frame: bytes) -> bool:
-        echoes = self._echoes
-        if echoes is None:
-            return False
-        now = time.monotonic()
-        while echoes and now - echoes[0][0] > _ECHO_WINDOW:
-            echoes.popleft()
-        for index, (_, sent) in enumerate(echoes):
-            if sent == frame:
-                del echoes[index]
+    def _take_one(self, timeout: float) -> bytes | None:
+        """The next frame that comes within timeout (s), None if none does; b"" if it was dropped.
+        OSError: the interface is gone."""
+        try:
+            message = self._bus.recv(timeout)
+            self._failures = 0
+            return None if message is None else self._frame(message)
+        except Exception as error:  # noqa: BLE001
+            # Drivers raise whatever their vendor's library does; what is not the frame's own
+            # fault ends the wire, and the loop opens it again.
+            kind = bad_frame(error)
+            if not kind:
+                raise OSError(f"{reason(error)}{self._advice(error)}") from None
+            return self._stumble(kind, error)
+
+    def _stumble(self, kind: str, error: Exception) -> bytes:
+        """Count a bad frame, and go on behind it."""
+        self._failures += 1
+        if self._failures > _MOST_FAILURES and self._address.interface not in _DIRECT:
+            raise OSError(f"nothing but failures, the last one: {reason(error)}") from None
+        if isinstance(error.__cause__, UnicodeError) and hasattr(self._bus, "flush"):
+            # slcan would keep what it cannot decode, and stumble over it for ever.
+            with contextlib.suppress(Exception):
+                self._bus.flush()
+        return self._drop(kind)
+
+    def _frame(self, message: Any) -> bytes:
+        """The sixteen bytes of a message of the library; none, and counted, if it has none."""
+        if message.is_fd:
+            return self._drop("CAN FD frames")
+        data = b"" if message.is_remote_frame else bytes(message.data)
+        cut = not message.is_remote_frame and message.dlc != len(data)
+        if cut or len(data) > _MOST_DATA:
+            return self._drop("frames of a wrong length")
+        number = index(message.arbitration_id)
+        if message.is_error_frame:
+            # Only Linux's identifier says what is wrong.
+            number = number if self._address.interface == "socketcan" else 0
+            return pack(CanFrame(number, data, extended=False, error=True))
+        if not 0 <= number <= (0x1FFFFFFF if message.is_extended_id else 0x7FF):
+            return self._drop("identifiers that no CAN frame has")
+        remote = bool(message.is_remote_frame)
+        frame = pack(CanFrame(number, data, bool(message.is_extended_id), remote))
+        own = self._echoes is not None and self._echoes.take(frame, time.monotonic())
+        return b"" if own else frame
+
+    def _drop(self, kind: str) -> bytes:
+        self.counts[kind] += 1
+        return b""
+
+    def _advice(self, error: BaseException) -> str:
+        """What the user can do about it, with a semicolon before."""
+        address = self._address
+        if address.interface == "udp_multicast":
+            return "; is there a route for multicast? ip route add 224.0.0.0/4 dev lo"
+        if address.interface != "socketcan":
+            return ""
+        if getattr(error, "errno", 0) == errno.EAFNOSUPPORT:
+            return "; this kernel has no CAN: modprobe can-raw"
+        rate = address.bitrate or "BITRATE"
+        return f"; is it up? ip link set {address.channel} up type can bitrate {rate}"
+
+
+class Echoes:
+    """Frames sent that are still to come back, as python-can's multicast hears itself."""
+
+    #: A frame that comes back later than this is another node's, s.
+    WINDOW = 1.0
+    _MOST = 4096
+
+    def __init__(self) -> None:
+        self._sent: deque[tuple[float, bytes]] = deque(maxlen=self._MOST)
+
+    def sent(self, frame: bytes, now: float) -> None:
+        """It will come back once."""
+        self._sent.append((now, frame))
+
+    def take(self, frame: bytes, now: float) -> bool:
+        """That frame is one that was sent, and has not come back before."""
+        while self._sent and now - self._sent[0][0] > self.WINDOW:
+            self._sent.popleft()
+        for place, (_, one) in enumerate(self._sent):
+            if one == frame:
+                del self._sent[place]
                 return True
         return False
-
-    def _advice(self) -> str:
-        address = self._address
-        if address.interface == "socketcan":
-            rate = address.bitrate or 1000000
-            return (
-                f"; is it there and up? ip link set {address.channel} up type can bitrate {rate}"
-            )
-        return ""
 
 
 class _Reader:
     """A thread that waits for frames and makes a descriptor readable with each."""
 
-    def __init__(self, bus: Any, convert: Any) -> None:
-        self._bus, self._convert = bus, convert
-        self._ours, self._theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    def __init__(self, take_one: Callable[[float], bytes | None], name: str) -> None:
+        self._take_one = take_one
+        # Whole frames, as each is sent at once. Who sends waits while the loop does not read.
+        self._ours, self._theirs = socket.socketpair()
         self._ours.setblocking(False)
-        self._counts: Counter[str] = convert.__self__.counts
         self._failure = ""
         self._stopping = False
-        self._thread = threading.Thread(target=self._run, name="CAN reader", daemon=True)
+        self._thread = threading.Thread(target=self._run, name=f"reader {name}", daemon=True)
         self._thread.start()
 
     def fileno(self) -> int:
@@ -175,67 +244,53 @@ class _Reader:
 
     def take(self) -> list[bytes]:
         """Frames that came; OSError: the interface is gone."""
-        frames = []
-        for _ in range(_BURST):
-            try:
-                data = self._ours.recv(SIZE)
-            except BlockingIOError:
-                break
-            if not data:
-                raise OSError(self._failure or "the interface was closed")
-            frames.append(data)
-        return frames
+        try:
+            data = self._ours.recv(SIZE * _BURST)
+        except BlockingIOError:
+            return []
+        if not data:
+            raise OSError(self._failure)
+        return [data[at : at + SIZE] for at in range(0, len(data), SIZE)]
 
     def stop(self) -> None:
-        """End soon; whoever closes the bus wakes the thread."""
+        """End the thread."""
         self._stopping = True
-
-    def join(self) -> None:
-        """Wait for the end."""
+        self._ours.shutdown(socket.SHUT_RDWR)  # it may be waiting until somebody reads
         self._thread.join()
         self._ours.close()
-        self._theirs.close()
 
     def _run(self) -> None:
-        while not self._stopping:
-            try:
-                message = _receive(self._bus, _WAIT, self._counts)
-                frame = None if message is None else self._convert(message)
-                if frame is not None:
-                    self._theirs.send(frame)
-            except Exception as error:  # noqa: BLE001
-                # Drivers raise whatever their vendor's library does; the loop reopens the wire.
-                self._failure = _reason(error)
-                with contextlib.suppress(OSError):
-                    self._theirs.send(b"")
-                return
+        with self._theirs as theirs:
+            while not self._stopping:
+                try:
+                    frame = self._take_one(_WAIT)
+                    if frame:
+                        theirs.sendall(frame)
+                except OSError as error:
+                    self._failure = str(error)
+                    return
 
 
-def _receive(bus: Any, timeout: float, counts: Counter[str]) -> Any:
-    """The next message, or None. OSError: the interface is gone; what is only a bad frame is
-    counted."""
-    import can
+def _check_is_up(bus: Any) -> None:
+    """Binding to an interface that is down succeeds; the error waits in the socket."""
+    code = bus.socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+    if code:
+        _shut_down(bus)
+        raise OSError(code, "the interface is down")
 
+
+def _shut_down(bus: Any) -> None:
     try:
-        return bus.recv(timeout)
-    except can.CanError as error:
-        if _is_medium(error):
-            raise OSError(_reason(error)) from None
-        counts[f"bad frames: {str(error).partition(' [')[0]}"] += 1
-    except ValueError as error:
-        # How drivers show a line or a packet that is none.
-        counts[f"bad frames: {type(error).__name__}"] += 1
-    return None
+        bus.shutdown()
+    except Exception:  # noqa: BLE001
+        # The device is gone: slcan fails in saying goodbye, and leaves its port open.
+        port = getattr(bus, "serialPortOrig", None)
+        if port is not None:
+            port.close()
 
 
-def _is_medium(error: BaseException) -> bool:
-    """An error of the library that comes from the operating system's."""
-    cause = error.__cause__ or error.__context__
-    full = isinstance(cause, (TimeoutError, BlockingIOError))
-    return isinstance(cause, OSError) and not full
-
-
-def _reason(error: BaseException) -> str:
-    text = str(error) or type(error).__name__
-    cause = error.__cause__
-    return f"{text} ({cause})" if cause is not None and str(cause) not in text else text
+def _quieten() -> None:
+    """What the library has to say comes as exceptions; its log would repeat it at every try."""
+    log = logging.getLogger("can")
+    if log.level == logging.NOTSET:
+        log.setLevel(logging.CRITICAL)

@@ -1,0 +1,37 @@
+"""Tables of measurements, and the machine that they were made on."""
+
+from __future__ import annotations
+
+import os
+import platform
+import statistics
+from collections.abc import Sequence
+
+
+def summary(values: Sequence[float]) -> tuple[float, float, float]:
+    """Median, 99th percentile (the largest if there are few), largest."""
+    ordered = sorted(values)
+    index = min(len(ordered) - 1, round(0.99 * (len(ordered) - 1)))
+    return statistics.median(ordered), ordered[index], ordered[-1]
+
+
+def machine() -> str:
+    """What the numbers depend on, in one line."""
+    model = "unknown processor"
+    with open("/proc/cpuinfo") as file:
+        for line in file:
+            if line.startswith("model name"):
+                model = line.partition(":")[2].strip()
+                break
+    distribution = os.environ.get("ROS_DISTRO", "?")
+    return (
+        f"{model}, {os.cpu_count()} cores; Linux {platform.release()}; "
+        f"Python {platform.python_version()}; ROS 2 {distribution}"
+    )
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """As Markdown."""
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines)
