@@ -209,7 +209,8 @@ class DeviceNode(Node, ABC):
         self._guard.trigger()
 
     def _drain(self) -> None:
-        while self._inbox:
+        # What comes meanwhile waits for its turn: a flood must not keep decisions from theirs.
+        for _ in range(len(self._inbox)):
             event = self._inbox.popleft()
             if isinstance(event, Summary):
                 self._publish_heartbeat(event)
@@ -225,6 +226,9 @@ class DeviceNode(Node, ABC):
                 self.desk.finished(event.token, self.failed_end(event.token, event.text))
             else:
                 self._event(event)
+
+        if self._inbox:
+            self._guard.trigger()
 
     def _event(self, event: Any) -> None:
         if isinstance(event, ParachuteChanged):
@@ -243,6 +247,7 @@ class DeviceNode(Node, ABC):
     def _beat(self) -> None:
         def answer(link: Any, now: float) -> None:
             link.owner_alive(now + OWNER_SILENCE)
+            self.desk.try_held(link, now)
             self.deliver([self.summarise(link, now)])
 
         self.in_link(answer)

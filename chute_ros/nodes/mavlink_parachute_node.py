@@ -86,8 +86,10 @@ class MavlinkParachuteNode(DeviceNode):
         if decision.action is model.Action.KILL:
             self.desk.request_for(decision, lambda link, token, now: link.kill(token, now))
         elif decision.action is model.Action.DEPLOY:
-            self.desk.request_for(
-                decision, lambda link, token, now: link.deploy(token, force, now)
+            self.desk.deploy_for(
+                decision,
+                lambda link, token, now: link.deploy(token, force, now),
+                self.values["give_up_after"],
             )
         elif decision.action is not model.Action.NONE:
             blocked = decision.action is model.Action.FLIGHT_BLOCK

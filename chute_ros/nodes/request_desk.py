@@ -36,6 +36,8 @@ class RequestDesk:
         self._tokens = count(1)
         self._waiting: dict[int, Future] = {}
         self._decisions: dict[int, model.Decision] = {}
+        #: Deploys that wait for a parachute: (token, begin, until). Of the link's thread.
+        self._held: list[tuple[int, Begin, float]] = []
 
     def request(self, begin: Begin) -> Future:
         """Have begin(link, token, now) called in the link's thread; the future is its end."""
@@ -49,6 +51,31 @@ class RequestDesk:
         token = next(self._tokens)
         self._decisions[token] = decision
         self._call(token, begin)
+
+    def deploy_for(self, decision: model.Decision, begin: Begin, give_up_after: float) -> None:
+        """The same for a deploy: a node that has just started waits until it has heard a
+        parachute, at most give_up_after s. try_held is called often meanwhile."""
+        token = next(self._tokens)
+        self._decisions[token] = decision
+
+        def begin_or_hold(link: Any, now: float) -> None:
+            if link.has_parachute():
+                self._begin(link, token, begin, now)
+            else:
+                self._held.append((token, begin, now + give_up_after))
+
+        self._in_link(begin_or_hold)
+
+    def try_held(self, link: Any, now: float) -> None:
+        """In the link's thread: begin the deploys that waited for a parachute, or for too long."""
+        ready = link.has_parachute()
+        held, self._held = self._held, []
+        for token, begin, until in held:
+            if ready or now >= until:
+                # A call of its own: a mistake in it must not cost those that follow.
+                self._call(token, begin)
+            else:
+                self._held.append((token, begin, until))
 
     def finished(self, token: int, end: Any) -> None:
         """A request ended: its caller gets end."""
@@ -64,12 +91,12 @@ class RequestDesk:
             self._report(decision, outcome, detail)
 
     def _call(self, token: int, begin: Begin) -> None:
-        def begin_or_say(link: Any, now: float) -> None:
-            try:
-                begin(link, token, now)
-            except Exception as error:
-                # Whoever waits must get an answer; the loop reports the mistake itself.
-                self._deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
-                raise
+        self._in_link(lambda link, now: self._begin(link, token, begin, now))
 
-        self._in_link(begin_or_say)
+    def _begin(self, link: Any, token: int, begin: Begin, now: float) -> None:
+        try:
+            begin(link, token, now)
+        except Exception as error:
+            # Whoever waits must get an answer; the loop reports the mistake itself.
+            self._deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
+            raise

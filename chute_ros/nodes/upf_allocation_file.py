@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import os
 from collections.abc import Mapping
@@ -15,7 +16,10 @@ class AllocationFile:
     """path: of the file; empty: under ROS_HOME (~/.ros), named after the node."""
 
     def __init__(self, path: str, node_name: str) -> None:
-        self.path = Path(path).expanduser() if path else _default_path(node_name)
+        try:
+            self.path = Path(path).expanduser() if path else _default_path(node_name)
+        except RuntimeError as error:
+            raise ParameterError(f"parameter allocation_table_file is {path!r}: {error}") from None
 
     def load(self) -> dict[bytes, int]:
         """The table; empty if there is no file. ParameterError if it cannot be believed: to begin
@@ -27,13 +31,20 @@ class AllocationFile:
         except (OSError, UnicodeDecodeError) as error:
             raise self._unusable(str(error)) from None
         try:
-            entries = json.loads(text)
-            table = {bytes.fromhex(unique_id): int(n) for unique_id, n in entries.items()}
-        except (ValueError, AttributeError, TypeError):
+            # As pairs: a dict would hide a unique id that is there twice.
+            pairs = json.loads(text, object_pairs_hook=tuple)
+            entries = [(bytes.fromhex(unique_id), node_id) for unique_id, node_id in pairs]
+        except (ValueError, TypeError, RecursionError):
             raise self._unusable("it holds no table of unique id to node id") from None
-        for unique_id, node_id in table.items():
-            if len(unique_id) != UNIQUE_ID_LENGTH or not LOWEST <= node_id <= HIGHEST:
+        if not isinstance(pairs, tuple):
+            raise self._unusable("it holds no table of unique id to node id")
+        for unique_id, node_id in entries:
+            whole = type(node_id) is int and LOWEST <= node_id <= HIGHEST
+            if len(unique_id) != UNIQUE_ID_LENGTH or not whole:
                 raise self._unusable(f"{unique_id.hex()}: {node_id} is no allocation")
+        table = dict(entries)
+        if len(table) < len(entries):
+            raise self._unusable("it names one device twice")
         if len(set(table.values())) < len(table):
             raise self._unusable("it gives one node id to two devices")
         return table
@@ -41,6 +52,8 @@ class AllocationFile:
     def save(self, table: Mapping[bytes, int]) -> None:
         """Write all beside the file, then put it in its place; OSError if that fails."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
+        for left in self.path.parent.glob(f"{glob.escape(self.path.name)}.*.new"):
+            left.unlink(missing_ok=True)  # of a process that was killed while it wrote
         beside = self.path.with_name(f"{self.path.name}.{os.getpid()}.new")
         text = json.dumps({key.hex(): n for key, n in sorted(table.items())}, indent=1) + "\n"
         descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,6 +68,8 @@ class UpfCanNode(DeviceNode):
         utc_offset = time.time() - time.monotonic()
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
         self.loop = WireLoop(link, make_can_wire(address), self.deliver)
+        #: Kills that were confirmed: (epoch, id, link) of the newest reports.
+        self._kills: deque[tuple[int, int, str]] = deque(maxlen=50)
         self._trigger_publisher = self.create_publisher(
             TriggerStatus, "upf/trigger_status", qos.STATUS
         )
@@ -113,8 +116,10 @@ class UpfCanNode(DeviceNode):
     def carry_out(self, decision: model.Decision) -> None:
         if decision.action is model.Action.DEPLOY:
             force = self.values["decided_deploy_forces"]
-            self.desk.request_for(
-                decision, lambda link, token, now: link.deploy(token, force, now)
+            self.desk.deploy_for(
+                decision,
+                lambda link, token, now: link.deploy(token, force, now),
+                self.values["give_up_after"],
             )
         elif decision.action is model.Action.KILL:
             text = "a UPF parachute stops no motors: take upf_can out of kill_links"
@@ -156,7 +161,10 @@ class UpfCanNode(DeviceNode):
 
     def _action(self, message: ActionReport) -> None:
         confirmed = message.outcome == model.Outcome.CONFIRMED
-        if message.action == model.Action.KILL and confirmed:
+        report = (message.epoch, message.id, message.link)
+        if message.action == model.Action.KILL and confirmed and report not in self._kills:
+            # Once: a report is said again when its decision is, long after it happened.
+            self._kills.append(report)
             self.in_link(lambda link, now: link.kill_confirmed(now))
 
     def _safety(self, message: SafetyState) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from types import MappingProxyType
 
-from chute_ros.model import Action
+from chute_ros.model import Action, Armed
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.preflight import arm_reasons
 from chute_ros.supervisor.steps import Steps
 
 ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
+#: What a vehicle says so soon after a kill was decided may be from before it, s.
+_KILL_SETTLES = 0.2
 #: Devices whose wish to block flight is remembered: made-up names must not grow us.
 MOST_DEVICE_BLOCKS = 64
 _DEPLOY_ALLOWED = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
@@ -70,8 +72,16 @@ class Requests(Steps):
         kill = self.state.kill
         if token or kill is None or self._kill_under_way():
             return self._kill_under_way()
+        if kill.confirmed and self._armed_since(kill.decided_at + _KILL_SETTLES):
+            return False
         wait = self.config.kill_timeout if kill.confirmed else self.config.resend_interval
         return self.now < kill.decided_at + wait
+
+    def _armed_since(self, when: float) -> bool:
+        """The vehicle says, and said after when, that its motors are armed (again)."""
+        said_at = self.state.vehicle_received - self.state.vehicle.armed_age
+        fresh = self.now - said_at <= self.config.vehicle_state_age
+        return self.state.vehicle.armed is Armed.ARMED and fresh and said_at > when
 
     def block_request(self, one: i.BlockRequest) -> None:
         """Blocks flight on the ground as an unhealthy link does; in the air it is remembered."""

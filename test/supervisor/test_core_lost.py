@@ -1,11 +1,12 @@
 """Decisions and reports that are lost, late, doubled, overtaken or refused; orders that cross."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from story import FLYING, LINK, STANDING, START, Story
 
-from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.model import Action, Armed, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline
@@ -76,6 +77,28 @@ def test_a_device_that_repeats_its_request_makes_no_new_decision_each_time() -> 
     assert len(story.decisions(K)) == 1
     story.at(8.0, ask)
     assert len(story.decisions(K)) == 2
+
+
+def test_a_device_that_asks_while_the_motors_turn_again_is_obeyed_again() -> None:
+    """A kill was confirmed, and undone since: the vehicle says that it is armed."""
+    story = Story().flying()
+    ask = i.KillRequest(0, "upf_can 33", "about to launch")
+    story.at(1.0, ask)
+    story.at(1.1, story.report(K, Outcome.CONFIRMED))
+    story.at(3.0, i.VehicleReport(replace(FLYING, armed=Armed.DISARMED)))
+    story.at(3.5, ask)
+    assert len(story.decisions(K)) == 1, "it is still off"
+    story.at(4.0, i.VehicleReport(FLYING))
+    story.at(4.5, ask)
+    assert len(story.decisions(K)) == 2
+
+
+def test_what_the_vehicle_said_before_the_kill_does_not_undo_it() -> None:
+    story = Story().flying()
+    story.at(1.0, i.KillRequest(0, "upf_can 33", "about to launch"))
+    story.at(1.05, story.report(K, Outcome.CONFIRMED))
+    story.at(1.1, i.VehicleReport(FLYING), i.KillRequest(0, "upf_can 33", "again"))
+    assert len(story.decisions(K)) == 1
 
 
 def test_a_device_that_repeats_its_request_cannot_put_off_the_answer_to_a_person() -> None:

@@ -114,6 +114,8 @@ class ServiceCalls:
         self._next_id: dict[_Key, int] = {}
         #: Transfer ids whose response has not come yet -> when they were sent.
         self._unanswered: dict[_Key, dict[int, float]] = {}
+        #: (server, service, transfer id) of calls that nobody answered in time -> call, when.
+        self._given_up: dict[tuple[int, str, int], tuple[Call, float]] = {}
         self._open: dict[int, _Open] = {}
         self._waiting: deque[_Open] = deque()
         self._out: list[SendCall] = []
@@ -150,7 +152,13 @@ class ServiceCalls:
             if _key(one.call) == (server, service) and transfer_id in one.transfer_ids:
                 self._end(one, values, now)
                 return
-        self.counts["responses that nobody waited for"] += 1
+        late = self._given_up.pop((server, service, transfer_id), None)
+        if late is None or now - late[1] >= _UNANSWERED:
+            self.counts["responses that nobody waited for"] += 1
+        else:
+            self.counts["responses that came too late"] += 1
+            # Nobody waits for it any more; whoever reads answers may still want to know.
+            self._read(CallFinished(0, late[0], values, 0, 0.0))
 
     def unsendable(self, send: SendCall, why: str, now: float) -> None:
         """What take_output gave cannot be put on the bus: the call ends."""
@@ -194,6 +202,8 @@ class ServiceCalls:
         number = min(in_order, key=lambda one: _awaited_since(unanswered, one, now))
         self._next_id[key] = (number + 1) % TRANSFER_IDS
         unanswered[number] = now
+        server, service = key
+        self._given_up.pop((server, service, number), None)
         for one in self._open.values():
             if _key(one.call) == key:
                 one.transfer_ids.discard(number)
@@ -211,6 +221,10 @@ class ServiceCalls:
     ) -> None:
         del self._open[one.token]
         answered = values is not None
+        if not answered:
+            for number in one.transfer_ids:
+                server, service = _key(one.call)
+                self._given_up[server, service, number] = (one.call, now)
         finished = CallFinished(
             one.token,
             one.call,

@@ -150,7 +150,9 @@ class NodeMonitor:
         recent = [(one, at) for one, at in entry.starts if now - at < _CONFLICT_WINDOW]
         newest = entry.starts[-1][0] if entry.starts else start
         if abs(start - newest) >= _SAME_START:
-            if any(abs(start - one) < _SAME_START for one, _ in recent):
+            # Uptimes are whole seconds: a start of the clock that has just ended may lie near.
+            others = [one for one, _ in recent if abs(one - newest) >= _SAME_START]
+            if any(abs(start - one) < _SAME_START for one in others):
                 # The clock before the last one is heard again: two nodes take turns.
                 entry.conflict_heard = now
             elif start > newest:

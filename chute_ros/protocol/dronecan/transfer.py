@@ -113,6 +113,8 @@ class _Session:
     crc: int = 0
     #: What came so far of a transfer of several frames; None: there is none under way.
     payload: bytearray | None = None
+    #: What the newest complete transfer of one frame said.
+    said: bytes = b""
     #: (transfer id, when) of the newest complete transfers.
     done: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=_REMEMBERED))
 
@@ -185,7 +187,11 @@ class Assembler:
         same = session.transfer_id == head.transfer_id and now - session.heard < TRANSFER_TIMEOUT
         if tail & _START:
             if session.came_before(head.transfer_id, now):
-                return self._drop("transfers that came twice")
+                # A device that has just started counts from 0 again; what it says then differs.
+                newest = session.done[-1][0] == head.transfer_id
+                anew = newest and tail & _END and session.said not in (b"", chunk)
+                if not anew:
+                    return self._drop("transfers that came twice")
             if tail & _TOGGLE:
                 return self._drop("toggle bit wrong")
             if not tail & _END and len(chunk) < _FRAME_PAYLOAD:
@@ -196,6 +202,7 @@ class Assembler:
             if tail & _END:
                 session.payload = None
                 session.done.append((head.transfer_id, now))
+                session.said = chunk
                 return self._done(head, chunk)
             session.crc = chunk[0] | chunk[1] << 8
             session.payload = bytearray(chunk[2:])
@@ -220,6 +227,7 @@ class Assembler:
             # It may be sent again under the same number.
             return self._drop("CRC of a transfer wrong (or another definition of its type)")
         session.done.append((head.transfer_id, now))
+        session.said = b""
         return self._done(head, payload)
 
     def _done(self, head: Transfer, payload: bytes) -> Transfer:

@@ -182,6 +182,10 @@ class MavlinkLink:
         """Frames sent since the start."""
         return self._outbox.sent_count
 
+    def has_parachute(self) -> bool:
+        """A device was heard that can be told to deploy."""
+        return self.chosen_parachute() is not None
+
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Where requests without a device go: the first that is not lost, or the first."""
         return self._devices.chosen_parachute()

@@ -6,7 +6,7 @@ architecture" (TriggerService, TriggerLaunch).
 
 from __future__ import annotations
 
-from chute_ros.model import Outcome
+from chute_ros.model import LinkState, Outcome
 from chute_ros.protocol.dronecan.calls import ServiceCalls
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.effect import Report
@@ -42,19 +42,19 @@ class Deploying:
     def deploy(self, token: int, force: bool, node_id: int, now: float) -> None:
         """Deploy through this controller; 0: the chosen one, or the trigger if there is none."""
         controller = self._devices.controller(node_id)
-        trigger = self._devices.trigger()
-        if controller is not None:
-            self._by_controller(token, controller, force, now)
-        elif trigger is not None and not node_id:
+        trigger = None if node_id else self._devices.trigger()
+        directly = self._config.without_controller or self._config.last_resort
+        if controller is not None and not (trigger and self._config.without_controller):
+            self._by_controller(token, controller, force, node_id, now)
+        elif trigger is not None and directly:
             self._by_trigger(token, trigger, now)
         else:
             self._requests.refuse(token, self._devices.no_controller(node_id))
 
     def update(self, now: float) -> bool:
         """Look at the clock; whether something was put among the calls."""
-        for node_id in self._last_resort.accepted_by():
-            controller = self._devices.controllers[node_id]
-            if not controller.alive or controller.overdue(now):
+        for node_id in self._last_resort.answered_by():
+            if self._devices.controllers[node_id].liveness.state is not LinkState.OK:
                 self._last_resort.silent(node_id, now)
         begun, fire = self._last_resort.update(now)
         for token in begun:
@@ -72,6 +72,10 @@ class Deploying:
         """When update has something to do; infinity: never."""
         return self._last_resort.next_deadline()
 
+    def restarted(self, node_id: int, now: float) -> None:
+        """A node started anew."""
+        self._last_resort.restarted(node_id, now)
+
     def over(self, token: int) -> None:
         """The request with this token ended."""
         self._last_resort.over(token)
@@ -83,14 +87,23 @@ class Deploying:
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _by_controller(self, token: int, controller: Controller, force: bool, now: float) -> None:
+    def _by_controller(
+        self, token: int, controller: Controller, force: bool, named: int, now: float
+    ) -> None:
         self._requests.make_way_for_release(now)
-        triggers = self._devices.alive_triggers
-        goal = goals.deploy(controller, triggers, self._definitions, force, now)
+        goal = goals.deploy(controller, self._triggers_of_it, self._definitions, force, now)
         self._requests.begin(token, goal, now)
-        if self._config.last_resort:
+        # Nobody says which trigger is whose: one of several controllers that was named is not
+        # gone round, as that would fire the others' triggers as well.
+        alone = not named or len(self._devices.controllers) == 1
+        if self._config.last_resort and alone and not controller.never_deploys:
             wait = self._config.last_resort_after if controller.alive else 0.0
-            self._last_resort.watch(token, controller.node_id, now + wait)
+            self._last_resort.watch(token, goal.commands[-1], now, wait)
+
+    def _triggers_of_it(self) -> list[Trigger]:
+        """The triggers whose word counts for a controller: those of the only one."""
+        alone = len(self._devices.controllers) == 1
+        return self._devices.alive_triggers() if alone else []
 
     def _by_trigger(self, token: int, trigger: Trigger, now: float) -> None:
         goal = goals.fire_trigger(trigger, self._devices.alive_triggers, self._definitions, now)
@@ -100,10 +113,15 @@ class Deploying:
             self._broadcast()
             # Every trigger, again and again, until one says that it has fired.
             interval = self._config.effect.retry_interval
-            self._last_resort.watch(token, 0, now + interval, begun=True)
+            self._last_resort.watch(token, None, now, interval)
 
     def _broadcast(self) -> None:
-        """TriggerLaunch: for every trigger."""
-        constants = self._definitions.types.message(names.TRIGGER_LAUNCH).constants
-        values = {"magic_number": constants[names.MAGIC]}
+        """TriggerLaunch: for every trigger, or for ours alone where that can be said."""
+        kind = self._definitions.types.message(names.TRIGGER_LAUNCH)
+        values = {"magic_number": kind.constants[names.MAGIC]}
+        ours = self._config.trigger_node_id
+        if ours and "node_id" not in kind.fields:
+            return  # TriggerService alone reaches only ours
+        if ours:
+            values["node_id"] = ours
         self._endpoint.broadcast(names.TRIGGER_LAUNCH, values, goals.FIRE_PRIORITY)

@@ -29,6 +29,8 @@ class ErrandDesk:
         self._in_air = in_air
         #: Controller -> when its parameters are to be read again.
         self._read_again: dict[int, float] = {}
+        #: Controllers whose parameters are being read.
+        self._reading: set[int] = set()
         self._finished: list[ErrandFinished] = []
 
     def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
@@ -77,7 +79,12 @@ class ErrandDesk:
             if controller.alive:
                 self._devices.to_read.append(controller)
         for controller in self._devices.to_read:
+            if controller.node_id in self._reading:
+                # One at a time; it is read once more when this one has ended.
+                self._read_again[controller.node_id] = now + READ_AGAIN
+                continue
             self._read_again.pop(controller.node_id, None)
+            self._reading.add(controller.node_id)
             token = ("parameters", controller.node_id)
             self._bus.begin(token, errands.list_parameters(controller.node_id), now)
         self._devices.to_read.clear()
@@ -115,5 +122,7 @@ class ErrandDesk:
             controller.parameters |= {one.name: one.value for one in done.parameters}
         if isinstance(token, int):
             self._finished.append(ErrandFinished(token, done))
-        elif not done.success and len(done.parameters) < errands.MOST_PARAMETERS:
+            return
+        self._reading.discard(done.node_id)
+        if not done.success and len(done.parameters) < errands.MOST_PARAMETERS:
             self._read_again[done.node_id] = now + READ_AGAIN

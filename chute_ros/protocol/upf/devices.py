@@ -247,7 +247,7 @@ class Controller(Device):
         for one in told:
             # By a bit's name (IMU) or by that of a field of its own (error_imu).
             flags |= _FLAGS.get(one.upper().removeprefix("ERROR_"), ErrorFlags(0))
-        fired = any(trigger.launched for trigger in triggers)
+        fired = any(trigger.launched and trigger.alive for trigger in triggers)
         faults = self.faults(now)
         for trigger in triggers:
             faults += trigger.faults(now)

@@ -45,17 +45,17 @@ REQUESTS = (*_SHOWN_BY, *_DEPLOYS.values())
 
 
 def read_answer(
-    definitions: Definitions, deploy_answered: Callable[[int, bool], None] = lambda *_: None
+    definitions: Definitions, deploy_answered: Callable[[Call, bool], None] = lambda *_: None
 ) -> Callable[[CallFinished], CallFinished]:
     """Says of an answered call of the flyfire services what its result means. deploy_answered:
-    is told the node id of a controller that answered a deploy, and whether it accepted."""
+    is told which call to deploy a controller answered, and whether it accepted."""
 
     def read(finished: CallFinished) -> CallFinished:
         assert finished.values is not None
         call = finished.command
         name = definitions.result_name(call.service, finished.values)
         if definitions.type_name(call.service, call.values) in _DEPLOYS.values():
-            deploy_answered(call.server, name == "SUCCESS")
+            deploy_answered(call, name == "SUCCESS")
         return replace(
             finished,
             accepted=name == "SUCCESS",

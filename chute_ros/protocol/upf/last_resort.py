@@ -1,8 +1,8 @@
 """A deploy that the controller does not answer goes to the triggers directly.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "system architecture": the trigger is usually driven by
-the controller, but open to the vehicle. A controller that refuses is not gone round; one that
-accepts and then falls silent is.
+the controller, but open to the vehicle. A controller that refuses is not gone round while it
+lives; one that accepts and then falls silent, or starts anew, is.
 """
 
 from __future__ import annotations
@@ -10,12 +10,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from chute_ros.protocol.dronecan.calls import Call
+
 
 @dataclass
 class _Watched:
-    node_id: int
+    #: What the controller must answer; None: there is no controller.
+    call: Call | None
     fire_at: float
-    begun: bool = False
+    wait: float
+    begun: bool
+    answered: bool = False
     accepted: bool = False
 
 
@@ -26,29 +31,34 @@ class LastResort:
         self._interval = interval
         self._watched: dict[int, _Watched] = {}
 
-    def watch(self, token: int, node_id: int, due: float, begun: bool = False) -> None:
-        """The controller with this node id must answer the deploy with this token by due.
-        begun: the triggers are fired anyway; it is only repeated."""
-        self._watched[token] = _Watched(node_id, due, begun)
+    def watch(self, token: int, call: Call | None, now: float, wait: float) -> None:
+        """The controller must answer this call of the deploy with this token within wait s.
+        None: the triggers are fired anyway; it is only repeated."""
+        self._watched[token] = _Watched(call, now + wait, wait, begun=call is None)
 
-    def answered(self, node_id: int, accepted: bool) -> None:
-        """This controller answered a deploy. One that accepted may yet fall silent."""
-        for token in [t for t, one in self._watched.items() if one.node_id == node_id]:
-            if accepted:
-                self._watched[token].accepted = True
-                self._watched[token].fire_at = math.inf
-            else:
-                del self._watched[token]
+    def answered(self, call: Call, accepted: bool) -> None:
+        """The controller answered this call, perhaps long after it was given up."""
+        for one in self._watched.values():
+            if one.call == call:
+                one.answered, one.accepted = True, accepted
+                one.fire_at = math.inf
 
-    def accepted_by(self) -> set[int]:
-        """Node ids of the controllers that have accepted a deploy which has not ended."""
-        return {one.node_id for one in self._watched.values() if one.accepted}
+    def answered_by(self) -> set[int]:
+        """Node ids of the controllers that answered a deploy which has not ended."""
+        return {one.call.server for one in self._watched.values() if one.call and one.answered}
 
     def silent(self, node_id: int, now: float) -> None:
-        """This controller is not heard any more."""
-        for one in self._watched.values():
-            if one.node_id == node_id and one.accepted:
-                one.accepted, one.fire_at = False, now
+        """This controller is not heard any more: whatever it answered, it will not do."""
+        for one in self._of(node_id):
+            if one.answered:
+                one.answered, one.fire_at = False, now
+
+    def restarted(self, node_id: int, now: float) -> None:
+        """This controller started anew: what it had accepted it knows no more."""
+        for one in self._of(node_id):
+            if one.answered:
+                one.answered = False
+                one.fire_at = now if one.accepted else now + one.wait
 
     def over(self, token: int) -> None:
         """It ended."""
@@ -69,3 +79,6 @@ class LastResort:
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
         return min((one.fire_at for one in self._watched.values()), default=math.inf)
+
+    def _of(self, node_id: int) -> list[_Watched]:
+        return [one for one in self._watched.values() if one.call and one.call.server == node_id]

@@ -79,8 +79,11 @@ class UpfLink:
         self.vehicle_service.update(now)
         self.requests.update(now)
         self._vehicle.update(now)
-        self._deploying.update(now)
+        # What ends now must not be pursued any more.
         self._drive(now)
+        if self._deploying.update(now):
+            self._drive(now)
+        self._events += self._deploying.take_reports()
 
     def next_deadline(self) -> float:
         """When update has something to do."""
@@ -211,6 +214,10 @@ class UpfLink:
         self._desk.disturb(token, node_id, force, make, now)
         self._drive(now)
 
+    def has_parachute(self) -> bool:
+        """A device was heard that can be told to deploy."""
+        return bool(self.devices.controllers or self.devices.triggers)
+
     # -- what the node may look at -------------------------------------------------------------
 
     @property
@@ -241,6 +248,7 @@ class UpfLink:
         elif heard.name == NODE_STATUS:
             for node_id in self.bus.nodes.take_restarted():
                 self.devices.restarted(node_id)
+                self._deploying.restarted(node_id, now)
                 self.devices.notice(Severity.ERROR, f"node {node_id} restarted")
             self.devices.node_status(heard.source, heard.values, now)
 

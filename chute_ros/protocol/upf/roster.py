@@ -63,18 +63,17 @@ class UpfDevices:
 
     def picture(self, now: float) -> ParachuteStatus | None:
         """The parachute, as this link sees it; None: there is none yet."""
-        controller = self.controller()
-        if controller is not None:
-            return self.picture_of(controller, now)
         trigger = self.trigger()
         if trigger is not None and self._config.without_controller:
             return trigger.parachute_status(now)
-        return None
+        controller = self.controller()
+        return None if controller is None else self.picture_of(controller, now)
 
     def picture_of(self, controller: Controller, now: float) -> ParachuteStatus:
         """One controller; with several, only its own word counts, as nobody says which trigger
         is whose."""
         alone = len(self.controllers) == 1
+        # A trigger that is lost counts only by being lost: it may have been exchanged.
         return controller.status(now, list(self.triggers.values()) if alone else [])
 
     # -- what they say ---------------------------------------------------------------------------

@@ -24,6 +24,10 @@ from chute_ros.protocol.upf.machine import BLOCKING
 KILL_MEMORY = 5.0
 #: What the supervisor should know by now is said again, s.
 _SAY_AGAIN = 0.5
+#: A kill that is not confirmed yet is asked for again, s.
+_ASK_AGAIN = 0.2
+#: A device that is silent for longer does not hold its block against a reset of the supervisor, s.
+_GONE_AFTER = 5.0
 #: A controller that asked for a block and goes on saying that it is READY does not want it, s.
 _BELIEVE_STATE_AFTER = 1.0
 #: Requests that wait for their answer at the same time; a flood must not grow us.
@@ -67,6 +71,11 @@ class _Pending:
     request: Heard
     ask: Ask
     until: float
+    ask_again: float
+
+
+def _kill_asked(device: str) -> AskSupervisor:
+    return AskSupervisor(Ask.KILL, device, "it is about to launch (TYPE_KILLSWITCH)")
 
 
 class VehicleService:
@@ -84,6 +93,8 @@ class VehicleService:
         self._standing: frozenset[str] = frozenset()
         self._blocked = False
         self._said_at: dict[str, float] = {}
+        #: Device -> when it last said anything of this.
+        self._heard_at: dict[str, float] = {}
         #: Controllers -> the newest state that has a name.
         self._states: dict[str, ParachuteState] = {}
         #: Devices that have asked for a release since we started.
@@ -105,17 +116,19 @@ class VehicleService:
             self.counts["requests of a type that is not known"] += 1
             self._respond(request, "REJECTED")
             return
+        ask, config = _ASKS[name], self._config
+        if config.controller_node_id not in (0, request.source):
+            self.counts["requests of nodes that are not our controller"] += 1
+            self._respond(request, "REJECTED")
+            return
         self.counts[f"{name} received"] += 1
-        ask = _ASKS[name]
-        config = self._config
+        self._heard_at[device] = now
         policy = config.kill_policy if ask is Ask.KILL else config.flight_block_policy
         if policy is Policy.REJECT:
             self._respond(request, "REJECTED")
             return
         if ask is Ask.KILL:
-            self._asks.append(
-                AskSupervisor(ask, device, "it is about to launch (TYPE_KILLSWITCH)")
-            )
+            self._asks.append(_kill_asked(device))
         else:
             self._want(device, f"it said so ({name})" if ask is Ask.FLIGHT_BLOCK else "", now)
         if policy is Policy.ACCEPT:
@@ -125,7 +138,8 @@ class VehicleService:
             self.counts["requests refused: too many at once"] += 1
             self._respond(request, "FAILED")
             return
-        self._pending.append(_Pending(request, ask, now + config.vehicle_service_timeout))
+        until = now + config.vehicle_service_timeout
+        self._pending.append(_Pending(request, ask, until, now + _ASK_AGAIN))
         self._answer_what_is_so(now)
 
     def state(self, device: str, state: ParachuteState, now: float) -> None:
@@ -135,6 +149,7 @@ class VehicleService:
         if state is ParachuteState.UNKNOWN:
             return
         before, self._states[device] = self._states.get(device), state
+        self._heard_at[device] = now
         if state in BLOCKING:
             if device not in self._blocks:
                 self._want(device, f"it is {state.name}", now)
@@ -162,7 +177,11 @@ class VehicleService:
         for device in sorted(set(self._blocks) ^ self._standing):
             # Of a device that has not said anything yet, a block from before we started stands.
             heard = device in self._blocks or device in self._released or device in self._states
-            if heard and now - self._said_at.get(device, -math.inf) >= _SAY_AGAIN:
+            gone = now - self._heard_at.get(device, now) > _GONE_AFTER
+            if gone and device in self._blocks:
+                # It was exchanged, and somebody has reset the supervisor.
+                del self._blocks[device]
+            elif heard and now - self._said_at.get(device, -math.inf) >= _SAY_AGAIN:
                 # It has not heard, or has started anew since.
                 self._want(device, self._blocks.get(device, ""), now)
         self._answer_what_is_so(now)
@@ -173,10 +192,16 @@ class VehicleService:
             self._pending.remove(one)
             self.counts[f"{one.ask.name} not done in time"] += 1
             self._respond(one.request, "FAILED")
+        for one in self._pending:
+            if one.ask is Ask.KILL and now >= one.ask_again:
+                # A supervisor that has just started has not heard it.
+                one.ask_again = now + _ASK_AGAIN
+                self._asks.append(_kill_asked(str(one.request.source)))
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
-        return min((one.until for one in self._pending), default=math.inf)
+        kills = (one.ask_again for one in self._pending if one.ask is Ask.KILL)
+        return min((*kills, *(one.until for one in self._pending)), default=math.inf)
 
     def take_asks(self) -> list[AskSupervisor]:
         """What to pass on; each is handed out once."""

@@ -44,16 +44,25 @@ class Vehicle:
         self._owner_until = until
 
     def in_air(self, now: float) -> bool:
-        """By the vehicle or by the controller."""
+        """By the vehicle or by the controller; also if the vehicle has stopped to say so.
+
+        A vehicle that never said anything is on a bench.
+        """
         vehicle, passed = self._state, now - self._received
         limit = self._config.vehicle_state_age
+        landed_fresh = vehicle.landed_state_age + passed <= limit
+        armed_fresh = vehicle.armed_age + passed <= limit
         flies = vehicle.landed_state not in (LandedState.UNKNOWN, LandedState.ON_GROUND)
-        if flies and vehicle.landed_state_age + passed <= limit:
-            return True
-        if vehicle.armed is Armed.ARMED and vehicle.armed_age + passed <= limit:
+        if (flies and landed_fresh) or (vehicle.armed is Armed.ARMED and armed_fresh):
             return True
         controllers = self._devices.controllers.values()
-        return any(one.alive and one.state in _FLYING for one in controllers)
+        if any(one.alive and one.state in _FLYING for one in controllers):
+            return True
+        spoke = self._received > -math.inf
+        return spoke and not (
+            (landed_fresh and vehicle.landed_state is LandedState.ON_GROUND)
+            or (armed_fresh and vehicle.armed is Armed.DISARMED)
+        )
 
     def update(self, now: float) -> None:
         """Tell it, if it is time to."""

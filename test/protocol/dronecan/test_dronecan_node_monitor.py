@@ -27,6 +27,18 @@ def speak(monitor, begin, end, booted, node_id=33, every=1.0):
         now += every
 
 
+def test_a_restart_soon_after_the_start_is_a_restart_and_no_conflict():
+    """Given a node that starts anew 3.4 s after its start, and tells whole seconds."""
+    monitor = NodeMonitor()
+    for start in (100.0, 103.4):
+        for tick in range(34):
+            now = start + tick * 0.1
+            values = {"uptime_sec": int(now - start), "health": 0, "mode": 0}
+            monitor.status(33, values | {"vendor_specific_status_code": 0}, now)
+    assert monitor.take_restarted() == [33]
+    assert monitor.conflicts(106.8) == []
+
+
 def test_a_new_node_is_asked_who_it_is_and_known_once_it_answers():
     monitor = NodeMonitor()
     assert monitor.next_deadline() == math.inf

@@ -233,6 +233,88 @@ def test_controller_that_accepts_and_goes_on_speaking_is_not_gone_round(bench):
     assert not fired_at(story)
 
 
+def test_refusal_that_comes_after_the_call_was_given_up_counts(bench):
+    """Answers 0.8 s late, each after its call has ended: they are refusals all the same."""
+    story = deploy(armed(bench("")))
+    answered = 0
+    while story.t < 4.0:
+        story.after(0.05).status("ARMED").trigger_status()
+        for asked in story.requests(SERVICE)[answered:]:
+            if story.t < 0.8:
+                break
+            story.answer_result(asked, "REJECTED")
+            answered += 1
+    assert answered >= 3
+    assert not fired_at(story)
+
+
+def test_refusal_of_one_deploy_says_nothing_of_another(bench):
+    story = deploy(armed(bench("")), True)
+    story.link.deploy(2, False, story.now)
+    story.step()
+    plain = [
+        one
+        for one in story.requests(SERVICE)
+        if story.definitions.type_name(SERVICE, one.values) == "TYPE_DEPLOY"
+    ]
+    story.answer_result(plain[0], "REJECTED")
+    assert not story.end(2).success
+    assert fired_at(story.at(1.3)), "the forced one has no answer"
+
+
+def test_controller_that_refused_once_and_then_died_is_gone_round(bench):
+    story = deploy(armed(bench("")), True)
+    story.answer_result(story.requests(SERVICE)[0], "TEMPORARILY_REJECTED")
+    story.at(1.2).trigger_status()
+    assert not fired_at(story)
+    assert fired_at(story.at(2.5))
+
+
+def test_controller_that_accepted_and_restarts_is_gone_round_at_once(bench):
+    story = armed(bench("")).node_status(uptime=60)
+    deploy(story).answer_result(story.requests(SERVICE)[0], "SUCCESS")
+    story.after(0.5).trigger_status().node_status(uptime=0).status("NOT_READY")
+    assert fired_at(story.after(0.05))
+
+
+def test_named_one_of_several_controllers_is_not_gone_round(bench):
+    """Nobody says which trigger is whose."""
+    story = armed(bench("")).status("ARMED", 40).clear()
+    assert not fired_at(deploy(story, node_id=33).at(9.0))
+
+
+def test_trigger_of_another_controller_is_no_confirmation(bench):
+    story = armed(bench("")).status("ARMED", 40).trigger_status("LAUNCHED").clear()
+    assert deploy(story, node_id=40).after(0.2).ends(1) == []
+    assert len(story.requests(SERVICE)) == 1
+
+
+def test_parachute_that_is_switched_off_is_not_gone_round(bench):
+    story = armed(bench(""))
+    story.link.devices.controllers[33].parameters[p.ENABLE_PARACHUTE] = False
+    assert not fired_at(deploy(story).at(4.0))
+
+
+def test_only_our_trigger_is_launched_where_it_is_named(bench):
+    story = deploy(armed(bench("", trigger_node_id=34))).at(1.3)
+    assert story.requests(TRIGGER, "TYPE_LAUNCH")
+    assert {one.get("node_id") for one in story.messages(LAUNCH)} <= {34}
+
+
+def test_without_last_resort_a_trigger_alone_is_not_fired(bench):
+    story = deploy(bench("", last_resort=False).trigger_status().clear())
+    assert not story.end(1).success
+    assert not fired_at(story.at(4.0))
+
+
+def test_after_a_stall_nothing_is_fired_for_a_request_that_has_ended(bench):
+    story = deploy(armed(bench("")))
+    story.t += 6.0
+    story.step()
+    assert not story.end(1).success
+    assert not fired_at(story)
+
+
 def test_last_resort_can_be_switched_off(bench):
     story = deploy(armed(bench("", last_resort=False))).at(9.0)
     assert not fired_at(story)

@@ -304,11 +304,12 @@ def test_trigger_that_is_silent_is_no_healthy_parachute(bench):
     assert story.pictures()[-1].state is S.ABNORMAL
 
 
-def test_controller_that_is_there_all_the_same_is_the_parachute(bench):
+def test_stray_controller_does_not_take_the_place_of_the_trigger(bench):
     story = bench("", without_controller=True).trigger_status().status("ARMED")
-    assert story.picture().device == "33"
-    story.clear().trigger_status()
-    assert story.pictures() == []
+    assert story.link.devices.picture(story.now).device == "34"
+    story.link.deploy(1, False, story.now)
+    assert story.step().requests("flyfire.TriggerService")
+    assert not story.requests("flyfire.ParachuteService")
 
 
 # -- settings ---------------------------------------------------------------------------------

@@ -427,14 +427,20 @@ def test_vehicle_is_in_the_air_by_its_own_word_or_the_controllers(bench):
     said = [
         (flying(), True),
         (flying(landed_state_age=2.0), True),  # armed
-        (flying(landed_state_age=2.0, armed_age=2.0), False),  # too old
+        (flying(landed_state_age=2.0, armed_age=2.0), True),  # it has stopped to say so
         (landed(), False),
         (landed(armed=flying().armed), True),
     ]
     for state, in_air in said:
         story.link.vehicle(state, story.now)
         assert story.link.in_air(story.now) is in_air
-    assert not story.link.in_air(story.now + 1.1)
+    story.link.vehicle(landed(), story.now)
+    assert not story.link.in_air(story.now)
+    assert story.link.in_air(story.now + 1.1)  # nobody says any more that it is on the ground
+
+
+def test_controllers_word_counts_where_no_vehicle_ever_spoke(bench):
+    story = bench("")
     for name, in_air in {
         "READY": False,
         "TAKEOFF": True,

@@ -80,7 +80,34 @@ def test_every_repetition_of_a_kill_is_answered(alone):
     story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1)
     story.link.kill_confirmed(story.now)
     assert story.step().answers() == ["SUCCESS"] * 2
-    assert story.asked() == [("KILL", "33")] * 2
+    assert set(story.asked()) == {("KILL", "33")}
+
+
+def test_kill_that_waits_is_asked_for_again_until_it_is_answered(alone):
+    """A supervisor that has just started has not heard the first."""
+    story = alone().ask(KILL).at(0.5)
+    assert len(story.asked()) == 3
+    story.link.kill_confirmed(story.now)
+    story.at(3.0)
+    assert len(story.asked()) == 3
+
+
+def test_nodes_that_are_not_our_controller_are_rejected_and_counted(alone):
+    story = alone(controller_node_id=40).ask(KILL).ask(BLOCK, number=1)
+    assert story.answers() == ["REJECTED"] * 2
+    assert story.asked() == []
+    assert story.link.counts["requests of nodes that are not our controller"] == 2
+
+
+def test_block_of_a_device_that_is_gone_does_not_outlive_a_reset_of_the_supervisor(alone):
+    story = alone().ask(BLOCK)
+    story.link.supervisor_said(True, {"33"}, story.now)
+    story.at(20.0)
+    asked = len(story.asked())
+    story.link.supervisor_said(False, set(), story.now)  # reset by a person
+    story.at(30.0)
+    story.link.supervisor_said(False, set(), story.now)
+    assert len(story.asked()) == asked
 
 
 # -- flight block -----------------------------------------------------------------------------

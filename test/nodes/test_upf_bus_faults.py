@@ -1,0 +1,234 @@
+"""upf_can on a bus that loses, doubles, spoils and floods."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus
+from chute_msgs.srv import Arm, Deploy, GetNodeInfo
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from upf_bench import Devices, Network, fly, tasks, values
+
+from chute_ros.model import LinkState
+from chute_ros.protocol.dronecan.bus_node import NODE_STATUS
+from chute_ros.protocol.dronecan.can_frame import (
+    ERROR_BUS_OFF,
+    ERROR_RESTARTED,
+    CanFrame,
+    pack,
+)
+from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, TRIGGER_STATUS
+from chute_ros.sim.can_faults import CanFaultKnobs
+
+#: A bus that loses much needs limits to match.
+FORGIVING = {
+    "device_stale_after": 2.5,
+    "device_lost_after": 5.0,
+    "status_timeout": 2.5,
+    "call_timeout": 0.2,
+    "call_tries": 7,
+    "effect_timeout": 2.0,
+    "give_up_after": 15.0,
+    "last_resort_after": 10.0,
+}
+FAULTS = {
+    "loss": CanFaultKnobs(loss=0.3),
+    "duplicates": CanFaultKnobs(duplicate=0.3),
+    "reordering": CanFaultKnobs(reorder=0.3),
+    "delay": CanFaultKnobs(delay=0.02),
+    "corruption": CanFaultKnobs(corrupt=0.1),
+    "toggle": CanFaultKnobs(toggle=0.1),
+    "half": CanFaultKnobs(half=0.3),
+    "all": CanFaultKnobs(
+        loss=0.1, duplicate=0.1, reorder=0.1, corrupt=0.02, toggle=0.05, half=0.1, delay=0.005
+    ),
+}
+
+
+class Spoiled:
+    """Controller and trigger behind a faulty plug."""
+
+    def __init__(self, bench, knobs):
+        self.bench, self.network = bench, Network(bench, **FORGIVING)
+        self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+        self.statuses = bench.follow(ParachuteStatus, "parachute/status")
+        self.controller, self.trigger = self.network.controller(), self.network.trigger()
+        self.loop = self.network.plug(self.controller, self.trigger, knobs=knobs)
+        bench.until(
+            lambda: self.beats and self.beats[-1].link_state == LinkState.OK and self.statuses,
+            "the controller is heard",
+        )
+
+    def check_nothing_broke(self):
+        assert self.network.node._loop_faults == 0, "no exception in the link's thread"
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_forced_deploy_gets_through_what_happens_to_frames(bench, name):
+    spoiled = Spoiled(bench, FAULTS[name])
+    answer = bench.call(Deploy, "upf_can/deploy", force=True, reason="a test")
+    assert answer.success, answer.message
+    assert spoiled.trigger.fired
+    assert set(spoiled.controller.came) <= {"TYPE_DEPLOY_FORCE", ""}
+    spoiled.check_nothing_broke()
+
+
+#: What a transfer of nine frames may have to go through; on a bus, its frames stay in order.
+LONG = {
+    "loss": CanFaultKnobs(loss=0.05),
+    "duplicates": CanFaultKnobs(duplicate=0.3),
+    "corruption": CanFaultKnobs(corrupt=0.05),
+    "toggle": CanFaultKnobs(toggle=0.05),
+    "half": CanFaultKnobs(half=0.3),
+    "all": CanFaultKnobs(loss=0.02, duplicate=0.1, corrupt=0.02, toggle=0.02, half=0.05),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_long_transfers_get_through_whole_or_not_at_all(bench, name):
+    spoiled = Spoiled(bench, LONG[name])
+
+    def answer():
+        told = bench.call(GetNodeInfo, "upf_can/get_node_info")
+        assert told.success or "no acknowledgement after 7 sends" in told.message
+        return told.success and told
+
+    told = bench.until(answer, "it is answered in the end")
+    assert told.name == "upf.controller"
+    assert told.unique_id == spoiled.controller.settings.unique_id.hex()
+    before = len(spoiled.beats)
+    bench.until(lambda: len(spoiled.beats) >= before + 5, "the heartbeat goes on")
+    spoiled.check_nothing_broke()
+
+
+def test_duplicates_arm_and_deploy_once(bench):
+    spoiled = Spoiled(bench, CanFaultKnobs(duplicate=1.0))
+    assert bench.call(Arm, "upf_can/arm", arm=True).success
+    answer = bench.call(Deploy, "upf_can/deploy", reason="a test")
+    assert answer.success, answer.message
+    assert spoiled.controller.came == ["TYPE_TAKEOFF", "TYPE_ARM", "TYPE_DEPLOY"]
+
+
+# Floods
+
+
+def noise(network, rng, count):
+    """Frames of all kinds: none of them makes sense."""
+    made = []
+    for _ in range(count):
+        kind = rng.randrange(4)
+        data = rng.randbytes(rng.randrange(9))
+        if kind == 0:
+            made.append(pack(CanFrame(rng.getrandbits(29), data)))
+        elif kind == 1:
+            made.append(pack(CanFrame(rng.getrandbits(11), data, extended=False)))
+        elif kind == 2:
+            # A message that we listen to, with any payload.
+            number = network.definitions.types.message(
+                rng.choice((PARACHUTE_STATUS, TRIGGER_STATUS, NODE_STATUS))
+            ).id
+            identifier = 16 << 24 | number << 8 | rng.randrange(60, 64)
+            made.append(pack(CanFrame(identifier, data)))
+        else:
+            # A request to us, of any service.
+            identifier = 16 << 24 | rng.randrange(256) << 16 | 1 << 15 | 10 << 8 | 1 << 7 | 60
+            made.append(pack(CanFrame(identifier, data)))
+    return made
+
+
+@pytest.mark.parametrize("garbage", [False, True], ids=["valid frames", "garbage"])
+def test_a_flood_keeps_neither_heartbeat_nor_status_nor_deploy(bench, garbage):
+    network = Network(bench, **FORGIVING, controller_node_id=33, trigger_node_id=34)
+    statuses = bench.follow(ParachuteStatus, "parachute/status")
+    devices = Devices(network)
+    party, rng = network.party(60), random.Random(7)
+
+    def flood():
+        if garbage:
+            party.put(*noise(network, rng, 50))
+        else:
+            for _ in range(50):
+                party.say(NODE_STATUS, uptime_sec=9)
+
+    devices.beats.clear()
+    statuses.clear()
+    future = bench.ask(Deploy, "upf_can/deploy", force=True, reason="a test")
+
+    def done():
+        flood()
+        return future.done() and len(devices.beats) >= 10 and len(statuses) >= 10
+
+    bench.until(done, "all goes on")
+    assert future.result().success, future.result().message
+    assert devices.trigger.fired
+    assert network.node._loop_faults == 0
+    assert network.link.bus.endpoint.received_count > 0
+
+
+# Who is on the bus
+
+
+def link_task(diagnostics):
+    return tasks(diagnostics).get("link")
+
+
+def await_trouble(bench, diagnostics, text):
+    bench.until(
+        lambda: link_task(diagnostics) and text in link_task(diagnostics).message,
+        f"diagnostics say {text!r}",
+    )
+    assert link_task(diagnostics).level == DiagnosticStatus.ERROR
+
+
+def await_well(bench, diagnostics):
+    bench.until(
+        lambda: link_task(diagnostics).level == DiagnosticStatus.OK, "diagnostics are well again"
+    )
+
+
+def test_two_devices_with_one_node_id_forbid_take_off_only(bench):
+    network = Network(bench, vehicle_state_age=60.0)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    devices = Devices(network)
+    bench.until(lambda: network.link.bus.nodes.get(33).uptime >= 4, "it runs for a while")
+    twin = network.plug(network.controller())
+    await_trouble(bench, diagnostics, "two nodes use node id 33: give one of them another")
+    devices.await_beat(device_healthy=False)
+    fly(bench, network)
+    devices.await_beat(device_healthy=True)
+    bench.unplug(twin)
+    await_well(bench, diagnostics)
+
+
+def test_another_node_with_our_node_id_is_told_and_forbids_take_off(bench):
+    network = Network(bench)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    devices = Devices(network)
+    party = network.party(10)
+    party.say(NODE_STATUS, uptime_sec=1)
+    devices.await_beat(device_healthy=False)
+    text = "another node uses our node id 10: set node_id to a free one"
+    await_trouble(bench, diagnostics, text)
+    await_well(bench, diagnostics)
+    devices.await_beat(device_healthy=True)
+
+
+# The bus itself
+
+
+def test_bus_off_is_told_and_over_once_the_controller_restarts(bench):
+    network = Network(bench)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    devices = Devices(network)
+    devices.act("silent")
+    # As the wire of an interface that tells of errors hands them on.
+    off = pack(CanFrame(ERROR_BUS_OFF, b"", False, error=True))
+    network.node.loop.call(lambda link, now: link.receive(off, now))
+    await_trouble(bench, diagnostics, "the CAN controller is bus-off")
+    assert values(link_task(diagnostics))["times bus-off"] == "1"
+    back = pack(CanFrame(ERROR_RESTARTED, b"", False, error=True))
+    network.node.loop.call(lambda link, now: link.receive(back, now))
+    await_well(bench, diagnostics)
+    devices.act("speak")
+    devices.await_beat(device_healthy=True)

@@ -1,0 +1,283 @@
+"""The services of upf_can, over real CAN frames."""
+
+from __future__ import annotations
+
+import pytest
+from chute_msgs.msg import ParachuteStatus, SafetyRequest
+from chute_msgs.srv import (
+    Arm,
+    Deploy,
+    GetNodeInfo,
+    GetParam,
+    ListParams,
+    NodeRequest,
+    SetParam,
+    TransportStats,
+    UpfCommand,
+)
+from upf_bench import PATIENT, Devices, Network, follow_log
+
+from chute_ros.model import ParachuteState
+from chute_ros.protocol.upf import parameters as p
+
+Command = UpfCommand.Request
+READY, TAKEOFF, ARMED = ParachuteState.READY, ParachuteState.TAKEOFF, ParachuteState.ARMED
+#: Nothing that the vehicle says grows old within a test.
+LASTING = {"vehicle_state_age": 60.0}
+
+
+@pytest.fixture
+def network(bench):
+    return Network(bench, **PATIENT, **LASTING)
+
+
+@pytest.fixture
+def devices(network):
+    return Devices(network)
+
+
+def call(bench, kind, service, /, **fields):
+    return bench.call(kind, f"upf_can/{service}", **fields)
+
+
+def command(bench, number, **fields):
+    return call(bench, UpfCommand, "command", command=number, reason="a test", **fields)
+
+
+# ~/command
+
+
+def test_each_command_moves_the_controller_and_is_confirmed_by_its_status(bench, devices):
+    story = [
+        (Command.TAKEOFF, TAKEOFF),
+        (Command.ARM, ARMED),
+        (Command.DISARM, TAKEOFF),
+        (Command.LAND, READY),
+    ]
+    for number, state in story:
+        answer = command(bench, number)
+        assert answer.success, answer.message
+        assert devices.controller.state is state
+    assert devices.controller.came == ["TYPE_TAKEOFF", "TYPE_ARM", "TYPE_DISARM", "TYPE_LAND"]
+
+
+@pytest.mark.parametrize(
+    ("number", "name"),
+    [(Command.DEPLOY, "TYPE_DEPLOY"), (Command.DEPLOY_FORCE, "TYPE_DEPLOY_FORCE")],
+)
+def test_both_kinds_of_deploy_fire_in_the_air(bench, devices, number, name):
+    for before in (Command.TAKEOFF, Command.ARM):
+        assert command(bench, before).success
+    answer = command(bench, number)
+    assert answer.success, answer.message
+    assert devices.trigger.fired
+    assert devices.controller.came[-1] == name
+
+
+def test_on_the_ground_only_the_forced_deploy_fires(bench, devices):
+    answer = command(bench, Command.DEPLOY)
+    assert not answer.success
+    assert "its state is READY: force sends TYPE_DEPLOY_FORCE" in answer.message
+    assert not devices.trigger.fired
+    answer = command(bench, Command.DEPLOY_FORCE)
+    assert answer.success, answer.message
+    assert devices.trigger.fired
+
+
+@pytest.mark.parametrize(
+    ("number", "before", "switch"),
+    [
+        (Command.TAKEOFF, [], p.AUTO_TAKEOFF),
+        (Command.ARM, [Command.TAKEOFF], p.AUTO_ARM),
+        (Command.DISARM, [Command.TAKEOFF, Command.ARM], p.AUTO_DISARM),
+        (Command.LAND, [Command.TAKEOFF], p.AUTO_LAND),
+    ],
+)
+def test_what_the_controller_does_by_itself_is_refused_and_not_sent(
+    bench, devices, number, before, switch
+):
+    for one in before:
+        assert command(bench, one).success
+    answer = call(bench, SetParam, "set_param", name=switch, value="true")
+    assert answer.success, answer.message
+    sent = list(devices.controller.came)
+    answer = command(bench, number)
+    assert not answer.success
+    assert f"{switch} of controller 33 is on" in answer.message
+    assert f"set {switch!r} to false" in answer.message
+    assert "nothing was sent" in answer.message
+    assert devices.controller.came == sent
+
+
+@pytest.mark.parametrize("number", [0, 7, 255])
+def test_a_command_that_is_none_is_refused_with_those_that_are(bench, devices, number):
+    answer = command(bench, number)
+    assert not answer.success
+    assert f"command {number}: need one of 1 TYPE_TAKEOFF, 2 TYPE_ARM" in answer.message
+    assert devices.controller.came == []
+
+
+@pytest.mark.parametrize("node_id", [34, 99, 200], ids=["the trigger", "nobody", "no id"])
+@pytest.mark.parametrize("number", [Command.TAKEOFF, Command.DEPLOY_FORCE])
+def test_a_command_to_what_is_no_controller_is_refused(bench, devices, number, node_id):
+    answer = command(bench, number, node_id=node_id)
+    assert not answer.success
+    assert f"no controller {node_id} was heard on this link (heard: 33" in answer.message
+    assert "triggers heard: 34" in answer.message
+    assert not devices.trigger.fired
+
+
+def test_a_command_is_in_the_log_with_its_reason(bench, devices):
+    said = follow_log(bench)
+    command(bench, Command.TAKEOFF)
+    bench.until(
+        lambda: any(one.msg == "~/command TYPE_TAKEOFF called: 'a test'" for one in said),
+        "it is logged",
+    )
+
+
+# ~/restart, ~/save_params, ~/erase_params
+
+
+def test_a_restart_is_a_restart_and_blocks_flight_meanwhile(bench, network):
+    devices = Devices(network, self_test=0.3)
+    statuses = bench.follow(ParachuteStatus, "parachute/status")
+    asked = bench.follow(SafetyRequest, "safety/request")
+    bench.until(lambda: statuses and statuses[-1].state == READY, "it is ready")
+    statuses.clear()
+    answer = call(bench, NodeRequest, "restart", reason="a test")
+    assert answer.success, answer.message
+    assert answer.message == "restart: the device answered that it will"
+    bench.until(
+        lambda: {one.state for one in statuses} >= {ParachuteState.NOT_READY}, "it starts anew"
+    )
+    bench.until(lambda: statuses[-1].state == READY, "it is ready again")
+    bench.until(
+        lambda: (
+            [one.request for one in asked if one.device == "33"]
+            and asked[-1].request == SafetyRequest.FLIGHT_BLOCK_RELEASE
+        ),
+        "what it asked for is released",
+    )
+    assert SafetyRequest.FLIGHT_BLOCK in [one.request for one in asked]
+    assert {one.link for one in asked} == {"upf_can"}
+    assert devices.controller.booted_at > 0.0
+
+
+def test_what_was_not_saved_is_gone_after_a_restart_and_what_was_is_not(bench, devices):
+    assert call(bench, SetParam, "set_param", name=p.AUTO_SAVE, value="false").success
+    answer = call(bench, SetParam, "set_param", name=p.LIGHT, value="false")
+    assert answer.success, answer.message
+    assert "not kept over a restart until ~/save_params" in answer.message
+    assert call(bench, NodeRequest, "restart").success
+    assert call(bench, GetParam, "get_param", name=p.LIGHT).value == "true"
+    assert call(bench, SetParam, "set_param", name=p.LIGHT, value="off").success
+    answer = call(bench, NodeRequest, "save_params", reason="a test")
+    assert (answer.success, answer.message) == (True, "save: done")
+    assert call(bench, NodeRequest, "restart").success
+    assert call(bench, GetParam, "get_param", name=p.LIGHT).value == "false"
+
+
+def test_erased_parameters_are_as_delivered(bench, devices):
+    assert call(bench, SetParam, "set_param", name=p.LIGHT, value="false").success
+    answer = call(bench, NodeRequest, "erase_params", reason="a test")
+    assert (answer.success, answer.message) == (True, "erase: done")
+    assert call(bench, GetParam, "get_param", name=p.LIGHT).value == "true"
+
+
+@pytest.mark.parametrize("name", ["restart", "erase_params"])
+def test_what_takes_the_device_away_is_refused_in_the_air_unless_forced(bench, devices, name):
+    devices.fly()
+    started = devices.controller.booted_at
+    answer = call(bench, NodeRequest, name, reason="a test")
+    assert not answer.success
+    assert "refused while the vehicle is in the air; force does it" in answer.message
+    assert devices.controller.booted_at == started
+    answer = call(bench, NodeRequest, name, reason="a test", force=True)
+    assert answer.success, answer.message
+    assert (devices.controller.booted_at > started) == (name == "restart")
+
+
+def test_the_controllers_own_state_counts_as_the_air_as_well(bench, devices):
+    assert command(bench, Command.TAKEOFF).success
+    assert not call(bench, NodeRequest, "restart").success
+    assert call(bench, NodeRequest, "save_params").success, "it takes nothing away"
+
+
+# ~/transport_stats, ~/get_node_info
+
+
+def test_the_devices_counters_are_told(bench, devices):
+    answer = call(bench, TransportStats, "transport_stats")
+    assert answer.success, answer.message
+    assert answer.transfers_tx > 5
+    assert answer.transfers_rx > 5
+    again = call(bench, TransportStats, "transport_stats")
+    assert again.transfers_tx > answer.transfers_tx
+
+
+@pytest.mark.parametrize("node_id", [0, 33, 34])
+def test_a_node_says_who_it_is(bench, devices, node_id):
+    one = devices.trigger if node_id == 34 else devices.controller
+    answer = call(bench, GetNodeInfo, "get_node_info", node_id=node_id)
+    assert answer.success, answer.message
+    assert answer.name == one.settings.name
+    assert (answer.software_version, answer.hardware_version) == ("3.0", "3.0")
+    assert answer.unique_id == one.settings.unique_id.hex()
+    assert answer.uptime < 60
+    assert answer.health == 0
+
+
+# All
+
+
+KINDS = {
+    "command": (UpfCommand, {"command": Command.TAKEOFF}),
+    "get_param": (GetParam, {"name": p.LIGHT}),
+    "set_param": (SetParam, {"name": p.LIGHT, "value": "true"}),
+    "list_params": (ListParams, {}),
+    "save_params": (NodeRequest, {}),
+    "erase_params": (NodeRequest, {}),
+    "restart": (NodeRequest, {}),
+    "transport_stats": (TransportStats, {}),
+    "get_node_info": (GetNodeInfo, {}),
+    "arm": (Arm, {}),
+    "deploy": (Deploy, {"force": True}),
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_without_any_device_each_service_says_so_at_once(bench, name):
+    Network(bench, call_timeout=60.0, give_up_after=600.0)
+    kind, fields = KINDS[name]
+    answer = call(bench, kind, name, **fields)
+    assert not answer.success
+    assert "heard" in answer.message
+
+
+@pytest.mark.parametrize("name", [n for n in KINDS if n not in ("command", "arm", "deploy")])
+def test_a_node_that_does_not_exist_is_given_up(bench, name):
+    network = Network(bench)
+    Devices(network)
+    kind, fields = KINDS[name]
+    answer = call(bench, kind, name, node_id=99, **fields)
+    assert not answer.success
+    assert "no acknowledgement after 2 sends" in answer.message
+    answer = call(bench, kind, name, node_id=128, **fields)
+    assert not answer.success
+    assert "there is no node id 128 on this link; name a node id from 1 to 127" in answer.message
+
+
+def test_services_at_once_each_get_their_own_answer(bench, devices):
+    # ROS itself keeps ten requests of a service.
+    names = list(devices.controller.values)[:8]
+    futures = [bench.ask(GetParam, "upf_can/get_param", name=name) for name in names]
+    futures.append(bench.ask(ListParams, "upf_can/list_params"))
+    futures.append(bench.ask(GetNodeInfo, "upf_can/get_node_info", node_id=34))
+    bench.until(lambda: all(future.done() for future in futures), "all are answered")
+    answers = [future.result() for future in futures]
+    assert [one.success for one in answers] == [True] * len(answers)
+    told = [p.words(value) for value in devices.controller.values.values()]
+    assert [one.value for one in answers[:-2]] == told[:8]
+    assert answers[-2].values == told
+    assert answers[-1].name == "upf.trigger"

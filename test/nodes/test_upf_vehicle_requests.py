@@ -1,0 +1,253 @@
+"""What a UPF asks of the vehicle, and what becomes of a deploy that it does not answer."""
+
+from __future__ import annotations
+
+import pytest
+from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyRequest, SafetyState
+from chute_msgs.srv import Deploy
+from node_bench import stamped
+from upf_bench import Network, follow_log
+
+from chute_ros.model import Action, LinkState, Outcome, ParachuteState
+from chute_ros.nodes import qos
+from chute_ros.protocol.upf.definitions import VEHICLE_SERVICE
+
+KILL, BLOCK, RELEASE = "TYPE_KILLSWITCH", "TYPE_FLIGHT_BLOCK", "TYPE_FLIGHT_BLOCK_RELEASE"
+LONG = {"vehicle_service_timeout": 60.0}
+
+
+class Asking:
+    """A device, and the rest of the vehicle, by hand."""
+
+    def __init__(self, bench, **parameters):
+        self.bench = bench
+        self.network = Network(bench, **parameters)
+        self.party = self.network.party(33)
+        self.asked = bench.follow(SafetyRequest, "safety/request")
+        self.number = 0
+
+    def ask(self, name):
+        self.number += 1
+        values = self.network.definitions.request(VEHICLE_SERVICE, name)
+        self.party.ask(10, VEHICLE_SERVICE, self.number, **values)
+
+    def await_request(self, request):
+        self.bench.until(
+            lambda: [one for one in self.asked if one.request == request],
+            "the supervisor is asked",
+        )
+        one = self.asked[-1]
+        assert (one.link, one.device) == ("upf_can", "33")
+        assert one.reason
+
+    def answers(self):
+        """Results so far, each with the transfer id of its request."""
+        heard = [one for one in self.party.heard if one.name == VEHICLE_SERVICE]
+        name = self.network.definitions.result_name
+        return [(one.transfer_id, name(VEHICLE_SERVICE, one.values)) for one in heard]
+
+    def await_answer(self, result):
+        self.bench.until(self.answers, "it is answered")
+        assert self.answers() == [(self.number, result)]
+
+    def report(self, action, outcome):
+        message = ActionReport(
+            action=int(action), outcome=int(outcome), link="mavlink_parachute", epoch=1, id=1
+        )
+        self.bench.publish(stamped(self.bench.client, message), "safety/action", qos.DECISION)
+
+    def supervisor_says(self, blocked, *devices):
+        message = SafetyState(flight_blocked=blocked, device_blocks=list(devices))
+        self.bench.publish(message, "safety/state", qos.LATCHED)
+        kept = self.network.link.vehicle_service
+        ours = {one.removeprefix("upf_can ") for one in devices if one.startswith("upf_can ")}
+        self.bench.until(
+            lambda: (kept._blocked, kept._standing) == (blocked, ours), "the node has heard it"
+        )
+
+
+# The kill switch
+
+
+def test_the_kill_switch_is_answered_once_the_motors_are_seen_to_stop(bench):
+    asking = Asking(bench, **LONG)
+    asking.ask(KILL)
+    asking.await_request(SafetyRequest.KILL)
+    for action, outcome in (
+        (Action.KILL, Outcome.SENT),
+        (Action.KILL, Outcome.ACCEPTED),
+        (Action.KILL, Outcome.FAILED),
+        (Action.DEPLOY, Outcome.CONFIRMED),
+        (Action.FLIGHT_BLOCK, Outcome.CONFIRMED),
+    ):
+        asking.report(action, outcome)
+    bench.turns(0.2)
+    assert asking.answers() == [], "none of these stops a motor"
+    asking.report(Action.KILL, Outcome.CONFIRMED)
+    asking.await_answer("SUCCESS")
+
+
+def test_a_kill_that_does_not_happen_in_time_is_told_as_failed(bench):
+    asking = Asking(bench, vehicle_service_timeout=0.3)
+    asking.ask(KILL)
+    asking.await_request(SafetyRequest.KILL)
+    asking.report(Action.KILL, Outcome.ACCEPTED)
+    asking.await_answer("FAILED")
+    bench.until(lambda: asking.network.link.counts["KILL not done in time"] == 1, "it is counted")
+
+
+@pytest.mark.parametrize("name", [KILL, BLOCK, RELEASE])
+def test_by_the_policy_accept_it_is_asked_and_answered_at_once(bench, name):
+    asking = Asking(bench, killswitch_policy="accept", flight_block_policy="accept", **LONG)
+    asking.ask(name)
+    asking.await_answer("SUCCESS")
+    asking.await_request(
+        {
+            KILL: SafetyRequest.KILL,
+            BLOCK: SafetyRequest.FLIGHT_BLOCK,
+            RELEASE: SafetyRequest.FLIGHT_BLOCK_RELEASE,
+        }[name]
+    )
+
+
+@pytest.mark.parametrize("name", [KILL, BLOCK, RELEASE])
+def test_by_the_policy_reject_nobody_is_asked(bench, name):
+    asking = Asking(bench, killswitch_policy="reject", flight_block_policy="reject", **LONG)
+    asking.ask(name)
+    asking.await_answer("REJECTED")
+    bench.turns(0.2)
+    assert asking.asked == []
+
+
+# Flight block
+
+
+def test_a_flight_block_is_answered_once_it_stands_for_this_device(bench):
+    asking = Asking(bench, **LONG)
+    asking.ask(BLOCK)
+    asking.await_request(SafetyRequest.FLIGHT_BLOCK)
+    asking.supervisor_says(True)
+    asking.supervisor_says(True, "upf_can 34", "another 33")
+    asking.supervisor_says(False, "upf_can 33")
+    bench.turns(0.2)
+    assert asking.answers() == []
+    asking.supervisor_says(True, "upf_can 34", "upf_can 33")
+    asking.await_answer("SUCCESS")
+
+
+def test_a_release_is_answered_once_the_block_of_this_device_is_gone(bench):
+    asking = Asking(bench, **LONG)
+    asking.supervisor_says(True, "upf_can 33")
+    asking.ask(RELEASE)
+    asking.await_request(SafetyRequest.FLIGHT_BLOCK_RELEASE)
+    bench.turns(0.2)
+    assert asking.answers() == []
+    asking.supervisor_says(True, "upf_can 34")
+    asking.await_answer("SUCCESS")
+
+
+def test_a_flight_block_that_does_not_come_to_stand_is_told_as_failed(bench):
+    asking = Asking(bench, vehicle_service_timeout=0.3)
+    asking.ask(BLOCK)
+    asking.supervisor_says(True)
+    asking.await_answer("FAILED")
+
+
+# A deploy that the controller does not answer
+
+
+class Vehicle:
+    """Controller and trigger, each with a plug of its own."""
+
+    def __init__(self, bench, **parameters):
+        self.bench, self.network = bench, Network(bench, **parameters)
+        self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+        self.statuses = bench.follow(ParachuteStatus, "parachute/status")
+        self.controller, self.trigger = self.network.controller(), self.network.trigger()
+
+    def await_healthy(self):
+        self.bench.until(
+            lambda: (
+                self.beats and self.beats[-1].device_healthy and self.network.link.devices.triggers
+            ),
+            "all is well",
+        )
+
+    def deploy(self, **fields):
+        return self.bench.call(Deploy, "upf_can/deploy", reason="a test", **fields)
+
+
+def both(bench, **parameters):
+    vehicle = Vehicle(bench, **parameters)
+    vehicle.network.plug(vehicle.trigger)
+    vehicle.plug = vehicle.network.plug(vehicle.controller)
+    vehicle.await_healthy()
+    return vehicle
+
+
+@pytest.mark.parametrize("force", [True, False])
+def test_a_controller_that_does_not_answer_is_gone_round(bench, force):
+    vehicle = both(bench, give_up_after=10.0)
+    said = follow_log(bench)
+    vehicle.plug.call(lambda link, now: link.act("mute"))
+    bench.until(lambda: vehicle.controller.mute, "it is mute")
+    answer = vehicle.deploy(force=force)
+    assert answer.success, answer.message
+    assert vehicle.trigger.fired
+    bench.until(
+        lambda: any("firing the triggers directly" in one.msg for one in said), "it is logged"
+    )
+    bench.until(lambda: vehicle.statuses[-1].deployed, "the status tells it")
+
+
+def test_a_controller_that_is_lost_is_gone_round_at_once(bench):
+    vehicle = both(bench, give_up_after=10.0, last_resort_after=60.0)
+    bench.unplug(vehicle.plug)
+    bench.until(lambda: vehicle.beats[-1].link_state == LinkState.LOST, "it is lost")
+    answer = vehicle.deploy(force=True)
+    assert answer.success, answer.message
+    assert vehicle.trigger.fired
+
+
+def test_a_controller_that_refuses_is_not_gone_round(bench):
+    vehicle = both(bench)
+    answer = vehicle.deploy()
+    assert not answer.success
+    assert "its state is READY" in answer.message
+    assert not vehicle.trigger.fired
+
+
+def test_without_the_last_resort_a_mute_controller_is_all_there_is(bench):
+    vehicle = both(bench, last_resort=False)
+    vehicle.plug.call(lambda link, now: link.act("mute"))
+    bench.until(lambda: vehicle.controller.mute, "it is mute")
+    answer = vehicle.deploy(force=True)
+    assert not answer.success
+    assert "no acknowledgement" in answer.message
+    assert not vehicle.trigger.fired
+
+
+def test_in_the_architecture_without_a_controller_the_trigger_is_the_parachute(bench):
+    vehicle = Vehicle(bench, without_controller=True, give_up_after=10.0)
+    vehicle.network.plug(vehicle.trigger)
+    vehicle.await_healthy()
+    bench.until(lambda: vehicle.statuses, "it is told")
+    one = vehicle.statuses[-1]
+    assert (one.device, one.state) == ("34", ParachuteState.READY)
+    assert one.backup_voltage == 12.0
+    assert one.height != one.height, "a trigger tells none"
+    answer = vehicle.deploy()
+    assert (answer.success, answer.accepted) == (True, True), answer.message
+    assert vehicle.trigger.fired
+    bench.until(lambda: vehicle.statuses[-1].state == ParachuteState.LAUNCHED, "it is told")
+
+
+def test_a_trigger_alone_is_no_parachute_unless_it_was_said_so(bench):
+    vehicle = Vehicle(bench)
+    vehicle.network.plug(vehicle.trigger)
+    bench.until(lambda: vehicle.network.link.devices.triggers, "the trigger is heard")
+    vehicle.beats.clear()
+    bench.until(lambda: len(vehicle.beats) >= 3, "it beats")
+    assert {one.link_state for one in vehicle.beats} == {LinkState.NEVER_SEEN}
+    assert not any(one.device_healthy for one in vehicle.beats)
+    assert vehicle.statuses == []

@@ -1,0 +1,176 @@
+"""Supervisor, mavlink_parachute, upf_can and all simulators: from one wire to the other."""
+
+from __future__ import annotations
+
+import pytest
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState, VehicleState
+from chute_msgs.srv import Arm, Deploy
+from diagnostic_msgs.msg import DiagnosticArray
+from mavlink_bench import Autopilot, do
+from mavlink_bench import quick as quick_mavlink
+from node_bench import LOCAL, port_of
+from upf_bench import Network
+
+from chute_ros.model import LinkState
+from chute_ros.nodes import qos
+from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.protocol.mavlink.dialect import dialect
+
+TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
+LINKS = ["mavlink_parachute", "upf_can"]
+HEIGHT = 20.0  # m
+
+
+class Flight:
+    """A vehicle whose autopilot speaks MAVLink and whose parachute is a UPF."""
+
+    def __init__(self, bench, kill_wait=10.0, **parameters):
+        self.bench = bench
+        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+        self.vehicle = bench.follow(VehicleState, "vehicle/state")
+        self.parachute = bench.follow(ParachuteStatus, "parachute/status")
+        bench.add(
+            SafetySupervisorNode,
+            startup_grace=0.5,
+            required_links=LINKS,
+            kill_links=LINKS[:1],
+            deploy_links=LINKS[1:],
+        )
+        mavlink = bench.add(MavlinkParachuteNode, **quick_mavlink(expect_parachute=False))
+        self.autopilot = Autopilot()
+        self.autopilot.model.climb_speed = 40.0
+        self.autopilot.loop = bench.simulate(
+            self.autopilot, f"udpin:{LOCAL}:0", f"udpout:{LOCAL}:{port_of(mavlink.loop)}"
+        )
+        limits = {"vehicle_service_timeout": 2.0, "give_up_after": 5.0}
+        self.network = Network(bench, **(limits | parameters))
+        self.controller = self.network.controller(kill_wait=kill_wait)
+        self.trigger = self.network.trigger()
+        self.loop = None
+
+    def plug_parachute_in(self):
+        self.loop = self.network.plug(self.controller, self.trigger)
+
+    def device(self, action):
+        do(self.bench, self.loop, lambda: self.loop.link.act(action))
+
+    def act(self, action):
+        do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
+
+    def await_stage(self, *stages):
+        self.bench.until(
+            lambda: self.safety and self.safety[-1].state in stages, f"the stage is {stages}"
+        )
+
+    def await_said(self, text):
+        self.bench.until(
+            lambda: any(text in line for line in self.network.said), f"the device says {text!r}"
+        )
+
+    def take_off(self):
+        self.plug_parachute_in()
+        self.await_stage(SafetyState.READY)
+        answer = self.bench.call(Arm, "safety/arm", arm=True)
+        assert answer.success, answer.message
+        self.act("arm")
+        self.act(f"takeoff={HEIGHT}")
+        self.await_stage(SafetyState.IN_FLIGHT)
+        self.bench.until(lambda: self.vehicle[-1].height > HEIGHT - 5.0, "it is up")
+
+    def when_said(self, text):
+        """The place of a line among all that the devices said."""
+        return next(place for place, line in enumerate(self.network.said) if text in line)
+
+
+def test_a_kill_switch_on_the_bus_stops_the_motors_and_is_answered_after(bench):
+    flight = Flight(bench)
+    flight.take_off()
+    assert flight.autopilot.model.armed
+    flight.device("deploy")
+    flight.await_said("TYPE_KILLSWITCH answered: SUCCESS")
+    assert not flight.autopilot.model.armed, "the motors are off by then"
+    assert flight.autopilot.heard_command(TERMINATE)
+    flight.await_said("FIRED")
+    assert flight.when_said("KILLSWITCH answered") < flight.when_said("FIRED")
+    flight.await_stage(SafetyState.DEPLOYED)
+    assert flight.controller.came.count("TYPE_DEPLOY_FORCE") == 0, "it deploys by itself"
+    assert flight.parachute[-1].deployed or bench.until(
+        lambda: flight.parachute[-1].deployed, "its status says so"
+    )
+
+
+def test_an_autopilot_that_takes_no_kill_is_told_to_the_device_as_a_failure(bench):
+    flight = Flight(bench, kill_wait=60.0, vehicle_service_timeout=0.3)
+    flight.take_off()
+    flight.act("mute")
+    flight.device("deploy")
+    flight.await_said("TYPE_KILLSWITCH answered: FAILED")
+    assert flight.autopilot.model.armed
+    flight.await_said("FIRED")
+
+
+def test_a_deploy_of_the_operator_stops_the_motors_first(bench):
+    flight = Flight(bench, kill_wait=0.05)
+    flight.take_off()
+    answer = bench.call(Deploy, "safety/deploy", reason="it falls")
+    assert answer.success, answer.message
+    assert flight.trigger.fired
+    assert not flight.autopilot.model.armed
+    assert flight.autopilot.heard_command(TERMINATE)
+    assert flight.controller.came[-1] == "TYPE_DEPLOY"
+    flight.await_stage(SafetyState.DEPLOYED)
+
+
+def test_a_controller_that_breaks_down_on_the_ground_blocks_flight_until_it_is_well(bench):
+    flight = Flight(bench)
+    flight.plug_parachute_in()
+    flight.await_stage(SafetyState.READY)
+    flight.device("error=IMU")
+    flight.await_stage(SafetyState.BLOCKED)
+    bench.until(lambda: "upf_can 33" in flight.safety[-1].device_blocks, "its block stands")
+    flight.await_said("TYPE_FLIGHT_BLOCK answered: SUCCESS")
+    flight.act("arm")
+    bench.until(lambda: not flight.autopilot.model.armed, "arming is undone")
+    flight.device("clear-errors")
+    flight.await_stage(SafetyState.READY)
+    assert flight.safety[-1].device_blocks == []
+    flight.await_said("TYPE_FLIGHT_BLOCK_RELEASE answered: SUCCESS")
+
+
+def test_a_controller_that_restarts_on_the_ground_blocks_flight_until_it_is_ready(bench):
+    flight = Flight(bench)
+    flight.controller.how = type(flight.controller.how)(flight.controller.how.node, self_test=1.0)
+    flight.plug_parachute_in()
+    flight.await_stage(SafetyState.READY)
+    flight.device("reboot")
+    flight.await_stage(SafetyState.BLOCKED)
+    flight.await_stage(SafetyState.READY)
+
+
+@pytest.mark.parametrize("expected", [True, False])
+def test_where_no_mavlink_parachute_is_expected_the_heartbeat_stands_for_the_autopilot(
+    bench, expected
+):
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    node = bench.add(MavlinkParachuteNode, **quick_mavlink(expect_parachute=expected))
+    bench.until(lambda: beats, "it beats")
+    assert (beats[-1].link_state, beats[-1].device_healthy) == (LinkState.NEVER_SEEN, False)
+    autopilot = Autopilot()
+    loop = bench.simulate(autopilot, f"udpout:{LOCAL}:{port_of(node.loop)}")
+
+    def told():
+        return [one.name.rpartition(": ")[2] for array in diagnostics for one in array.status]
+
+    bench.until(lambda: "autopilot" in told(), "the autopilot is told of")
+    if expected:
+        assert "parachute" in told(), "the one that is missing"
+        assert beats[-1].link_state == LinkState.NEVER_SEEN
+        return
+    assert not any(name.startswith("parachute") for name in told())
+    bench.until(lambda: beats[-1].link_state == LinkState.OK, "the autopilot is heard")
+    assert beats[-1].device_healthy
+    do(bench, loop, lambda: autopilot.act("silent"))
+    bench.until(lambda: beats[-1].link_state == LinkState.LOST, "its silence is told")
+    assert not beats[-1].device_healthy
