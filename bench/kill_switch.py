@@ -1,83 +1,134 @@
 """From a UPF's kill switch on the bus to the kill on MAVLink, and to the answer on the bus.
 
 Our three processes (upf_can, safety_supervisor, mavlink_parachute) beside a bare relay that does
-the same between the same two sockets without ROS; rounds take turns, in one run. Writes
-docs/bench.md.
+the same between the same two sockets without ROS, and beside that relay cut into three with our
+topics between. Rounds take turns, in one run. Writes docs/bench.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from bench.report import machine, summary, table
-from bench.wire_ends import Round, RoundFailedError, WireEnds
+from bench.report import load, machine, summary, table
+from bench.wire_ends import Round, RoundFailedError, WireEnds, WrongOrderError
 from chute_ros.errors import ChuteError
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports, isolated_ros
 from chute_ros.tools.processes import Processes
 from chute_ros.transport.data_types import load_data_types
 
-OURS, BARE = "chute_ros", "bare relay"
-#: Between two rounds, s: the kill of the last one must be over for the supervisor, and the vehicle
-#: known to be armed again.
-_REST = 0.25
-_KILL_TIMEOUT = 0.15
-_ROUND_TIMEOUT = 2.0
-_READY_TIMEOUT = 30.0
+OURS, ROS, BARE = "chute_ros", "ROS alone", "bare relay"
+#: Each peer rests so long between its rounds at least, s: for the supervisor the kill of the last
+#: one is over after its kill_timeout, and the vehicle is known to be armed again.
+_REST, _KILL_TIMEOUT = 0.4, 0.3
+#: A late answer is a late answer: it is measured, not given up.
+_SERVICE_TIMEOUT, _ROUND_TIMEOUT = 2.0, 3.0
+_READY_TIMEOUT = 40.0
+#: One round of so many may go without an answer; it is counted in the table.
+_ONE_OF = 50
+
+
+@dataclass
+class Peer:
+    """What is measured. Times are in rounds; a round without an answer is only counted."""
+
+    name: str
+    ends: WireEnds
+    rounds: list[Round] = field(default_factory=list)
+    missed: int = 0
 
 
 def main() -> None:
     """Measure, print, write."""
     options = argparse.ArgumentParser("bench.kill_switch", description=__doc__)
-    options.add_argument("--rounds", type=int, default=300, help="of each peer (default: 300)")
+    options.add_argument("--requests", type=int, default=200, help="to each peer (default: 200)")
     options.add_argument("--output", type=Path, default=Path("docs/bench.md"))
     chosen = options.parse_args()
-    if chosen.rounds < 2:
-        options.error("--rounds: need 2 or more")
+    if chosen.requests < 2:
+        options.error("--requests: need 2 or more")
+    if not chosen.output.parent.is_dir():
+        options.error(f"--output: there is no folder {chosen.output.parent}")
+    # The children must end however this ends.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("bench: terminated"))
+    before = load()
     with tempfile.TemporaryDirectory(prefix="chute_ros_bench_") as folder:
         processes = Processes(Path(folder))
         try:
             with isolated_ros() as namespace:
-                rounds = _measure(namespace, processes, chosen.rounds)
-        except (ChuteError, RoundFailedError) as error:
+                peers = _measure(namespace, processes, chosen.requests)
+        except KeyboardInterrupt:
+            sys.exit("bench: interrupted")
+        except (ChuteError, OSError) as error:
             logs = "\n".join(processes.tail(name) for name in processes.names())
             sys.exit(f"bench failed: {error}\n{logs}")
         finally:
             processes.end()
-    text = report(rounds)
+    text = report(peers, before)
     chosen.output.write_text(text)
     print(text)
 
 
-def _measure(namespace: str, processes: Processes, count: int) -> dict[str, list[Round]]:
+def _measure(namespace: str, processes: Processes, count: int) -> list[Peer]:
     definitions = Definitions(load_data_types("", "bench"))
-    bus, network, bare_bus, bare_network = free_udp_ports(4)
-    _start_ours(namespace, processes, bus, network)
-    processes.start("relay", "bench.bare_relay", str(bare_bus), str(bare_network))
-    ends = {
-        OURS: WireEnds(definitions, bus, network),
-        BARE: WireEnds(definitions, bare_bus, bare_network),
+    starts: dict[str, Callable[[str, Processes, int, int], None]] = {
+        OURS: _start_ours,
+        ROS: _start_ros,
+        BARE: _start_bare,
     }
-    try:
-        for name, pair in ends.items():
-            _await_ready(name, pair, processes)
-        rounds: dict[str, list[Round]] = {name: [] for name in ends}
+    ports = iter(free_udp_ports(2 * len(starts)))
+    peers = []
+    with ExitStack() as stack:
+        for name, start in starts.items():
+            bus, network = next(ports), next(ports)
+            start(namespace, processes, bus, network)
+            ends = WireEnds(definitions, bus, network)
+            stack.callback(ends.close)
+            peers.append(Peer(name, ends))
+        for peer in peers:
+            _await_ready(peer, peers, processes)
+        # What was asked for before all was there may still come.
+        _rest(peers, _SERVICE_TIMEOUT)
+        for peer in peers:
+            peer.ends.kills = 0
         for number in range(count):
-            for name, pair in ends.items():
-                for other in ends.values():
-                    other.rest(_REST / len(ends))
-                rounds[name].append(pair.kill_switch(_ROUND_TIMEOUT))
+            for peer in peers:
+                _rest(peers, _REST / len(peers))
+                _round(peer, count)
             processes.check()
             if (number + 1) % 25 == 0 or number + 1 == count:
                 print(f"  {number + 1} of {count} rounds", file=sys.stderr, flush=True)
-        return rounds
-    finally:
-        for pair in ends.values():
-            pair.close()
+        # A kill that was sent twice may come late.
+        _rest(peers, _REST)
+    return peers
+
+
+def _rest(peers: list[Peer], seconds: float) -> None:
+    """All go on saying how they are: none may seem lost while another has its turn."""
+    for peer in peers:
+        peer.ends.arm()
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        for peer in peers:
+            peer.ends.listen(0.005)
+
+
+def _round(peer: Peer, count: int) -> None:
+    try:
+        peer.rounds.append(peer.ends.kill_switch(_ROUND_TIMEOUT))
+    except WrongOrderError as error:
+        raise RoundFailedError(f"{peer.name}: {error}") from None
+    except RoundFailedError as error:
+        peer.missed += 1
+        if peer.missed > count // _ONE_OF:
+            raise RoundFailedError(f"{peer.name}: {peer.missed} missed, now: {error}") from None
 
 
 def _start_ours(namespace: str, processes: Processes, bus: int, network: int) -> None:
@@ -105,49 +156,73 @@ def _start_ours(namespace: str, processes: Processes, bus: int, network: int) ->
         "chute_ros.nodes.upf_can",
         connection=f"mcast:0:{bus}",
         allocator="false",
+        vehicle_service_timeout=str(_SERVICE_TIMEOUT),
     )
 
 
-def _await_ready(name: str, pair: WireEnds, processes: Processes) -> None:
+def _start_ros(namespace: str, processes: Processes, bus: int, network: int) -> None:
+    node = ("--ros-args", "-r", f"__ns:={namespace}/relay")
+    for role, *port in (("bus", str(bus)), ("decide",), ("network", str(network))):
+        processes.start(f"relay_{role}", "bench.ros_relay", role, *port, *node)
+
+
+def _start_bare(_: str, processes: Processes, bus: int, network: int) -> None:
+    processes.start("relay", "bench.bare_relay", str(bus), str(network))
+
+
+def _await_ready(peer: Peer, peers: list[Peer], processes: Processes) -> None:
     """Until a first round succeeds: all is started, and everybody has heard everybody."""
     end = time.monotonic() + _READY_TIMEOUT
     while True:
         processes.check()
-        pair.rest(_REST)
+        _rest(peers, _REST)
         try:
-            pair.kill_switch(_ROUND_TIMEOUT)
+            peer.ends.kill_switch(1.0)
             return
         except RoundFailedError as error:
             if time.monotonic() > end:
-                raise RoundFailedError(f"{name} was not ready: {error}") from None
+                raise RoundFailedError(f"{peer.name} was not ready: {error}") from None
 
 
-def report(rounds: dict[str, list[Round]]) -> str:
-    """The file docs/bench.md."""
+def report(peers: list[Peer], before: str) -> str:
+    """The file docs/bench.md. before: the load of the machine when it began."""
     rows = []
-    for what, values in (
-        ("to the kill on MAVLink", {n: [r.kill for r in all_] for n, all_ in rounds.items()}),
-        ("to the answer on the bus", {n: [r.answer for r in all_] for n, all_ in rounds.items()}),
+    for what, times in (
+        ("to the kill on MAVLink", {p.name: [r.kill for r in p.rounds] for p in peers}),
+        ("to the answer on the bus", {p.name: [r.answer for r in p.rounds] for p in peers}),
     ):
-        base = summary(values[BARE])
-        for name, measured in values.items():
-            numbers = summary(measured)
-            ratio = "1" if name == BARE else f"{numbers[0] / base[0]:.1f}"
-            rows.append((f"{what}: {name}", *(f"{n:.2f} ms" for n in numbers), ratio))
-    head = ("from the kill switch on the bus", "median", "99th percentile", "largest", "ratio")
-    count = len(rounds[OURS])
+        base = summary(times[BARE])
+        for peer in peers:
+            numbers = summary(times[peer.name])
+            ratios = (f"{number / base[i]:.1f}" for i, number in enumerate(numbers[:2]))
+            values = (*(f"{number:.2f} ms" for number in numbers), *ratios, str(peer.missed))
+            rows.append((f"{what}: {peer.name}", *values))
+    head = (
+        "from the kill switch on the bus",
+        "median",
+        "99th percentile",
+        "largest",
+        "ratio of medians",
+        "of 99th percentiles",
+        "missed",
+    )
+    count = len(peers[0].rounds) + peers[0].missed
+    kills = ", ".join(f"{peer.name} {peer.ends.kills}" for peer in peers)
     return (
         "# Measured\n\n"
         "Written by `make bench`. The numbers belong to the machine that made them:\n"
-        f"{machine()}.\n\n"
+        f"{machine()}.\n"
+        f"Load before the run: {before} (of the last minute).\n\n"
         "## Kill switch\n\n"
         "A UPF controller asks for TYPE_KILLSWITCH on the CAN bus (UDP multicast); the kill\n"
-        "(MAV_CMD_DO_FLIGHTTERMINATION) arrives at the autopilot, whose heartbeat then says\n"
-        "motors off; SUCCESS arrives at the controller. Ours are the processes upf_can,\n"
-        "safety_supervisor and mavlink_parachute, with two hops over ROS to the kill and one\n"
-        "back; the bare relay is one process with two sockets that checks nothing\n"
-        "(`bench/bare_relay.py`). "
-        f"{count} rounds of each, taking turns, in one run.\n\n" + table(head, rows) + "\n"
+        "(MAV_CMD_DO_FLIGHTTERMINATION) arrives at the autopilot, which acknowledges it and\n"
+        "whose heartbeat then says motors off; SUCCESS arrives at the controller. chute_ros: the\n"
+        "processes upf_can, safety_supervisor and mavlink_parachute, with two hops over ROS to\n"
+        "the kill and one back. ROS alone: three processes with the same hops and messages, that\n"
+        "decide and check nothing (`bench/ros_relay.py`). Bare relay: one process with two\n"
+        "sockets, that checks nothing (`bench/bare_relay.py`); the ratios are to it.\n"
+        f"{count} requests to each, taking turns, in one run. Missed: no SUCCESS within\n"
+        f"{_SERVICE_TIMEOUT:g} s. Kills that came: {kills}.\n\n" + table(head, rows) + "\n"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import statistics
@@ -9,10 +10,9 @@ from collections.abc import Sequence
 
 
 def summary(values: Sequence[float]) -> tuple[float, float, float]:
-    """Median, 99th percentile (the largest if there are few), largest."""
+    """Median, 99th percentile (nearest rank: of fewer than 100 the largest), largest."""
     ordered = sorted(values)
-    index = min(len(ordered) - 1, round(0.99 * (len(ordered) - 1)))
-    return statistics.median(ordered), ordered[index], ordered[-1]
+    return statistics.median(ordered), ordered[math.ceil(0.99 * len(ordered)) - 1], ordered[-1]
 
 
 def machine() -> str:
@@ -28,6 +28,11 @@ def machine() -> str:
         f"{model}, {os.cpu_count()} cores; Linux {platform.release()}; "
         f"Python {platform.python_version()}; ROS 2 {distribution}"
     )
+
+
+def load() -> str:
+    """How busy the machine was in the last minute: to be asked before a measurement."""
+    return f"{os.getloadavg()[0]:.1f}"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import select
 import time
 from dataclasses import dataclass
+from typing import Any
 
+from chute_ros.errors import ChuteError
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -23,10 +25,16 @@ from chute_ros.transport.udp import UdpWire
 CONTROLLER, VEHICLE = 33, 10
 #: How often both ends say how they are, s.
 _INTERVAL = 0.05
+#: Between the newest of that and a kill switch, s: it must not stand in the way.
+_QUIET = 0.02
 
 
-class RoundFailedError(Exception):
+class RoundFailedError(ChuteError):
     """A round did not go as it must. The text says how."""
+
+
+class WrongOrderError(RoundFailedError):
+    """The answer came, but not after the kill: that is no matter of time."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +59,11 @@ class WireEnds:
         self._encoder = FrameEncoder(1, 1)
         self._decoder = FrameDecoder()
         self._armed = True
+        self._killed_at = 0
         self._said = 0.0
         self._transfer_id = 0
         self._started = time.monotonic()
+        #: How many came.
         self.kills = 0
 
     def close(self) -> None:
@@ -76,77 +86,89 @@ class WireEnds:
         landed = dialect.MAV_LANDED_STATE_IN_AIR
         self._send(dialect.MAVLink_extended_sys_state_message(0, landed))
 
-    def rest(self, seconds: float) -> None:
-        """The autopilot is armed again; wait, and go on saying so."""
+    def arm(self) -> None:
+        """The autopilot is armed again, and says so."""
         self._armed = True
-        end = time.monotonic() + seconds
         self._heartbeat()
-        while time.monotonic() < end:
+
+    def listen(self, seconds: float) -> None:
+        """Take in what comes, and say how both ends are when it is time."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
             self.say()
-            self._wait(0.01)
-            self._hear()
+            self._hear(left)
 
     def kill_switch(self, timeout: float) -> Round:
         """Ask for it, and see the kill leave and the answer come."""
+        # What is still on its way belongs to the round before.
+        self.listen(0.001)
+        self.arm()
+        self._said = 0.0
+        self.listen(_QUIET)
         self._transfer_id = (self._transfer_id + 1) % 32
         values = self._definitions.request(VEHICLE_SERVICE, "TYPE_KILLSWITCH")
         self._endpoint.request(VEHICLE, VEHICLE_SERVICE, self._transfer_id, values, 2)
-        before = self.kills
+        before, self._armed = self.kills, True
+        end = time.monotonic() + timeout
         start = time.perf_counter_ns()
         self._send_bus()
         killed = 0
-        end = time.monotonic() + timeout
-        while time.monotonic() < end:
-            self.say()
-            self._wait(0.01)
-            answer = self._hear()
+        while (now := time.monotonic()) < end:
+            if now - self._said > 10 * _INTERVAL:
+                self.say()
+            answer = self._hear(0.05)
             if self.kills > before and not killed:
                 killed = self._killed_at
             if answer:
                 result, at = answer
-                if not killed:
-                    raise RoundFailedError("answered before the kill left")
                 if result != "SUCCESS":
                     raise RoundFailedError(f"answered {result}")
+                if not killed or at <= killed:
+                    raise WrongOrderError("answered SUCCESS before the kill came")
                 return Round((killed - start) / 1e6, (at - start) / 1e6)
-        seen = "the kill left, but no answer came" if killed else "no kill left"
+        seen = "the kill came, but no answer" if killed else "no kill came"
         raise RoundFailedError(f"{seen} within {timeout:g} s")
 
     # -- inside ---------------------------------------------------------------------------------
 
-    _killed_at = 0
-
-    def _wait(self, seconds: float) -> None:
-        files = [*self._bus.files(), *self._network.files()]
-        select.select(files, [], [], seconds)
-
-    def _hear(self) -> tuple[str, int] | None:
-        """Take in what came: obey a kill; (result, time) of an answer to the kill switch."""
+    def _hear(self, seconds: float) -> tuple[str, int] | None:
+        """Wait, and take in what came: obey a kill; (result, time) of an answer."""
+        network, bus = self._network.files(), self._bus.files()
+        ready = select.select([*network, *bus], [], [], seconds)[0]
         now = time.monotonic()
-        for file in self._network.files():
-            for data, _ in self._network.read(file):
-                for frame in self._decoder.feed_datagram(data, now):
-                    self._command(frame.message)
+        for file in ready:
+            if file in network:
+                datagrams = self._network.read(file)
+                # Before anything is decoded: what that takes here is not the peer's.
+                at = time.perf_counter_ns()
+                for data, _ in datagrams:
+                    for frame in self._decoder.feed_datagram(data, now):
+                        self._command(frame.message, at)
         found = None
-        for file in self._bus.files():
-            for data, _ in self._bus.read(file):
-                heard = self._endpoint.receive(data, now)
-                if heard is None or heard.kind is not Kind.RESPONSE:
-                    continue
-                if (heard.name, heard.transfer_id) == (VEHICLE_SERVICE, self._transfer_id):
-                    at = time.perf_counter_ns()
-                    found = (self._definitions.result_name(VEHICLE_SERVICE, heard.values), at)
+        for file in ready:
+            if file in bus:
+                # Own packets wake us as well, so that the answer may come on the heels of a kill.
+                packets = self._bus.read(file)
+                at = time.perf_counter_ns()
+                for data, _ in packets:
+                    heard = self._endpoint.receive(data, now)
+                    if heard is None or heard.kind is not Kind.RESPONSE:
+                        continue
+                    if (heard.name, heard.transfer_id) == (VEHICLE_SERVICE, self._transfer_id):
+                        result = self._definitions.result_name(VEHICLE_SERVICE, heard.values)
+                        found = (result, at)
         return found
 
-    def _command(self, message: object) -> None:
-        if message.get_type() != "COMMAND_LONG":  # type: ignore[attr-defined]
+    def _command(self, message: Any, at: int) -> None:
+        if message.get_type() != "COMMAND_LONG":
             return
-        number = message.command  # type: ignore[attr-defined]
-        if number == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
-            self._killed_at = time.perf_counter_ns()
+        if message.command == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
+            if self._armed:
+                self._killed_at = at
             self.kills += 1
             self._armed = False
-        self._send(dialect.MAVLink_command_ack_message(number, dialect.MAV_RESULT_ACCEPTED))
+        accepted = dialect.MAV_RESULT_ACCEPTED
+        self._send(dialect.MAVLink_command_ack_message(message.command, accepted))
         if not self._armed:
             self._heartbeat()
 
@@ -155,7 +177,7 @@ class WireEnds:
         quadrotor, autopilot = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4
         self._send(dialect.MAVLink_heartbeat_message(quadrotor, autopilot, armed, 0, 4, 3))
 
-    def _send(self, message: object) -> None:
+    def _send(self, message: Any) -> None:
         self._network.write(self._encoder.encode(message, time.monotonic()))
 
     def _send_bus(self) -> None:
