@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import gc
 import logging
 import socket
 import threading
@@ -59,7 +60,14 @@ class CanBusWire:
                 _check_is_up(bus)
         except Exception as error:  # noqa: BLE001
             # Drivers raise whatever their vendor's library does, and if there is none.
-            raise OSError(f"{reason(error)}{self._advice(error)}") from None
+            failure = f"{reason(error)}{self._advice(error)}"
+        else:
+            failure = ""
+        if failure:
+            # A driver that failed half-way has opened its port; what is left of it is kept alive
+            # by its own exception, at each try one more.
+            gc.collect()
+            raise OSError(failure)
         self._bus = bus
         if self._address.interface == "udp_multicast":
             self._echoes = Echoes()
