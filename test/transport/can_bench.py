@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import struct
@@ -100,7 +101,11 @@ def children() -> list[str]:
     """The processes that this one has started and that are still there."""
     found = []
     for task in os.listdir("/proc/self/task"):
-        with open(f"/proc/self/task/{task}/children") as listing:
+        # A thread of another story may end at this moment; it has started none.
+        with (
+            contextlib.suppress(FileNotFoundError),
+            open(f"/proc/self/task/{task}/children") as listing,
+        ):
             found += listing.read().split()
     return found
 
