@@ -103,7 +103,7 @@ def children() -> list[str]:
     for task in os.listdir("/proc/self/task"):
         # A thread of another story may end at this moment; it has started none.
         with (
-            contextlib.suppress(FileNotFoundError),
+            contextlib.suppress(FileNotFoundError, ProcessLookupError),
             open(f"/proc/self/task/{task}/children") as listing,
         ):
             found += listing.read().split()
