@@ -236,8 +236,11 @@ def test_in_the_architecture_without_a_controller_the_trigger_is_the_parachute(b
     assert (one.device, one.state) == ("34", ParachuteState.READY)
     assert one.backup_voltage == 12.0
     assert one.height != one.height, "a trigger tells none"
+    # TriggerLaunch and the TriggerService call leave together: the status that the first one
+    # causes may come before the answer to the second.
     answer = vehicle.deploy()
-    assert (answer.success, answer.accepted) == (True, True), answer.message
+    assert answer.success, answer.message
+    assert "TriggerStatus of 34 says launched" in answer.message
     assert vehicle.trigger.fired
     bench.until(lambda: vehicle.statuses[-1].state == ParachuteState.LAUNCHED, "it is told")
 
