@@ -28,10 +28,12 @@ setup(
         "console_scripts": [
             "mavlink_parachute = chute_ros.nodes.mavlink_parachute:main",
             "upf_can = chute_ros.nodes.upf_can:main",
+            "umbilical = chute_ros.nodes.umbilical:main",
             "safety_supervisor = chute_ros.nodes.safety_supervisor:main",
             "sim_mavlink_parachute = chute_ros.sim.sim_mavlink_parachute:main",
             "sim_upf = chute_ros.sim.sim_upf:main",
             "sim_autopilot = chute_ros.sim.sim_autopilot:main",
+            "sim_flight_computer = chute_ros.sim.sim_flight_computer:main",
             "demo = chute_ros.tools.demo:main",
         ],
     },

@@ -197,6 +197,12 @@ class DeviceNode(Node, ABC):
         self._received_at = (received, now)
         return (received - before) / (now - when) if now > when > 0.0 else 0.0
 
+    def wire_picture(self) -> diagnostics.WirePicture:
+        """For the link's task in diagnostics."""
+        assert self.loop is not None
+        connection = self.values["connection"]
+        return diagnostics.WirePicture(self.loop.wire.is_open, self.wire_text, connection)
+
     def stamp(self) -> Any:
         """The wall clock, for headers."""
         return self.wall.now().to_msg()

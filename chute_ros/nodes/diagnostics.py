@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from chute_ros.protocol.liveness import Liveness
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -26,6 +29,49 @@ def status(
         hardware_id=hardware,
         values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
     )
+
+
+@dataclass(frozen=True)
+class WirePicture:
+    """The wire of a link: is it open, what was last said of it, where it goes."""
+
+    is_open: bool
+    text: str
+    connection: str
+
+
+def wire_task(
+    node: str,
+    wire: WirePicture,
+    troubles: Sequence[str],
+    received: int,
+    values: Mapping[str, object],
+    dropped: Mapping[str, int],
+) -> DiagnosticStatus:
+    """The wire, what is doubtful on it, and what was dropped on it, by reason."""
+    level, text = (OK if wire.is_open else ERROR), wire.text
+    if troubles:
+        level, text = ERROR, "; ".join(troubles)
+    elif wire.is_open and not received:
+        level, text = WARN, f"{text}, nothing received yet"
+    every = {**values, **{f"dropped: {reason}": n for reason, n in sorted(dropped.items())}}
+    return status(node, "link", level, text, every, wire.connection)
+
+
+def never_heard(node: str) -> DiagnosticStatus:
+    """The parachute of a link on which none was heard."""
+    return status(node, "parachute", STALE, "never heard", {}, "")
+
+
+def liveness_values(live: Liveness, now: float) -> dict[str, object]:
+    """How well a device was heard; times in s, NaN: has not happened."""
+    return {
+        "link": live.state.name,
+        "heard (s ago)": live.age(now),
+        "in this link state for (s)": now - live.since,
+        "times lost": live.lost_count,
+        "regained (s ago)": now - live.regained_at,
+    }
 
 
 def array(stamp: Time, statuses: list[DiagnosticStatus]) -> DiagnosticArray:

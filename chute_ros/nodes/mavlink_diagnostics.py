@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -15,14 +16,11 @@ from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 
 @dataclass(frozen=True)
 class ParachuteDetails:
-    """One parachute: its picture, and times in s (NaN: has not happened)."""
+    """One parachute: its picture, s between its statuses, and how well it is heard."""
 
     status: model.ParachuteStatus
     status_interval: float
-    heartbeat_age: float
-    state_age: float
-    regained_ago: float
-    lost_count: int
+    liveness: Mapping[str, object]
 
 
 @dataclass(frozen=True)
@@ -43,15 +41,8 @@ def details_of(link: MavlinkLink, now: float) -> Details:
     """In the link's thread: all that the tasks below say."""
 
     def parachute(one: ParachuteTracker) -> ParachuteDetails:
-        live = one.liveness
-        return ParachuteDetails(
-            one.status(now),
-            one.status_interval,
-            live.age(now),
-            now - live.since,
-            now - live.regained_at,
-            live.lost_count,
-        )
+        values = diagnostics.liveness_values(one.liveness, now)
+        return ParachuteDetails(one.status(now), one.status_interval, values)
 
     return Details(
         tuple(map(parachute, link.parachutes.all())),
@@ -66,33 +57,23 @@ def details_of(link: MavlinkLink, now: float) -> Details:
 
 
 def link_task(
-    name: str,
-    details: Details,
-    traffic: dict[str, object],
-    is_open: bool,
-    wire_text: str,
-    connection: str,
+    name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
 ) -> DiagnosticStatus:
     """The wire, and what was dropped on it."""
-    level, text = (diagnostics.OK if is_open else diagnostics.ERROR), wire_text
-    if details.doubts:
-        level, text = diagnostics.ERROR, "; ".join(details.doubts)
-    elif is_open and not details.received:
-        level, text = diagnostics.WARN, f"{text}, nothing received yet"
     values = {
         **traffic,
         "acknowledgements that came late": details.late_acknowledgements,
         "heartbeats of devices beyond the sixteen that are followed": details.not_followed,
     }
-    values |= {f"dropped: {reason}": n for reason, n in sorted(details.dropped.items())}
-    return diagnostics.status(name, "link", level, text, values, connection)
+    return diagnostics.wire_task(
+        name, wire, details.doubts, details.received, values, details.dropped
+    )
 
 
 def parachute_tasks(name: str, details: Details, expected: bool) -> list[DiagnosticStatus]:
     """One task for each parachute of ours."""
     if not details.parachutes and expected:
-        stale = diagnostics.STALE
-        return [diagnostics.status(name, "parachute", stale, "never heard", {}, "")]
+        return [diagnostics.never_heard(name)]
     return [_parachute_task(name, one) for one in details.parachutes]
 
 
@@ -104,11 +85,7 @@ def _parachute_task(name: str, one: ParachuteDetails) -> DiagnosticStatus:
         diagnostics.OK if status.healthy else diagnostics.ERROR,
         "; ".join(status.faults) or status.state.name,
         {
-            "link": status.link_state.name,
-            "in this link state for (s)": one.state_age,
-            "times lost": one.lost_count,
-            "regained (s ago)": one.regained_ago,
-            "heartbeat age (s)": one.heartbeat_age,
+            **one.liveness,
             "PARACHUTE_STATUS interval (s)": one.status_interval,
             "state": status.state.name,
             "armed triggers": ", ".join(model.flag_names(status.armed_triggers)),

@@ -118,9 +118,9 @@ class MavlinkParachuteNode(DeviceNode):
             "frames sent": details.sent,
             "send errors": self.loop.send_errors,
         }
-        wire = (self.loop.wire.is_open, self.wire_text, self.values["connection"])
+        wire = self.wire_picture()
         return [
-            link_task(name, details, traffic, *wire),
+            link_task(name, details, traffic, wire),
             *parachute_tasks(name, details, self.values["expect_parachute"]),
             autopilot_task(name, details.vehicle),
         ]

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
+from chute_ros.nodes.ros_home import ros_home
 from chute_ros.protocol.dronecan.allocation import HIGHEST, LOWEST, UNIQUE_ID_LENGTH
 
 
@@ -81,5 +82,4 @@ class AllocationFile:
 
 
 def _default_path(node_name: str) -> Path:
-    home = Path(os.environ.get("ROS_HOME") or Path.home() / ".ros")
-    return home / "chute_ros" / f"{node_name.strip('/').replace('/', '.')}.node_ids.json"
+    return ros_home() / f"{node_name.strip('/').replace('/', '.')}.node_ids.json"

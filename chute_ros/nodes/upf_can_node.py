@@ -145,9 +145,9 @@ class UpfCanNode(DeviceNode):
             "frames that could not be sent": self.loop.send_errors,
             **{f"bad packets: {why}": n for why, n in sorted(self.loop.wire.counts.items())},
         }
-        wire = (self.loop.wire.is_open, self.wire_text, self.values["connection"])
+        wire = self.wire_picture()
         return [
-            bus_task(name, details, traffic, *wire),
+            bus_task(name, details, traffic, wire),
             *device_tasks(name, details),
             vehicle_service_task(name, details),
             allocation_task(name, details, str(self._file.path)),

@@ -79,19 +79,9 @@ def details_of(link: UpfLink, now: float) -> Details:
 
 
 def bus_task(
-    name: str,
-    details: Details,
-    traffic: Mapping[str, object],
-    is_open: bool,
-    wire_text: str,
-    connection: str,
+    name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
 ) -> DiagnosticStatus:
     """The bus, who is on it, and what was dropped on it."""
-    level, text = (diagnostics.OK if is_open else diagnostics.ERROR), wire_text
-    if is_open and details.troubles:
-        level, text = diagnostics.ERROR, "; ".join(details.troubles)
-    elif is_open and not details.received:
-        level, text = diagnostics.WARN, f"{text}, nothing received yet"
     values = {
         **traffic,
         "times bus-off": details.bus_off_count,
@@ -99,15 +89,14 @@ def bus_task(
         **details.nodes,
         **details.data_types,
     }
-    values |= {f"dropped: {reason}": n for reason, n in sorted(details.dropped.items())}
-    return diagnostics.status(name, "link", level, text, values, connection)
+    troubles = details.troubles if wire.is_open else ()
+    return diagnostics.wire_task(name, wire, troubles, details.received, values, details.dropped)
 
 
 def device_tasks(name: str, details: Details) -> list[DiagnosticStatus]:
     """One task for each controller and trigger."""
     if not details.devices:
-        stale = diagnostics.STALE
-        return [diagnostics.status(name, "parachute", stale, "never heard", {}, "")]
+        return [diagnostics.never_heard(name)]
     return [
         diagnostics.status(
             name,
@@ -153,18 +142,13 @@ def _controller(link: UpfLink, one: Controller, now: float) -> DeviceDetails:
 def _details(
     one: Device, state: str, faults: list[str], values: Mapping[str, Any], now: float
 ) -> DeviceDetails:
-    live = one.liveness
     return DeviceDetails(
         f"{one.kind} {one.node_id}",
         one.device,
-        live.state is model.LinkState.OK and not faults,
+        one.liveness.state is model.LinkState.OK and not faults,
         "; ".join(faults) or state or "state not known",
         {
-            "link": live.state.name,
-            "in this link state for (s)": now - live.since,
-            "times lost": live.lost_count,
-            "regained (s ago)": now - live.regained_at,
-            "heard (s ago)": live.age(now),
+            **diagnostics.liveness_values(one.liveness, now),
             "status interval (s)": one.status_interval,
             "restarts": one.restart_count,
             "uptime (s)": one.uptime,

@@ -7,64 +7,17 @@ of the two did not come. Nothing more is sent once the effect is there.
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.errors import ParameterError
 from chute_ros.model import Outcome
+from chute_ros.protocol.effect_phases import ENDED, Happening, Phase, next_phase
 
 #: Result of a command that nobody answered: beside the eight bits of any protocol's results.
 NO_ANSWER = 255
-
-
-class Phase(enum.Enum):
-    """Where the loop is."""
-
-    WAIT_ACKNOWLEDGEMENT = "waiting for the acknowledgement"
-    WAIT_EFFECT = "waiting for the effect"
-    WAIT_RETRY = "waiting to try again"
-    CONFIRMED = "confirmed"
-    FAILED = "failed"
-
-
-class Happening(enum.Enum):
-    """What can happen to it."""
-
-    ACCEPTED = "accepted"
-    NOT_NOW = "refused or unanswered, worth another try"
-    REFUSED = "refused for good"
-    EFFECT_SHOWN = "effect shown"
-    EFFECT_LATE = "effect overdue"
-    RETRY_DUE = "time to try again"
-    GIVE_UP = "time is up"
-
-
-TRANSITIONS: dict[tuple[Phase, Happening], Phase] = {
-    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.ACCEPTED): Phase.WAIT_EFFECT,
-    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.NOT_NOW): Phase.WAIT_RETRY,
-    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.REFUSED): Phase.FAILED,
-    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.EFFECT_SHOWN): Phase.CONFIRMED,
-    (Phase.WAIT_ACKNOWLEDGEMENT, Happening.GIVE_UP): Phase.FAILED,
-    (Phase.WAIT_EFFECT, Happening.EFFECT_SHOWN): Phase.CONFIRMED,
-    (Phase.WAIT_EFFECT, Happening.EFFECT_LATE): Phase.WAIT_RETRY,
-    (Phase.WAIT_EFFECT, Happening.GIVE_UP): Phase.FAILED,
-    (Phase.WAIT_RETRY, Happening.RETRY_DUE): Phase.WAIT_ACKNOWLEDGEMENT,
-    (Phase.WAIT_RETRY, Happening.EFFECT_SHOWN): Phase.CONFIRMED,
-    (Phase.WAIT_RETRY, Happening.GIVE_UP): Phase.FAILED,
-}
-
-_ENDED = (Phase.CONFIRMED, Phase.FAILED)
-
-
-def next_phase(phase: Phase, happening: Happening) -> Phase:
-    """The phase after happening; TransitionError for a pair that the table does not list."""
-    try:
-        return TRANSITIONS[phase, happening]
-    except KeyError:
-        raise TransitionError(f"'{happening.value}' while {phase.value}") from None
 
 
 @dataclass(frozen=True)
@@ -119,6 +72,9 @@ class Goal(Generic[CommandT]):
     insist: no refusal but time ends the tries. urgent: does not queue behind another command.
     hinders_release: makes the parachute less ready; gives way to a release.
     needs_acknowledgement: the effect alone, which may have come by itself, does not count.
+    unacknowledged: the protocol acknowledges nothing; the effect counts once it was sent.
+    once: never sent a second time, though the effect does not show.
+    even_if_shown: sent although the status shows the effect already.
     hint: what may be the cause of a refusal, by what the device says of itself; empty: unknown.
     """
 
@@ -131,6 +87,9 @@ class Goal(Generic[CommandT]):
     urgent: bool = False
     hinders_release: bool = False
     needs_acknowledgement: bool = False
+    unacknowledged: bool = False
+    once: bool = False
+    even_if_shown: bool = False
     hint: Callable[[], str] = str
 
 
@@ -145,13 +104,18 @@ class Report:
 
 @dataclass(frozen=True)
 class EffectFinished:
-    """The end of a loop. result: the protocol's result of the newest answer, or NO_ANSWER."""
+    """The end of a loop. result: the protocol's result of the newest answer, or NO_ANSWER.
+
+    sent: the command left at least once. shown: the device's own status showed the effect.
+    """
 
     token: int
     success: bool
     accepted: bool
     result: int
     message: str
+    sent: bool = False
+    shown: bool = False
 
 
 class EffectLoop(Generic[CommandT]):
@@ -167,14 +131,14 @@ class EffectLoop(Generic[CommandT]):
         self._deadline = math.inf  # of the present phase
         self._refresh_at = math.inf
         self._accepted_after = math.nan
-        self._sent = False
+        self._sends = 0
         self._result = NO_ANSWER
         self._answer = ""
         self._newest_accepted = False
         self._commands: list[CommandT] = []
         self._refreshes: list[CommandT] = []
         self._reports: list[Report] = []
-        if goal.shown is not None and goal.shown():
+        if goal.shown is not None and not goal.even_if_shown and goal.shown():
             self.phase = Phase.CONFIRMED
             self._end(True, f"{goal.effect} already; nothing was sent")
             return
@@ -183,13 +147,21 @@ class EffectLoop(Generic[CommandT]):
     @property
     def ended(self) -> bool:
         """Nothing more will come of it."""
-        return self.phase in _ENDED
+        return self.phase in ENDED
 
-    def command_sent(self, command: CommandT) -> None:
+    def command_sent(self, command: CommandT, now: float) -> None:
         """One of the goal's commands went out (it may have waited for its turn)."""
-        if command == self.goal.commands[-1] and not self._sent:
-            self._sent = True
+        if command != self.goal.commands[-1]:
+            return
+        self._sends += 1
+        if self._sends == 1:
             self._reports.append(Report(self.token, Outcome.SENT, f"{self.goal.name} sent"))
+        if self.goal.unacknowledged and self.phase is Phase.WAIT_ACKNOWLEDGEMENT:
+            self._take(Happening.SENT_UNACKNOWLEDGED)
+            self._deadline = math.inf if self.goal.once else now + self._limits.effect_timeout
+            if self.goal.shown is None:
+                self._take(Happening.EFFECT_SHOWN)
+                self._end(True, f"{self.goal.name} sent; {self.goal.effect}")
 
     def command_finished(self, answer: Answer, now: float) -> None:
         """The transaction of the goal's last command ended."""
@@ -220,6 +192,8 @@ class EffectLoop(Generic[CommandT]):
         if self.ended:
             return
         shown = self.goal.shown
+        if self.goal.unacknowledged and not self._sends:
+            return
         alone = shown is not None and not self.goal.needs_acknowledgement
         if not alone and math.isnan(self._accepted_after):
             return
@@ -232,6 +206,8 @@ class EffectLoop(Generic[CommandT]):
             if math.isnan(self._accepted_after)
             else f"acknowledged after {self._accepted_after:.2f} s"
         )
+        if self.goal.unacknowledged:
+            acknowledged = self._sent_text()
         if shown is None:
             self._end(True, f"{self.goal.name} {acknowledged}")
         else:
@@ -306,12 +282,22 @@ class EffectLoop(Generic[CommandT]):
                 f"acknowledged after {self._accepted_after:.2f} s, "
                 f"but the device's own status never showed: {self.goal.effect}{newest}"
             )
-        if not self._sent:
+        if not self._sends and self.goal.unacknowledged:
+            return f"{text}never sent: its turn did not come, or the wire is closed"
+        if not self._sends:
             return f"{text}never sent: an earlier command of the same number was under way"
+        if self.goal.unacknowledged:
+            return (
+                f"{text}{self._sent_text()}, "
+                f"but the device's own status never showed: {self.goal.effect}"
+            )
         answer = self._answer or "no acknowledgement came"
         if self.goal.shown is None or self.goal.shown():
             return text + answer
         return f"{text}{answer}, and the device's own status never showed: {self.goal.effect}"
+
+    def _sent_text(self) -> str:
+        return "sent once" if self._sends == 1 else f"sent {self._sends} times"
 
     def _take(self, happening: Happening) -> None:
         self.phase = next_phase(self.phase, happening)
@@ -325,4 +311,7 @@ class EffectLoop(Generic[CommandT]):
         self._commands.clear()
         self._refreshes.clear()
         accepted = not math.isnan(self._accepted_after)
-        self.finished = EffectFinished(self.token, success, accepted, self._result, message)
+        shown = success and self.goal.shown is not None
+        self.finished = EffectFinished(
+            self.token, success, accepted, self._result, message, self._sends > 0, shown
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -135,9 +136,13 @@ class Requests(Generic[TransactionsT]):
 
     def make_way_for_release(self, now: float) -> None:
         """End whatever would make a parachute less ready."""
+        self.abandon_where(lambda goal: goal.hinders_release, "a release was ordered", now)
+
+    def abandon_where(self, which: Callable[[Goal[Any]], bool], why: str, now: float) -> None:
+        """End the requests whose goal is one of those."""
         for token, running in self._running.items():
-            if running.loop.goal.hinders_release:
-                self.abandon(token, "a release was ordered", now)
+            if which(running.loop.goal):
+                self.abandon(token, why, now)
 
     def refuse(self, token: int, why: str) -> None:
         """End a request before anything was sent."""
@@ -188,7 +193,7 @@ class Requests(Generic[TransactionsT]):
             for out in self.commands.take_output():
                 loop = None if out.token is None else self._loop_of(self._owners.get(out.token))
                 if loop is not None:
-                    loop.command_sent(out.command)
+                    loop.command_sent(out.command, now)
                 send.append(out)
                 moved = True
             for token, running in list(self._running.items()):

@@ -16,6 +16,7 @@ from chute_ros.errors import ChuteError, ParameterError
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
+from chute_ros.sim.pty_wire import PtyWire
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.loop import LoopFault, ProtocolLink, WireChange, WireLoop
@@ -51,13 +52,7 @@ def parser(
         help=f"{CAN_FORMS if can else FORMS}; may be given more than once (default: {connection})",
     )
     options.set_defaults(default_connection=connection)
-    options.add_argument(
-        "--at",
-        action="append",
-        default=[],
-        metavar="SECONDS:ACTION",
-        help=f"do this so long after the start; ACTION is one of {actions}",
-    )
+    _add_script(options, actions)
     for name, text in (*_FAULTS, *(_CAN_FAULTS if can else ())):
         options.add_argument(f"--{name}", type=float, default=0.0, metavar="X", help=text)
     if can:
@@ -69,9 +64,37 @@ def parser(
             help="sign with this key (32 bytes or 64 hexadecimal digits), hear only what is "
             "signed",
         )
+    _add_seed_and_quiet(options)
+    return options
+
+
+def parser_on_pty(program: str, text: str, actions: str) -> argparse.ArgumentParser:
+    """Options of a simulator on a pseudo terminal, in place of those of a network."""
+    options = argparse.ArgumentParser(program, description=text)
+    options.add_argument(
+        "--link",
+        default="",
+        metavar="PATH",
+        help="have this symbolic link point to the pseudo terminal",
+    )
+    _add_script(options, actions)
+    _add_seed_and_quiet(options)
+    return options
+
+
+def _add_script(options: argparse.ArgumentParser, actions: str) -> None:
+    options.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        metavar="SECONDS:ACTION",
+        help=f"do this so long after the start; ACTION is one of {actions}",
+    )
+
+
+def _add_seed_and_quiet(options: argparse.ArgumentParser) -> None:
     options.add_argument("--seed", type=int, default=1, help="of the random faults (default: 1)")
     options.add_argument("--quiet", action="store_true", help="print nothing")
-    return options
 
 
 def script_of(entries: list[str]) -> list[tuple[float, str]]:
@@ -114,6 +137,11 @@ class Acting(ProtocolLink, Protocol):
     @property
     def arguments(self) -> Mapping[str, Callable[[str], Any]]:
         """What turns the argument of an action from text."""
+
+
+def _check_script(device: Acting, options: argparse.Namespace) -> None:
+    for _, action in script_of(options.at):
+        _check_action(device, action)
 
 
 def _check_action(device: Acting, action: str) -> None:
@@ -169,6 +197,20 @@ def run_on_can(
         _run_link(device, link, wires, options)
 
 
+def run_on_pty(device: Acting, options: argparse.Namespace) -> None:
+    """The same on a pseudo terminal, whose path is the first line that is printed."""
+    # First, so that a mistake in it leaves no link behind.
+    _check_script(device, options)
+    wire = PtyWire(options.link)
+    try:
+        wire.open()
+    except OSError as error:
+        raise ParameterError(f"--link {options.link!r}: {error}") from None
+    if not options.quiet:
+        print(wire.path + (f" linked from {options.link}" if options.link else ""), flush=True)
+    _run_link(device, device, [wire], options)
+
+
 def _connections(options: argparse.Namespace) -> list[str]:
     return options.connection or [options.default_connection]
 
@@ -176,8 +218,7 @@ def _connections(options: argparse.Namespace) -> list[str]:
 def _run_link(
     device: Acting, link: ProtocolLink, wires: list[Wire], options: argparse.Namespace
 ) -> None:
-    for _, action in script_of(options.at):
-        _check_action(device, action)
+    _check_script(device, options)
     started = time.monotonic()
 
     def show(events: list[Any]) -> None:

@@ -5,26 +5,31 @@ udpout:HOST:PORT                       send there; listen to what comes back
 udppair:HOST:PORT:HOST:PORT            two one-way sockets: listen on the first, send to the second
 tcp:HOST:PORT    tcpin:HOST:PORT       connect; accept connections
 serial:PATH[:BAUD]                     a serial port, 57600 baud if not said
+usb:VENDOR:PRODUCT[:SERIAL]            a serial port by its USB ids, hexadecimal
 """
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from chute_ros.errors import ParameterError
 
 FORMS = (
     "udpin:HOST:PORT, udpout:HOST:PORT, udppair:HOST:PORT:HOST:PORT, tcp:HOST:PORT, "
-    "tcpin:HOST:PORT or serial:PATH[:BAUD]"
+    "tcpin:HOST:PORT, serial:PATH[:BAUD] or usb:VENDOR:PRODUCT[:SERIAL]"
 )
+SERIAL_FORMS = "serial:PATH[:BAUD] or usb:VENDOR:PRODUCT[:SERIAL]"
 DEFAULT_BAUD = 57600
+_USB_ID = re.compile(r"(?:0[xX])?[0-9a-fA-F]{1,4}")
 _LISTENING = ("udpin", "tcpin")
 _PARTS = {"udpin": 2, "udpout": 2, "udppair": 4, "tcp": 2, "tcpin": 2}
 
 
 @dataclass(frozen=True)
 class Address:
-    """A parsed connection string. For serial: host is the path and port the baud rate."""
+    """A parsed connection string. For serial: host is the path and port the baud rate; for usb:
+    host is the serial number (empty: any), port the vendor's id and send_port the product's."""
 
     kind: str
     host: str
@@ -51,6 +56,8 @@ def parse_address(text: str) -> Address:
             path, baud = rest, str(DEFAULT_BAUD)
         if path and baud and int(baud) > 0:
             return Address(kind, path, int(baud))
+    if kind == "usb":
+        return _usb(rest, text)
     parts = rest.split(":") if colon else []
     if kind not in _PARTS or len(parts) != _PARTS[kind] or not all(parts):
         raise ParameterError(f"connection {text!r} is not understood: need {FORMS}")
@@ -59,3 +66,22 @@ def parse_address(text: str) -> Address:
         return Address(kind, host, _port(port, text, 0), send_host, _port(send_port, text, 1))
     # Port 0 lets the system choose one to listen on; nothing can be sent to it.
     return Address(kind, parts[0], _port(parts[1], text, 0 if kind in _LISTENING else 1))
+
+
+def parse_serial_address(text: str) -> Address:
+    """The same for what must be a serial port."""
+    kind = text.partition(":")[0]
+    if kind not in ("serial", "usb"):
+        raise ParameterError(f"connection {text!r} is no serial port: need {SERIAL_FORMS}")
+    return parse_address(text)
+
+
+def _usb(rest: str, whole: str) -> Address:
+    vendor, _, more = rest.partition(":")
+    product, colon, serial_number = more.partition(":")
+    if not _USB_ID.fullmatch(vendor) or not _USB_ID.fullmatch(product) or (colon and not more):
+        raise ParameterError(
+            f"connection {whole!r}: USB ids are hexadecimal, for example usb:c0de:cafe (lsusb "
+            f"shows them): need {FORMS}"
+        )
+    return Address("usb", serial_number, int(vendor, 16), send_port=int(product, 16))

@@ -63,14 +63,24 @@ class LoopFault:
 
 
 class WireLoop(Generic[LinkT]):
-    """Runs link over wire. deliver gets the events in this loop's thread and must not block."""
+    """Runs link over wire. deliver gets the events in this loop's thread and must not block.
 
-    def __init__(self, link: LinkT, wire: Wire, deliver: Callable[[list[Any]], None]) -> None:
+    opened: for a protocol that wants to know from when on (monotonic s) it can send.
+    """
+
+    def __init__(
+        self,
+        link: LinkT,
+        wire: Wire,
+        deliver: Callable[[list[Any]], None],
+        opened: Callable[[float], None] = lambda now: None,
+    ) -> None:
         self.link = link
         self.wire = wire
         self.send_errors = 0
         self.last_run = time.monotonic()
         self._deliver = deliver
+        self._opened = opened
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
         self._wake_in, self._wake_out = socket.socketpair()
         self._wake_in.setblocking(False)
@@ -188,6 +198,7 @@ class WireLoop(Generic[LinkT]):
             self._lost(f"{self.wire.describe()} cannot be opened: {error}", now)
             return
         self._last_failure = ""
+        self._opened(now)
         self._deliver([WireChange(True, f"{self.wire.describe()} is open")])
 
     def _lost(self, text: str, now: float) -> None:

@@ -6,9 +6,12 @@ from collections.abc import Hashable
 from typing import Protocol
 
 from chute_ros.transport.address import Address
+from chute_ros.transport.serial_ports import find_usb_port
 from chute_ros.transport.serial_wire import SerialWire
 from chute_ros.transport.tcp import TcpClientWire, TcpServerWire
 from chute_ros.transport.udp import UdpWire
+
+USB_BAUD = 115200
 
 
 class Wire(Protocol):
@@ -43,7 +46,13 @@ class Wire(Protocol):
 def make_wire(address: Address) -> Wire:
     """The wire for an address; not opened yet."""
     if address.kind == "serial":
-        return SerialWire(address.host, address.port)
+        path = address.host
+        return SerialWire(f"serial:{path}:{address.port}", lambda: path, address.port)
+    if address.kind == "usb":
+        vendor, product, number = address.port, address.send_port, address.host
+        name = f"usb:{vendor:04x}:{product:04x}" + (f":{number}" if number else "")
+        # A port on USB has no baud rate of its own; some drivers want one all the same.
+        return SerialWire(name, lambda: find_usb_port(vendor, product, number), USB_BAUD)
     if address.kind == "tcp":
         return TcpClientWire(address.host, address.port)
     if address.kind == "tcpin":

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import shutil
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
@@ -34,6 +37,8 @@ class Bench:
 
     def __init__(self, namespace: str) -> None:
         self.namespace = namespace
+        #: For files of this test; removed at its end.
+        self.folder = Path(tempfile.mkdtemp(prefix="chute_ros_test_"))
         self.executor = SingleThreadedExecutor()
         self.nodes: list[Node] = []
         self.loops: list[WireLoop[Any]] = []
@@ -80,6 +85,7 @@ class Bench:
             self.executor.remove_node(node)
             node.destroy_node()
         self.executor.shutdown()
+        shutil.rmtree(self.folder)
 
     # -- waiting --------------------------------------------------------------------------------
 

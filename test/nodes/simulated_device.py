@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 
 class SimulatedDevice(ABC):
-    """A parachute module on this link, as the stories need it. It clears the ground."""
+    """A parachute module on this link, as the stories need it."""
 
     @abstractmethod
     def plug_in(self) -> None:
@@ -31,6 +31,9 @@ class SimulatedDevice(ABC):
     @abstractmethod
     def break_down(self) -> str:
         """It says that it is not healthy; a word of the fault it then shows."""
+
+    def clear_the_ground(self) -> None:  # noqa: B027
+        """It is where it may be deployed, which most are from the start."""
 
     @abstractmethod
     def come_to_ground(self) -> None:

@@ -3,7 +3,7 @@
 import pytest
 
 from chute_ros.errors import ParameterError
-from chute_ros.transport.address import FORMS, Address, parse_address
+from chute_ros.transport.address import FORMS, Address, parse_address, parse_serial_address
 from chute_ros.transport.serial_wire import SerialWire
 from chute_ros.transport.tcp import TcpClientWire, TcpServerWire
 from chute_ros.transport.udp import UdpWire
@@ -24,6 +24,8 @@ FORMS_AND_MEANING = {
     "serial:/dev/ttyUSB0": (Address("serial", "/dev/ttyUSB0", 57600), SerialWire),
     "serial:/dev/ttyACM0:921600": (Address("serial", "/dev/ttyACM0", 921600), SerialWire),
     f"serial:{BY_PATH}": (Address("serial", BY_PATH, 57600), SerialWire),
+    "usb:c0de:cafe": (Address("usb", "", 0xC0DE, send_port=0xCAFE), SerialWire),
+    "usb:0x0403:6001:A10K": (Address("usb", "A10K", 0x0403, send_port=0x6001), SerialWire),
     f"serial:{BY_PATH}:115200": (Address("serial", BY_PATH, 115200), SerialWire),
 }
 
@@ -60,6 +62,11 @@ def test_the_table_above_covers_every_form_that_is_offered():
         "serial",
         "serial:",
         "serial::57600",
+        "usb",
+        "usb:c0de",
+        "usb:c0de:",
+        "usb:c0deb:cafe",
+        "usb:ttyACM0:cafe",
         "serial:/dev/ttyUSB0:",
         "serial:/dev/ttyUSB0:0",
         "/dev/ttyUSB0",
@@ -93,3 +100,14 @@ def test_a_port_that_is_none_is_named_with_its_connection(text, port):
     assert f"connection {text!r}: port {port!r}" in str(caught.value)
     assert "to 65535" in str(caught.value)
     assert FORMS in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["serial:/dev/ttyACM0", "usb:c0de:cafe:A1"])
+def test_where_only_a_serial_port_will_do_its_forms_are_taken(text):
+    assert parse_serial_address(text) == parse_address(text)
+
+
+@pytest.mark.parametrize("text", ["udpin:0.0.0.0:14550", "tcp:host:1", "/dev/ttyACM0", ""])
+def test_where_only_a_serial_port_will_do_nothing_else_is(text):
+    with pytest.raises(ParameterError, match=r"need serial:PATH\[:BAUD\] or usb:VENDOR:PRODUCT"):
+        parse_serial_address(text)

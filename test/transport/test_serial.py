@@ -1,10 +1,29 @@
 """A serial port as a wire, on pseudo terminals."""
 
+import contextlib
 import os
 import tty
+from types import SimpleNamespace
 
 import pytest
 from loop_bench import point, running
+
+from chute_ros.transport import serial_ports
+
+#: The user "nobody".
+NOBODY = 65534
+
+
+@contextlib.contextmanager
+def as_nobody():
+    """Without the rights of root, if that is who runs the tests."""
+    before = os.geteuid()
+    if before == 0:
+        os.seteuid(NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(before)
 
 
 class Device:
@@ -82,7 +101,7 @@ def test_a_path_that_is_not_there_is_said_clearly_and_tried_again(path, await_un
         (change,) = node.changes
         assert not change.is_open
         assert str(path) in change.text
-        assert "No such file or directory" in change.text
+        assert "no such port, is it plugged in?" in change.text
         late = Device(path)
         try:
             await_until(lambda: node.wire.is_open, "it is opened once it is there")
@@ -96,7 +115,7 @@ def test_a_port_in_use_is_not_shared(device, path, await_until):
         with running(f"serial:{path}") as intruder:
             (change,) = intruder.changes
             assert not change.is_open
-            assert "exclusively lock" in change.text
+            assert "the port is in use by another program" in change.text
             os.write(device.master, b"for the owner")
             await_until(
                 lambda: second_owner_to_be.link.heard() == b"for the owner", "the owner hears it"
@@ -110,8 +129,69 @@ def test_what_is_no_serial_port_is_said_clearly(tmp_path):
     with running(f"serial:{file}") as node:
         (change,) = node.changes
         assert not change.is_open
-        assert str(file) in change.text
+        assert f"{file} is no serial port" in change.text
     assert file.read_text() == "no port"
+
+
+def test_a_port_that_may_not_be_opened_says_what_to_do(device, path):
+    os.chmod(os.path.realpath(path), 0o600)
+    os.chmod(path.parent, 0o755)
+    with as_nobody(), running(f"serial:{path}") as node:
+        (change,) = node.changes
+    assert not change.is_open
+    assert "permission denied: add yourself to the group of the port" in change.text
+    assert change.text.count("\n") == 0
+
+
+@pytest.fixture
+def plugged_in(monkeypatch):
+    """USB ports that the machine seems to have: (device, vendor, product, serial number)."""
+    ports = []
+
+    def comports():
+        names = ("device", "vid", "pid", "serial_number")
+        return [SimpleNamespace(**dict(zip(names, port, strict=True))) for port in ports]
+
+    monkeypatch.setattr(serial_ports.list_ports, "comports", comports)
+    return ports
+
+
+def test_a_port_is_found_by_its_usb_ids_wherever_it_comes_back(
+    plugged_in, device, path, await_until
+):
+    with running("usb:c0de:cafe") as node:
+        (change,) = node.changes
+        assert "no such USB device is plugged in (there is no serial port here)" in change.text
+        plugged_in.append(("/dev/ttyS0", None, None, None))
+        plugged_in.append((str(path), 0xC0DE, 0xCAFE, "A1"))
+        await_until(lambda: node.wire.is_open, "it is found")
+        assert node.wire.describe() == f"usb:c0de:cafe ({path})"
+        os.write(device.master, b"telemetry")
+        await_until(lambda: node.link.heard() == b"telemetry", "it is heard")
+        plugged_in[-1] = (f"{path}.2", 0xC0DE, 0xCAFE, "A1")
+        device.unplug()
+        again = Device(path.with_name("ttyUSB0.2"))
+        try:
+            await_until(
+                lambda: len(node.changes) > 2 and node.wire.is_open, "it is found elsewhere"
+            )
+            assert node.wire.describe() == f"usb:c0de:cafe ({path}.2)"
+        finally:
+            again.unplug()
+
+
+def test_two_devices_with_the_same_ids_are_told_apart_by_their_serial_number(
+    plugged_in, device, path, await_until
+):
+    plugged_in.append((str(path), 0xC0DE, 0xCAFE, "A1"))
+    plugged_in.append(("/dev/ttyACM7", 0xC0DE, 0xCAFE, "B2"))
+    with running("usb:c0de:cafe") as node:
+        (change,) = node.changes
+        assert "2 devices have these ids: add the serial number of one" in change.text
+        assert "/dev/ttyACM7 B2" in change.text
+    with running("usb:C0DE:0xCAFE:A1") as node:
+        await_until(lambda: node.wire.is_open, "the right one is opened")
+        assert node.wire.describe() == f"usb:c0de:cafe:A1 ({path})"
 
 
 def test_a_device_that_takes_nothing_does_not_hold_up_the_loop(device, path, await_until):

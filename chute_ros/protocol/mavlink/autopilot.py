@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Any
 
 from chute_ros.model import Armed, LandedState, Reading, VehicleState
+from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
-from chute_ros.protocol.mavlink.boot_clock import Age, BootClock
 from chute_ros.protocol.mavlink.dialect import dialect
 
 STANDARD_GRAVITY = 9.80665  # m/s^2

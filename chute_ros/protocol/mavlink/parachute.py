@@ -23,8 +23,8 @@ from chute_ros.model import (
     TriggerFlags,
     flag_names,
 )
+from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
-from chute_ros.protocol.mavlink.boot_clock import Age, BootClock
 from chute_ros.protocol.mavlink.dialect import dialect
 
 _UNHEALTHY_STATES = {

@@ -9,15 +9,8 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import (
-    TRANSITIONS,
-    EffectLimits,
-    EffectLoop,
-    Goal,
-    Happening,
-    Phase,
-    next_phase,
-)
+from chute_ros.protocol.effect import EffectLimits, EffectLoop, Goal
+from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase, next_phase
 from chute_ros.protocol.mavlink import results
 from chute_ros.protocol.mavlink.commands import Command, CommandFinished
 
@@ -68,7 +61,7 @@ class Bench:
         commands = self.loop.take_commands()
         self.sent += [self.now for _ in commands]
         for command in commands:
-            self.loop.command_sent(command)
+            self.loop.command_sent(command, self.now)
         self.asked += [self.now for _ in self.loop.take_refreshes()]
         self.reports += [report.outcome for report in self.loop.take_reports()]
 

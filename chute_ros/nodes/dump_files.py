@@ -1,0 +1,100 @@
+"""Dumps of the flight computer's memory as files.
+
+While a dump comes its file has ".part" at the end of its name, and keeps it if the dump does not
+come whole.
+"""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+
+from chute_ros.errors import ParameterError
+from chute_ros.nodes.ros_home import ros_home
+
+PART = ".part"
+
+
+@dataclass(frozen=True)
+class DumpResult:
+    """A file that was written, its size in bytes, and what went wrong with it (empty: nothing)."""
+
+    path: str
+    size: int
+    failure: str = ""
+
+
+class DumpFiles:
+    """One dump at a time. folder: where those go that were given no path; empty: ROS_HOME."""
+
+    def __init__(self, folder: str) -> None:
+        try:
+            self.folder = Path(folder).expanduser() if folder else ros_home() / "dumps"
+        except RuntimeError as error:
+            raise ParameterError(f"parameter dump_folder is {folder!r}: {error}") from None
+        self._final = Path()
+        self._file: FileIO | None = None
+        self._size = 0
+        self._failure = ""
+
+    def refusal(self, path: str) -> str:
+        """Why a dump cannot go to this path (empty: a new name); empty text: it can."""
+        try:
+            if not path:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                return ""
+            wanted = Path(path).expanduser()
+            if wanted.exists():
+                return f"{wanted} exists already: name another path"
+            if not wanted.parent.is_dir():
+                return f"there is no folder {wanted.parent}"
+        except (OSError, RuntimeError, ValueError) as error:
+            return f"{path or self.folder}: {error}"
+        return ""
+
+    def start(self, memory: str, suffix: str, path: str, now: datetime.datetime) -> str:
+        """A dump begins; where it goes."""
+        self.finish(False)
+        name = f"{memory}_{now:%Y%m%dT%H%M%S_%f}{suffix}"
+        self._size, self._failure = 0, ""
+        try:
+            self._final = Path(path).expanduser() if path else self.folder / name
+            self._final.parent.mkdir(parents=True, exist_ok=True)
+            self._file = open(f"{self._final}{PART}", "xb", buffering=0)  # noqa: SIM115
+        except OSError as error:
+            self._failure = f"cannot be written: {error}"
+        return str(self._final)
+
+    def write(self, data: bytes) -> None:
+        """The next bytes."""
+        if self._file is None:
+            return
+        try:
+            self._file.write(data)
+            self._size += len(data)
+        except OSError as error:
+            self._failure = f"cannot be written: {error}"
+            self._close()
+
+    def finish(self, complete: bool) -> DumpResult:
+        """The dump is over."""
+        was_open = self._file is not None
+        self._close()
+        path = Path(f"{self._final}{PART}")
+        if was_open and complete and not self._failure:
+            try:
+                path = path.rename(self._final)
+            except OSError as error:
+                self._failure = f"cannot be renamed: {error}"
+        written = str(path) if self._size or was_open else ""
+        return DumpResult(written, self._size, self._failure)
+
+    def _close(self) -> None:
+        file, self._file = self._file, None
+        if file is not None:
+            try:
+                file.close()
+            except OSError as error:
+                self._failure = f"cannot be written: {error}"

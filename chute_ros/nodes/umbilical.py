@@ -1,0 +1,12 @@
+"""Executable umbilical: the ground side of a rocket's serial umbilical."""
+
+from chute_ros.nodes.entry import run
+
+
+def main() -> None:
+    """Run the node."""
+    run("umbilical", "UmbilicalNode")
+
+
+if __name__ == "__main__":
+    main()

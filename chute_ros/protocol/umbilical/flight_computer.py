@@ -1,0 +1,233 @@
+"""What the flight computer says of itself by its telemetry, normalised.
+
+Source: Umbilical Reference, sections 1 and 3.
+"""
+
+from __future__ import annotations
+
+import math
+
+from chute_ros.model import (
+    NAN,
+    Armed,
+    LandedState,
+    LinkState,
+    ParachuteState,
+    ParachuteStatus,
+    TriggerFlags,
+    VehicleState,
+)
+from chute_ros.protocol.boot_clock import Age, BootClock
+from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.umbilical.gate import Situation
+from chute_ros.protocol.umbilical.layouts import Record
+from chute_ros.protocol.umbilical.modes import IN_FLIGHT, FlightMode
+
+#: Who it is on the link; there is one at the end of a cable.
+DEVICE = "flight_computer"
+#: It has landed when its altitude stays within so many metres for so many seconds after a
+#: deployment: the slowest canopy falls several times as fast.
+_REST_HEIGHT, _REST_TIME = 3.0, 5.0
+_FIX_3D = 3
+_MODES = {int(mode): mode for mode in FlightMode}
+_SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
+
+
+class FlightComputer:
+    """Follows one flight computer."""
+
+    def __init__(self, limits: LivenessLimits) -> None:
+        self.liveness = Liveness(limits)
+        self.record: Record | None = None
+        self.records = 0
+        self.interval = NAN  # s, between the two newest
+        self.restarts = 0
+        self.restarted_in_flight = False
+        self._clock = BootClock()
+        self._limits = limits
+        self._was_in_flight = False
+        self._rest_altitude = NAN
+        self._rest_since = NAN
+        self._was_fresh = False
+
+    # -- what comes ------------------------------------------------------------------------------
+
+    def heard(self, record: Record, now: float) -> tuple[list[LinkChange], Age]:
+        """A record came: (what changed of the link, what its clock says)."""
+        age = self._clock.observe(int(record["ms_since_boot_cfc"]))
+        if age in (Age.OLD, Age.DOUBTFUL):
+            return [], age
+        if age is Age.RESTARTED:
+            self.restarts += 1
+            self.restarted_in_flight = self._was_in_flight and not self.landed(now)
+            self._was_in_flight = False
+        if self.record is not None:
+            self.interval = now - self.record.received
+        self.record = record
+        self.records += 1
+        mode = self.mode
+        if mode in IN_FLIGHT:
+            self._was_in_flight = True
+        elif mode is not FlightMode.FAULT:
+            self._was_in_flight = False
+        self._watch_rest(record, now)
+        return self.liveness.heard(now), age
+
+    def alive(self, now: float) -> list[LinkChange]:
+        """It is heard, though a long work keeps it from sending telemetry."""
+        return self.liveness.heard(now) if self.record is not None else []
+
+    def update(self, now: float) -> tuple[list[LinkChange], bool]:
+        """Look at the clock: (what changed of the link, whether the picture changed)."""
+        changes = self.liveness.update(now)
+        was_fresh, self._was_fresh = self._was_fresh, self.fresh(now)
+        return changes, bool(changes) or was_fresh != self._was_fresh
+
+    def next_deadline(self) -> float:
+        """When the picture changes by itself; infinity: never."""
+        stale_at = math.inf
+        if self.record is not None and self._was_fresh:
+            stale_at = self.record.received + self._limits.stale_after
+        return min(self.liveness.next_deadline(), stale_at)
+
+    # -- what it is ------------------------------------------------------------------------------
+
+    @property
+    def mode(self) -> FlightMode | None:
+        """The flight mode of the newest record; None: a number without a name, or no record."""
+        return None if self.record is None else _MODES.get(int(self.record["flight_mode"]))
+
+    def fresh(self, now: float) -> bool:
+        """The newest record is young enough to decide on."""
+        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        return self.record is not None and now < self.record.received + self._limits.stale_after
+
+    def situation(self, now: float) -> Situation:
+        """The gate's column."""
+        mode = self.mode
+        if mode is None or not self.fresh(now):
+            return Situation.UNKNOWN
+        if mode is FlightMode.FAULT and self._was_in_flight:
+            return Situation.FAULT_IN_FLIGHT
+        return _SITUATIONS[mode]
+
+    def landed(self, now: float) -> bool:
+        """After a deployment its altitude does not change any more."""
+        return self.deployed and now - self._rest_since >= _REST_TIME
+
+    @property
+    def deployed(self) -> bool:
+        """Drogue or main are out, by the newest record."""
+        if self.record is None:
+            return False
+        flags = self.record["ssa_drogue_deployed"] or self.record["ssa_main_deployed"]
+        return bool(flags) or self.mode in (FlightMode.DROGUE_DEPLOYED, FlightMode.MAIN_DEPLOYED)
+
+    @property
+    def armed(self) -> bool:
+        """The key is armed, by the mode that it gates; in a fault it is not known."""
+        return self.mode is FlightMode.STANDBY or self.mode in IN_FLIGHT
+
+    def status(self, now: float, pause: str) -> ParachuteStatus:
+        """The picture at now. pause: why there is no telemetry, empty: there should be some."""
+        if self.record is None:
+            return ParachuteStatus("", self.liveness.state)
+        return ParachuteStatus(
+            device=DEVICE,
+            link_state=self.liveness.state,
+            state=self._state(now, pause),
+            armed=self.armed,
+            deployed=self.deployed,
+            armed_triggers=TriggerFlags.FC if self.armed else TriggerFlags(0),
+            height=self.record.number("altitude"),
+            uptime=self._clock.uptime,
+            faults=tuple(self._faults(now, pause)),
+        )
+
+    def vehicle_state(self, now: float) -> VehicleState:
+        """The picture of the rocket at now: altitude as height, acceleration, position by fix."""
+        record = self.record
+        if record is None:
+            return VehicleState()
+        age = now - record.received
+        axes = [record.number(f"accel_{axis}") for axis in "xyz"]
+        acceleration = math.sqrt(sum(a * a for a in axes))
+        has_fix = record.number("fix_type") >= _FIX_3D
+        speed = -record.number("vel_d") if has_fix else NAN
+        height = record.number("altitude")
+        return VehicleState(
+            source=DEVICE,
+            link_state=self.liveness.state,
+            armed=self._motors(),
+            armed_age=age,
+            landed_state=self._landed_state(now),
+            landed_state_age=age,
+            height=height,
+            height_age=_age(age, height),
+            vertical_speed=speed,
+            vertical_speed_age=_age(age, speed),
+            acceleration=acceleration,
+            acceleration_age=_age(age, acceleration),
+            latitude=record.number("latitude") if has_fix else NAN,
+            longitude=record.number("longitude") if has_fix else NAN,
+            position_age=age if has_fix else NAN,
+            uptime=self._clock.uptime,
+            reboot_count=self.restarts,
+            rebooted_in_flight=self.restarted_in_flight,
+        )
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _watch_rest(self, record: Record, now: float) -> None:
+        altitude = record.number("altitude")
+        if not abs(altitude - self._rest_altitude) <= _REST_HEIGHT:
+            self._rest_altitude, self._rest_since = altitude, now
+
+    def _motors(self) -> Armed:
+        """Whether the motor may burn: the key is armed on the ground, or the MAV is open."""
+        assert self.record is not None
+        if self.mode is None:
+            return Armed.UNKNOWN
+        may_burn = self.mode is FlightMode.STANDBY or bool(self.record["mav_open"])
+        return Armed.ARMED if may_burn else Armed.DISARMED
+
+    def _landed_state(self, now: float) -> LandedState:
+        if self.mode in (FlightMode.STARTUP, FlightMode.STANDBY) or self.landed(now):
+            return LandedState.ON_GROUND
+        if self.mode in IN_FLIGHT or (self.mode is FlightMode.FAULT and self._was_in_flight):
+            return LandedState.IN_AIR
+        return LandedState.UNKNOWN
+
+    def _faults(self, now: float, pause: str) -> list[str]:
+        assert self.record is not None
+        faults = []
+        if pause:
+            faults.append(f"no telemetry: {pause}")
+        elif not self.fresh(now):
+            age = now - self.record.received
+            faults.append(f"telemetry {self.liveness.state.name}: {age:.1f} s old")
+        if self.mode is FlightMode.FAULT:
+            faults.append("flight mode Fault")
+        elif self.mode is None:
+            faults.append(f"flight mode {self.record['flight_mode']} has no name")
+        for name in ("altitude", "pressure"):
+            if not math.isfinite(self.record.number(name)):
+                faults.append(f"{name} is {self.record.number(name)}")
+        if self.restarted_in_flight:
+            faults.append("it restarted in flight")
+        return faults
+
+    def _state(self, now: float, pause: str) -> ParachuteState:
+        """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest."""
+        if self.deployed:
+            return ParachuteState.TOUCHDOWN if self.landed(now) else ParachuteState.LAUNCHED
+        if pause and self.liveness.state is LinkState.OK:
+            return ParachuteState.NOT_READY
+        if self._faults(now, pause):
+            return ParachuteState.ABNORMAL
+        return ParachuteState.ARMED if self.armed else ParachuteState.READY
+
+
+def _age(age: float, value: float) -> float:
+    """The age of a value; NaN: there is none."""
+    return age if math.isfinite(value) else NAN

@@ -1,0 +1,146 @@
+"""The layouts of $TELEM: which fields, in which order. Each is a file in msg_defs/telem.
+
+Source: Umbilical Reference, section 3; the other layouts were found in the field.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.errors import ParameterError
+from chute_ros.protocol.umbilical.fields import TYPES, FieldType, Value, problem_of
+
+#: The layout of the reference, which is preferred where a line does not tell.
+REFERENCE_LAYOUT = "telem57_airbrake_state"
+
+#: Fields that every layout must have, because what is decided rests on them.
+NEEDED = (
+    "flight_mode",
+    "altitude",
+    "sv_open",
+    "mav_open",
+    "ssa_drogue_deployed",
+    "ssa_main_deployed",
+    "ms_since_boot_cfc",
+)
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field. expected: (lowest, highest) that it is meant to hold, None: whatever fits."""
+
+    name: str
+    kind: FieldType
+    unit: str
+    expected: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Why a line is no record: reason to count under, detail for a person."""
+
+    reason: str
+    detail: str
+
+
+class Layout:
+    """One layout. target_floats: of the set-target command; target_fields: what shows it."""
+
+    def __init__(
+        self,
+        name: str,
+        fields: tuple[Field, ...],
+        target_floats: int,
+        target_fields: tuple[str, ...],
+    ) -> None:
+        self.name = name
+        self.fields = fields
+        self.target_floats = target_floats
+        self.target_fields = target_fields
+        self.index = {field.name: number for number, field in enumerate(fields)}
+        self._pattern = re.compile(",".join(field.kind.pattern for field in fields))
+        self._converters = tuple(int if f.kind.is_whole else float for f in fields)
+        self._limits = tuple((f.kind.lowest, f.kind.highest) for f in fields)
+        self._expected = [(i, f.expected) for i, f in enumerate(fields) if f.expected is not None]
+
+    @property
+    def count(self) -> int:
+        """Fields of a line."""
+        return len(self.fields)
+
+    def decode(self, body: str) -> tuple[Value, ...] | Problem:
+        """The values of a line (without "$TELEM," and its end), or why it is no record."""
+        texts = body.split(",")
+        # First all at once, which is the usual case; only then field by field for the reason.
+        if self._pattern.fullmatch(body):
+            values = tuple(c(text) for c, text in zip(self._converters, texts, strict=True))
+            limits = zip(values, self._limits, strict=True)
+            if all(low <= value <= high for value, (low, high) in limits) and "-0" not in texts:
+                return values
+        if len(texts) != self.count:
+            text = f"{len(texts)} fields where {self.name} has {self.count}"
+            return Problem("field count", text)
+        for field, text in zip(self.fields, texts, strict=True):
+            reason = problem_of(field.kind, text)
+            if reason:
+                shown = text if len(text) <= 50 else f"{text[:47]}..."
+                return Problem(reason, f"{field.name} ({field.kind.name}) is {shown!r}")
+        return tuple(c(text) for c, text in zip(self._converters, texts, strict=True))
+
+    def is_as_expected(self, values: tuple[Value, ...]) -> bool:
+        """Every field holds what it is meant to: tells layouts of one count apart."""
+        return all(low <= values[i] <= high for i, (low, high) in self._expected)
+
+
+@dataclass(frozen=True)
+class Record:
+    """One $TELEM line. received: monotonic s."""
+
+    layout: Layout
+    values: tuple[Value, ...]
+    received: float
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.layout.index
+
+    def __getitem__(self, name: str) -> Value:
+        return self.values[self.layout.index[name]]
+
+    def number(self, name: str) -> float:
+        """The field's value; NaN: not in the layout."""
+        return float(self[name]) if name in self else float("nan")
+
+
+def layout_from(content: Mapping[str, Any], where: str) -> Layout:
+    """The layout in a file's content; ParameterError, with where, if there is a mistake in it."""
+    try:
+        fields = tuple(_field(one) for one in content["fields"])
+        layout = Layout(
+            str(content["name"]),
+            fields,
+            int(content["target_floats"]),
+            tuple(content["target_fields"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise ParameterError(f"{where}: no layout of $TELEM: {error!r}") from None
+    missing = [name for name in (*NEEDED, *layout.target_fields) if name not in layout.index]
+    if missing:
+        raise ParameterError(f"{where}: the layout lacks {', '.join(missing)}")
+    if len(layout.index) != layout.count:
+        raise ParameterError(f"{where}: a field is named twice")
+    if layout.target_floats not in (2, 4):
+        raise ParameterError(f"{where}: target_floats is {layout.target_floats}: need 2 or 4")
+    if len(layout.target_fields) not in (0, layout.target_floats):
+        raise ParameterError(f"{where}: target_fields must be as many as target_floats, or none")
+    return layout
+
+
+def _field(content: Mapping[str, Any]) -> Field:
+    if content["type"] not in TYPES:
+        raise ValueError(f"type {content['type']}: need one of {', '.join(TYPES)}")
+    expected = content.get("expected")
+    limits = None if expected is None else (float(expected[0]), float(expected[1]))
+    return Field(str(content["name"]), TYPES[content["type"]], str(content["unit"]), limits)

@@ -1,0 +1,199 @@
+"""What a person or the supervisor wants of the flight computer: through the gate, to the wire.
+
+Every command goes through gate.rule here and nowhere else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from chute_ros.errors import ParameterError
+from chute_ros.protocol.events import Notice, Severity
+from chute_ros.protocol.requests import Requests
+from chute_ros.protocol.umbilical import commands, gate
+from chute_ros.protocol.umbilical.commands import CommandKind, Effect
+from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
+from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
+from chute_ros.protocol.umbilical.flight_computer import FlightComputer
+from chute_ros.protocol.umbilical.memory import MemoryWorks
+from chute_ros.protocol.umbilical.sayings import FlashUsage
+from chute_ros.protocol.umbilical.scheduler import CommandScheduler
+
+#: Not while the vehicle is being made safe.
+_UNSAFE = ("launch", "open_mav", "open_sv")
+_NOTHING_SHOWS = "telemetry cannot show its effect"
+
+
+class Orders:
+    """Begins requests; each ends in one RequestFinished with its token."""
+
+    def __init__(
+        self,
+        config: UmbilicalConfig,
+        requests: Requests[CommandScheduler],
+        computer: FlightComputer,
+        decoder: TelemetryDecoder,
+        memory: MemoryWorks,
+    ) -> None:
+        self._config = config
+        self._requests = requests
+        self._computer = computer
+        self._decoder = decoder
+        self._memory = memory
+        self._block = ""
+        self._key_disarmed = False
+        self._flash_usage_at = -math.inf
+        self._notices: list[Notice] = []
+
+    # -- orders ----------------------------------------------------------------------------------
+
+    def command(self, token: int, name: str, force: bool, now: float) -> None:
+        """A command by its name in the reference. force: a person confirms, or insists."""
+        if name == "set_target":
+            self._requests.refuse(token, "set_target needs its values: call ~/set_target")
+            return
+        kind = commands.KINDS.get(name)
+        if kind is None:
+            known = ", ".join(commands.KINDS)
+            self._requests.refuse(token, f"there is no command {name!r}: need one of {known}")
+            return
+        # What fires is not fired twice by mistake; a valve's telemetry may be old.
+        even_if_shown = force or name not in ("drogue", "main")
+        self._order(token, kind, force, even_if_shown, now)
+
+    def deploy(self, token: int, force: bool, again: bool, now: float) -> None:
+        """Fire the stage of the configuration. again: though telemetry says that it is out."""
+        stage = self._config.deploy
+        if stage is DeployStage.NEXT:
+            record = self._computer.record
+            out = record is not None and record["ssa_drogue_deployed"]
+            stage = DeployStage.MAIN if out else DeployStage.DROGUE
+        self._order(token, commands.KINDS[stage.value], force, again, now)
+
+    def set_target(self, token: int, values: tuple[float, ...], now: float) -> None:
+        """Set the landing target."""
+        layout = self._decoder.layout
+        if layout is None:
+            why = (
+                "how many floats the firmware takes is not known before its telemetry: set layout"
+            )
+            self._requests.refuse(token, f"set_target refused: {why}; nothing was sent")
+            return
+        try:
+            kind = commands.set_target(layout, values)
+        except ParameterError as error:
+            self._requests.refuse(token, f"set_target refused: {error}; nothing was sent")
+            return
+        self._order(token, kind, False, True, now)
+
+    def refuse(self, token: int, why: str) -> None:
+        """End a request before anything was sent."""
+        self._requests.refuse(token, f"{why}; nothing was sent")
+
+    def flight_block(self, reason: str, now: float) -> None:
+        """Refuse to launch for reason, or no longer (empty)."""
+        if reason != self._block:
+            text = f"flight blocked: {reason}" if reason else "flight block released"
+            self._notices.append(Notice(Severity.WARNING if reason else Severity.INFO, text))
+        self._block = reason
+        if reason:
+            self._end(("launch",), f"flight is blocked: {reason}", now)
+
+    def wire_closed(self, now: float = 0.0) -> None:
+        """The port is closed: what is not urgent does not wait for it to come back."""
+        self._requests.commands.wire_closed()
+        self._requests.abandon_where(
+            lambda goal: goal.name not in commands.URGENT, "the cable was pulled", now
+        )
+
+    # -- what the flight computer says -----------------------------------------------------------
+
+    def flash_usage(self, said: FlashUsage, now: float) -> None:
+        """The answer to flash_info."""
+        self._flash_usage_at = now
+        self._requests.effects_may_show(now)
+
+    def arming_blocked(self, text: str, now: float) -> None:
+        """It does not arm."""
+        self._end(("key_arm",), f"the flight computer says: {text}", now)
+
+    def take_notices(self) -> list[Notice]:
+        """What a person should read; each is handed out once."""
+        notices, self._notices = self._notices, []
+        return notices
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _order(
+        self, token: int, kind: CommandKind, force: bool, even_if_shown: bool, now: float
+    ) -> None:
+        name = kind.command.name
+        refusal = gate.rule(name, self._computer.situation(now), force).refusal
+        refusal = refusal or self._standing_refusal(name)
+        if refusal:
+            self._requests.refuse(token, refusal + self._never_heard())
+            return
+        self._end(commands.SUPERSEDES.get(name, ()), f"{name} was ordered", now)
+        if name in ("key_arm", "key_disarm"):
+            self._key_disarmed = name == "key_disarm"
+        if kind.lasting:
+            refusal = self._memory.begin(token, name, now)
+            if refusal:
+                self._requests.refuse(token, refusal)
+            else:
+                self._requests.commands.send_once(kind.command, now)
+            return
+        shown, text = self._shown(kind, even_if_shown, now)
+        goal = commands.goal_of(kind, shown, text, even_if_shown)
+        self._requests.begin(token, goal, now)
+
+    def _standing_refusal(self, name: str) -> str:
+        """Why this command is refused whatever the flight mode; empty: it is not."""
+        if not self._requests.commands.is_open and name not in commands.URGENT:
+            return f"{name} refused: the port is not open; nothing was sent"
+        if name in _UNSAFE and self._requests.under_way("safe"):
+            return f"{name} refused: the vehicle is being made safe; nothing was sent"
+        if name != "launch":
+            return ""
+        if self._block:
+            return f"launch refused: flight is blocked ({self._block}); nothing was sent"
+        if self._key_disarmed:
+            return "launch refused: the key was disarmed from here; nothing was sent"
+        return ""
+
+    def _never_heard(self) -> str:
+        return "" if self._computer.record is not None else " (no telemetry was ever heard)"
+
+    def _shown(
+        self, kind: CommandKind, even_if_shown: bool, now: float
+    ) -> tuple[Callable[[], bool] | None, str]:
+        """What shows the effect, and the same in words. Only what came after the order counts,
+        or what is fresh where that keeps a command from being sent again."""
+        name, computer = kind.command.name, self._computer
+        if name == "reboot":
+            before = computer.restarts
+            return lambda: computer.restarts > before, "its clock starts anew"
+        if name == "flash_info":
+            return lambda: self._flash_usage_at > now, "it says how full the flash is"
+        effect = self._effect(kind)
+        if effect is None:
+            return None, _NOTHING_SHOWS
+        believed = not even_if_shown and computer.fresh(now)
+
+        def shown() -> bool:
+            record = computer.record
+            if record is None or not (believed or record.received > now):
+                return False
+            return effect.shown(record)
+
+        return shown, effect.text
+
+    def _effect(self, kind: CommandKind) -> Effect | None:
+        if kind.command.name == "safe" and self._config.safe_opens_sv:
+            return commands.SAFE_THAT_VENTS
+        return kind.effect
+
+    def _end(self, names: tuple[str, ...], why: str, now: float) -> None:
+        if names:
+            self._requests.abandon_where(lambda goal: goal.name in names, why, now)

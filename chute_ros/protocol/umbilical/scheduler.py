@@ -1,0 +1,200 @@
+"""When which token is written: one a write, spaced, the heartbeat in between, the urgent first.
+
+The flight computer takes a packet for one token, sleeps 100 ms after each command and acknowledges
+nothing. So two tokens never leave together, and each write waits for the one before.
+
+    slot free:  heartbeat that is overdue  >  urgent  >  heartbeat that is due  >  the others
+
+Sources: Umbilical Reference, sections 1 and 2; the receiver's own behaviour, measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from chute_ros.errors import ParameterError
+from chute_ros.protocol.effect import NO_ANSWER
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command by its name in the reference, and its token on the wire."""
+
+    name: str
+    token: bytes
+
+
+HEARTBEAT = Command("heartbeat", b"<H>")
+
+
+@dataclass(frozen=True)
+class SchedulerLimits:
+    """Seconds between two writes; of the heartbeat; how much later one may be for what is urgent;
+    most_waiting: commands that wait at most."""
+
+    spacing: float = 0.12
+    heartbeat_interval: float = 1.0
+    heartbeat_slack: float = 0.5
+    most_waiting: int = 32
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.spacing < math.inf:
+            raise ParameterError(f"spacing is {self.spacing} s: the receiver needs 0.1 s or more")
+        if not 2 * self.spacing <= self.heartbeat_interval < math.inf:
+            raise ParameterError(
+                f"heartbeat_interval is {self.heartbeat_interval} s: need at least two spacings "
+                f"of {self.spacing} s, so that commands fit in between"
+            )
+        if not 0.0 <= self.heartbeat_slack < math.inf:
+            raise ParameterError(f"heartbeat_slack is {self.heartbeat_slack}: need 0 s or more")
+
+    @property
+    def latest_heartbeat(self) -> float:
+        """Longest time between two heartbeats, s, while the owner is alive and the wire open."""
+        return self.heartbeat_interval + self.heartbeat_slack + self.spacing
+
+
+@dataclass(frozen=True)
+class Send:
+    """Write this token now. token: number of the request's command; None: of none."""
+
+    command: Command
+    token: int | None = None
+
+
+@dataclass(frozen=True)
+class NotSent:
+    """A command that found no place to wait: how its transaction ended."""
+
+    token: int
+    command: Command
+    most_waiting: int
+
+    accepted = False
+    not_now = False
+    superseded = False
+    result = NO_ANSWER
+
+    def text(self) -> str:
+        """What came of it, in words."""
+        return f"not sent: {self.most_waiting} commands are waiting already"
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    token: int | None
+    command: Command
+
+
+class CommandScheduler:
+    """The commands on their way to the wire; sends them, and nothing ever comes back."""
+
+    def __init__(self, limits: SchedulerLimits) -> None:
+        self.limits = limits
+        self.heartbeats_sent = 0
+        self.commands_sent = 0
+        self.last_heartbeat = math.nan
+        self.is_open = False
+        self._urgent: deque[_Waiting] = deque()
+        self._others: deque[_Waiting] = deque()
+        self._heartbeats_until = -math.inf
+        self._free_at = -math.inf
+        self._heartbeat_at = -math.inf
+        self._output: list[Send] = []
+        self._finished: list[NotSent] = []
+
+    @property
+    def waiting(self) -> int:
+        """Commands that have not been sent yet."""
+        return len(self._urgent) + len(self._others)
+
+    def wire_opened(self, now: float) -> None:
+        """Tokens can be written. Whoever had the port before may just have written one."""
+        self.is_open = True
+        self._free_at = max(self._free_at, now + self.limits.spacing)
+        self._heartbeat_at = now
+
+    def wire_closed(self) -> None:
+        """Nothing can be written; what waits goes on waiting."""
+        self.is_open = False
+
+    def owner_alive(self, until: float) -> None:
+        """Heartbeats may be sent until then: a hung owner must look dead from outside."""
+        self._heartbeats_until = until
+
+    # -- as Requests wants it (Transactions) -----------------------------------------------------
+
+    def start(self, token: int, command: Command, now: float, urgent: bool, family: int) -> None:
+        """Queue a command of a request."""
+        if self.waiting >= self.limits.most_waiting and not urgent:
+            self._finished.append(NotSent(token, command, self.limits.most_waiting))
+            return
+        queue = self._urgent if urgent else self._others
+        queue.append(_Waiting(token, command))
+        self.update(now)
+
+    def send_once(self, command: Command, now: float) -> None:
+        """Queue a command that belongs to no request's loop."""
+        self._others.append(_Waiting(None, command))
+        self.update(now)
+
+    def cancel(self, token: int, now: float) -> None:
+        """It is not needed any more: it does not leave if it has not yet."""
+        for queue in (self._urgent, self._others):
+            for waiting in [one for one in queue if one.token == token]:
+                queue.remove(waiting)
+
+    def update(self, now: float) -> None:
+        """Look at the clock: at most one token becomes ready."""
+        if now >= self._heartbeats_until:
+            self._heartbeats_until = -math.inf
+        if not self.is_open or now < self._free_at:
+            return
+        beats = self._heartbeats_until > -math.inf
+        late = self.limits.heartbeat_slack
+        if beats and now >= self._heartbeat_at + late:
+            self._beat(now)
+        elif self._urgent:
+            self._send(self._urgent.popleft(), now)
+        elif beats and now >= self._heartbeat_at:
+            self._beat(now)
+        elif self._others:
+            self._send(self._others.popleft(), now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        if not self.is_open:
+            return math.inf
+        if self._urgent or self._others:
+            return self._free_at
+        if self._heartbeat_at < self._heartbeats_until:
+            return max(self._free_at, self._heartbeat_at)
+        return math.inf
+
+    def take_finished(self) -> list[NotSent]:
+        """Commands that found no place; each is handed out once."""
+        finished, self._finished = self._finished, []
+        return finished
+
+    def take_output(self) -> list[Send]:
+        """What is to be written; each is handed out once."""
+        output, self._output = self._output, []
+        return output
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _beat(self, now: float) -> None:
+        self.heartbeats_sent += 1
+        self.last_heartbeat = now
+        self._heartbeat_at = now + self.limits.heartbeat_interval
+        self._emit(Send(HEARTBEAT), now)
+
+    def _send(self, waiting: _Waiting, now: float) -> None:
+        self.commands_sent += 1
+        self._emit(Send(waiting.command, waiting.token), now)
+
+    def _emit(self, send: Send, now: float) -> None:
+        self._free_at = now + self.limits.spacing
+        self._output.append(send)

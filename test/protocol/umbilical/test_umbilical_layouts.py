@@ -1,0 +1,280 @@
+"""Lines to values: the layout of the reference field by field, golden lines, and the files."""
+
+import math
+
+import pytest
+import yaml
+from umbilical_lines import (
+    BY_NAME,
+    COUNTS,
+    DEPLOYMENT,
+    FOLDER,
+    LAYOUT,
+    PAD,
+    PAD_VALUES,
+    REFERENCE_FIELDS,
+    STATE,
+    body,
+    layouts,
+)
+
+from chute_ros.errors import ParameterError
+from chute_ros.protocol.umbilical.layouts import Problem, Record, layout_from
+from chute_ros.transport.telem_layouts import load_layouts
+
+#: In flight, main out, no fix, and every odd number that the flight computer can print.
+ODD = (
+    "5,-0,NaN,inf,-inf,0,4294967295,86399.99,25,-0.5,"
+    "0.000000000000000000000000000000000000000000001,"
+    "340282350000000000000000000000000000000,-340282350000000000000000000000000000000,"
+    "16777216,0.1,-0.1,100,0,4095,-1.5,1,1,255,1,0,1,2,3,4,5,6,2,NaN,0,4294967295,"
+    "0.1,-123456.78901234567,NaN,inf,0,4294967295,0,-2147483648,-0,-128,NaN,-inf,359.99,127,"
+    "0,-180,1000000,0.001,90,-180,NaN,4294967295"
+)
+ODD_VALUES = [
+    *(5, -0.0, math.nan, math.inf, -math.inf, 0.0, 4294967295, 86399.99, 25.0, -0.5),
+    *(1e-45, 3.4028235e38, -3.4028235e38, 16777216.0, 0.1, -0.1, 100.0, 0.0, 4095.0, -1.5),
+    *(1, 1, 255, 1, 0, 1, 2, 3, 4, 5, 6, 2, math.nan, 0, 4294967295),
+    *(0.1, -123456.78901234567, math.nan, math.inf, 0, 4294967295, 0, -2147483648, -0.0, -128),
+    *(math.nan, -math.inf, 359.99, 127, 0.0, -180.0, 1000000.0, 0.001, 90.0, -180.0),
+    *(math.nan, 4294967295),
+]
+
+
+def text_of(line):
+    return line.decode().removeprefix("$TELEM,").removesuffix("\n")
+
+
+# -- the reference ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", range(1, 58))
+def test_the_field_of_this_number_is_the_references(number):
+    field = LAYOUT.fields[number - 1]
+    assert (field.name, field.kind.name) == REFERENCE_FIELDS[number - 1]
+
+
+@pytest.mark.parametrize("number", range(1, 58))
+def test_the_field_of_this_number_takes_the_value_at_this_place_and_no_other(number):
+    texts = ["0"] * 57
+    texts[number - 1] = "1"
+    values = LAYOUT.decode(",".join(texts))
+    assert values == tuple(float(text) for text in texts)
+    name, _ = REFERENCE_FIELDS[number - 1]
+    assert Record(LAYOUT, values, 0.0)[name] == 1
+
+
+def test_the_reference_has_57_fields_and_comes_first():
+    assert (len(REFERENCE_FIELDS), LAYOUT.count) == (57, 57)
+    assert layouts()[0].name == STATE
+
+
+def test_a_line_from_the_pad():
+    values = LAYOUT.decode(text_of(PAD))
+    assert dict(zip(LAYOUT.index, values, strict=True)) == PAD_VALUES
+    assert list(LAYOUT.index) == list(PAD_VALUES)
+
+
+def test_a_line_with_every_odd_number_that_can_be_printed():
+    values = LAYOUT.decode(ODD)
+    assert [repr(one) for one in values] == [repr(one) for one in ODD_VALUES]
+
+
+@pytest.mark.parametrize("number", range(1, 58))
+def test_whole_numbers_are_ints_and_the_others_floats(number):
+    kind = REFERENCE_FIELDS[number - 1][1]
+    value = LAYOUT.decode(text_of(PAD))[number - 1]
+    assert type(value) is (float if kind in ("f32", "f64") else int)
+
+
+# -- lines that are none ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", range(57))
+def test_a_line_without_one_of_its_fields(number):
+    texts = text_of(PAD).split(",")
+    del texts[number]
+    problem = LAYOUT.decode(",".join(texts))
+    assert problem == Problem("field count", f"56 fields where {STATE} has 57")
+
+
+@pytest.mark.parametrize("number", range(58))
+def test_a_line_with_one_field_more(number):
+    texts = text_of(PAD).split(",")
+    texts.insert(number, "0")
+    assert LAYOUT.decode(",".join(texts)).reason == "field count"
+
+
+@pytest.mark.parametrize("number", range(57))
+def test_a_line_with_an_empty_field(number):
+    texts = text_of(PAD).split(",")
+    texts[number] = ""
+    name, kind = REFERENCE_FIELDS[number]
+    assert LAYOUT.decode(",".join(texts)) == Problem("empty field", f"{name} ({kind}) is ''")
+
+
+@pytest.mark.parametrize("text", ["", ",", "," * 56, "," * 100_000, "x" * 100_000])
+def test_hardly_a_line_at_all(text):
+    assert isinstance(LAYOUT.decode(text), Problem)
+
+
+def test_a_field_that_is_too_long_to_show_is_shown_by_its_beginning():
+    problem = LAYOUT.decode(body(altitude="9" * 5000))
+    assert problem == Problem("out of range", f"altitude (f32) is '{'9' * 47}...'")
+
+
+def test_a_field_of_47_characters_is_shown_whole():
+    text = "0." + "0" * 43 + "1x"
+    assert LAYOUT.decode(body(altitude=text)).detail == f"altitude (f32) is {text!r}"
+
+
+# -- the five layouts ---------------------------------------------------------------------------
+
+
+def test_the_layouts_that_are_shipped():
+    assert {name: layout.count for name, layout in BY_NAME.items()} == COUNTS
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_a_line_of_each_layout_comes_out_as_it_was_put_in(name):
+    layout = BY_NAME[name]
+    values = layout.decode(body(layout, altitude="1234.5", ms_since_boot_cfc="99"))
+    assert (values[3], values[-1], len(values)) == (1234.5, 99, COUNTS[name])
+
+
+def test_the_second_layout_of_57_fields_differs_in_field_32_alone():
+    pairs = zip(LAYOUT.fields, BY_NAME[DEPLOYMENT].fields, strict=True)
+    differing = [n for n, (one, other) in enumerate(pairs, 1) if one != other]
+    assert differing == [32]
+    assert BY_NAME[DEPLOYMENT].fields[31].kind.name == "f32"
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_a_record_says_which_fields_it_has(name):
+    layout = BY_NAME[name]
+    record = Record(layout, layout.decode(body(layout)), 1.5)
+    assert [one for one in layout.index if one not in record] == []
+    assert "blims_upwind_lat" in record or name != "telem54"
+    assert "no such field" not in record
+    assert math.isnan(record.number("no such field"))
+    assert record.number("mag_x") == 12.5
+
+
+@pytest.mark.parametrize(
+    ("name", "floats", "fields"),
+    [
+        ("telem50", 2, []),
+        ("telem52", 2, ["blims_target_lat", "blims_target_lon"]),
+        (STATE, 2, ["blims_target_lat", "blims_target_lon"]),
+        (DEPLOYMENT, 2, ["blims_target_lat", "blims_target_lon"]),
+        (
+            "telem54",
+            4,
+            ["blims_upwind_lat", "blims_upwind_lon", "blims_downwind_lat", "blims_downwind_lon"],
+        ),
+    ],
+)
+def test_what_each_firmware_takes_and_shows_as_a_target(name, floats, fields):
+    layout = BY_NAME[name]
+    assert (layout.target_floats, list(layout.target_fields)) == (floats, fields)
+
+
+@pytest.mark.parametrize(
+    ("name", "field", "fitting", "strange"),
+    [
+        (STATE, "airbrake_state", ["0", "1", "2"], ["3", "255"]),
+        (DEPLOYMENT, "airbrake_deployment", ["0", "0.5", "1", "-0"], ["1.01", "-1", "NaN", "inf"]),
+    ],
+)
+def test_field_32_is_as_expected_or_not(name, field, fitting, strange):
+    layout = BY_NAME[name]
+    for text in fitting + strange:
+        values = layout.decode(body(layout, **{field: text}))
+        assert layout.is_as_expected(values) == (text in fitting)
+
+
+# -- files with a mistake in them ---------------------------------------------------------------
+
+
+def content():
+    return yaml.safe_load((FOLDER / f"{STATE}.yaml").read_text())
+
+
+def spoilt(**changes):
+    return {**content(), **changes}
+
+
+def field(which, **changes):
+    """The file, with something else about one field."""
+    whole = content()
+    for one in whole["fields"]:
+        if one["name"] == which:
+            one.update(changes)
+    return whole
+
+
+MISTAKES = {
+    "nothing": (None, "no layout of"),
+    "a list": ([], "no layout of"),
+    "a word": ("telem", "no layout of"),
+    "no name": ({k: v for k, v in content().items() if k != "name"}, "'name'"),
+    "no fields": (spoilt(fields=[]), "lacks flight_mode"),
+    "fields that are none": (spoilt(fields=["pressure"]), "no layout of"),
+    "a field without a type": (spoilt(fields=[{"name": "a", "unit": "b"}]), "'type'"),
+    "a type that nobody knows": (field("temp", type="f16"), "f16: need one of bool01"),
+    "a type that is a list": (field("temp", type=["f32"]), "no layout of"),
+    "a needed field under another name": (field("mav_open", name="mav"), "lacks mav_open"),
+    "a field twice": (field("temp", name="pressure"), "named twice"),
+    "one target float": (spoilt(target_floats=1), "target_floats is 1: need 2 or 4"),
+    "a target float in words": (spoilt(target_floats="two"), "no layout of"),
+    "endless target floats": (spoilt(target_floats=math.inf), "no layout of"),
+    "target fields that do not exist": (spoilt(target_fields=["a", "b"]), "lacks a, b"),
+    "one target field": (spoilt(target_fields=["temp"]), "as many as target_floats"),
+    "no target fields at all": (spoilt(target_fields=None), "no layout of"),
+    "limits that are none": (field("airbrake_state", expected=[]), "no layout of"),
+    "half the limits": (field("airbrake_state", expected=[0]), "no layout of"),
+    "limits in words": (field("airbrake_state", expected=["low", "high"]), "no layout of"),
+}
+
+
+@pytest.mark.parametrize("story", MISTAKES)
+def test_a_mistake_in_a_file_is_told_with_the_name_of_the_file(story):
+    wrong, told = MISTAKES[story]
+    with pytest.raises(ParameterError, match=r"^/a/layout\.yaml: ") as caught:
+        layout_from(wrong, "/a/layout.yaml")
+    assert told in str(caught.value)
+
+
+def test_a_file_without_a_mistake_is_taken():
+    assert layout_from(content(), "here").fields == LAYOUT.fields
+
+
+def test_a_folder_without_layouts(tmp_path):
+    with pytest.raises(ParameterError, match="layouts is .* there is no layout"):
+        load_layouts(str(tmp_path), "layouts")
+
+
+def test_a_folder_that_is_not_there(tmp_path):
+    with pytest.raises(ParameterError, match="there is no layout"):
+        load_layouts(str(tmp_path / "none"), "layouts")
+
+
+@pytest.mark.parametrize("text", [b"a: [", b"\xff\xfe\xfa", b"", b"- 1"])
+def test_a_file_that_cannot_be_read(tmp_path, text):
+    (tmp_path / "mine.yaml").write_bytes(text)
+    with pytest.raises(ParameterError, match=r"mine\.yaml: "):
+        load_layouts(str(tmp_path), "layouts")
+
+
+def test_two_files_with_one_name(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.yaml").write_text((FOLDER / "telem50.yaml").read_text())
+    with pytest.raises(ParameterError, match="two layouts have one name"):
+        load_layouts(str(tmp_path), "layouts")
+
+
+def test_the_references_layout_comes_first_and_the_others_by_file(tmp_path):
+    for name in ("telem54", STATE, "telem50"):
+        (tmp_path / f"{name}.yaml").write_text((FOLDER / f"{name}.yaml").read_text())
+    names = [layout.name for layout in load_layouts(str(tmp_path), "layouts")]
+    assert names == [STATE, "telem50", "telem54"]
