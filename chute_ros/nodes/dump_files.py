@@ -27,7 +27,8 @@ class DumpResult:
 
 
 class DumpFiles:
-    """One dump at a time. folder: where those go that were given no path; empty: ROS_HOME."""
+    """One dump at a time. folder: where those go whose path is empty or relative; empty: one
+    under ROS_HOME."""
 
     def __init__(self, folder: str) -> None:
         try:
@@ -42,10 +43,10 @@ class DumpFiles:
     def refusal(self, path: str) -> str:
         """Why a dump cannot go to this path (empty: a new name); empty text: it can."""
         try:
+            self.folder.mkdir(parents=True, exist_ok=True)
             if not path:
-                self.folder.mkdir(parents=True, exist_ok=True)
                 return ""
-            wanted = Path(path).expanduser()
+            wanted = self.folder / Path(path).expanduser()
             if wanted.exists():
                 return f"{wanted} exists already: name another path"
             if not wanted.parent.is_dir():
@@ -60,7 +61,7 @@ class DumpFiles:
         name = f"{memory}_{now:%Y%m%dT%H%M%S_%f}{suffix}"
         self._size, self._failure = 0, ""
         try:
-            self._final = Path(path).expanduser() if path else self.folder / name
+            self._final = self.folder / (Path(path).expanduser() if path else name)
             self._final.parent.mkdir(parents=True, exist_ok=True)
             self._file = open(f"{self._final}{PART}", "xb", buffering=0)  # noqa: SIM115
         except OSError as error:

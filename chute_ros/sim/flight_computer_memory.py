@@ -135,13 +135,13 @@ class Memory:
             return
         kind = "BINARY" if self._settings.binary_dump else "CSV"
         begin, end = (f"--- {word} FLASH {kind} DUMP ---" for word in ("BEGIN", "END"))
-        content = self._bytes() if self._settings.binary_dump else self._table()
-        # After bytes there is no line to be ended, neither before the marker nor after it.
-        ending = end if self._settings.binary_dump else f"{end}\n"
-        self._job = _Dump(
-            f"{begin}\n".encode() + content, ending.encode(), self._settings.dump_rate, now
-        )
+        content = f"{begin}\n".encode() + self.content()
+        self._job = _Dump(content, f"{end}\n".encode(), self._settings.dump_rate, now)
         self.disturb_dump("")
+
+    def content(self) -> bytes:
+        """What a dump of the flash holds."""
+        return self._bytes() if self._settings.binary_dump else self._table()
 
     def disturb_dump(self, outcome: str) -> None:
         """Have the dump that runs, or else the next, end so; empty: as was said before."""

@@ -11,6 +11,7 @@ from node_bench import Bench
 
 from chute_ros.model import LinkState
 from chute_ros.nodes.umbilical_node import UmbilicalNode
+from chute_ros.protocol.umbilical.layouts import Layout
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 from chute_ros.sim.pty_wire import PtyWire
@@ -45,13 +46,13 @@ def quick(**parameters: Any) -> dict[str, Any]:
 
 
 class Cable:
-    """A node, and a flight computer that can be plugged into its cable."""
+    """A node, and a flight computer that can be plugged into its cable. sends: its layout."""
 
     def __init__(
         self,
         bench: Bench,
         settings: FlightComputerSettings | None = None,
-        layout: str = "telem57_airbrake_state",
+        sends: str = "telem57_airbrake_state",
         **parameters: Any,
     ) -> None:
         self.bench = bench
@@ -67,10 +68,15 @@ class Cable:
                 **parameters,
             ),
         )
-        layouts = {one.name: one for one in load_layouts("", "test")}
+        layouts = {one.name: one for one in self.shipped_layouts()}
         settings = settings or FlightComputerSettings(rate=RATE)
-        self.computer = FlightComputer(settings, layouts[layout])
+        self.computer = FlightComputer(settings, layouts[sends])
         self.loop: WireLoop[Any] | None = None
+
+    @staticmethod
+    def shipped_layouts() -> list[Layout]:
+        """Those that were built."""
+        return load_layouts("", "test")
 
     # -- the cable -----------------------------------------------------------------------------
 

@@ -138,7 +138,7 @@ def test_a_dump_can_stall_until_a_reboot(when):
     assert host.newest["flight_mode"] == 0
 
 
-def test_a_binary_dump_has_no_line_before_or_after_its_end():
+def test_a_binary_dump_is_exactly_its_bytes_between_the_marks():
     host = Host(binary_dump=True, dump_size=5000)
     host.run(0.2)
     host.forget()
@@ -148,7 +148,7 @@ def test_a_binary_dump_has_no_line_before_or_after_its_end():
     assert end
     assert len(content) == 5000
     assert len(set(content)) == 256
-    assert rest.startswith(b"$TELEM,")
+    assert rest.startswith(b"\n$TELEM,")
 
 
 def test_a_second_job_waits_for_nobody():

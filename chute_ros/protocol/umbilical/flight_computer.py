@@ -59,7 +59,7 @@ class FlightComputer:
             return [], age
         if age is Age.RESTARTED:
             self.restarts += 1
-            self.restarted_in_flight = self._was_in_flight and not self.landed(now)
+            self.restarted_in_flight = self._was_in_flight and not self.landed
             self._was_in_flight = False
         if self.record is not None:
             self.interval = now - self.record.received
@@ -111,9 +111,12 @@ class FlightComputer:
             return Situation.FAULT_IN_FLIGHT
         return _SITUATIONS[mode]
 
-    def landed(self, now: float) -> bool:
-        """After a deployment its altitude does not change any more."""
-        return self.deployed and now - self._rest_since >= _REST_TIME
+    @property
+    def landed(self) -> bool:
+        """After a deployment its altitude does not change any more, by its records: silence is
+        no rest."""
+        rested = NAN if self.record is None else self.record.received - self._rest_since
+        return self.deployed and rested >= _REST_TIME
 
     @property
     def deployed(self) -> bool:
@@ -160,7 +163,7 @@ class FlightComputer:
             link_state=self.liveness.state,
             armed=self._motors(),
             armed_age=age,
-            landed_state=self._landed_state(now),
+            landed_state=self._landed_state(),
             landed_state_age=age,
             height=height,
             height_age=_age(age, height),
@@ -191,8 +194,8 @@ class FlightComputer:
         may_burn = self.mode is FlightMode.STANDBY or bool(self.record["mav_open"])
         return Armed.ARMED if may_burn else Armed.DISARMED
 
-    def _landed_state(self, now: float) -> LandedState:
-        if self.mode in (FlightMode.STARTUP, FlightMode.STANDBY) or self.landed(now):
+    def _landed_state(self) -> LandedState:
+        if self.mode in (FlightMode.STARTUP, FlightMode.STANDBY) or self.landed:
             return LandedState.ON_GROUND
         if self.mode in IN_FLIGHT or (self.mode is FlightMode.FAULT and self._was_in_flight):
             return LandedState.IN_AIR
@@ -220,7 +223,7 @@ class FlightComputer:
     def _state(self, now: float, pause: str) -> ParachuteState:
         """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest."""
         if self.deployed:
-            return ParachuteState.TOUCHDOWN if self.landed(now) else ParachuteState.LAUNCHED
+            return ParachuteState.TOUCHDOWN if self.landed else ParachuteState.LAUNCHED
         if pause and self.liveness.state is LinkState.OK:
             return ParachuteState.NOT_READY
         if self._faults(now, pause):

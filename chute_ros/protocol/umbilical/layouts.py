@@ -124,7 +124,7 @@ def layout_from(content: Mapping[str, Any], where: str) -> Layout:
             int(content["target_floats"]),
             tuple(content["target_fields"]),
         )
-    except (KeyError, TypeError, ValueError) as error:
+    except (LookupError, OverflowError, TypeError, ValueError) as error:
         raise ParameterError(f"{where}: no layout of $TELEM: {error!r}") from None
     missing = [name for name in (*NEEDED, *layout.target_fields) if name not in layout.index]
     if missing:

@@ -30,7 +30,7 @@ from chute_ros.protocol.umbilical.layouts import Layout
 from chute_ros.protocol.umbilical.memory import MemoryWorks
 from chute_ros.protocol.umbilical.orders import Orders
 from chute_ros.protocol.umbilical.scheduler import CommandScheduler
-from chute_ros.protocol.umbilical.stream import Line, StreamReader
+from chute_ros.protocol.umbilical.stream import DumpBytes, Line, StreamReader
 
 #: A line that is nothing known is shown to a person at most each so many seconds.
 _SHOW_UNKNOWN_EACH = 10.0
@@ -53,6 +53,7 @@ class UmbilicalLink:
         self._requests = requests
         self._stream: Hashable = None
         self._reader = self._new_reader()
+        self._now = 0.0
         self._settled_at = 0.0
         self._first_line = True
         self._show_unknown_at = 0.0
@@ -68,6 +69,7 @@ class UmbilicalLink:
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         """The next bytes of this stream; a new stream is a port that was opened anew."""
+        self._now = now
         self.received_bytes += len(data)
         if stream != self._stream:
             self._stream, self._reader = stream, self._new_reader()
@@ -88,20 +90,15 @@ class UmbilicalLink:
 
     def stream_ended(self, stream: Hashable) -> None:
         """The port was closed: what was under way on it is over."""
-        for item in self._reader.end_dump():
-            self.memory.heard(item, self._settled_at)
+        self._end_dump("the cable was pulled, or the port closed")
         self._reader, self._stream = self._new_reader(), None
-        self.memory.cable_pulled()
-        self.orders.wire_closed()
+        self.orders.wire_closed(self._now)
 
     def update(self, now: float) -> None:
         """Look at the clock: limits, retries, our own heartbeat."""
+        self._now = now
         if self.memory.update(now):
-            why = self.memory.silent()
-            held = self._reader.end_dump()
-            for item in held[:-1]:
-                self.memory.heard(item, now)
-            self.memory.give_up(why)
+            self._end_dump(self.memory.silent())
         changes, picture_changed = self.computer.update(now)
         self._changed(changes)
         if picture_changed:
@@ -173,6 +170,13 @@ class UmbilicalLink:
 
     def _new_reader(self) -> StreamReader:
         return StreamReader(self.decoder.is_telemetry, self.counts)
+
+    def _end_dump(self, why: str) -> None:
+        """Give up the flash dump that is under way, if there is one."""
+        for item in self._reader.end_dump():
+            if isinstance(item, DumpBytes):
+                self.memory.heard(item, self._now)
+        self.memory.give_up(why)
 
     def _line(self, line: bytes, now: float) -> None:
         if self._first_line:

@@ -160,11 +160,6 @@ class MemoryWorks:
             wanted = work.name == "wipe_fram_and_reboot"
             self._end(wanted, "" if wanted else "the flight computer restarted")
 
-    def cable_pulled(self) -> None:
-        """The wire is gone."""
-        if self.work is not None:
-            self._end(False, "the cable was pulled, or the port closed")
-
     def update(self, now: float) -> bool:
         """Look at the clock; True: a flash dump was given up for its silence."""
         work = self.work
@@ -189,8 +184,9 @@ class MemoryWorks:
         return f"silent for {self._limits.dump_silence:g} s, its end mark did not come"
 
     def give_up(self, why: str) -> None:
-        """End the work."""
-        self._end(False, why)
+        """End the work, if there is one."""
+        if self.work is not None:
+            self._end(False, why)
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""

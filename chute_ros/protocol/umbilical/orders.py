@@ -100,7 +100,7 @@ class Orders:
         if reason:
             self._end(("launch",), f"flight is blocked: {reason}", now)
 
-    def wire_closed(self, now: float = 0.0) -> None:
+    def wire_closed(self, now: float) -> None:
         """The port is closed: what is not urgent does not wait for it to come back."""
         self._requests.commands.wire_closed()
         self._requests.abandon_where(

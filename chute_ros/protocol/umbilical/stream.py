@@ -21,8 +21,8 @@ MOST_LINE = 8192
 _MOST_TELEM = 4096
 _TELEM = b"$TELEM,"
 _BEGIN = re.compile(rb"(?:^|(?<!\] ))--- BEGIN FLASH (CSV|BINARY) DUMP ---$")
-_END = re.compile(rb"(?:\[INFO\] )?--- END FLASH (?:CSV|BINARY) DUMP ---\r?\n")
-_END_LONGEST = len(b"[INFO] --- END FLASH BINARY DUMP ---\r\n")
+_END = re.compile(rb"(?:\[INFO\] )?--- END FLASH (?:CSV|BINARY) DUMP ---")
+_END_LONGEST = len(b"[INFO] --- END FLASH BINARY DUMP ---")
 _TELEM_LINE = re.compile(rb"\$TELEM,([^\n]*)\n")
 
 TOO_LONG = "line too long"

@@ -10,12 +10,12 @@ from umbilical_lines import (
     DEPLOYMENT,
     FOLDER,
     LAYOUT,
+    LAYOUTS,
     PAD,
     PAD_VALUES,
     REFERENCE_FIELDS,
     STATE,
     body,
-    layouts,
 )
 
 from chute_ros.errors import ParameterError
@@ -66,7 +66,7 @@ def test_the_field_of_this_number_takes_the_value_at_this_place_and_no_other(num
 
 def test_the_reference_has_57_fields_and_comes_first():
     assert (len(REFERENCE_FIELDS), LAYOUT.count) == (57, 57)
-    assert layouts()[0].name == STATE
+    assert LAYOUTS[0].name == STATE
 
 
 def test_a_line_from_the_pad():
@@ -250,7 +250,7 @@ def test_a_file_without_a_mistake_is_taken():
 
 
 def test_a_folder_without_layouts(tmp_path):
-    with pytest.raises(ParameterError, match="layouts is .* there is no layout"):
+    with pytest.raises(ParameterError, match=r"layouts is .* there is no layout"):
         load_layouts(str(tmp_path), "layouts")
 
 

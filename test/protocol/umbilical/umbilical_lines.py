@@ -109,12 +109,9 @@ _ORDINARY = {
 _ORDINARY_FIELDS = {"airbrake_deployment": "0.5", "airbrake_state": "2"}
 
 
-def layouts():
-    """All that are shipped, the reference's first."""
-    return load_layouts(str(FOLDER), "test")
-
-
-BY_NAME = {layout.name: layout for layout in layouts()}
+#: All that are shipped, the reference's first.
+LAYOUTS = load_layouts(str(FOLDER), "test")
+BY_NAME = {layout.name: layout for layout in LAYOUTS}
 LAYOUT = BY_NAME[STATE]
 
 

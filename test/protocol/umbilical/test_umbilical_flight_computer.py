@@ -1,0 +1,458 @@
+"""The flight computer as the others see it: picture, situation, landing, restart and silence."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from umbilical_lines import BY_NAME, body, record
+
+from chute_ros.model import (
+    Armed,
+    LandedState,
+    LinkState,
+    ParachuteState,
+    ParachuteStatus,
+    TriggerFlags,
+    VehicleState,
+)
+from chute_ros.protocol.boot_clock import Age
+from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.protocol.umbilical.flight_computer import FlightComputer
+from chute_ros.protocol.umbilical.gate import Situation
+from chute_ros.protocol.umbilical.layouts import Layout, Record
+from chute_ros.protocol.umbilical.modes import FlightMode
+
+STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
+LIMITS = LivenessLimits(3.0, 15.0)
+ON_PAD = {"ssa_drogue_deployed": "0", "ssa_main_deployed": "0", "fix_type": "3"}
+
+
+class Rocket:
+    """A flight computer that started 100 s before time 0."""
+
+    def __init__(self):
+        self.computer = FlightComputer(LIMITS)
+        self.started = -100.0
+
+    def says(self, at, mode, **texts):
+        """A record; what changed of the link, and what its clock says."""
+        clock = {"ms_since_boot_cfc": str(round((at - self.started) * 1000))}
+        texts = {**ON_PAD, **clock, "flight_mode": str(mode), **texts}
+        came = self.computer.heard(record(at, **texts), at)
+        self.computer.update(at)
+        return came
+
+    def descends(self, start, seconds, mode=DROGUE, height=2000.0, speed=20.0):
+        """Ten records a second; the time of the last one."""
+        at = start
+        for step in range(round(seconds * 10) + 1):
+            at = start + step / 10
+            self.says(at, mode, altitude=f"{height - speed * step / 10:.3f}")
+        return at
+
+    def restarts(self, at):
+        self.started = at - 0.5
+
+
+def status(rocket, at, pause=""):
+    return rocket.computer.status(at, pause)
+
+
+def vehicle(rocket, at):
+    return rocket.computer.vehicle_state(at)
+
+
+# -- by mode ------------------------------------------------------------------------------------
+
+#: Mode: situation, parachute, armed, motors (MAV closed, MAV open), landed.
+_READY, _ARMED, _LAUNCHED = ParachuteState.READY, ParachuteState.ARMED, ParachuteState.LAUNCHED
+_GROUND, _AIR = LandedState.ON_GROUND, LandedState.IN_AIR
+_OFF, _ON = Armed.DISARMED, Armed.ARMED
+MODES = {
+    STARTUP: (Situation.STARTUP, _READY, False, (_OFF, _ON), _GROUND),
+    STANDBY: (Situation.STANDBY, _ARMED, True, (_ON, _ON), _GROUND),
+    ASCENT: (Situation.ASCENT, _ARMED, True, (_OFF, _ON), _AIR),
+    COAST: (Situation.COAST, _ARMED, True, (_OFF, _ON), _AIR),
+    DROGUE: (Situation.DROGUE_DEPLOYED, _LAUNCHED, True, (_OFF, _ON), _AIR),
+    MAIN: (Situation.MAIN_DEPLOYED, _LAUNCHED, True, (_OFF, _ON), _AIR),
+    FAULT: (
+        *(Situation.FAULT, ParachuteState.ABNORMAL, False, (_OFF, _ON)),
+        LandedState.UNKNOWN,
+    ),
+}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_what_each_flight_mode_means(mode):
+    situation, state, armed, motors, landed = MODES[mode]
+    for mav, motor in zip("01", motors, strict=True):
+        rocket = Rocket()
+        rocket.says(0.0, mode, mav_open=mav)
+        seen = status(rocket, 0.5)
+        assert rocket.computer.situation(0.5) is situation
+        assert (seen.state, seen.armed, seen.link_state) == (state, armed, LinkState.OK)
+        assert seen.armed_triggers == (TriggerFlags.FC if armed else TriggerFlags(0))
+        assert seen.deployed == (mode in (DROGUE, MAIN))
+        assert seen.faults == (("flight mode Fault",) if mode == FAULT else ())
+        assert (vehicle(rocket, 0.5).armed, vehicle(rocket, 0.5).landed_state) == (motor, landed)
+
+
+def test_every_flight_mode_has_its_number_of_the_reference_and_a_label():
+    labels = ["Startup", "Standby", "Ascent", "Coast", "DrogueDeployed", "MainDeployed", "Fault"]
+    assert [FlightMode(number).label for number in range(7)] == labels
+
+
+@pytest.mark.parametrize("mode", ["7", "255", "4294967295"])
+def test_a_flight_mode_without_a_name_is_no_situation_to_decide_in(mode):
+    rocket = Rocket()
+    rocket.says(0.0, mode)
+    assert rocket.computer.mode is None
+    assert rocket.computer.situation(0.0) is Situation.UNKNOWN
+    seen = status(rocket, 0.0)
+    assert (seen.state, seen.armed) == (ParachuteState.ABNORMAL, False)
+    assert seen.faults == (f"flight mode {mode} has no name",)
+    assert vehicle(rocket, 0.0).armed is Armed.UNKNOWN
+    assert vehicle(rocket, 0.0).landed_state is LandedState.UNKNOWN
+
+
+@pytest.mark.parametrize("flag", ["1", "2", "255"])
+@pytest.mark.parametrize("name", ["ssa_drogue_deployed", "ssa_main_deployed"])
+@pytest.mark.parametrize("mode", [STARTUP, COAST, FAULT, 7])
+def test_a_deployment_is_seen_by_its_flag_in_any_mode(mode, name, flag):
+    rocket = Rocket()
+    rocket.says(0.0, mode, **{name: flag})
+    assert (status(rocket, 0.0).deployed, status(rocket, 0.0).state) == (True, _LAUNCHED)
+
+
+def test_a_fault_that_follows_a_flight_is_one_in_flight():
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT)
+    rocket.says(0.1, FAULT)
+    rocket.says(0.2, FAULT)
+    assert rocket.computer.situation(0.2) is Situation.FAULT_IN_FLIGHT
+    assert vehicle(rocket, 0.2).landed_state is LandedState.IN_AIR
+    rocket.says(0.3, STANDBY)
+    rocket.says(0.4, FAULT)
+    assert rocket.computer.situation(0.4) is Situation.FAULT
+
+
+# -- before anything, and silence ----------------------------------------------------------------
+
+
+def test_before_the_first_record_nothing_is_known():
+    rocket = Rocket()
+    assert status(rocket, 5.0) == ParachuteStatus("", LinkState.NEVER_SEEN)
+    assert vehicle(rocket, 5.0) == VehicleState()
+    assert rocket.computer.situation(5.0) is Situation.UNKNOWN
+    assert rocket.computer.alive(5.0) == []
+    assert rocket.computer.update(5.0) == ([], False)
+    assert rocket.computer.next_deadline() == math.inf
+    assert (rocket.computer.deployed, rocket.computer.landed) == (False, False)
+
+
+def test_telemetry_is_fresh_for_three_seconds_and_not_a_moment_longer():
+    rocket = Rocket()
+    rocket.says(10.0, STANDBY)
+    assert rocket.computer.next_deadline() == 13.0
+    assert rocket.computer.situation(12.999) is Situation.STANDBY
+    assert rocket.computer.situation(13.0) is Situation.UNKNOWN
+    changes, picture = rocket.computer.update(13.0)
+    assert ([one.after for one in changes], picture) == ([LinkState.STALE], True)
+    assert rocket.computer.update(13.1) == ([], False)
+    seen = status(rocket, 13.0)
+    assert (seen.state, seen.link_state) == (ParachuteState.ABNORMAL, LinkState.STALE)
+    assert seen.faults == ("telemetry STALE: 3.0 s old",)
+
+
+def test_what_is_silent_for_fifteen_seconds_is_lost_and_may_come_back():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY)
+    rocket.computer.update(3.0)
+    assert rocket.computer.next_deadline() == 15.0
+    changes, _ = rocket.computer.update(15.0)
+    assert [one.after for one in changes] == [LinkState.LOST]
+    assert rocket.computer.next_deadline() == math.inf
+    assert status(rocket, 20.0).faults == ("telemetry LOST: 20.0 s old",)
+    changes, age = rocket.says(20.0, STANDBY)
+    assert ([one.regained for one in changes], age) == ([True], Age.NEW)
+    assert rocket.computer.situation(20.0) is Situation.STANDBY
+
+
+def test_a_pause_that_is_known_keeps_the_link_but_makes_nothing_fresh():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY)
+    for second in range(1, 61):
+        assert rocket.computer.alive(float(second)) == []
+        rocket.computer.update(float(second))
+    seen = status(rocket, 60.0, "dump flash in progress")
+    assert (seen.link_state, seen.state) == (LinkState.OK, ParachuteState.NOT_READY)
+    assert seen.faults == ("no telemetry: dump flash in progress",)
+    assert rocket.computer.situation(60.0) is Situation.UNKNOWN
+    assert vehicle(rocket, 60.0).height_age == 60.0
+    # The pause is over, and nothing came: now the silence counts.
+    assert rocket.computer.next_deadline() == 63.0
+    assert status(rocket, 61.0).state is ParachuteState.ABNORMAL
+
+
+def test_the_picture_changes_in_a_pause_when_the_last_record_grows_old():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY)
+    rocket.computer.alive(2.0)
+    assert rocket.computer.next_deadline() == 3.0
+    assert rocket.computer.update(3.0) == ([], True)
+    assert rocket.computer.next_deadline() == 5.0
+
+
+def test_who_is_silent_in_a_pause_is_lost_as_well():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY)
+    rocket.computer.update(3.0)
+    seen = status(rocket, 3.0, "wipe flash in progress")
+    assert (seen.link_state, seen.state) == (LinkState.STALE, ParachuteState.ABNORMAL)
+
+
+@pytest.mark.parametrize("pause", ["", "dump flash in progress"])
+def test_what_is_deployed_stays_so_in_silence(pause):
+    rocket = Rocket()
+    rocket.says(0.0, MAIN)
+    rocket.computer.update(20.0)
+    assert status(rocket, 20.0, pause).state is _LAUNCHED
+    assert status(rocket, 20.0, pause).deployed
+
+
+# -- landed -------------------------------------------------------------------------------------
+
+
+def test_it_has_landed_when_its_altitude_rests_for_five_seconds_after_a_deployment():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 10.0)
+    assert status(rocket, end).state is _LAUNCHED
+    rocket.descends(end, 4.9, MAIN, 12.0, 0.1)
+    assert status(rocket, end + 4.9).state is _LAUNCHED
+    rocket.descends(end + 5.0, 0.1, MAIN, 11.5, 0.1)
+    seen = status(rocket, end + 5.1)
+    assert (seen.state, seen.deployed) == (ParachuteState.TOUCHDOWN, True)
+    assert vehicle(rocket, end + 5.1).landed_state is LandedState.ON_GROUND
+
+
+def test_the_slowest_canopy_is_in_the_air():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 60.0, MAIN, 400.0, 1.0)
+    assert vehicle(rocket, end).landed_state is LandedState.IN_AIR
+
+
+@pytest.mark.parametrize("silence", [5.1, 14.0, 600.0])
+def test_silence_is_no_landing(silence):
+    rocket = Rocket()
+    at = rocket.descends(0.0, 10.0) + silence
+    rocket.computer.update(at)
+    assert status(rocket, at).state is _LAUNCHED
+    assert vehicle(rocket, at).landed_state is LandedState.IN_AIR
+
+
+def test_rest_without_a_deployment_is_no_landing():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 10.0, COAST, 3000.0, 0.0)
+    assert not rocket.computer.landed
+    assert vehicle(rocket, end).landed_state is LandedState.IN_AIR
+
+
+@pytest.mark.parametrize("altitude", ["NaN", "inf", "-inf"])
+def test_an_altitude_that_is_none_never_rests(altitude):
+    rocket = Rocket()
+    for second in range(20):
+        rocket.says(float(second), MAIN, altitude=altitude)
+    assert not rocket.computer.landed
+    for second in range(20, 27):
+        rocket.says(float(second), MAIN, altitude="5")
+    assert rocket.computer.landed
+
+
+# -- restart ------------------------------------------------------------------------------------
+
+
+def test_a_restart_is_believed_at_the_second_record_that_shows_it():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY, altitude="1")
+    rocket.restarts(1.0)
+    assert rocket.says(1.0, STARTUP, altitude="2") == ([], Age.DOUBTFUL)
+    assert rocket.computer.mode is FlightMode.STANDBY
+    assert rocket.says(1.1, STARTUP, altitude="3") == ([], Age.RESTARTED)
+    seen = vehicle(rocket, 1.1)
+    assert (seen.reboot_count, seen.rebooted_in_flight) == (1, False)
+    assert (seen.uptime, seen.height) == (0.6, 3.0)
+    assert status(rocket, 1.1).state is _READY
+
+
+@pytest.mark.parametrize("mode", [ASCENT, COAST, DROGUE, MAIN])
+def test_a_restart_in_flight_is_told_until_the_next_one_on_the_ground(mode):
+    rocket = Rocket()
+    rocket.says(0.0, mode)
+    rocket.restarts(1.0)
+    rocket.says(1.0, STARTUP)
+    rocket.says(1.1, STARTUP)
+    assert vehicle(rocket, 1.1).rebooted_in_flight
+    assert status(rocket, 1.1).state is ParachuteState.ABNORMAL
+    assert status(rocket, 1.1).faults == ("it restarted in flight",)
+    rocket.says(60.0, STARTUP)
+    rocket.restarts(70.0)
+    rocket.says(70.0, STARTUP)
+    rocket.says(70.1, STARTUP)
+    assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (2, False)
+
+
+def test_a_restart_in_flight_is_one_after_a_long_silence_too():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 10.0)
+    rocket.restarts(end + 30.0)
+    rocket.says(end + 30.0, STARTUP)
+    rocket.says(end + 30.1, STARTUP)
+    assert rocket.computer.restarted_in_flight
+
+
+def test_a_restart_after_the_landing_is_not_in_flight():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 6.0, MAIN, 10.0, 0.0)
+    rocket.restarts(end + 1.0)
+    rocket.says(end + 1.0, STARTUP)
+    rocket.says(end + 1.1, STARTUP)
+    assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (1, False)
+
+
+def test_a_record_that_is_older_than_the_one_before_changes_nothing():
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT, altitude="100")
+    old = {"ms_since_boot_cfc": "99900", "altitude": "90"}
+    assert rocket.says(0.1, STANDBY, **old) == ([], Age.OLD)
+    assert (rocket.computer.mode, rocket.computer.records) == (FlightMode.ASCENT, 1)
+    assert vehicle(rocket, 0.1).height == 100.0
+    assert not rocket.computer.fresh(3.0)
+
+
+def test_a_clock_that_wraps_is_no_restart():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY, ms_since_boot_cfc="4294967295")
+    assert rocket.says(0.1, STANDBY, ms_since_boot_cfc="50") == ([], Age.NEW)
+    assert rocket.computer.restarts == 0
+
+
+# -- the values ---------------------------------------------------------------------------------
+
+
+def test_the_picture_of_the_rocket():
+    rocket = Rocket()
+    rocket.says(1.0, ASCENT)
+    rocket.says(
+        *(2.0, ASCENT),
+        **{"altitude": "1250.5", "vel_d": "-120.25", "latitude": "42.5", "longitude": "-76.25"},
+        **{"accel_x": "3", "accel_y": "-4", "accel_z": "12"},
+    )
+    seen = vehicle(rocket, 2.5)
+    assert (seen.source, seen.link_state, seen.uptime) == ("flight_computer", LinkState.OK, 102.0)
+    assert (seen.height, seen.vertical_speed, seen.acceleration) == (1250.5, 120.25, 13.0)
+    assert (seen.latitude, seen.longitude) == (42.5, -76.25)
+    ages = (seen.height_age, seen.vertical_speed_age, seen.acceleration_age, seen.position_age)
+    assert (*ages, seen.armed_age, seen.landed_state_age) == (0.5,) * 6
+    assert (status(rocket, 2.5).height, status(rocket, 2.5).uptime) == (1250.5, 102.0)
+    assert (rocket.computer.records, rocket.computer.interval) == (2, 1.0)
+
+
+@pytest.mark.parametrize(("fix", "has"), [("0", False), ("2", False), ("3", True), ("4", True)])
+def test_without_a_three_dimensional_fix_there_is_no_position_and_no_speed(fix, has):
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT, fix_type=fix)
+    seen = vehicle(rocket, 1.0)
+    values = (seen.vertical_speed, seen.latitude, seen.longitude)
+    assert [math.isfinite(one) for one in values] == [has] * 3
+    assert [math.isfinite(one) for one in (seen.vertical_speed_age, seen.position_age)] == [
+        has
+    ] * 2
+    assert math.isfinite(seen.height)
+
+
+@pytest.mark.parametrize("text", ["NaN", "inf", "-inf"])
+def test_what_is_no_number_has_no_age(text):
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT, altitude=text, accel_y=text, vel_d=text)
+    seen = vehicle(rocket, 1.0)
+    ages = (seen.height_age, seen.acceleration_age, seen.vertical_speed_age)
+    assert [math.isnan(age) for age in ages] == [True] * 3
+
+
+@pytest.mark.parametrize("name", ["altitude", "pressure"])
+def test_a_barometer_that_shows_no_number_is_a_fault(name):
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY, **{name: "NaN"})
+    assert status(rocket, 0.0).faults == (f"{name} is nan",)
+    assert status(rocket, 0.0).state is ParachuteState.ABNORMAL
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_any_layout_serves(name):
+    layout = BY_NAME[name]
+    values = layout.decode(body(layout, flight_mode="1", ssa_drogue_deployed="0"))
+    computer = FlightComputer(LIMITS)
+    computer.heard(Record(layout, values, 0.0), 0.0)
+    assert computer.vehicle_state(0.0).height == 12.5
+    assert computer.status(0.0, "").deployed
+
+
+def test_so_does_one_with_hardly_a_field():
+    reference = BY_NAME["telem57_airbrake_state"]
+    needed = ("flight_mode", "altitude", "sv_open", "mav_open", "ssa_drogue_deployed")
+    needed = (*needed, "ssa_main_deployed", "ms_since_boot_cfc")
+    small = Layout("small", tuple(f for f in reference.fields if f.name in needed), 2, ())
+    computer = FlightComputer(LIMITS)
+    computer.heard(Record(small, small.decode("1,25,0,0,0,0,99"), 0.0), 0.0)
+    seen = computer.vehicle_state(0.0)
+    assert (seen.height, seen.armed, seen.landed_state) == (25.0, Armed.ARMED, _GROUND)
+    values = (seen.acceleration, seen.latitude, seen.vertical_speed, seen.position_age)
+    assert [math.isnan(one) for one in values] == [True] * 4
+
+
+# -- whatever comes -----------------------------------------------------------------------------
+
+RECORDS = st.fixed_dictionaries(
+    {
+        "flight_mode": st.sampled_from("01234567"),
+        "altitude": st.sampled_from(["0", "1", "5", "1000", "NaN", "inf", "-0"]),
+        "ssa_drogue_deployed": st.sampled_from("01"),
+        "ssa_main_deployed": st.sampled_from("01"),
+        "mav_open": st.sampled_from("01"),
+        "fix_type": st.sampled_from("0234"),
+        "ms_since_boot_cfc": st.sampled_from(["0", "1", "500", "5000", "60000", "4294967295"]),
+    }
+)
+
+
+def seen(computer, now):
+    """What others decide on, without the ages."""
+    one = computer.status(now, "")
+    other = computer.vehicle_state(now)
+    return (
+        *(one.state, one.armed, one.deployed, one.link_state, computer.situation(now)),
+        *(other.armed, other.landed_state, other.link_state, other.rebooted_in_flight),
+    )
+
+
+@given(st.lists(st.tuples(RECORDS | st.none(), st.floats(0, 20)), max_size=20))
+def test_the_picture_changes_by_a_record_or_at_a_deadline_and_never_between(story):
+    """Each step: a record (None: only a sign of life), and the time until the next."""
+    computer, now = FlightComputer(LIMITS), 0.0
+    for texts, pause in story:
+        if texts is None:
+            computer.alive(now)
+        else:
+            computer.heard(record(now, **texts), now)
+        computer.update(now)
+        until = now + pause
+        while (deadline := computer.next_deadline()) <= until:
+            assert deadline > now
+            assert seen(computer, math.nextafter(deadline, 0.0)) == seen(computer, now)
+            before, now = seen(computer, now), deadline
+            changes, told = computer.update(now)
+            assert told == bool(changes) or told
+            assert told or seen(computer, now) == before
+        assert seen(computer, until) == seen(computer, now)
+        now = until
