@@ -8,7 +8,8 @@ SHELL := /bin/bash
 PYTHON ?= python3
 DISTRO ?=
 DEMO_ARGS ?=
-# What the vehicle of the demo carries: mavlink, upf or both.
+# The vehicle of the demo: drone or rocket; and what a drone carries: mavlink, upf or both.
+VEHICLE ?= drone
 PARACHUTE ?= mavlink
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
@@ -25,8 +26,9 @@ LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
-demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both)
-	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo --parachute $(PARACHUTE) $(DEMO_ARGS)
+demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both; VEHICLE=rocket)
+	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo --vehicle $(VEHICLE) \
+	    --parachute $(PARACHUTE) $(DEMO_ARGS)
 
 test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh

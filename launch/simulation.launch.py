@@ -1,4 +1,4 @@
-"""One simulated vehicle: the nodes of vehicle.launch.py, an autopilot and a parachute.
+"""One simulated vehicle: the nodes of vehicle.launch.py and what they speak to.
 
 ros2 launch chute_ros simulation.launch.py namespace:=drone1 port:=14600 parachute:=upf
 
@@ -27,13 +27,18 @@ def _vehicle(context: LaunchContext) -> list:
     port = int(LaunchConfiguration("port").perform(context))
     network, air = f"udpout:127.0.0.1:{port}", f"127.0.0.1:{port + 1}"
     bus = f"mcast:0:{port + 2}"
+    terminal = f"/tmp/chute_ros_umbilical_{port}"
     parachute = LaunchConfiguration("parachute").perform(context)
-    parachutes = []
-    if parachute != "upf":
-        parachutes.append(_simulator("sim_mavlink_parachute", network, f"udpout:{air}"))
-    if parachute != "mavlink":
+    simulators = []
+    if parachute == "umbilical":
+        simulators.append(_simulator("sim_flight_computer", arguments=("--link", terminal)))
+    else:
+        simulators.append(_simulator("sim_autopilot", network, f"udpin:{air}"))
+    if parachute in ("mavlink", "both"):
+        simulators.append(_simulator("sim_mavlink_parachute", network, f"udpout:{air}"))
+    if parachute in ("upf", "both"):
         feel = ("--vehicle", f"udpout:{air}")
-        parachutes.append(_simulator("sim_upf", bus, arguments=feel))
+        simulators.append(_simulator("sim_upf", bus, arguments=feel))
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
@@ -42,10 +47,10 @@ def _vehicle(context: LaunchContext) -> list:
                 "connection": f"udpin:127.0.0.1:{port}",
                 "parachute": parachute,
                 "bus": bus,
+                "cable": f"serial:{terminal}",
             }.items(),
         ),
-        _simulator("sim_autopilot", network, f"udpin:{air}"),
-        *parachutes,
+        *simulators,
     ]
 
 
@@ -69,7 +74,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "parachute",
                 default_value="mavlink",
-                choices=["mavlink", "upf", "both"],
+                choices=["mavlink", "upf", "both", "umbilical"],
                 description="what the vehicle carries",
             ),
             DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),

@@ -2,6 +2,7 @@
 
 ros2 launch chute_ros vehicle.launch.py namespace:=drone1 connection:=udpin:0.0.0.0:14550
 ros2 launch chute_ros vehicle.launch.py namespace:=drone1 parachute:=upf bus:=socketcan:can0
+ros2 launch chute_ros vehicle.launch.py namespace:=rocket parachute:=umbilical
 """
 
 from ament_index_python.packages import get_package_share_directory
@@ -21,33 +22,31 @@ def _nodes(context: LaunchContext) -> list:
     namespace = LaunchConfiguration("namespace").perform(context)
     connection = LaunchConfiguration("connection").perform(context)
     bus = LaunchConfiguration("bus").perform(context)
+    cable = LaunchConfiguration("cable").perform(context)
+    links = {
+        "mavlink": {"mavlink_parachute": connection},
+        "upf": {"mavlink_parachute": connection, "upf_can": bus},
+        "both": {"mavlink_parachute": connection, "upf_can": bus},
+        "umbilical": {"umbilical": cable},
+    }[parachute]
     nodes = [
         Node(
             package="chute_ros",
-            executable="mavlink_parachute",
+            executable=link,
             namespace=namespace,
-            parameters=[config, *([{"connection": connection}] if connection else [])],
+            parameters=[config, *([{"connection": wire}] if wire else [])],
             output="screen",
-        ),
-        Node(
-            package="chute_ros",
-            executable="safety_supervisor",
-            namespace=namespace,
-            parameters=[config],
-            output="screen",
-        ),
-    ]
-    if parachute != "mavlink":
-        nodes.append(
-            Node(
-                package="chute_ros",
-                executable="upf_can",
-                namespace=namespace,
-                parameters=[config, *([{"connection": bus}] if bus else [])],
-                output="screen",
-            )
         )
-    return nodes
+        for link, wire in links.items()
+    ]
+    supervisor = Node(
+        package="chute_ros",
+        executable="safety_supervisor",
+        namespace=namespace,
+        parameters=[config],
+        output="screen",
+    )
+    return [*nodes, supervisor]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -58,7 +57,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "parachute",
                 default_value="mavlink",
-                choices=["mavlink", "upf", "both"],
+                choices=["mavlink", "upf", "both", "umbilical"],
                 description="what the vehicle carries",
             ),
             DeclareLaunchArgument(
@@ -75,6 +74,11 @@ def generate_launch_description() -> LaunchDescription:
                 "bus",
                 default_value="",
                 description="where the CAN bus of a UPF is; empty: as the parameter file says",
+            ),
+            DeclareLaunchArgument(
+                "cable",
+                default_value="",
+                description="serial port of an umbilical; empty: as the parameter file says",
             ),
             OpaqueFunction(function=_nodes),
         ]

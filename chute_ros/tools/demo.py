@@ -1,7 +1,8 @@
 """Executable demo: one simulated flight with the real nodes, told as it happens.
 
-The nodes and simulators run as processes of their own and speak over real UDP, CAN frames and real
-ROS. Every step is awaited with a time limit; one that does not happen ends the demo with code 1.
+The nodes and simulators run as processes of their own and speak over real UDP, CAN frames, a pty
+and real ROS. Every step is awaited with a time limit; one that does not happen ends the demo with
+code 1.
 """
 
 from __future__ import annotations
@@ -18,16 +19,24 @@ from chute_ros.tools.demo_story import fly
 from chute_ros.tools.isolation import isolated_ros
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
+from chute_ros.tools.rocket_rig import RocketRig
+from chute_ros.tools.rocket_story import RocketStory
 
 
 def main() -> None:
     """Fly; exit code 0 if every step happened."""
     options = argparse.ArgumentParser("demo", description=__doc__)
     options.add_argument(
+        "--vehicle",
+        choices=("drone", "rocket"),
+        default="drone",
+        help="a drone with an autopilot, or a rocket on its umbilical (default: drone)",
+    )
+    options.add_argument(
         "--parachute",
         choices=KINDS,
         default="mavlink",
-        help="which one the vehicle carries (default: mavlink)",
+        help="which one the drone carries (default: mavlink)",
     )
     options.add_argument("--logs", type=Path, help="keep the logs of all processes in this folder")
     options.add_argument(
@@ -40,13 +49,16 @@ def main() -> None:
         processes = Processes(folder)
         try:
             with isolated_ros() as namespace:
-                rig = Rig.on_free_ports(chosen.parachute, chosen.fault or "", namespace, processes)
                 director = Director(namespace, processes)
-                pilot = Pilot(rig.pilot, system_id=1)
+                fault = chosen.fault or ""
                 try:
-                    fly(rig, director, pilot)
+                    if chosen.vehicle == "rocket":
+                        rocket = RocketRig(fault, namespace, processes, Path(scratch))
+                        RocketStory(rocket, director).fly()
+                    else:
+                        drone = Rig.on_free_ports(chosen.parachute, fault, namespace, processes)
+                        _fly_drone(drone, director)
                 finally:
-                    pilot.close()
                     director.close()
         except KeyboardInterrupt:
             sys.exit("demo: interrupted")
@@ -54,6 +66,14 @@ def main() -> None:
             sys.exit(f"\nDEMO FAILED: {error}")
         finally:
             processes.end()
+
+
+def _fly_drone(rig: Rig, director: Director) -> None:
+    pilot = Pilot(rig.pilot, system_id=1)
+    try:
+        fly(rig, director, pilot)
+    finally:
+        pilot.close()
 
 
 if __name__ == "__main__":

@@ -123,6 +123,12 @@ class Director:
         """Call safety/deploy; the future of its answer."""
         return self._deploy.call_async(Deploy.Request(force=False, reason=reason))
 
+    def ask(self, kind: Any, service: str, **fields: Any) -> Any:
+        """Call a service of a node; the future of its answer."""
+        client = self.node.create_client(kind, service)
+        self.until(f"{service} is offered", 20.0, client.service_is_ready)
+        return client.call_async(kind.Request(**fields))
+
     # -- topics ---------------------------------------------------------------------------------
 
     def _vehicle(self, message: VehicleState) -> None:

@@ -15,15 +15,17 @@ from chute_ros.nodes.device_node import COMMON_PARAMETERS
 from chute_ros.nodes.mavlink_parameters import PARAMETERS as MAVLINK_PARAMETERS
 from chute_ros.nodes.parameters import Parameter, Value
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
+from chute_ros.nodes.umbilical_parameters import PARAMETERS as UMBILICAL_PARAMETERS
 from chute_ros.nodes.upf_parameters import PARAMETERS as UPF_PARAMETERS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
     "mavlink_parachute": (*MAVLINK_PARAMETERS, *COMMON_PARAMETERS),
     "upf_can": (*UPF_PARAMETERS, *COMMON_PARAMETERS),
+    "umbilical": (*UMBILICAL_PARAMETERS, *COMMON_PARAMETERS),
     "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
 README = Path("README.md")
-_MAVLINK, _UPF, _SUPERVISOR = NODES
+_MAVLINK, _UPF, _UMBILICAL, _SUPERVISOR = NODES
 _BOTH_LINKS = [_MAVLINK, _UPF]
 #: File -> what its vehicle carries, its nodes, and what differs from the defaults.
 CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] = {
@@ -47,6 +49,16 @@ CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] =
         {
             (_SUPERVISOR, "required_links"): _BOTH_LINKS,
             (_SUPERVISOR, "deploy_links"): _BOTH_LINKS,
+        },
+    ),
+    Path("config/umbilical_vehicle.yaml"): (
+        "a flight computer on a serial umbilical",
+        (_UMBILICAL, _SUPERVISOR),
+        {
+            (_UMBILICAL, "publish_vehicle_state"): True,
+            (_SUPERVISOR, "required_links"): [_UMBILICAL],
+            (_SUPERVISOR, "kill_links"): [_UMBILICAL],
+            (_SUPERVISOR, "deploy_links"): [_UMBILICAL],
         },
     ),
 }

@@ -12,6 +12,7 @@ from chute_ros.model import LinkState
 from chute_ros.nodes import qos
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.nodes.umbilical_node import UmbilicalNode
 
 VOLATILE, LATCHED = DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL
 STATUS, DECISION = (10, VOLATILE), (50, VOLATILE)
@@ -19,6 +20,15 @@ STATUS, DECISION = (10, VOLATILE), (50, VOLATILE)
 PUBLISHED = {
     "mavlink_parachute": {
         "parachute/status": ("ParachuteStatus", STATUS),
+        "vehicle/state": ("VehicleState", STATUS),
+        "safety/heartbeat": ("LinkHeartbeat", STATUS),
+        "safety/request": ("SafetyRequest", STATUS),
+        "safety/action": ("ActionReport", DECISION),
+        "/diagnostics": ("DiagnosticArray", STATUS),
+    },
+    "umbilical": {
+        "parachute/status": ("ParachuteStatus", STATUS),
+        "umbilical/telem": ("Telem", STATUS),
         "vehicle/state": ("VehicleState", STATUS),
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
         "safety/request": ("SafetyRequest", STATUS),
@@ -34,6 +44,10 @@ PUBLISHED = {
 }
 SUBSCRIBED = {
     "mavlink_parachute": {
+        "safety/decision": ("SafetyDecision", DECISION),
+        "safety/heartbeat": ("LinkHeartbeat", STATUS),
+    },
+    "umbilical": {
         "safety/decision": ("SafetyDecision", DECISION),
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
     },
@@ -58,6 +72,16 @@ SERVICES = {
             "get_info": "GetInfo",
         }.items()
     },
+    "umbilical": {
+        f"umbilical/{name}": f"chute_msgs/srv/{kind}"
+        for name, kind in {
+            "arm": "Arm",
+            "deploy": "Deploy",
+            "command": "UmbilicalCommand",
+            "set_target": "SetTarget",
+            "dump": "Dump",
+        }.items()
+    },
     "safety_supervisor": {
         "safety/arm": "chute_msgs/srv/Arm",
         "safety/deploy": "chute_msgs/srv/Deploy",
@@ -69,6 +93,10 @@ SERVICES = {
 ROS_TOPICS = {"/rosout", "/parameter_events"}
 NODES = {
     "mavlink_parachute": (MavlinkParachuteNode, quick()),
+    "umbilical": (
+        UmbilicalNode,
+        {"connection": "serial:/nowhere/ttyACM0", "publish_vehicle_state": True},
+    ),
     "safety_supervisor": (SafetySupervisorNode, {}),
 }
 

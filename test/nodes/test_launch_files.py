@@ -40,10 +40,13 @@ def test_there_are_launch_files_with_and_without_simulators():
 
 def started(file):
     """The executables of this package that it starts."""
-    nodes = [call["executable"] for call in calls(file, "Node")]
+    named = [call["executable"] for call in calls(file, "Node")]
     # A simulator is no ROS node; a helper of the file makes its process.
-    simulators = [call[0] for call in calls(file, "_simulator")]
-    return {ast.literal_eval(name) for name in nodes + simulators}
+    named += [call[0] for call in calls(file, "_simulator")]
+    texts = {name.strip("'") for name in named if name.startswith("'")}
+    # The nodes of the links stand in a table.
+    constants = [n.value for n in ast.walk(ast.parse(file.read_text())) if type(n) is ast.Constant]
+    return texts | (executables() & {one for one in constants if isinstance(one, str)})
 
 
 @EVERY
@@ -55,8 +58,8 @@ def test_it_starts_what_setup_installs(file):
 
 def test_both_together_start_nodes_and_simulators():
     names = set().union(*map(started, FILES))
-    assert names >= {"mavlink_parachute", "upf_can", "safety_supervisor"}
-    assert names >= {"sim_autopilot", "sim_mavlink_parachute", "sim_upf"}
+    assert names >= {"mavlink_parachute", "upf_can", "umbilical", "safety_supervisor"}
+    assert names >= {"sim_autopilot", "sim_mavlink_parachute", "sim_upf", "sim_flight_computer"}
 
 
 @EVERY
@@ -98,8 +101,8 @@ def test_the_simulation_stays_on_this_host():
 def test_the_simulators_take_the_options_that_are_given_to_them():
     options = parser("any", "", "udpin:127.0.0.1:0", "")
     known = {text for action in options._actions for text in action.option_strings}
-    # Of sim_upf alone.
-    known |= {"--vehicle"}
+    # Of sim_upf alone, and of sim_flight_computer.
+    known |= {"--vehicle", "--link"}
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
     texts = [
         node.value
@@ -132,7 +135,19 @@ class Recorded:
         return Recorded.chosen.get(self.args[0], "")
 
 
-@pytest.mark.parametrize("parachute", ["mavlink", "upf", "both"])
+#: Parachute -> what vehicle.launch.py starts for it, and simulation.launch.py beside that.
+STARTED = {
+    "mavlink": ({"mavlink_parachute"}, {"sim_autopilot", "sim_mavlink_parachute"}),
+    "upf": ({"mavlink_parachute", "upf_can"}, {"sim_autopilot", "sim_upf"}),
+    "both": (
+        {"mavlink_parachute", "upf_can"},
+        {"sim_autopilot", "sim_mavlink_parachute", "sim_upf"},
+    ),
+    "umbilical": ({"umbilical"}, {"sim_flight_computer"}),
+}
+
+
+@pytest.mark.parametrize("parachute", STARTED)
 @EVERY
 def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     file, parachute, monkeypatch
@@ -154,8 +169,9 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     function = space.get("_nodes") or space["_vehicle"]
     function(context=None)
     names = {one.options.get("executable") or one.options.get("name") for one in Recorded.made}
-    upf = {"upf_can"} if file.name.startswith("vehicle") else {"sim_upf"}
-    assert upf <= names if parachute != "mavlink" else not upf & names
+    nodes, simulators = STARTED[parachute]
+    vehicle = file.name.startswith("vehicle")
+    assert names - {None} == ({*nodes, "safety_supervisor"} if vehicle else simulators)
 
 
 @EVERY

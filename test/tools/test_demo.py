@@ -24,17 +24,19 @@ def start(*arguments):
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """(exit code, stdout, stderr, folder of the logs) of a good run and of a spoiled one."""
-    good, bad, upf, both = (
-        tmp_path_factory.mktemp(name) for name in ("good", "bad", "upf", "both")
+    good, bad, upf, both, rocket, deaf = (
+        tmp_path_factory.mktemp(name) for name in ("good", "bad", "upf", "both", "rocket", "deaf")
     )
     children = (
         start("--logs", str(good)),
         start("--logs", str(bad), "--fault", "parachute-mute"),
         start("--logs", str(upf), "--parachute", "upf"),
         start("--logs", str(both), "--parachute", "both"),
+        start("--logs", str(rocket), "--vehicle", "rocket"),
+        start("--logs", str(deaf), "--vehicle", "rocket", "--fault", "parachute-mute"),
     )
     ends = []
-    for child, folder in zip(children, (good, bad, upf, both), strict=True):
+    for child, folder in zip(children, (good, bad, upf, both, rocket, deaf), strict=True):
         out, err = child.communicate(timeout=120.0)
         ends.append((child.returncode, out, err, folder))
     return ends
@@ -107,6 +109,45 @@ def test_with_both_parachutes_the_operators_deploy_goes_to_both(runs):
     assert "mavlink_parachute DEPLOY CONFIRMED" in out
     assert "RELEASED by" in (folder / "parachute.log").read_text()
     assert "FIRED by" in (folder / "upf.log").read_text()
+
+
+def test_a_rocket_flies_to_its_landing_under_the_canopies_that_were_called_for(runs):
+    code, out, err, folder = runs[4]
+    assert code == 0, out + err
+    story = [
+        "no cable yet",
+        "launch refused",
+        "READY",
+        "Arming blocked: wipe flash first",
+        "Flash wiped successfully.",
+        "key armed",
+        "drogue refused: the drogue is not fired on the ground",
+        "needs an explicit confirmation",
+        "LAUNCH",
+        "IN_FLIGHT",
+        "burnout at",
+        "and no drogue",
+        "KILL CONFIRMED: telemetry says mav_open 0",
+        "DEPLOY CONFIRMED: telemetry says ssa_drogue_deployed 1",
+        "MAIN at",
+        "LANDED at",
+        "DEMO PASSED",
+    ]
+    places = [out.find(step) for step in story]
+    assert -1 not in places, out
+    assert places == sorted(places), "in this order"
+    logs = {file.name: file.read_text() for file in folder.iterdir()}
+    assert set(logs) == {f"{n}.log" for n in ("supervisor", "umbilical", "rocket")}
+    assert logs["rocket.log"].index("command <V>") < logs["rocket.log"].index("command <D>")
+    assert not any("Traceback" in text for text in logs.values())
+
+
+def test_a_rocket_that_takes_no_command_does_not_fly(runs):
+    code, out, err, _ = runs[5]
+    assert code == 1, out + err
+    assert "DEMO FAILED: wiping: " in err
+    assert "LAUNCH\n" not in out
+    assert "Traceback" not in err
 
 
 def test_where_a_step_cannot_happen_it_fails_loudly(runs):

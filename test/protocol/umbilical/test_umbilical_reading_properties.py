@@ -140,15 +140,13 @@ def test_no_bytes_ever_raise_or_pile_up(chunks):
 
 
 @given(STREAMS)
-def test_every_byte_of_a_dump_is_in_the_stream_in_one_piece(stream):
+def test_whatever_comes_out_stands_in_the_stream_in_one_piece_and_in_this_order(stream):
     ear = Ear()
     ear.feed(stream)
-    after = stream
+    at = 0
     for item in ear.what_came():
-        if isinstance(item, DumpBytes):
-            before, found, after = after.partition(item.data)
-            assert found
-            assert b"DUMP ---" in before
+        if isinstance(item, (Line, DumpBytes)):
+            at = stream.index(item.data, at) + len(item.data)
 
 
 @given(STREAMS)
@@ -168,11 +166,14 @@ def test_dumps_begin_and_end_in_turn(stream):
     assert not inside
 
 
-@given(STREAMS.filter(lambda data: PAD not in data and line(BY_NAME["telem50"]) not in data))
+@given(STREAMS)
 def test_exactly_the_bytes_of_a_dump_come_out_of_it(content):
     # An end mark inside is the end; what its log line begins with would belong to it.
     assume(b"--- END FLASH" not in content)
     assume(not content.endswith(b"[INFO] "))
+    # So is telemetry, and a record that was cut in its last number is whole.
+    bodies = [one.rpartition(b"$TELEM,")[2] for one in content.split(b"\n")[:-1]]
+    assume(not any(Ear().decoder.is_telemetry(one.removesuffix(b"\r")) for one in bodies))
     ear = Ear()
     ear.feed(BEGIN + content + END)
     dump = [DumpBytes(content)] if content else []
