@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import LinkState
@@ -133,3 +135,21 @@ class Liveness:
             return []
         self.since = now
         return [LinkChange(before, self.state, now, silence)]
+
+
+class Followed(Protocol):
+    """A device whose link is followed."""
+
+    @property
+    def liveness(self) -> Liveness:
+        """Its link."""
+
+
+FollowedT = TypeVar("FollowedT", bound=Followed)
+
+
+def first_alive(devices: Iterable[FollowedT]) -> FollowedT | None:
+    """The first device that is not lost, or else the first; None: there is none."""
+    known = list(devices)
+    alive = (one for one in known if one.liveness.state is not LinkState.LOST)
+    return next(alive, known[0] if known else None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from chute_ros.model import LinkState, VehicleState
+from chute_ros.model import VehicleState
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Event,
@@ -17,12 +17,12 @@ from chute_ros.protocol.events import (
     Severity,
     VehicleChanged,
 )
-from chute_ros.protocol.liveness import LinkChange
+from chute_ros.protocol.liveness import LinkChange, first_alive
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker, is_autopilot
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
-from chute_ros.protocol.mavlink.roster import DeviceT, Roster
+from chute_ros.protocol.mavlink.roster import Roster
 
 Ids = tuple[int, int]
 
@@ -44,11 +44,11 @@ class Devices:
 
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Where requests without a device go: the first that is not lost, or the first."""
-        return _first_alive(self.parachutes)
+        return first_alive(self.parachutes.all())
 
     def chosen_autopilot(self) -> AutopilotTracker | None:
         """The first autopilot of ours that is not lost, or the first."""
-        return _first_alive(self.autopilots)
+        return first_alive(self.autopilots.all())
 
     def doubts(self) -> list[str]:
         """Why it is doubtful which devices are ours."""
@@ -163,9 +163,3 @@ class Devices:
 
     def _changed(self, name: str, changes: list[LinkChange]) -> None:
         self._events += [DeviceLinkChanged(name, change) for change in changes]
-
-
-def _first_alive(roster: Roster[DeviceT]) -> DeviceT | None:
-    ours = roster.all()
-    alive = (device for device in ours if device.liveness.state is not LinkState.LOST)
-    return next(alive, ours[0] if ours else None)

@@ -10,9 +10,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from chute_ros.model import LinkState, ParachuteStatus
+from chute_ros.model import ParachuteStatus
 from chute_ros.protocol.events import DeviceLinkChanged, Event, Notice, ParachuteChanged, Severity
-from chute_ros.protocol.liveness import LinkChange
+from chute_ros.protocol.liveness import LinkChange, first_alive
 from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.protocol.upf.devices import Controller, Device, Trigger
@@ -43,11 +43,11 @@ class UpfDevices:
         """The one with this node id; 0: the first that is not lost, or the first."""
         if node_id:
             return self.controllers.get(node_id)
-        return _first_alive(self.controllers)
+        return first_alive(self.controllers.values())
 
     def trigger(self) -> Trigger | None:
         """The first that is not lost, or the first."""
-        return _first_alive(self.triggers)
+        return first_alive(self.triggers.values())
 
     def alive_triggers(self) -> list[Trigger]:
         """Those that are heard."""
@@ -205,8 +205,3 @@ def trigger_picture(trigger: Trigger, now: float) -> Mapping[str, Any]:
         "error_flags": flags if isinstance(flags, int) else 0,
         "faults": tuple(trigger.faults(now)),
     }
-
-
-def _first_alive(known: Mapping[int, DeviceT]) -> DeviceT | None:
-    alive = (one for one in known.values() if one.liveness.state is not LinkState.LOST)
-    return next(alive, next(iter(known.values()), None))

@@ -274,6 +274,27 @@ def test_telemetry_on_the_heels_of_a_cut_dump_is_whole(before):
     ]
 
 
+def test_a_dump_after_one_that_was_given_up_is_searched_from_its_first_byte():
+    ear = Ear()
+    ear.hear(BEGIN + b"-" * 20 + b"$TELEM,1,2")
+    ear.reader.end_dump()
+    assert ear.hear(BEGIN + PAD) == [*whole_dump(b"", complete=False), Line(WHOLE)]
+
+
+@pytest.mark.parametrize("size", [1, 64, 0])
+@pytest.mark.parametrize("length", [4096, 4097])
+def test_a_dump_is_searched_for_telemetry_up_to_a_length_however_it_comes(length, size):
+    zeros = length - len(line(altitude="0."))
+    data = line(altitude="0." + "0" * zeros)
+    assert len(data) == length
+    ear = Ear()
+    items = ear.hear(BEGIN + data, size)
+    if length == 4096:
+        assert items == [*whole_dump(b"", complete=False), Line(data[:-1])]
+    else:
+        assert joined([*items, *ear.reader.end_dump()]) == whole_dump(data, complete=False)
+
+
 def test_telemetry_after_the_end_mark_does_not_make_the_dump_incomplete():
     assert Ear().hear(BEGIN + CSV + END + PAD)[2] == DumpEnded(True)
 
