@@ -172,6 +172,14 @@ class DeviceNode(Node, ABC):
         """Have begin(link, token, now) called in the link's thread; the future is its end."""
         return self.desk.request(begin)
 
+    def deploy_for(self, decision: model.Decision, force: bool) -> None:
+        """Deploy for a decision, at the latest once a parachute is heard."""
+        self.desk.deploy_for(
+            decision,
+            lambda link, token, now: link.deploy(token, force, now),
+            self.values["give_up_after"],
+        )
+
     def in_link(self, function: Callable[[Any, float], None]) -> None:
         """Have function(link, now) called in the link's thread."""
         assert self.loop is not None

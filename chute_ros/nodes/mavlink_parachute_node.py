@@ -82,15 +82,10 @@ class MavlinkParachuteNode(DeviceNode):
         return RequestFinished(finished)
 
     def carry_out(self, decision: model.Decision) -> None:
-        force = self.values["deploy_arms_trigger"]
         if decision.action is model.Action.KILL:
             self.desk.request_for(decision, lambda link, token, now: link.kill(token, now))
         elif decision.action is model.Action.DEPLOY:
-            self.desk.deploy_for(
-                decision,
-                lambda link, token, now: link.deploy(token, force, now),
-                self.values["give_up_after"],
-            )
+            self.deploy_for(decision, self.values["deploy_arms_trigger"])
         elif decision.action is not model.Action.NONE:
             blocked = decision.action is model.Action.FLIGHT_BLOCK
             reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""

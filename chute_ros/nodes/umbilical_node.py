@@ -101,12 +101,7 @@ class UmbilicalNode(DeviceNode):
                 decision, lambda link, token, now: link.command(token, "safe", True, now)
             )
         elif decision.action is model.Action.DEPLOY:
-            force = self.values["decided_deploy_forces"]
-            self.desk.deploy_for(
-                decision,
-                lambda link, token, now: link.deploy(token, force, now),
-                self.values["give_up_after"],
-            )
+            self.deploy_for(decision, self.values["decided_deploy_forces"])
         elif decision.action is not model.Action.NONE:
             blocked = decision.action is model.Action.FLIGHT_BLOCK
             reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""

@@ -115,12 +115,7 @@ class UpfCanNode(DeviceNode):
 
     def carry_out(self, decision: model.Decision) -> None:
         if decision.action is model.Action.DEPLOY:
-            force = self.values["decided_deploy_forces"]
-            self.desk.deploy_for(
-                decision,
-                lambda link, token, now: link.deploy(token, force, now),
-                self.values["give_up_after"],
-            )
+            self.deploy_for(decision, self.values["decided_deploy_forces"])
         elif decision.action is model.Action.KILL:
             text = "a UPF parachute stops no motors: take upf_can out of kill_links"
             self.decisions.report(decision, model.Outcome.FAILED, text)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
-from typing import Any
 
 from chute_ros.protocol.umbilical.layouts import Layout
+from chute_ros.sim.acting import Actor, Script
 from chute_ros.sim.flight_computer_commands import NAMES, CommandReceiver
 from chute_ros.sim.flight_computer_flight import FlightProgram
 from chute_ros.sim.flight_computer_memory import Memory
@@ -30,7 +30,7 @@ _SNAPSHOT = 20
 _RECORDED = (Mode.Ascent, Mode.Coast, Mode.DrogueDeployed, Mode.MainDeployed)
 
 
-class FlightComputer:
+class FlightComputer(Actor):
     """One device. script: (s after the start, action). now: s, as the loop tells it."""
 
     def __init__(
@@ -39,6 +39,7 @@ class FlightComputer:
         layout: Layout,
         script: list[tuple[float, str]] | None = None,
     ) -> None:
+        super().__init__()
         self.settings, self.layout = settings, layout
         self.now = 0.0
         self.booted_at = math.nan
@@ -58,7 +59,7 @@ class FlightComputer:
         self.memory = Memory(settings, header, self.queue)
         self.flight = FlightProgram(settings, layout.target_floats, self._log, self._print_line)
         self.memory.on_wiped = lambda: setattr(self.flight, "may_arm", True)
-        self.actions: dict[str, Callable[[str], None]] = {
+        self.actions = {
             "mute": lambda _: setattr(self, "deaf", True),
             "unmute": lambda _: setattr(self, "deaf", False),
             "silent": lambda _: setattr(self, "silent", True),
@@ -73,8 +74,7 @@ class FlightComputer:
             "lose-dump-end": lambda _: self.memory.disturb_dump("loses-end"),
             "dump-stalls": lambda _: self.memory.disturb_dump("stalls"),
         }
-        #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
-        self.arguments: dict[str, Callable[[str], Any]] = {"jump": Mode.__getitem__}
+        self.arguments = {"jump": Mode.__getitem__}
         #: Those that are not for the flight program.
         self.commands_apart: dict[str, Callable[[], None]] = {
             "<R>": self.reboot,
@@ -85,14 +85,13 @@ class FlightComputer:
             "<G>": lambda: self.memory.begin_dump(self.now),
             "<W>": lambda: self.memory.begin_wipe(self.now),
         }
-        self._script = sorted(script or [])
+        self._script = Script(script or [])
         self._started_at = math.nan
         self._running_from = math.nan
         self._loop_at = math.nan
         self._telem_at = math.nan
         self._cycles = 0
         self._output: list[bytes] = []
-        self._events: list[str] = []
 
     # -- as the loop wants it -------------------------------------------------------------------
 
@@ -112,8 +111,8 @@ class FlightComputer:
     def update(self, now: float) -> None:
         if math.isnan(self._started_at):
             self._start(now)
-        while self._script and self._script[0][0] <= now - self._started_at:
-            self.act(self._script.pop(0)[1])
+        for action in self._script.take_due(now):
+            self.act(action)
         while self._loop_at <= now:
             self._advance(self._loop_at)
             self._loop()
@@ -129,7 +128,7 @@ class FlightComputer:
         if math.isnan(self._started_at):
             return 0.0
         return min(
-            self._script[0][0] + self._started_at if self._script else math.inf,
+            self._script.next_deadline(),
             self._loop_at,
             self._telem_at,
             self.receiver.next_deadline(),
@@ -141,10 +140,6 @@ class FlightComputer:
         """Chunks of up to 64 bytes."""
         output, self._output = self._output, []
         return output
-
-    def take_events(self) -> list[str]:
-        events, self._events = self._events, []
-        return events
 
     # -- for tests and for whoever watches ------------------------------------------------------
 
@@ -168,16 +163,6 @@ class FlightComputer:
         """It neither hears nor sends."""
         return self.now < self._running_from
 
-    def act(self, action: str) -> None:
-        """Do what --at says: "name" or "name=argument"."""
-        name, _, argument = action.partition("=")
-        self.say(f"action {action}")
-        self.actions[name](argument)
-
-    def say(self, text: str) -> None:
-        """One line for whoever watches."""
-        self._events.append(text)
-
     def reboot(self) -> None:
         """Start anew. What is out of the rocket, and what is in flash and FRAM, stays."""
         self.booted_at = self.now
@@ -200,6 +185,7 @@ class FlightComputer:
     def _start(self, now: float) -> None:
         """It was switched on before, so that it needs no time to boot."""
         self.now = self._started_at = self._loop_at = now
+        self._script.start(now)
         self.reboot()
         self._running_from = self._telem_at = now
 

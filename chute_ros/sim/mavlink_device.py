@@ -12,16 +12,16 @@ from typing import Any
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
+from chute_ros.sim.acting import Actor, Script
 
 Params = tuple[float, float, float, float, float, float, float]
-#: An action of the command line's --at: what follows "=" comes as the argument.
-ActionTable = dict[str, Callable[[str], None]]
 
 
-class MavlinkDevice:
+class MavlinkDevice(Actor):
     """A component with streams and commands. The subclass fills streams, commands and actions."""
 
     def __init__(self, system_id: int, component_id: int, script: list[tuple[float, str]]) -> None:
+        super().__init__()
         self.system_id, self.component_id = system_id, component_id
         self.now = 0.0
         self.booted_at = math.nan
@@ -39,16 +39,14 @@ class MavlinkDevice:
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
             dialect.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_message_interval,
         }
-        self.actions: ActionTable = {
+        self.actions = {
             "mute": lambda _: setattr(self, "mute", True),
             "unmute": lambda _: setattr(self, "mute", False),
             "silent": lambda _: setattr(self, "silent", True),
             "speak": lambda _: setattr(self, "silent", False),
             "reboot": lambda _: self.reboot(),
         }
-        #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
-        self.arguments: dict[str, Callable[[str], Any]] = {}
-        self._script = sorted(script)
+        self._script = Script(script)
         self._started_at = math.nan
         self._intervals: dict[int, float] = {}
         self._due: dict[int, float] = {}
@@ -57,7 +55,6 @@ class MavlinkDevice:
         self._decoders: dict[Hashable, FrameDecoder] = {}
         self._after_acknowledgement: list[Any] = []
         self._output: list[bytes] = []
-        self._events: list[str] = []
 
     # -- as the loop wants it -------------------------------------------------------------------
 
@@ -85,9 +82,9 @@ class MavlinkDevice:
         self.now = now
         if math.isnan(self._started_at):
             self._started_at = now
+            self._script.start(now)
             self.reboot()
-        while self._script and self._script[0][0] <= now - self._started_at:
-            _, action = self._script.pop(0)
+        for action in self._script.take_due(now):
             self.act(action)
         self.step(now)
         for message_id, due in list(self._due.items()):
@@ -98,16 +95,11 @@ class MavlinkDevice:
     def next_deadline(self) -> float:
         if math.isnan(self._started_at):
             return 0.0
-        script = self._script[0][0] + self._started_at if self._script else math.inf
-        return min([script, self.next_step(), *self._due.values()])
+        return min([self._script.next_deadline(), self.next_step(), *self._due.values()])
 
     def take_output(self) -> list[bytes]:
         output, self._output = self._output, []
         return output
-
-    def take_events(self) -> list[str]:
-        events, self._events = self._events, []
-        return events
 
     def sign(self, signer: Signer, verifier: Verifier) -> None:
         """From now on sign what is sent, and hear only what is signed."""
@@ -134,16 +126,6 @@ class MavlinkDevice:
         self._intervals = dict(self.default_intervals)
         self._due = {i: self.now for i, every in self._intervals.items() if every < math.inf}
         self.say("started")
-
-    def act(self, action: str) -> None:
-        """Do what --at says: "name" or "name=argument"."""
-        name, _, argument = action.partition("=")
-        self.say(f"action {action}")
-        self.actions[name](argument)
-
-    def say(self, text: str) -> None:
-        """One line for whoever watches."""
-        self._events.append(text)
 
     def boot_ms(self) -> int:
         """Time since start, ms, as uint32."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Any
 
+from chute_ros.sim.acting import Script
 from chute_ros.sim.upf_node import UpfNode
 
 
@@ -15,10 +16,9 @@ class UpfBus:
         self, nodes: list[UpfNode], script: list[tuple[float, str]] | None = None
     ) -> None:
         self.nodes = nodes
-        self._script = sorted(script or [])
-        self._started = float("nan")
+        self._script = Script(script or [])
+        self._is_started = False
         self._output: list[bytes] = []
-        self._events: list[str] = []
 
     @property
     def actions(self) -> dict[str, Callable[[str], None]]:
@@ -38,29 +38,27 @@ class UpfBus:
         pass
 
     def update(self, now: float) -> None:
-        if self._started != self._started:
-            self._started = now
+        if not self._is_started:
+            self._is_started = True
+            self._script.start(now)
             for node in self.nodes:
                 node.start(now)
-        while self._script and self._script[0][0] <= now - self._started:
-            self.act(self._script.pop(0)[1])
+        for action in self._script.take_due(now):
+            self.act(action)
         for node in self.nodes:
             node.update(now)
         self._exchange(now)
 
     def next_deadline(self) -> float:
-        script = [self._script[0][0] + self._started] if self._script else []
-        return min([*script, *(node.next_deadline() for node in self.nodes)])
+        deadlines = (node.next_deadline() for node in self.nodes)
+        return min([self._script.next_deadline(), *deadlines])
 
     def take_output(self) -> list[bytes]:
         output, self._output = self._output, []
         return output
 
     def take_events(self) -> list[str]:
-        events, self._events = self._events, []
-        for node in self.nodes:
-            events += node.take_events()
-        return events
+        return [event for node in self.nodes for event in node.take_events()]
 
     def act(self, action: str) -> None:
         """Have every node that knows the action do it."""

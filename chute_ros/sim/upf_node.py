@@ -21,6 +21,7 @@ from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.upf import errands
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.sim.acting import Actor
 from chute_ros.sim.upf_clock import BusClock
 from chute_ros.sim.upf_dna import NodeIdClient
 from chute_ros.sim.upf_memory import ParameterMemory
@@ -43,10 +44,11 @@ class NodeSettings:
         return sha256(self.name.encode()).digest()[:16]
 
 
-class UpfNode:
+class UpfNode(Actor):
     """One node. The subclass fills messages, services, broadcasts and actions."""
 
     def __init__(self, definitions: Definitions, settings: NodeSettings) -> None:
+        super().__init__(settings.name)
         self.definitions = definitions
         self.settings = settings
         self.now = 0.0
@@ -73,21 +75,18 @@ class UpfNode:
         self.broadcasts: dict[str, tuple[Callable[[], float], Callable[[], dict[str, Any]]]] = {
             NODE_STATUS: (lambda: self._interval(p.NODE_STATUS_INTERVAL), self._node_status),
         }
-        self.actions: dict[str, Callable[[str], None]] = {
+        self.actions = {
             "mute": lambda _: setattr(self, "mute", True),
             "unmute": lambda _: setattr(self, "mute", False),
             "silent": lambda _: setattr(self, "silent", True),
             "speak": lambda _: setattr(self, "silent", False),
             "reboot": lambda _: self.reboot(),
         }
-        #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
-        self.arguments: dict[str, Callable[[str], Any]] = {}
         self.calls = ServiceCalls(_CALLS)
         self.endpoint = Endpoint(definitions.types, 0)
         self.clock = BusClock()
         self._dna = NodeIdClient(settings.unique_id)
         self._due: dict[str, float] = {}
-        self._events: list[str] = []
         #: The answer to a restart, which is sent before it.
         self._last_words: list[bytes] = []
 
@@ -164,11 +163,6 @@ class UpfNode:
         self._last_words.clear()
         return [] if self.silent else frames
 
-    def take_events(self) -> list[str]:
-        """Lines for whoever watches; each is handed out once."""
-        events, self._events = self._events, []
-        return events
-
     # -- for the subclass -----------------------------------------------------------------------
 
     def step(self, now: float) -> None:
@@ -208,16 +202,6 @@ class UpfNode:
     def send_soon(self, name: str) -> None:
         """This broadcast is news."""
         self._due[name] = self.now
-
-    def act(self, action: str) -> None:
-        """Do what --at says: "name" or "name=argument"."""
-        name, _, argument = action.partition("=")
-        self.say(f"action {action}")
-        self.actions[name](argument)
-
-    def say(self, text: str) -> None:
-        """One line for whoever watches."""
-        self._events.append(f"{self.settings.name}: {text}")
 
     def switch(self, name: str) -> bool:
         """A parameter that switches something."""

@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 from typing import Any
 
-from chute_ros.errors import NotBuiltError, ParameterError
+from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.data_types import DataTypes
+from chute_ros.transport.shared_folder import shared_folder
 
 _STANDARD = "uavcan."
 
@@ -22,7 +23,11 @@ def load_data_types(folder: str, named: str) -> DataTypes:
     import dronecan
     from dronecan.dsdl import DsdlException, parse_namespaces
 
-    path = Path(folder).expanduser() if folder else _shipped()
+    path = (
+        Path(folder).expanduser()
+        if folder
+        else shared_folder("dsdl/flyfire", "the DroneCAN data types")
+    )
     # As the parser takes it: not where a link points to.
     path = Path(os.path.abspath(path))
     if not path.is_dir():
@@ -46,19 +51,3 @@ def load_data_types(folder: str, named: str) -> DataTypes:
 def _standard_folder(library: Any) -> Path:
     """Where types of the vendor find the standard ones that they are made of."""
     return Path(library.__file__).parent / "dsdl_specs" / "uavcan"
-
-
-def _shipped() -> Path:
-    # Here: who names a folder needs no ROS.
-    try:
-        from ament_index_python.packages import get_package_share_directory
-
-        folder = Path(get_package_share_directory("chute_msgs")) / "dsdl" / "flyfire"
-    except (ImportError, LookupError):
-        folder = Path()
-    if folder.name != "flyfire" or not folder.is_dir():
-        raise NotBuiltError(
-            "the DroneCAN data types cannot be found: build chute_msgs and source the result, or "
-            "name a folder that has them"
-        )
-    return folder

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import yaml
 
-from chute_ros.errors import NotBuiltError, ParameterError
+from chute_ros.errors import ParameterError
 from chute_ros.protocol.umbilical.layouts import REFERENCE_LAYOUT, Layout, layout_from
+from chute_ros.transport.shared_folder import shared_folder
 
 
 def load_layouts(folder: str, named: str) -> list[Layout]:
@@ -15,7 +16,7 @@ def load_layouts(folder: str, named: str) -> list[Layout]:
 
     ParameterError, with named for where the folder comes from, if it has none or one is wrong.
     """
-    path = Path(folder).expanduser() if folder else _shipped()
+    path = Path(folder).expanduser() if folder else shared_folder("telem", "the layouts of $TELEM")
     files = sorted(path.glob("*.yaml"))
     if not files:
         raise ParameterError(f"{named} is {folder!r}: there is no layout (*.yaml) in this folder")
@@ -32,19 +33,3 @@ def _load(file: Path) -> Layout:
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         raise ParameterError(f"{file}: cannot be read: {error}") from None
     return layout_from(content, str(file))
-
-
-def _shipped() -> Path:
-    # Here: who names a folder needs no ROS.
-    try:
-        from ament_index_python.packages import get_package_share_directory
-
-        folder = Path(get_package_share_directory("chute_msgs")) / "telem"
-    except (ImportError, LookupError):
-        folder = Path()
-    if folder.name != "telem" or not folder.is_dir():
-        raise NotBuiltError(
-            "the layouts of $TELEM cannot be found: build chute_msgs and source the result, or "
-            "name a folder that has them"
-        )
-    return folder

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 
 from chute_ros.errors import ParameterError
+from chute_ros.protocol.umbilical.fields import NUMBERS
 from chute_ros.protocol.umbilical.layouts import Layout, Problem, Record
 
 #: So many lines in a row must fit a layout before it is believed, or another one is.
@@ -48,7 +49,9 @@ class TelemetryDecoder:
             if isinstance(result, Problem):
                 problem = result
             elif self._fixed or present.is_as_expected(result) or self._fitting(body) is present:
-                self._rival, self._streak = None, 0
+                if self._rival is not None and not _fits(self._rival, body):
+                    # A line that fits both says nothing against the other.
+                    self._rival, self._streak = None, 0
                 return Record(present, result, now)
         if not self._fixed and self._recognised(self._fitting(body)):
             assert self.layout is not None
@@ -61,6 +64,8 @@ class TelemetryDecoder:
     def is_telemetry(self, body: bytes) -> bool:
         """A whole record of any layout that may come: not a part of a dump."""
         text = body.decode("ascii", errors="replace")
+        if not NUMBERS.fullmatch(text):
+            return False
         known = [self.layout] if self._fixed and self.layout else self.layouts
         return any(not isinstance(one.decode(text), Problem) for one in known)
 
@@ -126,3 +131,8 @@ class TelemetryDecoder:
             wanted = f"{self.layout.name} has {self.layout.count}" if self.layout else "none fits"
             self._notices.append(f"a $TELEM line of {count} fields: {wanted}; known are {known}")
         return True
+
+
+def _fits(layout: Layout, body: str) -> bool:
+    values = layout.decode(body)
+    return not isinstance(values, Problem) and layout.is_as_expected(values)

@@ -17,6 +17,8 @@ _F64_LIMIT = 1.7976931348623157e308
 
 _WHOLE = r"-?(?:0|[1-9][0-9]{0,9})"
 _FLOAT = r"(?:-?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]+)?|inf)|NaN)"
+#: All that a whole record is written with.
+NUMBERS = re.compile(r"[-0-9.,Nainf]*")
 _NOT_FINITE = ("NaN", "inf", "-inf")
 
 

@@ -21,7 +21,7 @@ from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.umbilical.gate import Situation
 from chute_ros.protocol.umbilical.layouts import Record
-from chute_ros.protocol.umbilical.modes import IN_FLIGHT, FlightMode
+from chute_ros.protocol.umbilical.modes import GROUND, IN_FLIGHT, FlightMode
 
 #: Who it is on the link; there is one at the end of a cable.
 DEVICE = "flight_computer"
@@ -45,32 +45,32 @@ class FlightComputer:
         self.restarted_in_flight = False
         self._clock = BootClock()
         self._limits = limits
-        self._was_in_flight = False
+        #: In the air, as far as its records have told.
+        self._flying = False
         self._rest_altitude = NAN
         self._rest_since = NAN
+        self._was_deployed = False
         self._was_fresh = False
 
     # -- what comes ------------------------------------------------------------------------------
 
     def heard(self, record: Record, now: float) -> tuple[list[LinkChange], Age]:
         """A record came: (what changed of the link, what its clock says)."""
-        age = self._clock.observe(int(record["ms_since_boot_cfc"]))
+        # A clock of 0 is one that has just started here, not one that is missing.
+        age = self._clock.observe(max(1, int(record["ms_since_boot_cfc"])))
         if age in (Age.OLD, Age.DOUBTFUL):
             return [], age
         if age is Age.RESTARTED:
             self.restarts += 1
-            self.restarted_in_flight = self._was_in_flight and not self.landed
-            self._was_in_flight = False
+            self.restarted_in_flight = self._flying
+            # Its altitude may count from elsewhere now.
+            self._rest_altitude = NAN
         if self.record is not None:
             self.interval = now - self.record.received
         self.record = record
         self.records += 1
-        mode = self.mode
-        if mode in IN_FLIGHT:
-            self._was_in_flight = True
-        elif mode is not FlightMode.FAULT:
-            self._was_in_flight = False
         self._watch_rest(record, now)
+        self._watch_flight()
         return self.liveness.heard(now), age
 
     def alive(self, now: float) -> list[LinkChange]:
@@ -105,18 +105,17 @@ class FlightComputer:
     def situation(self, now: float) -> Situation:
         """The gate's column."""
         mode = self.mode
-        if mode is None or not self.fresh(now):
+        if not self.fresh(now):
             return Situation.UNKNOWN
-        if mode is FlightMode.FAULT and self._was_in_flight:
-            return Situation.FAULT_IN_FLIGHT
-        return _SITUATIONS[mode]
+        if self._flying and mode not in IN_FLIGHT:
+            return Situation.LOST_IN_FLIGHT
+        return Situation.UNKNOWN if mode is None else _SITUATIONS[mode]
 
     @property
     def landed(self) -> bool:
         """After a deployment its altitude does not change any more, by its records: silence is
         no rest."""
-        rested = NAN if self.record is None else self.record.received - self._rest_since
-        return self.deployed and rested >= _REST_TIME
+        return self.deployed and self._at_rest
 
     @property
     def deployed(self) -> bool:
@@ -173,7 +172,7 @@ class FlightComputer:
             acceleration_age=_age(age, acceleration),
             latitude=record.number("latitude") if has_fix else NAN,
             longitude=record.number("longitude") if has_fix else NAN,
-            position_age=age if has_fix else NAN,
+            position_age=_age(age, record.number("latitude")) if has_fix else NAN,
             uptime=self._clock.uptime,
             reboot_count=self.restarts,
             rebooted_in_flight=self.restarted_in_flight,
@@ -183,8 +182,22 @@ class FlightComputer:
 
     def _watch_rest(self, record: Record, now: float) -> None:
         altitude = record.number("altitude")
-        if not abs(altitude - self._rest_altitude) <= _REST_HEIGHT:
+        deployed, self._was_deployed = self.deployed and not self._was_deployed, self.deployed
+        if deployed or not abs(altitude - self._rest_altitude) <= _REST_HEIGHT:
             self._rest_altitude, self._rest_since = altitude, now
+
+    def _watch_flight(self) -> None:
+        """Whether it flies: a ground mode after a restart in the air, and a mode without a name or
+        a fault, say nothing of it until its altitude stays."""
+        if self.mode in IN_FLIGHT:
+            self._flying = not self.landed
+        elif self._at_rest or (self.mode in GROUND and not self.restarted_in_flight):
+            self._flying = False
+
+    @property
+    def _at_rest(self) -> bool:
+        """Its altitude has not changed for a while, by its records: silence is no rest."""
+        return self.record is not None and self.record.received - self._rest_since >= _REST_TIME
 
     def _motors(self) -> Armed:
         """Whether the motor may burn: the key is armed on the ground, or the MAV is open."""
@@ -195,10 +208,10 @@ class FlightComputer:
         return Armed.ARMED if may_burn else Armed.DISARMED
 
     def _landed_state(self) -> LandedState:
-        if self.mode in (FlightMode.STARTUP, FlightMode.STANDBY) or self.landed:
-            return LandedState.ON_GROUND
-        if self.mode in IN_FLIGHT or (self.mode is FlightMode.FAULT and self._was_in_flight):
+        if self._flying:
             return LandedState.IN_AIR
+        if self.mode in GROUND or self.landed:
+            return LandedState.ON_GROUND
         return LandedState.UNKNOWN
 
     def _faults(self, now: float, pause: str) -> list[str]:
@@ -216,7 +229,7 @@ class FlightComputer:
         for name in ("altitude", "pressure"):
             if not math.isfinite(self.record.number(name)):
                 faults.append(f"{name} is {self.record.number(name)}")
-        if self.restarted_in_flight:
+        if self.restarted_in_flight and self._flying:
             faults.append("it restarted in flight")
         return faults
 

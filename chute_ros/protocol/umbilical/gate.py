@@ -25,7 +25,7 @@ class Situation(enum.Enum):
     DROGUE_DEPLOYED = "DrogueDeployed"
     MAIN_DEPLOYED = "MainDeployed"
     FAULT = "Fault"
-    FAULT_IN_FLIGHT = "Fault, after it was seen in flight"
+    LOST_IN_FLIGHT = "lost in flight: a fault, a restart or an unknown mode since"
     UNKNOWN = "not known: no fresh telemetry"
 
 
@@ -38,18 +38,10 @@ class Verdict(enum.Enum):
     NEVER = "never sent"
 
 
-GROUND = (Situation.STARTUP, Situation.STANDBY)
-FLIGHT = (
-    Situation.ASCENT,
-    Situation.COAST,
-    Situation.DROGUE_DEPLOYED,
-    Situation.MAIN_DEPLOYED,
-    Situation.FAULT_IN_FLIGHT,
-)
 _A, _F, _C, _N = Verdict.ALLOWED, Verdict.FORCE, Verdict.CONFIRM, Verdict.NEVER
 
 #: In the order of Situation:
-#: Startup, Standby, Ascent, Coast, Drogue, Main, Fault, Fault in flight, unknown.
+#: Startup, Standby, Ascent, Coast, Drogue, Main, Fault, lost in flight, unknown.
 _ROWS: dict[str, tuple[Verdict, ...]] = {
     "heartbeat": (_A, _A, _A, _A, _A, _A, _A, _A, _A),
     "launch": (_N, _C, _N, _N, _N, _N, _N, _N, _N),

@@ -26,6 +26,8 @@ NEEDED = (
     "ssa_main_deployed",
     "ms_since_boot_cfc",
 )
+#: Those of them that are whole numbers.
+_WHOLE = tuple(name for name in NEEDED if name != "altitude")
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,9 @@ def layout_from(content: Mapping[str, Any], where: str) -> Layout:
     missing = [name for name in (*NEEDED, *layout.target_fields) if name not in layout.index]
     if missing:
         raise ParameterError(f"{where}: the layout lacks {', '.join(missing)}")
+    broken = [name for name in _WHOLE if not layout.fields[layout.index[name]].kind.is_whole]
+    if broken:
+        raise ParameterError(f"{where}: {', '.join(broken)} must be of a whole number's type")
     if len(layout.index) != layout.count:
         raise ParameterError(f"{where}: a field is named twice")
     if layout.target_floats not in (2, 4):

@@ -25,6 +25,8 @@ class FlightMode(enum.IntEnum):
         return self.name.title().replace("_", "")
 
 
+#: On the ground by the flight computer's own word.
+GROUND = (FlightMode.STARTUP, FlightMode.STANDBY)
 #: In the air by the flight computer's own word.
 IN_FLIGHT = (
     FlightMode.ASCENT,

@@ -12,8 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.protocol.events import Severity
+from chute_ros.protocol.umbilical.fields import NUMBERS
+from chute_ros.protocol.umbilical.stream import CUT_LINE
 
-CUT_LINE = "cut line"
 UNKNOWN_LINE = "unknown line"
 
 
@@ -92,6 +93,8 @@ Saying = (
     | StrayMark
 )
 
+#: What a long work or an answer depends on.
+_VITAL = (FlashUsage, WipeBegan, WipeProgress, WipeEnded, ArmingBlocked)
 _LEVELS = {
     "ERROR": Severity.ERROR,
     "WARN": Severity.WARNING,
@@ -99,13 +102,14 @@ _LEVELS = {
     "DEBUG": Severity.INFO,
     "TRACE": Severity.INFO,
 }
+_LOG = re.compile(r"\[(ERROR|WARN|INFO|DEBUG|TRACE)\] (.*)$")
 #: How a line that is known begins, and what it is. What fits first counts.
 _KNOWN: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Saying]], ...] = (
     (
-        re.compile(r"\[(ERROR|WARN|INFO|DEBUG|TRACE)\] (.*)$"),
+        _LOG,
         lambda m: LogLine(_LEVELS[m[1]], m[2]),
     ),
-    (re.compile(r"(?:SNAP seq=|Snapshot: |FRAM).*$"), lambda m: MemoryText(m[0])),
+    (re.compile(r"(?:SNAP seq=|Snapshot: |(?<! )FRAM).*$"), lambda m: MemoryText(m[0])),
     (
         re.compile(r"Flash: ([0-9]{1,9})/([0-9]{1,9}) KB used \([0-9.]+%\)$"),
         lambda m: FlashUsage(int(m[1]), int(m[2])),
@@ -121,8 +125,6 @@ _KNOWN: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Saying]], ...] = 
     (re.compile(r"--- (?:BEGIN|END) FLASH (?:CSV|BINARY) DUMP ---$"), lambda m: StrayMark()),
 )
 _TELEM = "$TELEM,"
-#: All that a whole record is written with.
-_NUMBERS = re.compile(r"[-0-9.,Nainf]*")
 
 
 def recognise(line: bytes) -> tuple[Saying | None, str]:
@@ -132,9 +134,11 @@ def recognise(line: bytes) -> tuple[Saying | None, str]:
     if start >= 0:
         rest = text[start + len(_TELEM) :]
         # A cut record with another line on its heels is that line.
-        said = None if _NUMBERS.fullmatch(rest) else _known(rest)[0]
+        said = None if NUMBERS.fullmatch(rest) else _known(rest)[0]
         if said is not None:
             return said, CUT_LINE
+        if not NUMBERS.fullmatch(rest) and _LOG.match(text):
+            return _known(text)  # it only speaks of telemetry
         return Telemetry(rest), CUT_LINE if start else ""
     return _known(text)
 
@@ -147,7 +151,11 @@ def _known(text: str) -> tuple[Saying | None, str]:
     ]
     if not found:
         return None, UNKNOWN_LINE if text else ""
-    start, _, said = min(found, key=lambda one: one[:2])
+    # On the heels of a cut log line, what matters must not pass for its text; an echo of it in the
+    # log follows the level directly.
+    vital = [one for one in found if isinstance(one[2], _VITAL)]
+    on_heels = [one for one in vital if not text[: one[0]].endswith("] ")]
+    start, _, said = min(on_heels or found, key=lambda one: one[:2])
     return _printable(said), CUT_LINE if start else ""
 
 

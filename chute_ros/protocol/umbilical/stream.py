@@ -26,6 +26,7 @@ _END_LONGEST = len(b"[INFO] --- END FLASH BINARY DUMP ---")
 _TELEM_LINE = re.compile(rb"\$TELEM,([^\n]*)\n")
 
 TOO_LONG = "line too long"
+CUT_LINE = "cut line"
 
 
 class DumpFormat(enum.Enum):
@@ -113,7 +114,7 @@ class StreamReader:
             items.append(Line(line))
             return bool(rest)
         if begin.start():
-            items.append(Line(line[: begin.start()]))
+            self._counts[CUT_LINE] += 1
         self.dumping, self._searched = True, 0
         items.append(DumpBegan(DumpFormat(begin[1].decode().lower())))
         return True

@@ -279,3 +279,13 @@ def test_what_is_no_telemetry(data):
 def test_one_layout_alone_is_enough():
     alone = TelemetryDecoder([Layout("mine", LAYOUT.fields, 2, ())], "", Counter())
     assert [alone.decode(GOOD, 1.0) is not None for _ in range(4)] == [False, False, True, True]
+
+
+def test_a_fraction_that_touches_zero_and_one_is_recognised_all_the_same():
+    """Given 0 on the pad, which fits both, when the brakes then move, then few are lost."""
+    ear = knowing(STATE, airbrake_state="0")
+    moving = [body(BY_NAME[DEPLOYMENT], airbrake_deployment=v) for v in ("0.3", "0.3", "1")]
+    heard = ear.hear(*moving * 4)
+    assert ear.layout == DEPLOYMENT
+    assert heard.count(DEPLOYMENT) == 9, "after the third that fits no other"
+    assert ear.counts == {f"fits {DEPLOYMENT}, not {STATE}": 2}

@@ -6,6 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from umbilical_lines import BY_NAME, body, record
+from umbilical_rocket import (
+    ASCENT,
+    COAST,
+    DROGUE,
+    FAULT,
+    LIMITS,
+    MAIN,
+    STANDBY,
+    STARTUP,
+    Rocket,
+    status,
+    vehicle,
+)
 
 from chute_ros.model import (
     Armed,
@@ -17,51 +30,10 @@ from chute_ros.model import (
     VehicleState,
 )
 from chute_ros.protocol.boot_clock import Age
-from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.protocol.umbilical.flight_computer import FlightComputer
 from chute_ros.protocol.umbilical.gate import Situation
 from chute_ros.protocol.umbilical.layouts import Layout, Record
 from chute_ros.protocol.umbilical.modes import FlightMode
-
-STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
-LIMITS = LivenessLimits(3.0, 15.0)
-ON_PAD = {"ssa_drogue_deployed": "0", "ssa_main_deployed": "0", "fix_type": "3"}
-
-
-class Rocket:
-    """A flight computer that started 100 s before time 0."""
-
-    def __init__(self):
-        self.computer = FlightComputer(LIMITS)
-        self.started = -100.0
-
-    def says(self, at, mode, **texts):
-        """A record; what changed of the link, and what its clock says."""
-        clock = {"ms_since_boot_cfc": str(round((at - self.started) * 1000))}
-        texts = {**ON_PAD, **clock, "flight_mode": str(mode), **texts}
-        came = self.computer.heard(record(at, **texts), at)
-        self.computer.update(at)
-        return came
-
-    def descends(self, start, seconds, mode=DROGUE, height=2000.0, speed=20.0):
-        """Ten records a second; the time of the last one."""
-        at = start
-        for step in range(round(seconds * 10) + 1):
-            at = start + step / 10
-            self.says(at, mode, altitude=f"{height - speed * step / 10:.3f}")
-        return at
-
-    def restarts(self, at):
-        self.started = at - 0.5
-
-
-def status(rocket, at, pause=""):
-    return rocket.computer.status(at, pause)
-
-
-def vehicle(rocket, at):
-    return rocket.computer.vehicle_state(at)
-
 
 # -- by mode ------------------------------------------------------------------------------------
 
@@ -130,7 +102,7 @@ def test_a_fault_that_follows_a_flight_is_one_in_flight():
     rocket.says(0.0, ASCENT)
     rocket.says(0.1, FAULT)
     rocket.says(0.2, FAULT)
-    assert rocket.computer.situation(0.2) is Situation.FAULT_IN_FLIGHT
+    assert rocket.computer.situation(0.2) is Situation.LOST_IN_FLIGHT
     assert vehicle(rocket, 0.2).landed_state is LandedState.IN_AIR
     rocket.says(0.3, STANDBY)
     rocket.says(0.4, FAULT)
@@ -267,74 +239,6 @@ def test_an_altitude_that_is_none_never_rests(altitude):
     for second in range(20, 27):
         rocket.says(float(second), MAIN, altitude="5")
     assert rocket.computer.landed
-
-
-# -- restart ------------------------------------------------------------------------------------
-
-
-def test_a_restart_is_believed_at_the_second_record_that_shows_it():
-    rocket = Rocket()
-    rocket.says(0.0, STANDBY, altitude="1")
-    rocket.restarts(1.0)
-    assert rocket.says(1.0, STARTUP, altitude="2") == ([], Age.DOUBTFUL)
-    assert rocket.computer.mode is FlightMode.STANDBY
-    assert rocket.says(1.1, STARTUP, altitude="3") == ([], Age.RESTARTED)
-    seen = vehicle(rocket, 1.1)
-    assert (seen.reboot_count, seen.rebooted_in_flight) == (1, False)
-    assert (seen.uptime, seen.height) == (0.6, 3.0)
-    assert status(rocket, 1.1).state is _READY
-
-
-@pytest.mark.parametrize("mode", [ASCENT, COAST, DROGUE, MAIN])
-def test_a_restart_in_flight_is_told_until_the_next_one_on_the_ground(mode):
-    rocket = Rocket()
-    rocket.says(0.0, mode)
-    rocket.restarts(1.0)
-    rocket.says(1.0, STARTUP)
-    rocket.says(1.1, STARTUP)
-    assert vehicle(rocket, 1.1).rebooted_in_flight
-    assert status(rocket, 1.1).state is ParachuteState.ABNORMAL
-    assert status(rocket, 1.1).faults == ("it restarted in flight",)
-    rocket.says(60.0, STARTUP)
-    rocket.restarts(70.0)
-    rocket.says(70.0, STARTUP)
-    rocket.says(70.1, STARTUP)
-    assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (2, False)
-
-
-def test_a_restart_in_flight_is_one_after_a_long_silence_too():
-    rocket = Rocket()
-    end = rocket.descends(0.0, 10.0)
-    rocket.restarts(end + 30.0)
-    rocket.says(end + 30.0, STARTUP)
-    rocket.says(end + 30.1, STARTUP)
-    assert rocket.computer.restarted_in_flight
-
-
-def test_a_restart_after_the_landing_is_not_in_flight():
-    rocket = Rocket()
-    end = rocket.descends(0.0, 6.0, MAIN, 10.0, 0.0)
-    rocket.restarts(end + 1.0)
-    rocket.says(end + 1.0, STARTUP)
-    rocket.says(end + 1.1, STARTUP)
-    assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (1, False)
-
-
-def test_a_record_that_is_older_than_the_one_before_changes_nothing():
-    rocket = Rocket()
-    rocket.says(0.0, ASCENT, altitude="100")
-    old = {"ms_since_boot_cfc": "99900", "altitude": "90"}
-    assert rocket.says(0.1, STANDBY, **old) == ([], Age.OLD)
-    assert (rocket.computer.mode, rocket.computer.records) == (FlightMode.ASCENT, 1)
-    assert vehicle(rocket, 0.1).height == 100.0
-    assert not rocket.computer.fresh(3.0)
-
-
-def test_a_clock_that_wraps_is_no_restart():
-    rocket = Rocket()
-    rocket.says(0.0, STANDBY, ms_since_boot_cfc="4294967295")
-    assert rocket.says(0.1, STANDBY, ms_since_boot_cfc="50") == ([], Age.NEW)
-    assert rocket.computer.restarts == 0
 
 
 # -- the values ---------------------------------------------------------------------------------

@@ -74,7 +74,7 @@ def test_a_record_that_was_cut_is_counted_and_what_is_on_its_heels_is_said(line,
     assert recognise(WHOLE[:cut] + line) == (said, CUT_LINE)
 
 
-@pytest.mark.parametrize("cut", [1, 10, 13, 20])
+@pytest.mark.parametrize("cut", [1, 10, 13, 19])
 @pytest.mark.parametrize("first", [b"Wipe progress: 3/56 sectors", b"Wiping QSPI Flash... Please"])
 @pytest.mark.parametrize(("line", "said"), KNOWN_STORIES)
 def test_so_is_what_follows_another_cut_line(line, said, first, cut):
@@ -154,3 +154,28 @@ def test_the_first_level_counts_where_a_log_line_quotes_another():
         LogLine(Severity.WARNING, "said: [ERROR] no"),
         "",
     )
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"Flash wiped successfully.",
+        b"ERASE FAILED!",
+        b"ERASE TIMEOUT!",
+        b"Wipe progress: 3/56 sectors",
+        b"Arming blocked: wipe flash first",
+        b"Flash: 1024/14336 KB used (7.1%)",
+    ],
+)
+def test_what_matters_is_not_lost_on_the_heels_of_a_cut_log_line(line):
+    assert recognise(b"[INFO] Refere" + line) == (recognise(line)[0], CUT_LINE)
+    echo, reason = recognise(b"[INFO] " + line)
+    assert isinstance(echo, LogLine)
+    assert reason == ""
+
+
+def test_a_log_line_that_speaks_of_telemetry_or_of_the_fram_is_a_log_line():
+    for text in ("$TELEM,1,2 sent", "UMBILICAL CMD: Dump FRAM", "Snapshot ring reset."):
+        said, reason = recognise(f"[DEBUG] {text}".encode())
+        assert (said, reason) == (LogLine(Severity.INFO, text), "")
+    assert recognise(b"Unknown command FRAM?") == (None, UNKNOWN_LINE)

@@ -1,0 +1,59 @@
+"""What every simulated device does on demand: actions by name, at set times, told in lines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+#: Name -> what it does; what follows "=" comes as the argument.
+ActionTable = dict[str, Callable[[str], None]]
+
+
+class Actor:
+    """Has actions and says what happens. name: before each line, empty: nothing."""
+
+    def __init__(self, name: str = "") -> None:
+        self.actions: ActionTable = {}
+        #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
+        self.arguments: dict[str, Callable[[str], Any]] = {}
+        self._prefix = f"{name}: " if name else ""
+        self._said: list[str] = []
+
+    def act(self, action: str) -> None:
+        """Do what --at says: "name" or "name=argument"."""
+        name, _, argument = action.partition("=")
+        self.say(f"action {action}")
+        self.actions[name](argument)
+
+    def say(self, text: str) -> None:
+        """One line for whoever watches."""
+        self._said.append(self._prefix + text)
+
+    def take_events(self) -> list[str]:
+        """The lines since the last call."""
+        said, self._said = self._said, []
+        return said
+
+
+class Script:
+    """The entries of --at: (s after the start, action)."""
+
+    def __init__(self, entries: list[tuple[float, str]]) -> None:
+        self._entries = sorted(entries)
+        self._started = math.nan
+
+    def start(self, now: float) -> None:
+        """The times count from here."""
+        self._started = now
+
+    def take_due(self, now: float) -> list[str]:
+        """The actions whose time has come; each is handed out once."""
+        due = []
+        while self._entries and self._entries[0][0] <= now - self._started:
+            due.append(self._entries.pop(0)[1])
+        return due
+
+    def next_deadline(self) -> float:
+        """When the next one is due; infinity: never."""
+        return self._entries[0][0] + self._started if self._entries else math.inf

@@ -1,0 +1,163 @@
+"""A flight computer that restarts, fails or says nonsense in flight: it is still in the air."""
+
+import pytest
+from umbilical_rocket import (
+    ASCENT,
+    COAST,
+    DROGUE,
+    FAULT,
+    MAIN,
+    STANDBY,
+    STARTUP,
+    Rocket,
+    status,
+    vehicle,
+)
+
+from chute_ros.model import LandedState, ParachuteState
+from chute_ros.protocol.boot_clock import Age
+from chute_ros.protocol.umbilical.gate import Situation
+from chute_ros.protocol.umbilical.modes import FlightMode
+
+# -- restart ------------------------------------------------------------------------------------
+
+
+def test_a_restart_is_believed_at_the_second_record_that_shows_it():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY, altitude="1")
+    rocket.restarts(1.0)
+    assert rocket.says(1.0, STARTUP, altitude="2") == ([], Age.DOUBTFUL)
+    assert rocket.computer.mode is FlightMode.STANDBY
+    assert rocket.says(1.1, STARTUP, altitude="3") == ([], Age.RESTARTED)
+    seen = vehicle(rocket, 1.1)
+    assert (seen.reboot_count, seen.rebooted_in_flight) == (1, False)
+    assert (seen.uptime, seen.height) == (0.6, 3.0)
+    assert status(rocket, 1.1).state is ParachuteState.READY
+
+
+@pytest.mark.parametrize("mode", [ASCENT, COAST, DROGUE, MAIN])
+def test_a_restart_in_flight_is_told_until_the_next_one_on_the_ground(mode):
+    rocket = Rocket()
+    rocket.says(0.0, mode)
+    rocket.restarts(1.0)
+    rocket.says(1.0, STARTUP)
+    rocket.says(1.1, STARTUP)
+    assert vehicle(rocket, 1.1).rebooted_in_flight
+    assert status(rocket, 1.1).state is ParachuteState.ABNORMAL
+    assert status(rocket, 1.1).faults == ("it restarted in flight",)
+    rocket.says(60.0, STARTUP)
+    rocket.restarts(70.0)
+    rocket.says(70.0, STARTUP)
+    rocket.says(70.1, STARTUP)
+    assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (2, False)
+
+
+def test_a_restart_in_flight_is_one_after_a_long_silence_too():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 10.0)
+    rocket.restarts(end + 30.0)
+    rocket.says(end + 30.0, STARTUP)
+    rocket.says(end + 30.1, STARTUP)
+    assert rocket.computer.restarted_in_flight
+
+
+def test_a_restart_after_the_landing_is_not_in_flight():
+    rocket = Rocket()
+    end = rocket.descends(0.0, 6.0, MAIN, 10.0, 0.0)
+    rocket.restarts(end + 1.0)
+    rocket.says(end + 1.0, STARTUP)
+    rocket.says(end + 1.1, STARTUP)
+    assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (1, False)
+
+
+def test_a_record_that_is_older_than_the_one_before_changes_nothing():
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT, altitude="100")
+    old = {"ms_since_boot_cfc": "99900", "altitude": "90"}
+    assert rocket.says(0.1, STANDBY, **old) == ([], Age.OLD)
+    assert (rocket.computer.mode, rocket.computer.records) == (FlightMode.ASCENT, 1)
+    assert vehicle(rocket, 0.1).height == 100.0
+    assert not rocket.computer.fresh(3.0)
+
+
+def test_a_clock_that_wraps_is_no_restart():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY, ms_since_boot_cfc="4294967295")
+    assert rocket.says(0.1, STANDBY, ms_since_boot_cfc="50") == ([], Age.NEW)
+    assert rocket.computer.restarts == 0
+
+
+# -- and what it says after that is no word on whether it flies ------------------------------
+
+
+def restarted_in_flight():
+    """In Startup again, in the middle of its flight; the time."""
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT, altitude="800")
+    rocket.restarts(1.0)
+    rocket.says(1.0, STARTUP, altitude="900")
+    rocket.says(1.1, STARTUP, altitude="910")
+    return rocket, 1.1
+
+
+@pytest.mark.parametrize("mode", [STARTUP, STANDBY, FAULT, 9])
+def test_after_a_restart_in_flight_no_mode_means_ground(mode):
+    rocket, now = restarted_in_flight()
+    rocket.descends(now, 4.0, mode=mode, height=900.0)
+    now += 4.0
+    assert rocket.computer.situation(now) is Situation.LOST_IN_FLIGHT
+    assert vehicle(rocket, now).landed_state is LandedState.IN_AIR
+    assert "it restarted in flight" in status(rocket, now).faults
+    assert status(rocket, now).state is ParachuteState.ABNORMAL
+
+
+def test_it_is_on_the_ground_again_once_its_altitude_stays():
+    rocket, now = restarted_in_flight()
+    rocket.descends(now, 10.0, mode=STARTUP, height=300.0, speed=30.0)
+    rocket.descends(now + 10.0, 5.0, mode=STARTUP, height=0.0, speed=0.0)
+    now += 15.0
+    assert rocket.computer.situation(now) is Situation.STARTUP
+    assert vehicle(rocket, now).landed_state is LandedState.ON_GROUND
+    assert vehicle(rocket, now).rebooted_in_flight, "which stays known"
+    assert status(rocket, now).faults == ()
+
+
+def test_a_clock_that_starts_at_zero_is_a_restart_as_well():
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT)
+    for at, clock in ((1.0, 0), (1.07, 70), (1.17, 170)):
+        rocket.says(at, STARTUP, ms_since_boot_cfc=str(clock), altitude=f"{900 + 100 * at}")
+    assert rocket.computer.restarted_in_flight
+    assert rocket.computer.situation(1.17) is Situation.LOST_IN_FLIGHT
+
+
+def test_a_mode_without_a_name_does_not_make_it_forget_the_flight():
+    rocket = Rocket()
+    rocket.says(0.0, COAST, altitude="2000")
+    rocket.says(0.1, 9, altitude="2010")
+    assert rocket.computer.situation(0.1) is Situation.LOST_IN_FLIGHT
+    rocket.says(0.2, FAULT, altitude="2020")
+    assert rocket.computer.situation(0.2) is Situation.LOST_IN_FLIGHT
+
+
+def test_a_fault_on_the_pad_after_a_launch_that_did_not_lift_is_none_in_flight():
+    rocket = Rocket()
+    rocket.descends(0.0, 6.0, mode=ASCENT, height=0.0, speed=0.0)
+    rocket.says(6.1, FAULT, altitude="0")
+    assert rocket.computer.situation(6.1) is Situation.FAULT
+
+
+def test_a_fault_that_falls_to_the_ground_rests_there():
+    rocket = Rocket()
+    rocket.says(0.0, COAST, altitude="2000")
+    rocket.descends(0.1, 5.0, mode=FAULT, height=500.0, speed=100.0)
+    assert rocket.computer.situation(5.1) is Situation.LOST_IN_FLIGHT
+    rocket.descends(5.2, 5.0, mode=FAULT, height=0.0, speed=0.0)
+    assert rocket.computer.situation(10.2) is Situation.FAULT
+
+
+def test_rest_is_counted_from_the_deployment_on():
+    rocket = Rocket()
+    rocket.descends(0.0, 20.0, mode=COAST, height=2000.0, speed=0.0)
+    rocket.descends(20.1, 1.0, mode=DROGUE, height=2000.0, speed=0.0)
+    assert vehicle(rocket, 21.1).landed_state is LandedState.IN_AIR

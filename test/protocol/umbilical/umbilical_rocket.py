@@ -1,0 +1,45 @@
+"""A flight computer that speaks record by record, for the stories of its picture."""
+
+from umbilical_lines import record
+
+from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.protocol.umbilical.flight_computer import FlightComputer
+
+STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
+LIMITS = LivenessLimits(3.0, 15.0)
+ON_PAD = {"ssa_drogue_deployed": "0", "ssa_main_deployed": "0", "fix_type": "3"}
+
+
+class Rocket:
+    """A flight computer that started 100 s before time 0."""
+
+    def __init__(self):
+        self.computer = FlightComputer(LIMITS)
+        self.started = -100.0
+
+    def says(self, at, mode, **texts):
+        """A record; what changed of the link, and what its clock says."""
+        clock = {"ms_since_boot_cfc": str(round((at - self.started) * 1000))}
+        texts = {**ON_PAD, **clock, "flight_mode": str(mode), **texts}
+        came = self.computer.heard(record(at, **texts), at)
+        self.computer.update(at)
+        return came
+
+    def descends(self, start, seconds, mode=DROGUE, height=2000.0, speed=20.0):
+        """Ten records a second; the time of the last one."""
+        at = start
+        for step in range(round(seconds * 10) + 1):
+            at = start + step / 10
+            self.says(at, mode, altitude=f"{height - speed * step / 10:.3f}")
+        return at
+
+    def restarts(self, at):
+        self.started = at - 0.5
+
+
+def status(rocket, at, pause=""):
+    return rocket.computer.status(at, pause)
+
+
+def vehicle(rocket, at):
+    return rocket.computer.vehicle_state(at)
