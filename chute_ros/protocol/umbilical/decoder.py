@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 
 from chute_ros.errors import ParameterError
+from chute_ros.protocol.events import Notice, Severity
 from chute_ros.protocol.umbilical.fields import NUMBERS
 from chute_ros.protocol.umbilical.layouts import Layout, Problem, Record
 
@@ -38,7 +39,7 @@ class TelemetryDecoder:
         self._rival: Layout | None = None
         self._streak = 0
         self._told: set[int] = set()
-        self._notices: list[str] = []
+        self._notices: list[Notice] = []
 
     def decode(self, body: str, now: float) -> Record | None:
         """The record in a line's body; None: it is counted under its reason."""
@@ -69,7 +70,7 @@ class TelemetryDecoder:
         known = [self.layout] if self._fixed and self.layout else self.layouts
         return any(not isinstance(one.decode(text), Problem) for one in known)
 
-    def take_notices(self) -> list[str]:
+    def take_notices(self) -> list[Notice]:
         """What a person should read; each is handed out once."""
         notices, self._notices = self._notices, []
         return notices
@@ -96,10 +97,12 @@ class TelemetryDecoder:
             return False
         before, self.layout = self.layout, fitting
         self._rival, self._streak = None, 0
-        self._notices.append(
-            f"telemetry has layout {fitting.name} ({fitting.count} fields)"
-            + (f", no longer {before.name}" if before is not None else "")
-        )
+        text = f"telemetry has layout {fitting.name} ({fitting.count} fields)"
+        if before is None:
+            self._notices.append(Notice(Severity.INFO, text))
+        else:
+            text = f"{text}, no longer {before.name}"
+            self._notices.append(Notice(Severity.WARNING, text))
         return True
 
     def _count(self, body: str, problem: Problem | None) -> None:
@@ -129,7 +132,8 @@ class TelemetryDecoder:
             self._told.add(count)
             known = ", ".join(f"{one.name} ({one.count} fields)" for one in self.layouts)
             wanted = f"{self.layout.name} has {self.layout.count}" if self.layout else "none fits"
-            self._notices.append(f"a $TELEM line of {count} fields: {wanted}; known are {known}")
+            text = f"a $TELEM line of {count} fields: {wanted}; known are {known}"
+            self._notices.append(Notice(Severity.WARNING, text))
         return True
 
 

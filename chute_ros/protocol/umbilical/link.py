@@ -118,8 +118,8 @@ class UmbilicalLink:
 
     def take_events(self) -> list[UmbilicalEvent]:
         """What happened, oldest first; each is handed out once."""
-        notices = [Notice(Severity.WARNING, text) for text in self.decoder.take_notices()]
-        happened = [*self._events, *notices, *self.orders.take_notices()]
+        notices = [*self.decoder.take_notices(), *self.orders.take_notices()]
+        happened = [*self._events, *notices]
         self._events = []
         return [*happened, *self.memory.take_events(), *self._requests.take_events()]
 

@@ -231,6 +231,11 @@ MISTAKES = {
     "target fields that do not exist": (spoilt(target_fields=["a", "b"]), "lacks a, b"),
     "one target field": (spoilt(target_fields=["temp"]), "as many as target_floats"),
     "no target fields at all": (spoilt(target_fields=None), "no layout of"),
+    "a clock that may be no number": (
+        field("ms_since_boot_cfc", type="f32"),
+        "ms_since_boot_cfc must be of a whole number's type",
+    ),
+    "a mode that may be no number": (field("flight_mode", type="f64"), "flight_mode must be"),
     "limits that are none": (field("airbrake_state", expected=[]), "no layout of"),
     "half the limits": (field("airbrake_state", expected=[0]), "no layout of"),
     "limits in words": (field("airbrake_state", expected=["low", "high"]), "no layout of"),
