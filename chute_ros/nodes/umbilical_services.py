@@ -45,8 +45,9 @@ class UmbilicalServices:
 
     async def _set_target(self, request: Any, response: Any) -> Any:
         values = [request.latitude, request.longitude, request.third, request.fourth]
-        while len(values) > 2 and math.isnan(values[-1]):
-            values.pop()
+        # What is left out of a request is 0, and no point of the sea off Africa.
+        if all(math.isnan(value) or value == 0.0 for value in values[2:]):
+            del values[2:]
         end = await self._node.request(
             lambda link, token, now: link.set_target(token, tuple(values), now)
         )

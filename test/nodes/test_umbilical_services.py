@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from chute_msgs.msg import ActionReport, SafetyDecision, Telem
-from chute_msgs.srv import Dump
+from chute_msgs.srv import Dump, SetTarget
 from node_bench import stamped
 from umbilical_bench import PATIENT, RATE, Cable
 
@@ -168,6 +168,19 @@ def test_set_target_with_two_floats(cable):
     assert one.blims_target_lon_deg == pytest.approx(-76.4878, abs=1e-5)
 
 
+def test_set_target_without_a_word_of_the_other_two(cable):
+    answer = cable.bench.call(SetTarget, "umbilical/set_target", latitude=42.5, longitude=-76.5)
+    assert answer.confirmed, answer.message
+
+
+def test_a_firmware_of_four_floats_takes_no_two(bench):
+    cable = Cable(bench, sends="telem54", **PATIENT)
+    cable.plugged()
+    answer = cable.set_target(42.5, -76.5)
+    assert not answer.sent
+    assert "takes 4 floats (two points), not 2" in answer.message
+
+
 def test_set_target_with_four_floats(bench):
     cable = Cable(bench, sends="telem54", **PATIENT)
     cable.plugged()
@@ -185,7 +198,7 @@ def test_set_target_with_four_floats(bench):
         ((float("nan"), 1.0), "latitude nan is out of range"),
         ((1.0, float("inf")), "longitude inf is out of range"),
         ((1.0, 2.0, 3.0, 4.0), "takes 2 floats (latitude and longitude), not 4"),
-        ((1.0, 2.0, 3.0), "takes 2 floats (latitude and longitude), not 3"),
+        ((1.0, 2.0, 3.0), "takes 2 floats (latitude and longitude), not 4"),
     ],
 )
 def test_a_target_that_cannot_be_is_refused(cable, target, why):
