@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
@@ -31,6 +30,7 @@ from rclpy.task import Future
 from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.decision_carrier import DecisionCarrier
+from chute_ros.nodes.inbox import Inbox
 from chute_ros.nodes.link_log import log_event
 from chute_ros.nodes.parameters import Parameter, declare
 from chute_ros.nodes.request_desk import CallFailed, RequestDesk
@@ -41,6 +41,7 @@ from chute_ros.protocol.events import (
     ParachuteChanged,
     RequestFinished,
     RequestReport,
+    VehicleChanged,
 )
 from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
 
@@ -71,6 +72,9 @@ class Summary:
 class DeviceNode(Node, ABC):
     """Base of the nodes that speak to a device. The subclass makes self.loop and calls begin."""
 
+    #: Events that may be left out where the executor does not keep up.
+    PICTURES: tuple[type, ...] = (ParachuteChanged, VehicleChanged)
+
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
         super().__init__(name, **options)
         self.loop: WireLoop[Any] | None = None
@@ -85,8 +89,8 @@ class DeviceNode(Node, ABC):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         # A service that awaits the device must not keep the other callbacks from running.
         self._service_group = ReentrantCallbackGroup()
-        self._inbox: deque[Any] = deque()
-        self._guard = self.create_guard_condition(self._drain)
+        guard = self.create_guard_condition(self._drain)
+        self._inbox = Inbox(self._take, guard.trigger, self.PICTURES)
         self.desk = RequestDesk(self.in_link, self.deliver, self.decisions.report)
         #: The newest picture of each device.
         self.statuses: dict[str, model.ParachuteStatus] = {}
@@ -219,30 +223,26 @@ class DeviceNode(Node, ABC):
 
     def deliver(self, events: list[Any]) -> None:
         """In the link's thread: hand events to the executor."""
-        self._inbox.extend(events)
-        self._guard.trigger()
+        self._inbox.put(events)
 
     def _drain(self) -> None:
-        # What comes meanwhile waits for its turn: a flood must not keep decisions from theirs.
-        for _ in range(len(self._inbox)):
-            event = self._inbox.popleft()
-            if isinstance(event, Summary):
-                self._publish_heartbeat(event)
-            elif isinstance(event, WireChange):
-                self.wire_text = event.text
-                log = self.get_logger()
-                log.info(event.text) if event.is_open else log.warning(event.text)
-            elif isinstance(event, LoopFault):
-                self._loop_faults += 1
-                self.get_logger().error(event.text, throttle_duration_sec=1.0)
-            elif isinstance(event, CallFailed):
-                self.desk.report(event.token, model.Outcome.FAILED, event.text)
-                self.desk.finished(event.token, self.failed_end(event.token, event.text))
-            else:
-                self._event(event)
+        self._inbox.drain()
 
-        if self._inbox:
-            self._guard.trigger()
+    def _take(self, event: Any) -> None:
+        if isinstance(event, Summary):
+            self._publish_heartbeat(event)
+        elif isinstance(event, WireChange):
+            self.wire_text = event.text
+            log = self.get_logger()
+            log.info(event.text) if event.is_open else log.warning(event.text)
+        elif isinstance(event, LoopFault):
+            self._loop_faults += 1
+            self.get_logger().error(event.text, throttle_duration_sec=1.0)
+        elif isinstance(event, CallFailed):
+            self.desk.report(event.token, model.Outcome.FAILED, event.text)
+            self.desk.finished(event.token, self.failed_end(event.token, event.text))
+        else:
+            self._event(event)
 
     def _event(self, event: Any) -> None:
         if isinstance(event, ParachuteChanged):
@@ -309,6 +309,9 @@ class DeviceNode(Node, ABC):
             statuses.append(diagnostics.status(name, "link", diagnostics.ERROR, text, {}, ""))
         if summary is not None:
             statuses += self.diagnose(summary)
-        faults = {"exceptions in the link's thread": self._loop_faults}
+        faults = {
+            "exceptions in the link's thread": self._loop_faults,
+            "pictures left out, as the executor did not keep up": self._inbox.left_out,
+        }
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
         self._diagnostics_publisher.publish(diagnostics.array(self.stamp(), statuses))

@@ -37,6 +37,8 @@ from chute_ros.transport.wire import make_wire
 class UmbilicalNode(DeviceNode):
     """The node umbilical."""
 
+    PICTURES = (*DeviceNode.PICTURES, events.TelemetryReceived, LogLine)
+
     def __init__(self, **options: Any) -> None:
         super().__init__("umbilical", PARAMETERS, **options)
         address = parse_serial_address(self.values["connection"])

@@ -149,6 +149,11 @@ class EffectLoop(Generic[CommandT]):
         """Nothing more will come of it."""
         return self.phase in ENDED
 
+    @property
+    def is_sent(self) -> bool:
+        """Its command left at least once."""
+        return self._sends > 0
+
     def command_sent(self, command: CommandT, now: float) -> None:
         """One of the goal's commands went out (it may have waited for its turn)."""
         if command != self.goal.commands[-1]:

@@ -111,6 +111,11 @@ class Requests(Generic[TransactionsT]):
     def __contains__(self, token: int) -> bool:
         return token in self._running
 
+    def not_sent_yet(self, token: int) -> bool:
+        """It is under way, but nothing of it has left."""
+        running = self._running.get(token)
+        return running is not None and not running.loop.is_sent
+
     def under_way(self, name: str) -> bool:
         """A goal with this name has not ended yet."""
         return any(running.loop.goal.name == name for running in self._running.values())

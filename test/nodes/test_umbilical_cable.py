@@ -138,6 +138,37 @@ class Noise:
         return []
 
 
+class Flood(Noise):
+    """A device that sends whole records and log lines as fast as the port takes them."""
+
+    def __init__(self, layout):
+        super().__init__(None)
+        self._layout = layout
+        self._sent = 0
+
+    def take_output(self):
+        self._sent += 1
+        values = ["0"] * self._layout.count
+        values[self._layout.index["ms_since_boot_cfc"]] = str(self._sent)
+        line = f"$TELEM,{','.join(values)}\n[WARN] again and again\n".encode()
+        return [line] * 20
+
+
+def test_a_device_that_floods_keeps_neither_heartbeat_nor_commands_from_their_turn(bench):
+    cable = Cable(bench, **PATIENT)
+    flood = Flood(cable.computer.layout)
+    loop = WireLoop(flood, PtyWire(str(cable.path)), lambda events: None)
+    loop.start()
+    bench.loops.append(loop)
+    computer = cable.node.loop.link.computer
+    bench.until(lambda: computer.records > 5000, "thousands of records have come")
+    cable.heartbeats.clear()
+    bench.until(lambda: len(cable.heartbeats) >= 5, "it beats meanwhile")
+    assert cable.heartbeats[-1].link_state == LinkState.OK
+    answer = cable.command("launch", force=True)
+    assert "flight mode Startup" in answer.message, "and it answers"
+
+
 def test_lines_that_are_cut_and_garbage_in_between_cost_only_themselves(bench):
     settings = FlightComputerSettings(rate=100.0, cut=0.2, garbage=0.2, seed=5)
     cable = Cable(bench, settings, **PATIENT)

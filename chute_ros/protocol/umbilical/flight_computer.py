@@ -50,6 +50,7 @@ class FlightComputer:
         self._rest_altitude = NAN
         self._rest_since = NAN
         self._was_deployed = False
+        self._paused = False
         self._was_fresh = False
 
     # -- what comes ------------------------------------------------------------------------------
@@ -77,9 +78,14 @@ class FlightComputer:
         """It is heard, though a long work keeps it from sending telemetry."""
         return self.liveness.heard(now) if self.record is not None else []
 
-    def update(self, now: float) -> tuple[list[LinkChange], bool]:
-        """Look at the clock: (what changed of the link, whether the picture changed)."""
-        changes = self.liveness.update(now)
+    def update(self, now: float, paused: bool = False) -> tuple[list[LinkChange], bool]:
+        """Look at the clock: (what changed of the link, whether the picture changed).
+
+        paused: a long work with a limit of its own keeps it from sending: its silence says nothing
+        of the link.
+        """
+        self._paused = paused
+        changes = [] if paused else self.liveness.update(now)
         was_fresh, self._was_fresh = self._was_fresh, self.fresh(now)
         return changes, bool(changes) or was_fresh != self._was_fresh
 
@@ -88,7 +94,7 @@ class FlightComputer:
         stale_at = math.inf
         if self.record is not None and self._was_fresh:
             stale_at = self.record.received + self._limits.stale_after
-        return min(self.liveness.next_deadline(), stale_at)
+        return stale_at if self._paused else min(self.liveness.next_deadline(), stale_at)
 
     # -- what it is ------------------------------------------------------------------------------
 

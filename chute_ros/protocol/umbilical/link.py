@@ -99,10 +99,12 @@ class UmbilicalLink:
         self._now = now
         if self.memory.update(now):
             self._end_dump(self.memory.silent())
-        changes, picture_changed = self.computer.update(now)
+        changes, picture_changed = self.computer.update(now, bool(self.memory.pause))
         self._changed(changes)
         if picture_changed:
             self._tell_picture(now)
+        if self.orders.judge_again(now):
+            self._drive(now)  # what is not allowed any more is taken out before its turn comes
         self._requests.update(now)
         self._drive(now)
 
@@ -228,6 +230,7 @@ class UmbilicalLink:
         self._changed(changes)
         self._events.append(TelemetryReceived(record, self.computer.records))
         self._tell_picture(now)
+        self.orders.judge_again(now)
         self._requests.effects_may_show(now)
 
     def _tell_picture(self, now: float) -> None:

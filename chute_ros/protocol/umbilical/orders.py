@@ -45,6 +45,8 @@ class Orders:
         self._key_disarmed = False
         self._flash_usage_at = -math.inf
         self._notices: list[Notice] = []
+        #: What waits for its turn on the wire: request -> (command, force).
+        self._waiting: dict[int, tuple[str, bool]] = {}
 
     # -- orders ----------------------------------------------------------------------------------
 
@@ -118,6 +120,18 @@ class Orders:
         """It does not arm."""
         self._end(("key_arm",), f"the flight computer says: {text}", now)
 
+    def judge_again(self, now: float) -> bool:
+        """Telemetry or the clock moved on: what has not left yet must still be allowed; whether
+        something is not."""
+        refused = False
+        for token, (name, force) in list(self._waiting.items()):
+            if not self._requests.not_sent_yet(token):
+                del self._waiting[token]
+            elif refusal := gate.rule(name, self._computer.situation(now), force).refusal:
+                self._requests.abandon(token, refusal, now)
+                refused = True
+        return refused
+
     def take_notices(self) -> list[Notice]:
         """What a person should read; each is handed out once."""
         notices, self._notices = self._notices, []
@@ -147,6 +161,9 @@ class Orders:
         shown, text = self._shown(kind, even_if_shown, now)
         goal = commands.goal_of(kind, shown, text, even_if_shown)
         self._requests.begin(token, goal, now)
+        if name not in commands.URGENT:
+            # Those were wanted when they were allowed, and may have to wait for the cable.
+            self._waiting[token] = (name, force)
 
     def _standing_refusal(self, name: str) -> str:
         """Why this command is refused whatever the flight mode; empty: it is not."""

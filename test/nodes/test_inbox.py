@@ -1,0 +1,52 @@
+"""Events from a link's thread to the executor: in order, none but pictures ever left out."""
+
+from __future__ import annotations
+
+from chute_ros.nodes.inbox import MOST_WAITING, Inbox
+
+
+class Picture:
+    """The next one tells the same."""
+
+
+class Executor:
+    """Fetches when it is told to."""
+
+    def __init__(self):
+        self.taken, self.wakes = [], 0
+        self.inbox = Inbox(self.taken.append, self._wake, (Picture,))
+
+    def _wake(self):
+        self.wakes += 1
+
+
+def test_what_is_put_in_is_taken_out_in_order():
+    executor = Executor()
+    executor.inbox.put([1, 2])
+    executor.inbox.put([3])
+    assert executor.wakes == 2
+    executor.inbox.drain()
+    assert executor.taken == [1, 2, 3]
+    assert executor.wakes == 2, "nothing is left"
+
+
+def test_what_comes_while_it_is_drained_waits_for_its_turn():
+    executor = Executor()
+    inbox = Inbox(lambda event: inbox.put([event + 1]), executor._wake, ())
+    inbox.put([1])
+    inbox.drain()
+    assert executor.wakes == 3, "put, put meanwhile, and once more for what is left"
+
+
+def test_an_executor_that_does_not_keep_up_loses_pictures_and_nothing_else():
+    executor = Executor()
+    for _ in range(MOST_WAITING + 1):
+        executor.inbox.put([Picture()])
+    executor.inbox.put([Picture(), "the end of a request", Picture()])
+    assert executor.inbox.left_out == 2
+    executor.inbox.drain()
+    assert len(executor.taken) == MOST_WAITING + 2
+    assert executor.taken[-1] == "the end of a request"
+    executor.inbox.put([Picture()])
+    executor.inbox.drain()
+    assert isinstance(executor.taken[-1], Picture), "and then they come again"
