@@ -11,7 +11,7 @@ from chute_ros.protocol.umbilical.sayings import LogLine
 
 @dataclass(frozen=True)
 class TelemetryReceived:
-    """A record. sequence: 1 or more; uptime: of the flight computer, s."""
+    """A record. sequence: counts them from 1."""
 
     record: Record
     sequence: int
