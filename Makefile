@@ -34,7 +34,7 @@ test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kil
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
 
 bench: build ## measure against bare scripts, write docs/bench.md
-	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench.kill_switch $(BENCH_ARGS)
+	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
 
 build: ## build both packages
 	@$(UNDERLAY) && exec scripts/build.sh

@@ -1,1 +1,1 @@
-"""What can be measured: each file is a command that prints and writes its own table."""
+"""What can be measured: each part is a command that prints its own tables; bench itself is all."""

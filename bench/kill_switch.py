@@ -2,28 +2,27 @@
 
 Our three processes (upf_can, safety_supervisor, mavlink_parachute) beside a bare relay that does
 the same between the same two sockets without ROS, and beside that relay cut into three with our
-topics between. Rounds take turns, in one run. Writes docs/bench.md.
+topics between. Rounds take turns, in one run.
 """
 
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from bench.report import load, machine, summary, table
+from bench.command import at_least, run, with_children
+from bench.report import load, summary, table
 from bench.wire_ends import Round, RoundFailedError, WireEnds, WrongOrderError
-from chute_ros.errors import ChuteError
 from chute_ros.protocol.upf.definitions import Definitions
-from chute_ros.tools.isolation import free_udp_ports, isolated_ros
+from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.processes import Processes
 from chute_ros.transport.data_types import load_data_types
+
+HEADING = "Kill switch"
 
 OURS, ROS, BARE = "chute_ros", "ROS alone", "bare relay"
 #: Each peer rests so long between its rounds at least, s: for the supervisor the kill of the last
@@ -46,34 +45,23 @@ class Peer:
     missed: int = 0
 
 
-def main() -> None:
-    """Measure, print, write."""
-    options = argparse.ArgumentParser("bench.kill_switch", description=__doc__)
-    options.add_argument("--requests", type=int, default=200, help="to each peer (default: 200)")
-    options.add_argument("--output", type=Path, default=Path("docs/bench.md"))
-    chosen = options.parse_args()
-    if chosen.requests < 2:
-        options.error("--requests: need 2 or more")
-    if not chosen.output.parent.is_dir():
-        options.error(f"--output: there is no folder {chosen.output.parent}")
-    # The children must end however this ends.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("bench: terminated"))
+def add_options(options: argparse.ArgumentParser) -> None:
+    """How much is measured."""
+    options.add_argument(
+        "--requests",
+        type=at_least(int, 2),
+        default=200,
+        help="kill switches, to each peer (default: 200)",
+    )
+
+
+def section(chosen: argparse.Namespace) -> str:
+    """Measure; the section without its heading."""
     before = load()
-    with tempfile.TemporaryDirectory(prefix="chute_ros_bench_") as folder:
-        processes = Processes(Path(folder))
-        try:
-            with isolated_ros() as namespace:
-                peers = _measure(namespace, processes, chosen.requests)
-        except KeyboardInterrupt:
-            sys.exit("bench: interrupted")
-        except (ChuteError, OSError) as error:
-            logs = "\n".join(processes.tail(name) for name in processes.names())
-            sys.exit(f"bench failed: {error}\n{logs}")
-        finally:
-            processes.end()
-    text = report(peers, before)
-    chosen.output.write_text(text)
-    print(text)
+    peers = with_children(
+        lambda namespace, children: _measure(namespace, children, chosen.requests)
+    )
+    return report(peers, before)
 
 
 def _measure(namespace: str, processes: Processes, count: int) -> list[Peer]:
@@ -185,7 +173,7 @@ def _await_ready(peer: Peer, peers: list[Peer], processes: Processes) -> None:
 
 
 def report(peers: list[Peer], before: str) -> str:
-    """The file docs/bench.md. before: the load of the machine when it began."""
+    """The section without its heading. before: the load of the machine when it began."""
     rows = []
     for what, times in (
         ("to the kill on MAVLink", {p.name: [r.kill for r in p.rounds] for p in peers}),
@@ -209,11 +197,7 @@ def report(peers: list[Peer], before: str) -> str:
     count = len(peers[0].rounds) + peers[0].missed
     kills = ", ".join(f"{peer.name} {peer.ends.kills}" for peer in peers)
     return (
-        "# Measured\n\n"
-        "Written by `make bench`. The numbers belong to the machine that made them:\n"
-        f"{machine()}.\n"
-        f"Load before the run: {before} (of the last minute).\n\n"
-        "## Kill switch\n\n"
+        f"{before}\n\n"
         "A UPF controller asks for TYPE_KILLSWITCH on the CAN bus (UDP multicast); the kill\n"
         "(MAV_CMD_DO_FLIGHTTERMINATION) arrives at the autopilot, which acknowledges it and\n"
         "whose heartbeat then says motors off; SUCCESS arrives at the controller. chute_ros: the\n"
@@ -227,4 +211,4 @@ def report(peers: list[Peer], before: str) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run("bench.kill_switch", __doc__ or "", [sys.modules[__name__]])

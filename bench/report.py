@@ -31,8 +31,19 @@ def machine() -> str:
 
 
 def load() -> str:
-    """How busy the machine was in the last minute: to be asked before a measurement."""
-    return f"{os.getloadavg()[0]:.1f}"
+    """How busy the machine was in the last minute, as a line: to be asked before a measurement."""
+    return f"Load before the run: {os.getloadavg()[0]:.1f} (of the last minute)."
+
+
+def document(sections: Sequence[tuple[str, str]]) -> str:
+    """The whole file, of (heading, text); what follows under the same heading goes on with it."""
+    said = "Written by `make bench`. The numbers belong to the machine that made them:"
+    parts = [f"# Measured\n\n{said}\n{machine()}.\n"]
+    before = ""
+    for heading, text in sections:
+        parts.append(text if heading == before else f"## {heading}\n\n{text}")
+        before = heading
+    return "\n".join(parts)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

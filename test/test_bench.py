@@ -11,68 +11,166 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-COMMAND = [sys.executable, "-m", "bench.kill_switch"]
+KILL_SWITCH, DECODING, TELEMETRY = (
+    "bench.kill_switch",
+    "bench.umbilical_decoding",
+    "bench.umbilical_telemetry",
+)
+FEW = ("--requests", "5", "--batches", "3", "--seconds", "0.5", "--top-rate", "100")
 PEERS = ("chute_ros", "ROS alone", "bare relay")
 HOPS = ("to the kill on MAVLink", "to the answer on the bus")
-NUMBER = r"(\d+\.\d+)"
-ROW = re.compile(
-    rf"^\| (to the [a-zA-Z ]+): ([a-zA-Z_ ]+) \| {NUMBER} ms \| {NUMBER} ms \| {NUMBER} ms "
-    rf"\| {NUMBER} \| {NUMBER} \| (\d+) \|$",
-    re.MULTILINE,
+LAYOUTS = (
+    "telem57_airbrake_state",
+    "telem50",
+    "telem52",
+    "telem54",
+    "telem57_airbrake_deployment",
 )
+DECODERS = ("chute_ros, whole link", "chute_ros, decoder", "bare split and float")
+ENDS = ("chute_ros", "bare script")
+RATES = ("at 13 lines/s", "at 100 lines/s")
+ROW = re.compile(r"^\| ([^|:]+): ([^|]+) \| (.+) \|$", re.MULTILINE)
 
 
 def rows(text):
-    return {(m[1], m[2]): tuple(map(float, m.groups()[2:])) for m in ROW.finditer(text)}
+    """(what, peer) -> the other cells."""
+    return {(m[1], m[2]): m[3].split(" | ") for m in ROW.finditer(text)}
 
 
-def check(text):
-    """The whole file is of the form that the command writes; how many requests it is of."""
+def number(cell, unit=""):
+    assert re.fullmatch(rf"\d+(\.\d+)?{unit}", cell), cell
+    return float(cell.removesuffix(unit))
+
+
+def parts(text):
+    """Each table with what stands before it."""
+    found = re.split(r"(?<=\|)\n\n?(?!\|)", text)
+    return [part for part in found if "\n|" in part]
+
+
+def check_times(table, unit, base):
+    """Median, 99th percentile, largest, two ratios, missed."""
+    for (_, peer), cells in table.items():
+        median, late, largest = (number(cell, unit) for cell in cells[:3])
+        assert 0.0 < median <= late <= largest
+        ratios = [number(cell) for cell in cells[3:5]]
+        assert all(ratio > 0.0 for ratio in ratios)
+        assert peer != base or ratios == [1.0, 1.0]
+        assert len(cells) == 6
+        number(cells[5])
+
+
+def check_kill_switch(text):
+    """The section is of the form that the command writes; how many requests it is of."""
     measured = rows(text)
     assert set(measured) == {(hop, peer) for hop in HOPS for peer in PEERS}
     assert text.count("\n|") == len(measured) + 2, "no other rows"
-    for (_, peer), (median, late, largest, *ratios, _missed) in measured.items():
-        assert 0.0 < median <= late <= largest
-        assert all(ratio > 0.0 for ratio in ratios)
-        if peer == "bare relay":
-            assert ratios == [1.0, 1.0]
+    check_times(measured, " ms", "bare relay")
     for peer in PEERS:
-        assert measured[HOPS[0], peer][0] <= measured[HOPS[1], peer][0], "first the kill"
-    assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+; ROS 2 \w+\.$", text, re.M)
-    assert re.search(r"^Load before the run: \d+\.\d ", text, re.M)
+        to_kill, to_answer = (number(measured[hop, peer][0], " ms") for hop in HOPS)
+        assert to_kill <= to_answer, "first the kill"
     assert re.search(
         r"Kills that came: chute_ros \d+, ROS alone \d+, bare relay \d+\.$", text, re.M
     )
     return int(re.search(r"^(\d+) requests to each, taking turns, in one run", text, re.M)[1])
 
 
-def test_it_measures_both_hops_of_all_peers(tmp_path):
-    output = tmp_path / "bench.md"
+def check_decoding(text):
+    """The same; how many batches it is of."""
+    measured = rows(text)
+    assert set(measured) == {(layout, peer) for layout in LAYOUTS for peer in DECODERS}
+    assert text.count("\n|") == len(measured) + 2, "no other rows"
+    check_times(measured, " us", "bare split and float")
+    return int(re.search(r"^(\d+) batches of 100 lines to each, taking turns", text, re.M)[1])
+
+
+def check_telemetry(text):
+    """The same; how many lines at the real rate it is of."""
+    latency, cpu, highest = parts(text)
+    assert set(rows(latency)) == {(RATES[0], peer) for peer in ENDS}
+    check_times(rows(latency), " ms", "bare script")
+    assert set(rows(cpu)) == {(rate, peer) for rate in RATES for peer in ENDS}
+    for share, ratio in rows(cpu).values():
+        number(share, " %")
+        assert ratio == "-" or number(ratio) > 0.0
+    assert set(rows(highest)) == {("without loss", peer) for peer in ENDS}
+    for rate, ratio, share, above in rows(highest).values():
+        assert rate == "-" or number(rate, " lines/s") >= 50.0
+        assert ratio == "-" or number(ratio) > 0.0
+        assert share == "-" or number(share, " %") >= 0.0
+        assert above == "-" or re.match(r"\d+ of \d+ at \d+/s", above)
+    return int(re.search(r"at 13 lines/s (\d+) lines to each\.$", text, re.M)[1])
+
+
+def sections(text):
+    """The whole file is of the form that the command writes: its three sections."""
+    heading = re.compile(r"^##+ (?:Kill switch|Decoding a line|Through the node)$", re.M)
+    head, *found = heading.split(text)
+    assert len(found) == 3
+    assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+; ROS 2 \w+\.$", head, re.M)
+    assert found[0].rstrip().endswith("## Umbilical telemetry")
+    assert text.count("## Umbilical telemetry") == 1
+    for section in found:
+        assert re.match(r"\n\nLoad before the run: \d+\.\d ", section)
+    return [section.replace("## Umbilical telemetry\n", "") for section in found]
+
+
+def bench(module, *arguments):
     done = subprocess.run(
-        [*COMMAND, "--requests", "5", "--output", str(output)],
+        [sys.executable, "-m", module, *arguments],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
-        timeout=150.0,
+        timeout=240.0,
     )
     assert done.returncode == 0, done.stderr
-    assert check(output.read_text()) == 5
+    return done
+
+
+def test_all_parts_are_measured_in_one_run(tmp_path):
+    output = tmp_path / "bench.md"
+    done = bench("bench", *FEW, "--output", str(output))
+    kill_switch, decoding, telemetry = sections(output.read_text())
+    assert check_kill_switch(kill_switch) == 5
+    assert check_decoding(decoding) == 3
+    assert check_telemetry(telemetry) == 6 * 6
     assert output.read_text() in done.stdout, "it prints what it writes"
-    assert "5 of 5 rounds" in done.stderr, "it says how far it is"
+    for said in ("5 of 5 rounds", "5 of 5 layouts", "6 of 6 turns"):
+        assert said in done.stderr, "it says how far it is"
+
+
+def test_a_part_alone_writes_nothing_but_where_it_is_told_to(tmp_path):
+    before = (ROOT / "docs" / "bench.md").read_text()
+    done = bench(DECODING, "--batches", "2")
+    assert check_decoding(done.stdout.rstrip()) == 2
+    assert (ROOT / "docs" / "bench.md").read_text() == before
 
 
 def test_what_is_in_docs_is_what_the_command_writes():
     text = (ROOT / "docs" / "bench.md").read_text()
+    kill_switch, decoding, telemetry = sections(text)
     # Of fewer the 99th percentile would be the largest.
-    assert check(text) >= 200
+    assert check_kill_switch(kill_switch) >= 200
+    assert check_decoding(decoding) >= 100
+    assert check_telemetry(telemetry) >= 200
     # All but the numbers and the machine's line is the command's own text.
     program = (
-        "from types import SimpleNamespace\n"
-        "from bench.kill_switch import BARE, OURS, ROS, Peer, report\n"
+        "from types import SimpleNamespace as Some\n"
+        "from bench import kill_switch as k, umbilical_decoding as d, umbilical_telemetry as t\n"
+        "from bench.report import document, load\n"
+        "from bench.umbilical_ends import Step\n"
         "from bench.wire_ends import Round\n"
-        "ends, rounds = SimpleNamespace(kills=0), [Round(1.0, 2.0)]\n"
-        "print(report([Peer(name, ends, rounds) for name in (OURS, ROS, BARE)], '0.0'), end='')\n"
+        "names = (k.OURS, k.ROS, k.BARE)\n"
+        "peers = [k.Peer(name, Some(kills=0), [Round(1.0, 2.0)]) for name in names]\n"
+        "times = {name: d.Times([1.0]) for name in (d.LINK, d.DECODER, d.BARE)}\n"
+        f"measured = dict.fromkeys({LAYOUTS}, times)\n"
+        "step = Step(13.0, 1, [1.0], 0.1)\n"
+        "ends = [t.Peer(n, None, t.Search(1.0, step, step)) for n in (t.OURS, t.BARE)]\n"
+        "[turns.append(step) for end in ends for turns in end.turns.values()]\n"
+        "print(document([(k.HEADING, k.report(peers, load())),\n"
+        "    (d.HEADING, d.report(measured, load())),\n"
+        "    (t.HEADING, t.report(ends, 4.0, load()))]), end='')\n"
     )
     made = subprocess.run(
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
@@ -83,14 +181,51 @@ def test_what_is_in_docs_is_what_the_command_writes():
 def words(text):
     """A report without what differs from run to run: the machine's line and all numbers."""
     lines = [line for line in text.splitlines() if " cores; Linux " not in line]
-    return re.sub(r"\d+(\.\d+)?", "N", "\n".join(lines))
+    text = "\n".join(lines).replace(" (the writer did not reach it)", "")
+    return re.sub(r"\d+(\.\d+)?", "N", text)
+
+
+def test_the_bare_script_publishes_what_the_node_publishes():
+    program = (
+        "from contextlib import ExitStack\n"
+        "from bench.command import with_children\n"
+        "from bench.umbilical_telemetry import start_peers\n"
+        "from chute_msgs.msg import Telem\n"
+        "fields = Telem.get_fields_and_field_types()\n"
+        "def measure(namespace, children):\n"
+        "    with ExitStack() as stack:\n"
+        "        told = []\n"
+        "        for peer in start_peers(namespace, children, stack):\n"
+        "            for _ in range(3):\n"
+        "                peer.ends.lines.restart()\n"
+        "                if not peer.ends.step(50.0, 4.0).lost:\n"
+        "                    break\n"
+        "            came = peer.ends.messages()\n"
+        "            told.append([{name: getattr(m, name) for name in fields} for m in came])\n"
+        "        return told\n"
+        "ours, bare = with_children(measure)\n"
+        "own = ('header', 'sequence', 'device_uptime')\n"
+        "for told in (ours, bare):\n"
+        "    assert all(m['device_uptime'] > 0.0 and m['header'].stamp.sec for m in told)\n"
+        "    steps = {b['sequence'] - a['sequence'] for a, b in zip(told, told[1:])}\n"
+        "    assert steps == {1}, steps\n"
+        "    [m.pop(name) for m in told for name in own]\n"
+        "assert len(ours) == 200, len(ours)\n"
+        "assert {m['flight_mode'] for m in ours} >= {0, 1, 2, 3}\n"
+        "assert repr(ours) == repr(bare)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_its_children_end_with_it(tmp_path, number):
+@pytest.mark.parametrize(("module", "processes"), [(KILL_SWITCH, 8), (TELEMETRY, 3)])
+def test_its_children_end_with_it(tmp_path, number, module, processes):
     marker = f"CHUTE_ROS_BENCH_TEST_{os.getpid()}_{number.value}"
     child = subprocess.Popen(
-        [*COMMAND, "--output", str(tmp_path / "bench.md")],
+        [sys.executable, "-m", module, "--output", str(tmp_path / "bench.md")],
         cwd=ROOT,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -100,7 +235,7 @@ def test_its_children_end_with_it(tmp_path, number):
     end = time.monotonic() + 30.0
     settled = 0
     while settled < 25:  # all there, and none is just being started
-        settled = settled + 1 if len(running(marker)) >= 8 else 0
+        settled = settled + 1 if len(running(marker)) >= processes else 0
         assert child.poll() is None, child.stderr.read()
         assert time.monotonic() < end, f"the peers are not all there: {running(marker)}"
         time.sleep(0.02)
@@ -126,10 +261,23 @@ def running(marker):
     return found
 
 
-@pytest.mark.parametrize("wrong", [("--requests", "1"), ("--output", "/nowhere/at/all.md")])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("--requests", "1"),
+        ("--batches", "1"),
+        ("--seconds", "0"),
+        ("--top-rate", "nan"),
+        ("--output", "/nowhere/at/all.md"),
+    ],
+)
 def test_a_mistake_is_said_before_anything_is_started(wrong):
     done = subprocess.run(
-        [*COMMAND, *wrong], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-m", "bench", *wrong],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 2
     assert wrong[0] in done.stderr.splitlines()[-1]

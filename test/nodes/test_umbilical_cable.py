@@ -167,6 +167,8 @@ def test_a_device_that_floods_keeps_neither_heartbeat_nor_commands_from_their_tu
     assert cable.heartbeats[-1].link_state == LinkState.OK
     answer = cable.command("launch", force=True)
     assert "flight mode Startup" in answer.message, "and it answers"
+    counts = cable.node.loop.link.counts
+    assert counts["lines for the log beyond fifty a second"] > 1000, "nobody could read them"
 
 
 def test_lines_that_are_cut_and_garbage_in_between_cost_only_themselves(bench):

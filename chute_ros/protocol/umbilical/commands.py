@@ -22,6 +22,7 @@ URGENT = ("safe", "drogue", "main")
 #: What a newer command puts an end to, where it is still under way.
 SUPERSEDES: dict[str, tuple[str, ...]] = {
     "safe": ("launch", "open_mav", "open_sv"),
+    "launch": ("close_mav",),
     "open_mav": ("close_mav",),
     "close_mav": ("open_mav", "launch"),
     "open_sv": ("close_sv",),

@@ -7,6 +7,7 @@ no serial port and no ROS.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Hashable
 
@@ -24,7 +25,7 @@ from chute_ros.protocol.requests import Requests
 from chute_ros.protocol.umbilical import sayings as s
 from chute_ros.protocol.umbilical.config import UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
-from chute_ros.protocol.umbilical.events import TelemetryReceived, UmbilicalEvent
+from chute_ros.protocol.umbilical.events import Progress, TelemetryReceived, UmbilicalEvent
 from chute_ros.protocol.umbilical.flight_computer import DEVICE, FlightComputer
 from chute_ros.protocol.umbilical.layouts import Layout
 from chute_ros.protocol.umbilical.memory import MemoryWorks
@@ -35,6 +36,8 @@ from chute_ros.protocol.umbilical.stream import DumpBytes, Line, StreamReader
 #: A line that is nothing known is shown to a person at most each so many seconds.
 _SHOW_UNKNOWN_EACH = 10.0
 _MOST_SHOWN = 60
+#: Lines for the log a second, at most.
+MOST_TOLD = 50
 
 
 class UmbilicalLink:
@@ -57,6 +60,8 @@ class UmbilicalLink:
         self._settled_at = 0.0
         self._first_line = True
         self._show_unknown_at = 0.0
+        self._told_since = -math.inf
+        self._told = 0
         self._output: list[bytes] = []
         self._events: list[UmbilicalEvent] = []
 
@@ -79,13 +84,13 @@ class UmbilicalLink:
             # What waited in the flight computer's queue is of before: it must not pass for fresh.
             self.counts["bytes right after the opening"] += len(data)
             return
+        self._heard_in_pause(now)
         for item in self._reader.feed(data):
             if isinstance(item, Line):
                 self._line(item.data, now)
             else:
                 self.memory.heard(item, now)
-        if self.memory.pause:
-            self._changed(self.computer.alive(now))
+        self._heard_in_pause(now)
         self._drive(now)
 
     def stream_ended(self, stream: Hashable) -> None:
@@ -103,8 +108,7 @@ class UmbilicalLink:
         self._changed(changes)
         if picture_changed:
             self._tell_picture(now)
-        if self.orders.judge_again(now):
-            self._drive(now)  # what is not allowed any more is taken out before its turn comes
+        self.orders.judge_again(now)
         self._requests.update(now)
         self._drive(now)
 
@@ -123,7 +127,8 @@ class UmbilicalLink:
         notices = [*self.decoder.take_notices(), *self.orders.take_notices()]
         happened = [*self._events, *notices]
         self._events = []
-        return [*happened, *self.memory.take_events(), *self._requests.take_events()]
+        happened += [*self.memory.take_events(), *self._requests.take_events()]
+        return [one for one in happened if not self._is_one_too_many(one)]
 
     # -- what the node asks for ------------------------------------------------------------------
 
@@ -170,8 +175,30 @@ class UmbilicalLink:
 
     # -- inside ----------------------------------------------------------------------------------
 
+    def _is_one_too_many(self, event: UmbilicalEvent) -> bool:
+        """A line for a person, of more than he could read: counted, and left out."""
+        if not isinstance(event, (s.LogLine, Notice, Progress)):
+            return False
+        if isinstance(event, Notice) and event.severity is Severity.ERROR:
+            return False
+        if self._now >= self._told_since + 1.0:
+            self._told_since, self._told = self._now, 0
+        self._told += 1
+        if self._told <= MOST_TOLD:
+            return False
+        self.counts["lines for the log beyond fifty a second"] += 1
+        return True
+
     def _new_reader(self) -> StreamReader:
         return StreamReader(self.decoder.is_telemetry, self.counts)
+
+    def _heard_in_pause(self, now: float) -> None:
+        """Whatever comes in a pause says that it is there; its silence before says nothing."""
+        if self.memory.pause:
+            liveness = self.computer.liveness
+            if liveness.state is LinkState.OK:
+                liveness.last_heard = now
+            self._changed(self.computer.alive(now))
 
     def _end_dump(self, why: str) -> None:
         """Give up the flash dump that is under way, if there is one."""
@@ -230,8 +257,8 @@ class UmbilicalLink:
         self._changed(changes)
         self._events.append(TelemetryReceived(record, self.computer.records))
         self._tell_picture(now)
-        self.orders.judge_again(now)
         self._requests.effects_may_show(now)
+        self.orders.judge_again(now)
 
     def _tell_picture(self, now: float) -> None:
         if self.computer.liveness.state is not LinkState.NEVER_SEEN:
@@ -243,6 +270,11 @@ class UmbilicalLink:
         self._events += [DeviceLinkChanged(DEVICE.replace("_", " "), one) for one in changes]
 
     def _drive(self, now: float) -> None:
-        for send in self._requests.drive(now):
+        # What is over is taken out before the next token leaves.
+        sends = self._requests.drive(now)
+        self.scheduler.withdraw(lambda command: not self.memory.waits_for(command))
+        self.scheduler.send_next(now)
+        for send in [*sends, *self._requests.drive(now)]:
             self.memory.token_sent(send.command, now)
+            self.orders.token_sent(send.command.name, now)
             self._output.append(send.command.token)

@@ -102,10 +102,15 @@ class MemoryWorks:
         self.work = Work(name, token, Step.ASKED, now)
         return ""
 
+    def waits_for(self, command: Command) -> bool:
+        """Whether the work under way is one of ours that still waits for this token to leave."""
+        work = self.work
+        return bool(work and work.token and not work.sent and work.name == command.name)
+
     def token_sent(self, command: Command, now: float) -> None:
         """A token was written: is it this work's?"""
         work = self.work
-        if work is not None and command.name == work.name and work.token and not work.sent:
+        if work is not None and self.waits_for(command):
             self.work = replace(
                 work, step=next_step(work.step, Sign.TOKEN_SENT), last=now, sent=True
             )

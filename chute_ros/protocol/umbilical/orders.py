@@ -17,6 +17,7 @@ from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
 from chute_ros.protocol.umbilical.flight_computer import FlightComputer
 from chute_ros.protocol.umbilical.memory import MemoryWorks
+from chute_ros.protocol.umbilical.modes import FlightMode
 from chute_ros.protocol.umbilical.sayings import FlashUsage
 from chute_ros.protocol.umbilical.scheduler import CommandScheduler
 
@@ -44,9 +45,11 @@ class Orders:
         self._block = ""
         self._key_disarmed = False
         self._flash_usage_at = -math.inf
+        #: When a command was sent last, by its name.
+        self._sent_at: dict[str, float] = {}
         self._notices: list[Notice] = []
-        #: What waits for its turn on the wire: request -> (command, force).
-        self._waiting: dict[int, tuple[str, bool]] = {}
+        #: What may still leave, for the first time or again: request -> (command, force).
+        self._to_leave: dict[int, tuple[CommandKind, bool]] = {}
 
     # -- orders ----------------------------------------------------------------------------------
 
@@ -68,9 +71,7 @@ class Orders:
         """Fire the stage of the configuration. again: though telemetry says that it is out."""
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
-            record = self._computer.record
-            out = record is not None and record["ssa_drogue_deployed"]
-            stage = DeployStage.MAIN if out else DeployStage.DROGUE
+            stage = DeployStage.MAIN if self._drogue_is_out() else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 
     def set_target(self, token: int, values: tuple[float, ...], now: float) -> None:
@@ -109,6 +110,10 @@ class Orders:
             lambda goal: goal.name not in commands.URGENT, "the cable was pulled", now
         )
 
+    def token_sent(self, name: str, now: float) -> None:
+        """A command has left: only what comes after that shows its effect."""
+        self._sent_at[name] = now
+
     # -- what the flight computer says -----------------------------------------------------------
 
     def flash_usage(self, said: FlashUsage, now: float) -> None:
@@ -120,17 +125,22 @@ class Orders:
         """It does not arm."""
         self._end(("key_arm",), f"the flight computer says: {text}", now)
 
-    def judge_again(self, now: float) -> bool:
-        """Telemetry or the clock moved on: what has not left yet must still be allowed; whether
-        something is not."""
-        refused = False
-        for token, (name, force) in list(self._waiting.items()):
-            if not self._requests.not_sent_yet(token):
-                del self._waiting[token]
-            elif refusal := gate.rule(name, self._computer.situation(now), force).refusal:
+    def judge_again(self, now: float) -> None:
+        """Telemetry or the clock moved on: what has yet to leave, or would leave again, must still
+        be allowed."""
+        situation = self._computer.situation(now)
+        for token, (kind, force) in list(self._to_leave.items()):
+            waits = self._waits(token, kind)
+            if not waits and (kind.once or token not in self._requests):
+                del self._to_leave[token]
+                continue
+            refusal = gate.rule(kind.command.name, situation, force).refusal
+            if refusal and not waits:
+                refusal = f"not to be sent again (flight mode {situation.value})"
+            if refusal and kind.lasting:
+                self._memory.give_up(refusal)
+            elif refusal:
                 self._requests.abandon(token, refusal, now)
-                refused = True
-        return refused
 
     def take_notices(self) -> list[Notice]:
         """What a person should read; each is handed out once."""
@@ -157,13 +167,27 @@ class Orders:
                 self._requests.refuse(token, refusal)
             else:
                 self._requests.commands.send_once(kind.command, now)
+                self._to_leave[token] = (kind, force)
             return
         shown, text = self._shown(kind, even_if_shown, now)
         goal = commands.goal_of(kind, shown, text, even_if_shown)
         self._requests.begin(token, goal, now)
         if name not in commands.URGENT:
             # Those were wanted when they were allowed, and may have to wait for the cable.
-            self._waiting[token] = (name, force)
+            self._to_leave[token] = (kind, force)
+
+    def _waits(self, token: int, kind: CommandKind) -> bool:
+        """Nothing of this request has left yet."""
+        if not kind.lasting:
+            return self._requests.not_sent_yet(token)
+        work = self._memory.work
+        return work is not None and work.token == token and not work.sent
+
+    def _drogue_is_out(self) -> bool:
+        record = self._computer.record
+        modes = (FlightMode.DROGUE_DEPLOYED, FlightMode.MAIN_DEPLOYED)
+        flag = record is not None and record["ssa_drogue_deployed"]
+        return bool(flag) or self._computer.mode in modes
 
     def _standing_refusal(self, name: str) -> str:
         """Why this command is refused whatever the flight mode; empty: it is not."""
@@ -188,11 +212,15 @@ class Orders:
         """What shows the effect, and the same in words. Only what came after the order counts,
         or what is fresh where that keeps a command from being sent again."""
         name, computer = kind.command.name, self._computer
+
+        def since() -> float:
+            return max(now, self._sent_at.get(name, now))
+
         if name == "reboot":
             before = computer.restarts
             return lambda: computer.restarts > before, "its clock starts anew"
         if name == "flash_info":
-            return lambda: self._flash_usage_at > now, "it says how full the flash is"
+            return lambda: self._flash_usage_at > since(), "it says how full the flash is"
         effect = self._effect(kind)
         if effect is None:
             return None, _NOTHING_SHOWS
@@ -200,7 +228,7 @@ class Orders:
 
         def shown() -> bool:
             record = computer.record
-            if record is None or not (believed or record.received > now):
+            if record is None or not (believed or record.received > since()):
                 return False
             return effect.shown(record)
 

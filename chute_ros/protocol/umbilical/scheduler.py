@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.errors import ParameterError
@@ -133,12 +134,10 @@ class CommandScheduler:
             return
         queue = self._urgent if urgent else self._others
         queue.append(_Waiting(token, command))
-        self.update(now)
 
     def send_once(self, command: Command, now: float) -> None:
         """Queue a command that belongs to no request's loop."""
         self._others.append(_Waiting(None, command))
-        self.update(now)
 
     def cancel(self, token: int, now: float) -> None:
         """It is not needed any more: it does not leave if it has not yet."""
@@ -146,7 +145,16 @@ class CommandScheduler:
             for waiting in [one for one in queue if one.token == token]:
                 queue.remove(waiting)
 
+    def withdraw(self, which: Callable[[Command], bool]) -> None:
+        """Those of send_once that are not needed any more do not leave if they have not yet."""
+        for waiting in [one for one in self._others if one.token is None and which(one.command)]:
+            self._others.remove(waiting)
+
     def update(self, now: float) -> None:
+        """Nothing ends by time here. What leaves does so by send_next, after all has been
+        cancelled that is not needed any more."""
+
+    def send_next(self, now: float) -> None:
         """Look at the clock: at most one token becomes ready."""
         if now >= self._heartbeats_until:
             self._heartbeats_until = -math.inf

@@ -1,0 +1,226 @@
+"""Deploy: fires until telemetry shows it, and never what is out already."""
+
+import pytest
+from umbilical_link_bench import (
+    ASCENT,
+    COAST,
+    DROGUE,
+    FAULT,
+    MAIN,
+    STANDBY,
+    STARTUP,
+    Bench,
+    ready,
+)
+
+from chute_ros.protocol.umbilical.config import DeployStage
+from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
+
+TOKENS = {DeployStage.DROGUE: "<D>", DeployStage.MAIN: "<d>"}
+FLAGS = {DeployStage.DROGUE: "ssa_drogue_deployed", DeployStage.MAIN: "ssa_main_deployed"}
+MODES = {DeployStage.DROGUE: DROGUE, DeployStage.MAIN: MAIN}
+STAGES = pytest.mark.parametrize("stage", TOKENS, ids=lambda one: one.value)
+
+
+@STAGES
+def test_deploy_fires_the_stage_of_the_settings(stage):
+    bench = ready(COAST, deploy=stage)
+    number = bench.deploy()
+    assert bench.tokens == [TOKENS[stage]]
+    bench.after(0.3).talk(**{FLAGS[stage]: 1}).after(0.2)
+    end = bench.end(number)
+    assert (end.success, end.sent, end.shown) == (True, True, True)
+    assert bench.steps(number) == ["SENT", "CONFIRMED"]
+    assert bench.after(9.0).tokens == [TOKENS[stage]]
+
+
+@STAGES
+def test_a_flight_mode_shows_it_as_well(stage):
+    bench = ready(COAST, deploy=stage)
+    number = bench.deploy()
+    assert bench.after(0.3).talk(flight_mode=MODES[stage]).after(0.2).end(number).shown
+
+
+@pytest.mark.parametrize(
+    ("out", "token"),
+    [
+        ({"flight_mode": COAST}, "<D>"),
+        ({"flight_mode": COAST, "ssa_drogue_deployed": 1}, "<d>"),
+        ({"flight_mode": DROGUE, "ssa_drogue_deployed": 1}, "<d>"),
+        ({"flight_mode": DROGUE}, "<d>"),
+    ],
+)
+def test_next_is_the_main_once_the_drogue_is_out(out, token):
+    bench = ready(out.pop("flight_mode"), deploy=DeployStage.NEXT, **out)
+    bench.deploy()
+    assert bench.tokens == [token]
+
+
+def test_next_is_nothing_once_both_are_out():
+    bench = ready(MAIN, deploy=DeployStage.NEXT)
+    assert "already; nothing was sent" in bench.end(bench.deploy()).message
+    assert bench.tokens == []
+
+
+@STAGES
+def test_what_is_out_already_is_not_fired(stage):
+    bench = ready(COAST, deploy=stage, **{FLAGS[stage]: 1})
+    number = bench.deploy()
+    end = bench.end(number)
+    assert (end.success, end.sent, end.shown) == (True, False, True)
+    assert end.message.endswith("already; nothing was sent")
+    assert bench.after(9.0).tokens == []
+
+
+@STAGES
+def test_what_is_out_already_is_fired_again_where_that_is_wanted(stage):
+    bench = ready(COAST, deploy=stage, **{FLAGS[stage]: 1})
+    number = bench.deploy(again=True)
+    assert bench.ends(number) == []
+    assert bench.after(0.2).end(number).sent
+    assert bench.after(9.0).tokens == [TOKENS[stage]]
+
+
+@STAGES
+@pytest.mark.parametrize("force", [False, True])
+def test_by_name_it_is_fired_again_only_if_forced(stage, force):
+    bench = ready(COAST, **{FLAGS[stage]: 1})
+    bench.order(stage.value, force)
+    assert bench.after(2.0).tokens == ([TOKENS[stage]] if force else [])
+
+
+@STAGES
+def test_stale_telemetry_that_says_out_is_not_believed(stage):
+    bench = ready(COAST, deploy=stage, **{FLAGS[stage]: 1}).silent().after(3.5)
+    number = bench.deploy(force=True)
+    assert bench.tokens == [TOKENS[stage]]
+    assert bench.after(1.0).ends(number) == []
+    assert bench.talk().after(0.2).end(number).success
+
+
+def test_stale_telemetry_is_not_believed_after_an_earlier_shot_either():
+    bench = ready(COAST)
+    bench.deploy()
+    bench.after(0.2).talk(ssa_drogue_deployed=1).after(0.3).silent().after(3.5)
+    second = bench.deploy(force=True)
+    assert bench.tokens == ["<D>", "<D>"]
+    assert bench.ends(second) == []
+
+
+@STAGES
+@pytest.mark.parametrize("mode", [STARTUP, STANDBY, FAULT])
+def test_on_the_ground_it_is_refused_unless_forced(stage, mode):
+    bench = ready(mode, deploy=stage)
+    number = bench.deploy()
+    assert f"the {stage.value} is not fired on the ground" in bench.end(number).message
+    assert bench.after(1.0).tokens == []
+    bench.deploy(force=True)
+    assert bench.tokens == [TOKENS[stage]]
+
+
+def test_without_telemetry_it_is_refused_unless_forced():
+    bench = Bench().at(1.0)
+    number = bench.deploy()
+    assert bench.end(number).message.endswith("(no telemetry was ever heard)")
+    bench.deploy(force=True)
+    assert bench.after(0.5).tokens == ["<D>"]
+
+
+def test_it_fires_again_until_telemetry_shows_it():
+    bench = ready(ASCENT)
+    number = bench.deploy()
+    bench.after(3.5).talk(ssa_drogue_deployed=1).after(6.0)
+    assert bench.times("<D>") == [1.05, 2.55, 4.05]
+    message = bench.end(number).message
+    assert message == (
+        "telemetry says ssa_drogue_deployed 1, or flight mode DrogueDeployed after 3.55 s; "
+        "sent 3 times"
+    )
+
+
+def test_it_ends_when_the_time_is_up_and_says_so():
+    bench = ready(ASCENT)
+    number = bench.deploy()
+    bench.after(20.0)
+    assert bench.times("<D>") == [1.05, 2.55, 4.05, 5.55]
+    end = bench.end(number)
+    assert (end.success, end.sent, end.shown) == (False, True, False)
+    assert end.message == (
+        "drogue given up after 5.0 s: sent 4 times, but the device's own status never showed: "
+        "telemetry says ssa_drogue_deployed 1, or flight mode DrogueDeployed"
+    )
+
+
+def test_it_fires_again_though_telemetry_is_lost_meanwhile():
+    bench = ready(ASCENT)
+    bench.deploy()
+    bench.silent().after(20.0)
+    assert len(bench.times("<D>")) == 4
+
+
+def test_it_leaves_before_all_that_waits():
+    bench = ready(COAST)
+    for _ in range(5):
+        bench.order("flash_info")
+    bench.deploy()
+    assert bench.after(1.0).tokens == ["<I>", "<D>", *["<I>"] * 4]
+
+
+def test_it_finds_a_place_though_the_queue_is_full():
+    bench = ready(COAST, scheduler=SchedulerLimits(most_waiting=1))
+    for _ in range(5):
+        bench.order("flash_info")
+    bench.deploy()
+    assert bench.after(0.2).tokens == ["<I>", "<D>"]
+
+
+# -- the cable ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("out_for", [0.0, 1.0, 4.8])
+def test_ordered_while_the_cable_is_out_it_leaves_as_soon_as_it_is_back(out_for):
+    bench = ready(COAST).pull().silent()
+    number = bench.deploy()
+    bench.after(out_for).plug()
+    back = bench.t
+    bench.after(0.15)
+    assert bench.times("<D>") == [pytest.approx(back + 0.12)]
+    assert bench.steps(number) == ["SENT"]
+
+
+def test_a_cable_that_comes_back_too_late_fires_nothing():
+    bench = ready(COAST).pull().silent()
+    number = bench.deploy()
+    bench.after(5.5).plug().after(9.0)
+    assert bench.tokens == []
+    end = bench.end(number)
+    assert (end.success, end.sent) == (False, False)
+    assert "never sent: its turn did not come, or the wire is closed" in end.message
+
+
+def test_a_time_that_is_up_unseen_when_the_cable_comes_back_fires_nothing():
+    bench = ready(COAST).pull().silent()
+    number = bench.deploy()
+    bench.t += 30.0
+    bench.plug().after(9.0)
+    assert bench.tokens == []
+    assert not bench.end(number).sent
+
+
+def test_pulled_after_the_first_shot_it_fires_again_when_the_cable_is_back():
+    bench = ready(COAST)
+    number = bench.deploy()
+    bench.after(0.2).pull().silent().after(2.0).plug().talk().after(0.5)
+    assert bench.times("<D>") == [1.05, 3.37]
+    bench.talk(ssa_drogue_deployed=1).after(0.3)
+    assert bench.end(number).success
+
+
+def test_there_is_a_parachute_once_telemetry_was_heard_and_the_wire_is_open():
+    bench = Bench()
+    assert not bench.link.has_parachute()
+    bench.talk(flight_mode=STANDBY).after(1.0)
+    assert bench.link.has_parachute()
+    bench.pull()
+    assert not bench.link.has_parachute()
+    assert bench.plug().link.has_parachute()
