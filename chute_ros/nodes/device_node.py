@@ -69,6 +69,14 @@ class Summary:
     details: Any
 
 
+@dataclass(frozen=True)
+class CarriedOut:
+    """The link's thread has done what a decision wants."""
+
+    decision: model.Decision
+    text: str
+
+
 class DeviceNode(Node, ABC):
     """Base of the nodes that speak to a device. The subclass makes self.loop and calls begin."""
 
@@ -176,6 +184,17 @@ class DeviceNode(Node, ABC):
         """Have begin(link, token, now) called in the link's thread; the future is its end."""
         return self.desk.request(begin)
 
+    def carry_out_at_once(
+        self, decision: model.Decision, function: Callable[[Any, float], None], text: str
+    ) -> None:
+        """Have function(link, now) called in the link's thread, and report text once it was."""
+
+        def run(link: Any, now: float) -> None:
+            function(link, now)
+            self.deliver([CarriedOut(decision, text)])
+
+        self.in_link(run)
+
     def deploy_for(self, decision: model.Decision, force: bool) -> None:
         """Deploy for a decision, at the latest once a parachute is heard."""
         self.desk.deploy_for(
@@ -238,6 +257,8 @@ class DeviceNode(Node, ABC):
         elif isinstance(event, LoopFault):
             self._loop_faults += 1
             self.get_logger().error(event.text, throttle_duration_sec=1.0)
+        elif isinstance(event, CarriedOut):
+            self.decisions.report(event.decision, model.Outcome.CONFIRMED, event.text)
         elif isinstance(event, CallFailed):
             self.desk.report(event.token, model.Outcome.FAILED, event.text)
             self.desk.finished(event.token, self.failed_end(event.token, event.text))

@@ -89,10 +89,10 @@ class MavlinkParachuteNode(DeviceNode):
         elif decision.action is not model.Action.NONE:
             blocked = decision.action is model.Action.FLIGHT_BLOCK
             reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""
-            assert self.loop is not None
-            self.loop.call(lambda link, now: link.flight_block(reason, now))
             text = "arming on the ground is undone" if blocked else "arming is left alone"
-            self.decisions.report(decision, model.Outcome.CONFIRMED, text)
+            self.carry_out_at_once(
+                decision, lambda link, now: link.flight_block(reason, now), text
+            )
 
     def arm_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
         link.arm(token, request.arm, request.triggers, now)

@@ -42,7 +42,7 @@ def details_of(link: UmbilicalLink, now: float) -> Details:
     record, layout = computer.record, link.decoder.layout
     mode = computer.mode
     return Details(
-        status=computer.status(now, link.memory.pause),
+        status=computer.status(now, link.pause),
         received_bytes=link.received_bytes,
         records=computer.records,
         layout="not recognised yet" if layout is None else layout.name,
@@ -57,7 +57,7 @@ def details_of(link: UmbilicalLink, now: float) -> Details:
         heartbeats=scheduler.heartbeats_sent,
         heartbeat_age=now - scheduler.last_heartbeat,
         latest_heartbeat=scheduler.limits.latest_heartbeat,
-        work=link.memory.pause,
+        work=link.pause,
     )
 
 

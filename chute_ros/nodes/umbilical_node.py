@@ -107,9 +107,10 @@ class UmbilicalNode(DeviceNode):
         elif decision.action is not model.Action.NONE:
             blocked = decision.action is model.Action.FLIGHT_BLOCK
             reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""
-            self.in_link(lambda link, now: link.flight_block(reason, now))
             text = "launch is refused" if blocked else "launch is left to the gate"
-            self.decisions.report(decision, model.Outcome.CONFIRMED, text)
+            self.carry_out_at_once(
+                decision, lambda link, now: link.flight_block(reason, now), text
+            )
 
     def arm_link(self, link: UmbilicalLink, token: int, request: Any, now: float) -> None:
         link.arm(token, request.arm, request.triggers, now)

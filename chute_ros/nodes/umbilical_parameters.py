@@ -29,7 +29,7 @@ PARAMETERS = (
         "folder with $TELEM layouts (*.yaml) of your own; empty: the ones shipped",
     ),
     Parameter(
-        "telemetry_stale_after", 3.0, "telemetry silent for this long is STALE, s", 0.05, 600.0
+        "telemetry_stale_after", 3.0, "telemetry silent for this long is STALE, s", 0.05, 30.0
     ),
     Parameter(
         "telemetry_lost_after", 15.0, "telemetry silent for this long is LOST, s", 0.05, 600.0
@@ -70,7 +70,7 @@ PARAMETERS = (
         60.0,
     ),
     Parameter("retry_interval", 0.25, "between that limit and the next try, s", 0.02, 60.0),
-    Parameter("give_up_after", 5.0, "for all tries of a command together, s", 0.1, 600.0),
+    Parameter("give_up_after", 5.0, "for all tries of a command together, s", 0.1, 30.0),
     Parameter(
         "deploy_stage",
         DeployStage.DROGUE.value,
@@ -136,4 +136,5 @@ def config_from(values: Mapping[str, Any]) -> UmbilicalConfig:
         settle_time=values["settle_time"],
         deploy=DeployStage(values["deploy_stage"]),
         safe_opens_sv=values["safe_opens_sv"],
+        decided_deploy_forces=values["decided_deploy_forces"],
     )

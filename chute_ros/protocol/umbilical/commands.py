@@ -65,6 +65,11 @@ def _mode(*modes: FlightMode) -> Effect:
     return Effect(text, lambda r: r["flight_mode"] in modes)
 
 
+def mode_alone(mode: FlightMode) -> Effect:
+    """Only the mode can show it."""
+    return _mode(mode)
+
+
 def _deployed(flag: str, mode: FlightMode) -> Effect:
     text = f"telemetry says {flag} 1, or flight mode {mode.label}"
     return Effect(text, lambda r: r[flag] != 0 or r["flight_mode"] == mode)

@@ -40,7 +40,8 @@ class MemoryLimits:
 @dataclass(frozen=True)
 class UmbilicalConfig:
     """layout: name of the only one, empty: recognised. settle_time: what comes within it after the
-    opening is of before, s. safe_opens_sv: of the firmware's <V>."""
+    opening is of before, s. safe_opens_sv: of the firmware's <V>. decided_deploy_forces: a deploy
+    that the supervisor decided is sent in every flight mode."""
 
     layout: str = ""
     telemetry: LivenessLimits = LivenessLimits(3.0, 15.0)
@@ -50,3 +51,4 @@ class UmbilicalConfig:
     settle_time: float = 0.2
     deploy: DeployStage = DeployStage.DROGUE
     safe_opens_sv: bool = False
+    decided_deploy_forces: bool = True

@@ -15,7 +15,7 @@ Value = int | float
 _F32_LIMIT = 3.4028235677973366e38
 _F64_LIMIT = 1.7976931348623157e308
 
-_WHOLE = r"-?(?:0|[1-9][0-9]{0,9})"
+_WHOLE = r"(?:0|-?[1-9][0-9]{0,9})"
 _FLOAT = r"(?:-?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]+)?|inf)|NaN)"
 #: All that a whole record is written with.
 NUMBERS = re.compile(r"[-0-9.,Nainf]*")
@@ -61,9 +61,9 @@ def problem_of(kind: FieldType, text: str) -> str:
         return "empty field"
     if text != text.strip():
         return "padded field"
+    if kind.is_whole and text == "-0":
+        return "not a number"
     if re.fullmatch(kind.pattern, text):
-        if kind.is_whole and text == "-0":
-            return "not a number"
         return "" if in_range(kind, convert(kind, text), text) else "out of range"
     if (_DIGITS if kind.is_whole else _DECIMAL).fullmatch(text):
         # Too many digits, or zeros in front.

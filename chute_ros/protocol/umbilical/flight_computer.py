@@ -29,6 +29,11 @@ DEVICE = "flight_computer"
 #: deployment: the slowest canopy falls several times as fast.
 _REST_HEIGHT, _REST_TIME = 3.0, 5.0
 _FIX_3D = 3
+#: Command -> the flag and the flight mode that show it.
+CANOPIES = {
+    "drogue": ("ssa_drogue_deployed", FlightMode.DROGUE_DEPLOYED),
+    "main": ("ssa_main_deployed", FlightMode.MAIN_DEPLOYED),
+}
 _MODES = {int(mode): mode for mode in FlightMode}
 _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
 
@@ -50,6 +55,9 @@ class FlightComputer:
         self._rest_altitude = NAN
         self._rest_since = NAN
         self._was_deployed = False
+        #: What came out in this flight, by the names of the commands.
+        self._came_out: set[str] = set()
+        self._clock_moved_at = NAN
         self._paused = False
         self._was_fresh = False
 
@@ -66,12 +74,15 @@ class FlightComputer:
             self.restarted_in_flight = self._flying
             # Its altitude may count from elsewhere now.
             self._rest_altitude = NAN
-        if self.record is not None:
-            self.interval = now - self.record.received
-        self.record = record
+        before, self.record = self.record, record
+        if before is not None:
+            self.interval = now - before.received
+        if before is None or before["ms_since_boot_cfc"] != record["ms_since_boot_cfc"]:
+            self._clock_moved_at = now
         self.records += 1
         self._watch_rest(record, now)
         self._watch_flight()
+        self._watch_canopies(before, record)
         return self.liveness.heard(now), age
 
     def alive(self, now: float) -> list[LinkChange]:
@@ -130,6 +141,16 @@ class FlightComputer:
             return False
         flags = self.record["ssa_drogue_deployed"] or self.record["ssa_main_deployed"]
         return bool(flags) or self.mode in (FlightMode.DROGUE_DEPLOYED, FlightMode.MAIN_DEPLOYED)
+
+    @property
+    def flying(self) -> bool:
+        """In the air, as far as its records have told."""
+        return self._flying
+
+    def came_out(self, name: str) -> bool:
+        """The drogue or the main came out in this flight: a flag that was set before it, as by a
+        test on the ground, does not count, and a restart does not undo it."""
+        return name in self._came_out
 
     @property
     def armed(self) -> bool:
@@ -200,6 +221,16 @@ class FlightComputer:
         elif self._at_rest or (self.mode in GROUND and not self.restarted_in_flight):
             self._flying = False
 
+    def _watch_canopies(self, before: Record | None, record: Record) -> None:
+        for name, (flag, mode) in CANOPIES.items():
+            rose = before is not None and not before[flag] and record[flag]
+            if rose or self.mode is mode:
+                self._came_out.add(name)
+        if self.mode is FlightMode.MAIN_DEPLOYED:
+            self._came_out.add("drogue")  # its mode comes after the drogue's
+        if self.mode in GROUND and not self._flying:
+            self._came_out.clear()
+
     @property
     def _at_rest(self) -> bool:
         """Its altitude has not changed for a while, by its records: silence is no rest."""
@@ -235,6 +266,8 @@ class FlightComputer:
         for name in ("altitude", "pressure"):
             if not math.isfinite(self.record.number(name)):
                 faults.append(f"{name} is {self.record.number(name)}")
+        if self.record.received - self._clock_moved_at > self._limits.stale_after:
+            faults.append("its clock stands still")
         if self.restarted_in_flight and self._flying:
             faults.append("it restarted in flight")
         return faults

@@ -80,7 +80,7 @@ class Layout:
         if self._pattern.fullmatch(body):
             values = tuple(c(text) for c, text in zip(self._converters, texts, strict=True))
             limits = zip(values, self._limits, strict=True)
-            if all(low <= value <= high for value, (low, high) in limits) and "-0" not in texts:
+            if all(low <= value <= high for value, (low, high) in limits):
                 return values
         if len(texts) != self.count:
             text = f"{len(texts)} fields where {self.name} has {self.count}"

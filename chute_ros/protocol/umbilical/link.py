@@ -28,7 +28,7 @@ from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
 from chute_ros.protocol.umbilical.events import Progress, TelemetryReceived, UmbilicalEvent
 from chute_ros.protocol.umbilical.flight_computer import DEVICE, FlightComputer
 from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.protocol.umbilical.memory import MemoryWorks
+from chute_ros.protocol.umbilical.memory import MemoryWorks, Step
 from chute_ros.protocol.umbilical.orders import Orders
 from chute_ros.protocol.umbilical.scheduler import CommandScheduler
 from chute_ros.protocol.umbilical.stream import DumpBytes, Line, StreamReader
@@ -104,7 +104,7 @@ class UmbilicalLink:
         self._now = now
         if self.memory.update(now):
             self._end_dump(self.memory.silent())
-        changes, picture_changed = self.computer.update(now, bool(self.memory.pause))
+        changes, picture_changed = self.computer.update(now, bool(self.pause))
         self._changed(changes)
         if picture_changed:
             self._tell_picture(now)
@@ -165,9 +165,24 @@ class UmbilicalLink:
 
     # -- what the node may look at ---------------------------------------------------------------
 
+    @property
+    def pause(self) -> str:
+        """Why there is no telemetry now, in words; empty: there should be some.
+
+        In flight only what was asked for from here counts: a line from the wire must not hide
+        that the flight computer is lost.
+        """
+        work = self.memory.work
+        if work is None or (work.token == 0 and self.computer.flying):
+            return ""
+        if work.step is not Step.BEGUN and self.computer.fresh(self._now):
+            return ""  # it has not begun, and telemetry still comes
+        return self.memory.pause
+
     def has_parachute(self) -> bool:
-        """There is a wire that a deploy can be written to."""
-        return self.scheduler.is_open and self.computer.record is not None
+        """A deploy need not wait: for telemetry that allows it, unless it is sent in any mode."""
+        heard = self.scheduler.is_open and self.computer.record is not None
+        return heard or self.config.decided_deploy_forces
 
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of the rocket."""
@@ -262,7 +277,7 @@ class UmbilicalLink:
 
     def _tell_picture(self, now: float) -> None:
         if self.computer.liveness.state is not LinkState.NEVER_SEEN:
-            status = self.computer.status(now, self.memory.pause)
+            status = self.computer.status(now, self.pause)
             self._events.append(ParachuteChanged(status))
             self._events.append(VehicleChanged(self.computer.vehicle_state(now)))
 

@@ -15,14 +15,24 @@ from chute_ros.protocol.umbilical import commands, gate
 from chute_ros.protocol.umbilical.commands import CommandKind, Effect
 from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
-from chute_ros.protocol.umbilical.flight_computer import FlightComputer
+from chute_ros.protocol.umbilical.flight_computer import CANOPIES, FlightComputer
+from chute_ros.protocol.umbilical.gate import Situation
 from chute_ros.protocol.umbilical.memory import MemoryWorks
-from chute_ros.protocol.umbilical.modes import FlightMode
 from chute_ros.protocol.umbilical.sayings import FlashUsage
 from chute_ros.protocol.umbilical.scheduler import CommandScheduler
 
 #: Not while the vehicle is being made safe.
 _UNSAFE = ("launch", "open_mav", "open_sv")
+#: Not while a launch is under way.
+_DISTURBING = (
+    "launch",
+    "reboot",
+    "reset_fram",
+    "dump_fram",
+    "dump_flash",
+    "wipe_flash",
+    "wipe_fram_and_reboot",
+)
 _NOTHING_SHOWS = "telemetry cannot show its effect"
 
 
@@ -71,7 +81,7 @@ class Orders:
         """Fire the stage of the configuration. again: though telemetry says that it is out."""
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
-            stage = DeployStage.MAIN if self._drogue_is_out() else DeployStage.DROGUE
+            stage = DeployStage.MAIN if self._computer.came_out("drogue") else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 
     def set_target(self, token: int, values: tuple[float, ...], now: float) -> None:
@@ -134,7 +144,10 @@ class Orders:
             if not waits and (kind.once or token not in self._requests):
                 del self._to_leave[token]
                 continue
-            refusal = gate.rule(kind.command.name, situation, force).refusal
+            name = kind.command.name
+            if situation is Situation.UNKNOWN and name in commands.URGENT:
+                continue  # it was wanted when it was allowed, and may have to wait for the cable
+            refusal = gate.rule(name, situation, force).refusal
             if refusal and not waits:
                 refusal = f"not to be sent again (flight mode {situation.value})"
             if refusal and kind.lasting:
@@ -172,9 +185,7 @@ class Orders:
         shown, text = self._shown(kind, even_if_shown, now)
         goal = commands.goal_of(kind, shown, text, even_if_shown)
         self._requests.begin(token, goal, now)
-        if name not in commands.URGENT:
-            # Those were wanted when they were allowed, and may have to wait for the cable.
-            self._to_leave[token] = (kind, force)
+        self._to_leave[token] = (kind, force)
 
     def _waits(self, token: int, kind: CommandKind) -> bool:
         """Nothing of this request has left yet."""
@@ -183,20 +194,18 @@ class Orders:
         work = self._memory.work
         return work is not None and work.token == token and not work.sent
 
-    def _drogue_is_out(self) -> bool:
-        record = self._computer.record
-        modes = (FlightMode.DROGUE_DEPLOYED, FlightMode.MAIN_DEPLOYED)
-        flag = record is not None and record["ssa_drogue_deployed"]
-        return bool(flag) or self._computer.mode in modes
-
     def _standing_refusal(self, name: str) -> str:
         """Why this command is refused whatever the flight mode; empty: it is not."""
         if not self._requests.commands.is_open and name not in commands.URGENT:
             return f"{name} refused: the port is not open; nothing was sent"
         if name in _UNSAFE and self._requests.under_way("safe"):
             return f"{name} refused: the vehicle is being made safe; nothing was sent"
+        if name in _DISTURBING and self._requests.under_way("launch"):
+            return f"{name} refused: a launch is under way; nothing was sent"
         if name != "launch":
             return ""
+        if self._memory.work is not None:
+            return f"launch refused: a {self._memory.work.text} is under way; nothing was sent"
         if self._block:
             return f"launch refused: flight is blocked ({self._block}); nothing was sent"
         if self._key_disarmed:
@@ -224,7 +233,8 @@ class Orders:
         effect = self._effect(kind)
         if effect is None:
             return None, _NOTHING_SHOWS
-        believed = not even_if_shown and computer.fresh(now)
+        known = name not in CANOPIES or computer.came_out(name)
+        believed = not even_if_shown and computer.fresh(now) and known
 
         def shown() -> bool:
             record = computer.record
@@ -237,6 +247,16 @@ class Orders:
     def _effect(self, kind: CommandKind) -> Effect | None:
         if kind.command.name == "safe" and self._config.safe_opens_sv:
             return commands.SAFE_THAT_VENTS
+        canopy = CANOPIES.get(kind.command.name)
+        record = self._computer.record
+        if (
+            canopy
+            and record
+            and record[canopy[0]]
+            and not self._computer.came_out(kind.command.name)
+        ):
+            # A flag that was set before shows nothing: as by a test on the ground.
+            return commands.mode_alone(canopy[1])
         return kind.effect
 
     def _end(self, names: tuple[str, ...], why: str, now: float) -> None:

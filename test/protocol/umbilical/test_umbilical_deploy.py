@@ -22,6 +22,12 @@ MODES = {DeployStage.DROGUE: DROGUE, DeployStage.MAIN: MAIN}
 STAGES = pytest.mark.parametrize("stage", TOKENS, ids=lambda one: one.value)
 
 
+def out(stage, **rest):
+    """In Coast, where it has come out before our eyes."""
+    bench = ready(COAST, **rest)
+    return bench.talk(**{FLAGS[stage]: 1}).after(0.3).clear()
+
+
 @STAGES
 def test_deploy_fires_the_stage_of_the_settings(stage):
     bench = ready(COAST, deploy=stage)
@@ -42,7 +48,7 @@ def test_a_flight_mode_shows_it_as_well(stage):
 
 
 @pytest.mark.parametrize(
-    ("out", "token"),
+    ("told", "token"),
     [
         ({"flight_mode": COAST}, "<D>"),
         ({"flight_mode": COAST, "ssa_drogue_deployed": 1}, "<d>"),
@@ -50,8 +56,8 @@ def test_a_flight_mode_shows_it_as_well(stage):
         ({"flight_mode": DROGUE}, "<d>"),
     ],
 )
-def test_next_is_the_main_once_the_drogue_is_out(out, token):
-    bench = ready(out.pop("flight_mode"), deploy=DeployStage.NEXT, **out)
+def test_next_is_the_main_once_the_drogue_is_out(told, token):
+    bench = ready(COAST, deploy=DeployStage.NEXT).talk(**told).after(0.3)
     bench.deploy()
     assert bench.tokens == [token]
 
@@ -64,7 +70,7 @@ def test_next_is_nothing_once_both_are_out():
 
 @STAGES
 def test_what_is_out_already_is_not_fired(stage):
-    bench = ready(COAST, deploy=stage, **{FLAGS[stage]: 1})
+    bench = out(stage, deploy=stage)
     number = bench.deploy()
     end = bench.end(number)
     assert (end.success, end.sent, end.shown) == (True, False, True)
@@ -74,7 +80,7 @@ def test_what_is_out_already_is_not_fired(stage):
 
 @STAGES
 def test_what_is_out_already_is_fired_again_where_that_is_wanted(stage):
-    bench = ready(COAST, deploy=stage, **{FLAGS[stage]: 1})
+    bench = out(stage, deploy=stage)
     number = bench.deploy(again=True)
     assert bench.ends(number) == []
     assert bench.after(0.2).end(number).sent
@@ -84,14 +90,14 @@ def test_what_is_out_already_is_fired_again_where_that_is_wanted(stage):
 @STAGES
 @pytest.mark.parametrize("force", [False, True])
 def test_by_name_it_is_fired_again_only_if_forced(stage, force):
-    bench = ready(COAST, **{FLAGS[stage]: 1})
+    bench = out(stage)
     bench.order(stage.value, force)
     assert bench.after(2.0).tokens == ([TOKENS[stage]] if force else [])
 
 
 @STAGES
 def test_stale_telemetry_that_says_out_is_not_believed(stage):
-    bench = ready(COAST, deploy=stage, **{FLAGS[stage]: 1}).silent().after(3.5)
+    bench = out(stage, deploy=stage).silent().after(3.5)
     number = bench.deploy(force=True)
     assert bench.tokens == [TOKENS[stage]]
     assert bench.after(1.0).ends(number) == []
@@ -216,11 +222,46 @@ def test_pulled_after_the_first_shot_it_fires_again_when_the_cable_is_back():
     assert bench.end(number).success
 
 
-def test_there_is_a_parachute_once_telemetry_was_heard_and_the_wire_is_open():
-    bench = Bench()
+def test_a_decided_deploy_waits_for_telemetry_only_where_telemetry_must_allow_it():
+    assert Bench().link.has_parachute(), "it is sent in every mode"
+    bench = Bench(decided_deploy_forces=False)
     assert not bench.link.has_parachute()
     bench.talk(flight_mode=STANDBY).after(1.0)
     assert bench.link.has_parachute()
     bench.pull()
     assert not bench.link.has_parachute()
     assert bench.plug().link.has_parachute()
+
+
+# -- what was out before the flight, and what a restart forgets -----------------------------------
+
+
+@STAGES
+def test_a_flag_that_a_test_on_the_ground_left_does_not_keep_a_canopy_in(stage):
+    bench = ready(STANDBY, deploy=stage, **{FLAGS[stage]: 1})
+    bench.talk(flight_mode=ASCENT, altitude=500).after(0.3).talk(flight_mode=COAST).after(0.3)
+    number = bench.deploy()
+    assert bench.tokens == [TOKENS[stage]]
+    assert bench.after(0.5).ends(number) == [], "nor does the flag show that it came out now"
+    assert bench.talk(flight_mode=MODES[stage]).after(0.3).end(number).shown
+
+
+def test_after_a_restart_in_flight_next_is_still_the_main():
+    bench = ready(DROGUE, deploy=DeployStage.NEXT, ssa_drogue_deployed=1, altitude=900)
+    bench.restarts(flight_mode=STARTUP, ssa_drogue_deployed=0, altitude=800).after(0.5)
+    bench.deploy()
+    assert bench.tokens == ["<d>"]
+
+
+def test_it_is_not_fired_again_once_fresh_telemetry_says_ground():
+    bench = ready(COAST)
+    number = bench.deploy()
+    bench.after(0.5).talk(flight_mode=STANDBY).after(9.0)
+    assert bench.times("<D>") == [1.05]
+    assert "not to be sent again (flight mode Standby)" in bench.end(number).message
+
+
+def test_forced_it_is_fired_again_on_the_ground_as_well():
+    bench = ready(STANDBY)
+    bench.deploy(force=True)
+    assert len(bench.after(4.0).times("<D>")) == 3

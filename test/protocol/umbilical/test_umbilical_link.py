@@ -235,3 +235,31 @@ def test_after_a_restart_in_flight_nothing_is_taken_for_the_ground():
         assert "lost in flight" in bench.end(number).message
     bench.deploy()
     assert bench.tokens == ["<D>"]
+
+
+# -- what must not hide that it is lost ---------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "mark", ["Wiping QSPI Flash... Please wait.", "--- BEGIN FLASH CSV DUMP ---"]
+)
+def test_a_line_that_nobody_asked_for_is_no_pause_in_flight(mark):
+    bench = ready(COAST, altitude=2000).hear(mark).silent().after(16.0)
+    assert [one.change.after for one in bench.of(DeviceLinkChanged)] == [
+        LinkState.STALE,
+        LinkState.LOST,
+    ]
+
+
+def test_a_work_that_has_not_begun_is_no_fault_while_telemetry_comes():
+    bench = ready(STANDBY)
+    bench.order("dump_flash")
+    bench.after(1.0)
+    assert bench.of(ParachuteChanged)[-1].status.faults == ()
+    assert bench.of(ParachuteChanged)[-1].status.healthy
+
+
+def test_a_clock_that_stands_still_is_a_fault():
+    """A flight computer that restarts over and over says one record each time."""
+    bench = ready(STANDBY, ms_since_boot_cfc=300).after(4.0)
+    assert "its clock stands still" in bench.of(ParachuteChanged)[-1].status.faults

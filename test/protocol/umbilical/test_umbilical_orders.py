@@ -268,3 +268,35 @@ def test_safe_waits_for_the_cable():
     bench.after(2.0).plug().talk(mav_open=0).after(1.0)
     assert bench.end(number).success
     assert bench.tokens == ["<V>"]
+
+
+# -- around a launch ----------------------------------------------------------------------------
+
+
+def test_a_launch_that_is_under_way_is_not_ordered_twice():
+    bench = ready(STANDBY)
+    bench.order("launch", True)
+    second = bench.order("launch", True)
+    assert "launch refused: a launch is under way" in bench.end(second).message
+    assert bench.after(4.0).tokens == ["<L>"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["reboot", "reset_fram", "dump_fram", "dump_flash", "wipe_flash", "wipe_fram_and_reboot"],
+)
+def test_nothing_disturbs_a_launch_that_is_under_way(name):
+    bench = ready(STANDBY)
+    bench.order("launch", True)
+    number = bench.order(name, True)
+    assert f"{name} refused: a launch is under way" in bench.end(number).message
+    assert bench.after(4.0).tokens == ["<L>"]
+
+
+@pytest.mark.parametrize("name", ["dump_flash", "wipe_flash", "dump_fram"])
+def test_nothing_launches_during_a_long_work(name):
+    bench = ready(STANDBY)
+    bench.order(name)
+    number = bench.after(0.5).order("launch", True)
+    assert "is under way; nothing was sent" in bench.end(number).message
+    assert "<L>" not in bench.after(4.0).tokens
