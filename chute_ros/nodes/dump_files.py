@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import datetime
 from dataclasses import dataclass
-from io import FileIO
+from io import BufferedWriter
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
@@ -36,7 +36,7 @@ class DumpFiles:
         except RuntimeError as error:
             raise ParameterError(f"parameter dump_folder is {folder!r}: {error}") from None
         self._final = Path()
-        self._file: FileIO | None = None
+        self._file: BufferedWriter | None = None
         self._size = 0
         self._failure = ""
 
@@ -47,8 +47,9 @@ class DumpFiles:
             if not path:
                 return ""
             wanted = self.folder / Path(path).expanduser()
-            if wanted.exists():
-                return f"{wanted} exists already: name another path"
+            for one in (wanted, Path(f"{wanted}{PART}")):
+                if one.exists():
+                    return f"{one} exists already: name another path"
             if not wanted.parent.is_dir():
                 return f"there is no folder {wanted.parent}"
         except (OSError, RuntimeError, ValueError) as error:
@@ -63,7 +64,7 @@ class DumpFiles:
         try:
             self._final = self.folder / (Path(path).expanduser() if path else name)
             self._final.parent.mkdir(parents=True, exist_ok=True)
-            self._file = open(f"{self._final}{PART}", "xb", buffering=0)  # noqa: SIM115
+            self._file = open(f"{self._final}{PART}", "xb")  # noqa: SIM115
         except OSError as error:
             self._failure = f"cannot be written: {error}"
         return str(self._final)

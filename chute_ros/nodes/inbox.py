@@ -9,6 +9,9 @@ from typing import Any
 #: Where more events than this wait, pictures are left out: the next one tells the same.
 MOST_WAITING = 2000
 
+#: Events taken at once, before the executor's other callbacks have their turn.
+MOST_AT_ONCE = 100
+
 
 class Inbox:
     """take: gets each event, in the executor; wake: has drain called there; pictures: the types of
@@ -37,7 +40,7 @@ class Inbox:
     def drain(self) -> None:
         """In the executor: take what is there. What comes meanwhile waits for its turn: a flood
         must not keep decisions from theirs."""
-        for _ in range(len(self._waiting)):
+        for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
             self._take(self._waiting.popleft())
         if self._waiting:
             self._wake()

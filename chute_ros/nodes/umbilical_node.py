@@ -99,9 +99,14 @@ class UmbilicalNode(DeviceNode):
     def carry_out(self, decision: model.Decision) -> None:
         if decision.action is model.Action.KILL:
             # The motor's valve is closed: that is what stops a hybrid motor.
-            self.desk.request_for(
-                decision, lambda link, token, now: link.command(token, "safe", True, now)
-            )
+            # And nothing launches after it until the supervisor releases flight.
+            reason = f"killed: {'; '.join(decision.reasons) or decision.rule}"
+
+            def kill(link: UmbilicalLink, token: int, now: float) -> None:
+                link.flight_block(reason, now)
+                link.command(token, "safe", True, now)
+
+            self.desk.request_for(decision, kill)
         elif decision.action is model.Action.DEPLOY:
             self.deploy_for(decision, self.values["decided_deploy_forces"])
         elif decision.action is not model.Action.NONE:

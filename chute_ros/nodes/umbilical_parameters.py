@@ -46,7 +46,7 @@ PARAMETERS = (
         1.0,
         "between two <H> to the flight computer, s; its own limit is 3 to 15 s",
         0.25,
-        60.0,
+        5.0,
     ),
     Parameter(
         "umbilical_heartbeat_slack",
@@ -60,7 +60,7 @@ PARAMETERS = (
         0.12,
         "between two writes, s; the receiver sleeps 0.1 s after each command",
         0.1,
-        10.0,
+        1.0,
     ),
     Parameter(
         "effect_timeout",
@@ -70,7 +70,7 @@ PARAMETERS = (
         60.0,
     ),
     Parameter("retry_interval", 0.25, "between that limit and the next try, s", 0.02, 60.0),
-    Parameter("give_up_after", 5.0, "for all tries of a command together, s", 0.1, 30.0),
+    Parameter("give_up_after", 5.0, "for all tries of a command together, s", 0.1, 10.0),
     Parameter(
         "deploy_stage",
         DeployStage.DROGUE.value,

@@ -223,7 +223,9 @@ class EffectLoop(Generic[CommandT]):
         if self.ended:
             return
         self._take(Happening.GIVE_UP)
-        self._end(False, f"{self.goal.name} given up: {why}")
+        left = self.goal.unacknowledged and self._sends > 0
+        sent = f"; it had been {self._sent_text()}" if left else ""
+        self._end(False, f"{self.goal.name} given up: {why}{sent}")
 
     def update(self, now: float) -> None:
         """Look at the clock."""

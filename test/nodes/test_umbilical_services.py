@@ -335,6 +335,17 @@ def test_a_kill_is_the_vehicle_made_safe(cable, decide):
     assert cable.tokens() == ["<M>", "<V>"]
 
 
+def test_after_a_kill_nothing_launches_until_flight_is_released(cable, decide):
+    assert cable.arm().success
+    assert decide(Action.KILL, "a test").outcome == Outcome.CONFIRMED
+    answer = cable.command("launch", force=True)
+    assert "launch refused: flight is blocked (killed: a test)" in answer.message
+    answer = cable.command("open_mav")
+    assert "open_mav refused: flight is blocked (killed: a test)" in answer.message
+    assert decide(Action.FLIGHT_BLOCK_RELEASE).outcome == Outcome.CONFIRMED
+    assert cable.command("launch", force=True).confirmed
+
+
 def test_while_flight_is_blocked_nothing_launches(cable, decide):
     assert cable.arm().success
     assert decide(Action.FLIGHT_BLOCK, "a link is silent").outcome == Outcome.CONFIRMED

@@ -23,7 +23,7 @@ RATE = 20.0
 #: Limits of a node whose flight computer answers, however busy this machine is.
 PATIENT = {
     "effect_timeout": 5.0,
-    "give_up_after": 15.0,
+    "give_up_after": 10.0,
     "telemetry_stale_after": 5.0,
     "telemetry_lost_after": 15.0,
 }

@@ -28,6 +28,7 @@ DEVICE = "flight_computer"
 #: It has landed when its altitude stays within so many metres for so many seconds after a
 #: deployment: the slowest canopy falls several times as fast.
 _REST_HEIGHT, _REST_TIME = 3.0, 5.0
+_REST_SPEED = 1.0  # m/s
 _FIX_3D = 3
 #: Command -> the flag and the flight mode that show it.
 CANOPIES = {
@@ -39,9 +40,9 @@ _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
 
 
 class FlightComputer:
-    """Follows one flight computer."""
+    """Follows one flight computer. main_counts: only the main is the parachute, not the drogue."""
 
-    def __init__(self, limits: LivenessLimits) -> None:
+    def __init__(self, limits: LivenessLimits, main_counts: bool = False) -> None:
         self.liveness = Liveness(limits)
         self.record: Record | None = None
         self.records = 0
@@ -50,13 +51,17 @@ class FlightComputer:
         self.restarted_in_flight = False
         self._clock = BootClock()
         self._limits = limits
+        self._main_counts = main_counts
+        self._cable_pulled = False
         #: In the air, as far as its records have told.
         self._flying = False
         self._rest_altitude = NAN
         self._rest_since = NAN
-        self._was_deployed = False
+        self._was_out = False
         #: What came out in this flight, by the names of the commands.
         self._came_out: set[str] = set()
+        #: What was fired from here in this flight.
+        self._fired: set[str] = set()
         self._clock_moved_at = NAN
         self._paused = False
         self._was_fresh = False
@@ -75,15 +80,25 @@ class FlightComputer:
             # Its altitude may count from elsewhere now.
             self._rest_altitude = NAN
         before, self.record = self.record, record
+        self._cable_pulled = False
         if before is not None:
             self.interval = now - before.received
         if before is None or before["ms_since_boot_cfc"] != record["ms_since_boot_cfc"]:
             self._clock_moved_at = now
         self.records += 1
-        self._watch_rest(record, now)
+        self._watch_rest(before, record, now)
         self._watch_flight()
         self._watch_canopies(before, record)
         return self.liveness.heard(now), age
+
+    def cable_pulled(self) -> None:
+        """What it said before says nothing of what is at the cable's end when it is back."""
+        self._cable_pulled = True
+
+    def fired(self, name: str) -> None:
+        """A command that fires the drogue or the main has left."""
+        if self._flying:
+            self._fired.add(name)
 
     def alive(self, now: float) -> list[LinkChange]:
         """It is heard, though a long work keeps it from sending telemetry."""
@@ -104,7 +119,7 @@ class FlightComputer:
         """When the picture changes by itself; infinity: never."""
         stale_at = math.inf
         if self.record is not None and self._was_fresh:
-            stale_at = self.record.received + self._limits.stale_after
+            stale_at = self._clock_moved_at + self._limits.stale_after
         return stale_at if self._paused else min(self.liveness.next_deadline(), stale_at)
 
     # -- what it is ------------------------------------------------------------------------------
@@ -112,18 +127,22 @@ class FlightComputer:
     @property
     def mode(self) -> FlightMode | None:
         """The flight mode of the newest record; None: a number without a name, or no record."""
-        return None if self.record is None else _MODES.get(int(self.record["flight_mode"]))
+        return None if self.record is None else _mode(self.record)
 
     def fresh(self, now: float) -> bool:
-        """The newest record is young enough to decide on."""
+        """The newest record is young enough to decide on, and no repetition of an older one."""
+        if self._cable_pulled:
+            return False
         # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
-        return self.record is not None and now < self.record.received + self._limits.stale_after
+        return self.record is not None and now < self._clock_moved_at + self._limits.stale_after
 
     def situation(self, now: float) -> Situation:
         """The gate's column."""
         mode = self.mode
         if not self.fresh(now):
-            return Situation.UNKNOWN
+            # What was in the air a moment ago is so now.
+            near = self.liveness.state in (LinkState.OK, LinkState.STALE)
+            return Situation.LOST_IN_FLIGHT if self._flying and near else Situation.UNKNOWN
         if self._flying and mode not in IN_FLIGHT:
             return Situation.LOST_IN_FLIGHT
         return Situation.UNKNOWN if mode is None else _SITUATIONS[mode]
@@ -132,11 +151,19 @@ class FlightComputer:
     def landed(self) -> bool:
         """After a deployment its altitude does not change any more, by its records: silence is
         no rest."""
-        return self.deployed and self._at_rest
+        return self._is_out and self._at_rest
 
     @property
     def deployed(self) -> bool:
-        """Drogue or main are out, by the newest record."""
+        """The parachute is out, by the newest record: drogue or main, or the main alone."""
+        if not self._main_counts:
+            return self._is_out
+        flag = self.record is not None and self.record["ssa_main_deployed"]
+        return bool(flag) or self.mode is FlightMode.MAIN_DEPLOYED
+
+    @property
+    def _is_out(self) -> bool:
+        """Drogue or main are out."""
         if self.record is None:
             return False
         flags = self.record["ssa_drogue_deployed"] or self.record["ssa_main_deployed"]
@@ -151,6 +178,10 @@ class FlightComputer:
         """The drogue or the main came out in this flight: a flag that was set before it, as by a
         test on the ground, does not count, and a restart does not undo it."""
         return name in self._came_out
+
+    def was_fired(self, name: str) -> bool:
+        """It came out in this flight, or was fired from here: not every firmware tells."""
+        return name in self._came_out or name in self._fired
 
     @property
     def armed(self) -> bool:
@@ -207,10 +238,14 @@ class FlightComputer:
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _watch_rest(self, record: Record, now: float) -> None:
+    def _watch_rest(self, before: Record | None, record: Record, now: float) -> None:
         altitude = record.number("altitude")
-        deployed, self._was_deployed = self.deployed and not self._was_deployed, self.deployed
-        if deployed or not abs(altitude - self._rest_altitude) <= _REST_HEIGHT:
+        came_out, self._was_out = self._is_out and not self._was_out, self._is_out
+        took_off = self.mode in IN_FLIGHT and (before is None or _mode(before) not in IN_FLIGHT)
+        # A barometer that is stuck is no rest where the satellites tell of a fall.
+        moves = record.number("fix_type") >= _FIX_3D and abs(record.number("vel_d")) > _REST_SPEED
+        stays = abs(altitude - self._rest_altitude) <= _REST_HEIGHT
+        if came_out or took_off or moves or not stays:
             self._rest_altitude, self._rest_since = altitude, now
 
     def _watch_flight(self) -> None:
@@ -230,6 +265,7 @@ class FlightComputer:
             self._came_out.add("drogue")  # its mode comes after the drogue's
         if self.mode in GROUND and not self._flying:
             self._came_out.clear()
+            self._fired.clear()
 
     @property
     def _at_rest(self) -> bool:
@@ -240,6 +276,8 @@ class FlightComputer:
         """Whether the motor may burn: the key is armed on the ground, or the MAV is open."""
         assert self.record is not None
         if self.mode is None:
+            return Armed.UNKNOWN
+        if self.mode is FlightMode.FAULT and not self.record["mav_open"]:
             return Armed.UNKNOWN
         may_burn = self.mode is FlightMode.STANDBY or bool(self.record["mav_open"])
         return Armed.ARMED if may_burn else Armed.DISARMED
@@ -274,13 +312,17 @@ class FlightComputer:
 
     def _state(self, now: float, pause: str) -> ParachuteState:
         """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest."""
-        if self.deployed:
+        if self.deployed or self.landed:
             return ParachuteState.TOUCHDOWN if self.landed else ParachuteState.LAUNCHED
         if pause and self.liveness.state is LinkState.OK:
             return ParachuteState.NOT_READY
         if self._faults(now, pause):
             return ParachuteState.ABNORMAL
         return ParachuteState.ARMED if self.armed else ParachuteState.READY
+
+
+def _mode(record: Record) -> FlightMode | None:
+    return _MODES.get(int(record["flight_mode"]))
 
 
 def _age(age: float, value: float) -> float:

@@ -23,7 +23,7 @@ from chute_ros.protocol.events import (
 from chute_ros.protocol.liveness import LinkChange
 from chute_ros.protocol.requests import Requests
 from chute_ros.protocol.umbilical import sayings as s
-from chute_ros.protocol.umbilical.config import UmbilicalConfig
+from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
 from chute_ros.protocol.umbilical.events import Progress, TelemetryReceived, UmbilicalEvent
 from chute_ros.protocol.umbilical.flight_computer import DEVICE, FlightComputer
@@ -48,7 +48,9 @@ class UmbilicalLink:
         self.counts: Counter[str] = Counter()
         self.received_bytes = 0
         self.decoder = TelemetryDecoder(layouts, config.layout, self.counts)
-        self.computer = FlightComputer(config.telemetry)
+        self.computer = FlightComputer(
+            config.telemetry, main_counts=config.deploy is not DeployStage.DROGUE
+        )
         self.memory = MemoryWorks(config.memory)
         self.scheduler = CommandScheduler(config.scheduler)
         requests: Requests[CommandScheduler] = Requests(self.scheduler, config.effect)
@@ -97,6 +99,7 @@ class UmbilicalLink:
         """The port was closed: what was under way on it is over."""
         self._end_dump("the cable was pulled, or the port closed")
         self._reader, self._stream = self._new_reader(), None
+        self.computer.cable_pulled()
         self.orders.wire_closed(self._now)
 
     def update(self, now: float) -> None:

@@ -27,6 +27,8 @@ from chute_ros.protocol.umbilical.stream import DumpBegan, DumpBytes, DumpEnded
 
 #: A progress of a dump is told each so many bytes.
 _TELL_EACH = 256 * 1024
+#: A dump that nobody of ours asked for is followed at most each so many seconds.
+_UNASKED_EACH = 5.0
 
 
 class Step(enum.Enum):
@@ -91,6 +93,7 @@ class MemoryWorks:
     def __init__(self, limits: MemoryLimits) -> None:
         self._limits = limits
         self.work: Work | None = None
+        self._unasked_until = -math.inf
         self._events: list[events.UmbilicalEvent] = []
 
     # -- asked for -------------------------------------------------------------------------------
@@ -130,10 +133,14 @@ class MemoryWorks:
     def heard(self, said: object, now: float) -> None:
         """Something of a dump or of a wipe was said."""
         if isinstance(said, DumpBegan):
+            if self.work is None and now < self._unasked_until:
+                return  # somebody asks for dumps without end, or the wire is noise
+            if self.work is None:
+                self._unasked_until = now + _UNASKED_EACH
             self._sign("dump_flash", now, f".{said.format.value}")
         elif isinstance(said, DumpBytes):
             self._bytes(said.data, now)
-        elif isinstance(said, DumpEnded):
+        elif isinstance(said, DumpEnded) and self.work is not None:
             why = "" if said.complete else "its end mark did not come before telemetry went on"
             self._end(said.complete, why)
         elif isinstance(said, MemoryText):

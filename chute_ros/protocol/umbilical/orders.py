@@ -33,6 +33,8 @@ _DISTURBING = (
     "wipe_flash",
     "wipe_fram_and_reboot",
 )
+#: The receiver sleeps 0.1 s and the flight loop takes its turn, s.
+_SETTLES = 0.3
 _NOTHING_SHOWS = "telemetry cannot show its effect"
 
 
@@ -81,7 +83,7 @@ class Orders:
         """Fire the stage of the configuration. again: though telemetry says that it is out."""
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
-            stage = DeployStage.MAIN if self._computer.came_out("drogue") else DeployStage.DROGUE
+            stage = DeployStage.MAIN if self._computer.was_fired("drogue") else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 
     def set_target(self, token: int, values: tuple[float, ...], now: float) -> None:
@@ -123,6 +125,8 @@ class Orders:
     def token_sent(self, name: str, now: float) -> None:
         """A command has left: only what comes after that shows its effect."""
         self._sent_at[name] = now
+        if name in CANOPIES:
+            self._computer.fired(name)
 
     # -- what the flight computer says -----------------------------------------------------------
 
@@ -166,8 +170,11 @@ class Orders:
         self, token: int, kind: CommandKind, force: bool, even_if_shown: bool, now: float
     ) -> None:
         name = kind.command.name
-        refusal = gate.rule(name, self._computer.situation(now), force).refusal
-        refusal = refusal or self._standing_refusal(name)
+        refusal = ""
+        if not self._requests.commands.is_open and name not in commands.URGENT:
+            refusal = f"{name} refused: the port is not open; nothing was sent"
+        refusal = refusal or gate.rule(name, self._computer.situation(now), force).refusal
+        refusal = refusal or self._standing_refusal(name, force)
         if refusal:
             self._requests.refuse(token, refusal + self._never_heard())
             return
@@ -194,12 +201,12 @@ class Orders:
         work = self._memory.work
         return work is not None and work.token == token and not work.sent
 
-    def _standing_refusal(self, name: str) -> str:
+    def _standing_refusal(self, name: str, force: bool) -> str:
         """Why this command is refused whatever the flight mode; empty: it is not."""
-        if not self._requests.commands.is_open and name not in commands.URGENT:
-            return f"{name} refused: the port is not open; nothing was sent"
         if name in _UNSAFE and self._requests.under_way("safe"):
             return f"{name} refused: the vehicle is being made safe; nothing was sent"
+        if name == "open_mav" and self._block and not force:
+            return f"open_mav refused: flight is blocked ({self._block}); force sends it"
         if name in _DISTURBING and self._requests.under_way("launch"):
             return f"{name} refused: a launch is under way; nothing was sent"
         if name != "launch":
@@ -235,10 +242,12 @@ class Orders:
             return None, _NOTHING_SHOWS
         known = name not in CANOPIES or computer.came_out(name)
         believed = not even_if_shown and computer.fresh(now) and known
+        # Where it shows already, only what is said once the command has been taken counts.
+        settles = _SETTLES if computer.record and effect.shown(computer.record) else 0.0
 
         def shown() -> bool:
             record = computer.record
-            if record is None or not (believed or record.received > since()):
+            if record is None or not (believed or record.received > since() + settles):
                 return False
             return effect.shown(record)
 

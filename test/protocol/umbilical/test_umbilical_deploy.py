@@ -13,7 +13,9 @@ from umbilical_link_bench import (
     ready,
 )
 
+from chute_ros.protocol.events import ParachuteChanged
 from chute_ros.protocol.umbilical.config import DeployStage
+from chute_ros.protocol.umbilical.events import DumpStarted
 from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
 
 TOKENS = {DeployStage.DROGUE: "<D>", DeployStage.MAIN: "<d>"}
@@ -82,7 +84,7 @@ def test_what_is_out_already_is_not_fired(stage):
 def test_what_is_out_already_is_fired_again_where_that_is_wanted(stage):
     bench = out(stage, deploy=stage)
     number = bench.deploy(again=True)
-    assert bench.ends(number) == []
+    assert bench.after(0.2).ends(number) == []
     assert bench.after(0.2).end(number).sent
     assert bench.after(9.0).tokens == [TOKENS[stage]]
 
@@ -265,3 +267,24 @@ def test_forced_it_is_fired_again_on_the_ground_as_well():
     bench = ready(STANDBY)
     bench.deploy(force=True)
     assert len(bench.after(4.0).times("<D>")) == 3
+
+
+def test_next_is_the_main_though_the_firmware_never_tells_of_the_drogue():
+    bench = ready(COAST, deploy=DeployStage.NEXT, altitude=2000)
+    bench.deploy()
+    bench.after(6.0).clear().deploy()
+    assert bench.after(0.2).tokens == ["<d>"]
+
+
+def test_where_the_main_is_the_parachute_the_drogue_does_not_count_as_deployed():
+    bench = ready(DROGUE, deploy=DeployStage.MAIN, ssa_drogue_deployed=1)
+    assert not bench.of(ParachuteChanged) or not bench.of(ParachuteChanged)[-1].status.deployed
+    bench.talk(ssa_main_deployed=1).after(0.3)
+    assert bench.of(ParachuteChanged)[-1].status.deployed
+
+
+def test_a_dump_that_nobody_asked_for_is_not_followed_over_and_over():
+    bench = ready(STANDBY)
+    for _ in range(50):
+        bench.hear("--- BEGIN FLASH CSV DUMP ---", "--- END FLASH CSV DUMP ---")
+    assert len(bench.of(DumpStarted)) == 1

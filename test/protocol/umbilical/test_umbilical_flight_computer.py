@@ -49,7 +49,7 @@ MODES = {
     DROGUE: (Situation.DROGUE_DEPLOYED, _LAUNCHED, True, (_OFF, _ON), _AIR),
     MAIN: (Situation.MAIN_DEPLOYED, _LAUNCHED, True, (_OFF, _ON), _AIR),
     FAULT: (
-        *(Situation.FAULT, ParachuteState.ABNORMAL, False, (_OFF, _ON)),
+        *(Situation.FAULT, ParachuteState.ABNORMAL, False, (Armed.UNKNOWN, _ON)),
         LandedState.UNKNOWN,
     ),
 }

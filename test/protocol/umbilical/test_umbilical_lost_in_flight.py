@@ -161,3 +161,38 @@ def test_rest_is_counted_from_the_deployment_on():
     rocket.descends(0.0, 20.0, mode=COAST, height=2000.0, speed=0.0)
     rocket.descends(20.1, 1.0, mode=DROGUE, height=2000.0, speed=0.0)
     assert vehicle(rocket, 21.1).landed_state is LandedState.IN_AIR
+
+
+def test_a_fault_right_after_the_ignition_is_no_landing():
+    """Given 10 s at rest on the pad, when it fails in the climb, then it is in the air."""
+    rocket = Rocket()
+    rocket.descends(0.0, 10.0, mode=STANDBY, height=0.0, speed=0.0)
+    rocket.says(10.1, ASCENT, altitude="0.5")
+    rocket.says(10.2, FAULT, altitude="2")
+    assert rocket.computer.situation(10.2) is Situation.LOST_IN_FLIGHT
+    assert vehicle(rocket, 10.2).landed_state is LandedState.IN_AIR
+
+
+def test_a_barometer_that_is_stuck_is_no_landing():
+    rocket = Rocket()
+    for step in range(200):
+        rocket.says(step / 10, DROGUE, altitude="1500", vel_d="28")
+    assert vehicle(rocket, 20.0).landed_state is LandedState.IN_AIR
+
+
+def test_what_was_in_the_air_a_moment_ago_may_still_be_deployed():
+    rocket = Rocket()
+    rocket.says(0.0, COAST, altitude="2000")
+    assert rocket.computer.situation(3.2) is Situation.LOST_IN_FLIGHT
+    rocket.computer.update(3.2)
+    rocket.computer.update(16.0)
+    assert rocket.computer.situation(16.0) is Situation.UNKNOWN, "but not for ever"
+
+
+def test_a_record_of_before_the_cable_was_pulled_is_not_fresh():
+    rocket = Rocket()
+    rocket.says(0.0, STANDBY)
+    rocket.computer.cable_pulled()
+    assert rocket.computer.situation(0.5) is Situation.UNKNOWN
+    rocket.says(0.6, STANDBY)
+    assert rocket.computer.situation(0.6) is Situation.STANDBY
