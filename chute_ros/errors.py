@@ -26,3 +26,11 @@ class SigningKeyError(ChuteError, ValueError):
 
 class NotBuiltError(ChuteError, ImportError):
     """A generated part is missing. The text says which command makes it."""
+
+
+class RecordError(ChuteError, ValueError):
+    """A recording of the supervisor cannot be read. The text says what does not fit."""
+
+
+class ProfileError(ChuteError, ValueError):
+    """A profile of rules is not right. The text lists each mistake with its line and the fix."""

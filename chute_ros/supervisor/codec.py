@@ -1,0 +1,127 @@
+"""Inputs, outputs, states and settings of the core as JSON text and back, to the last bit.
+
+Every frozen dataclass becomes an object that names its class under "is" and holds the fields that
+differ from their defaults; floats keep every bit (Python writes the shortest text that reads back
+as the same number); NaN and the infinities are written as JSON's common extension does.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+import json
+import types
+import typing
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from chute_ros.errors import RecordError
+
+#: Under this name an object says which class it is.
+CLASS = "is"
+
+
+class Codec:
+    """Reads and writes the classes that it was given, and those that their fields name."""
+
+    def __init__(self, *classes: type) -> None:
+        self._classes: dict[str, type] = {}
+        for one in classes:
+            self._learn(one)
+
+    def to_json(self, value: object, whole: bool = False) -> str:
+        """One line of JSON. whole: with the fields that have their defaults as well, which may be
+        others in another version."""
+        return json.dumps(self.plain(value, whole), separators=(",", ":"))
+
+    def from_json(self, text: str) -> Any:
+        """What to_json was given; RecordError says what does not fit."""
+        try:
+            return self.value(json.loads(text), object)
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise RecordError(f"cannot be read: {error} in {text[:80]!r}") from error
+
+    def plain(self, value: object, whole: bool = False) -> Any:
+        """value in terms of JSON."""
+        if isinstance(value, enum.Enum):
+            return value.value
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            told: dict[str, Any] = {CLASS: type(value).__name__}
+            for field in dataclasses.fields(value):
+                one = getattr(value, field.name)
+                if whole or not _is_default(field, one):
+                    told[field.name] = self.plain(one, whole)
+            return told
+        if isinstance(value, Mapping):
+            return [[self.plain(key, whole), self.plain(one, whole)] for key, one in value.items()]
+        if isinstance(value, (set, frozenset)):
+            return sorted(self.plain(one, whole) for one in value)
+        if isinstance(value, (tuple, list)):
+            return [self.plain(one, whole) for one in value]
+        return value
+
+    def value(self, plain: Any, kind: Any) -> Any:
+        """The value of this type that plain stands for."""
+        if isinstance(plain, dict):
+            return self._object(plain)
+        origin = typing.get_origin(kind)
+        arguments = typing.get_args(kind)
+        if origin in (types.UnionType, typing.Union):
+            if plain is None:
+                return None
+            return self.value(plain, next(one for one in arguments if one is not type(None)))
+        if origin is tuple:
+            kinds = arguments if arguments[-1] is not Ellipsis else arguments[:1] * len(plain)
+            return tuple(self.value(one, k) for one, k in zip(plain, kinds, strict=True))
+        if origin is frozenset:
+            return frozenset(self.value(one, arguments[0]) for one in plain)
+        if isinstance(origin, type) and issubclass(origin, Mapping):
+            pairs = ((self.value(k, arguments[0]), self.value(v, arguments[1])) for k, v in plain)
+            return MappingProxyType(dict(pairs))
+        if isinstance(kind, type) and issubclass(kind, enum.Enum):
+            return kind(plain)
+        if kind is float:
+            return float(plain)
+        return plain
+
+    def _object(self, plain: dict[str, Any]) -> Any:
+        name = plain[CLASS]
+        if name not in self._classes:
+            raise RecordError(f"class {name} is not known: written by another version")
+        kind = self._classes[name]
+        hints = _hints(kind)
+        unknown = sorted(set(plain) - set(hints) - {CLASS})
+        if unknown:
+            raise RecordError(f"{name} has no {', '.join(unknown)}: written by another version")
+        told = {key: self.value(one, hints[key]) for key, one in plain.items() if key != CLASS}
+        return kind(**told)
+
+    def _learn(self, kind: Any) -> None:
+        if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+            if kind.__name__ not in self._classes:
+                self._classes[kind.__name__] = kind
+                for hint in _hints(kind).values():
+                    self._learn(hint)
+            return
+        for argument in typing.get_args(kind):
+            self._learn(argument)
+
+
+@functools.cache
+def _hints(kind: type) -> dict[str, Any]:
+    return typing.get_type_hints(kind)
+
+
+def _is_default(field: dataclasses.Field[Any], value: object) -> bool:
+    """Exactly: 0 and 0.0 and -0.0 and False are equal, and differ."""
+    if field.default is not dataclasses.MISSING:
+        default = field.default
+    elif field.default_factory is not dataclasses.MISSING:
+        default = field.default_factory()
+    else:
+        return False
+    if isinstance(value, float) or isinstance(default, float):
+        return type(value) is type(default) and repr(value) == repr(default)
+    return type(value) is type(default) and value == default
