@@ -235,3 +235,5 @@ class Decision:
     reasons: tuple[str, ...]
     targets: tuple[str, ...]
     shadow: bool = False
+    #: Which device on the link a deploy is for; empty: the one that the node chooses.
+    device: str = ""

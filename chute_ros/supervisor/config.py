@@ -2,10 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.supervisor.link_evidence import LinkLimits
+from chute_ros.supervisor.rules import DEVICE_RULES, Profile
+
+_NO_LIMITS: MappingProxyType[str, LinkLimits] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One step of the deploy ladder. device: "" for the one that the node chooses, "1/162" for a
+    certain one, "trigger" for the triggers of a UPF parachute, past its controller."""
+
+    link: str
+    device: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> Rung:
+        """ "LINK" or "LINK:DEVICE"."""
+        link, _, device = text.partition(":")
+        if not link or (":" in text and not device):
+            raise ParameterError(
+                f"parameter deploy_ladder has {text!r}: need LINK or LINK:DEVICE, for example "
+                "mavlink_parachute, mavlink_parachute:1/162, upf_can:trigger"
+            )
+        return cls(link, device)
+
+    def __str__(self) -> str:
+        return f"{self.link}:{self.device}" if self.device else self.link
+
+
+@dataclass(frozen=True)
+class PreflightLimits:
+    """What a device must be for arming. Where it does not say, nothing is held against it."""
+
+    #: Days since the canopy was packed; 0: not looked at.
+    max_pack_age: int = 365
+    #: Arming needs a pack date at all.
+    require_pack_date: bool = False
+    #: Arming needs the parachute's own automatic trigger system to arm itself (ATS_AUTO_ARM).
+    require_self_arm: bool = False
+    #: On the ground the parachute must not say that it is high enough to deploy (GROUND_CLEARED).
+    forbid_ground_cleared: bool = True
+    #: Remaining charge of the vehicle's battery, 0 to 1.
+    min_battery_remaining: float = 0.3
+    #: V; 0: not looked at.
+    min_battery_voltage: float = 0.0
+    #: Of the parachute's own supply, V; 0: not looked at.
+    min_backup_voltage: float = 0.0
+    #: Wall clocks of the hosts may differ by this.
+    max_clock_difference: float = 0.25
 
 
 @dataclass(frozen=True)
@@ -18,13 +68,15 @@ class SupervisorConfig:
     kill_links: tuple[str, ...] = ("mavlink_parachute",)
     #: Links that release a parachute.
     deploy_links: tuple[str, ...] = ("mavlink_parachute",)
-    #: Silence of a node's heartbeat (ten a second) after which its link is stale, and lost.
-    heartbeat: LivenessLimits = field(default=LivenessLimits(0.5, 1.0))
-    #: How long links may take to come up before that counts as a fault.
-    startup_grace: float = 10.0
+    #: The steps of a deploy, first to last; empty: the deploy_links in their order.
+    deploy_ladder: tuple[Rung, ...] = ()
+    #: A step that has not been confirmed after this is followed by the next.
+    ladder_step_timeout: float = 2.0
+    #: Limits of each link, where they are not the standard ones.
+    link_limits: Mapping[str, LinkLimits] = field(default_factory=lambda: _NO_LIMITS)
     #: The parachute is released this long after the kill, confirmed or not (as ArduPilot does).
     kill_to_deploy_delay: float = 0.5
-    #: How long a deploy may take until its confirmation.
+    #: How long the last step of a deploy may take until its confirmation.
     deploy_timeout: float = 8.0
     #: A kill without confirmation is given up, as seen by its caller, after this.
     kill_timeout: float = 6.0
@@ -33,26 +85,62 @@ class SupervisorConfig:
     report_wait: float = 0.5
     #: A decision that nobody has reported on is sent again after this.
     resend_interval: float = 0.1
+    #: An alarm that does not stop is said again after this.
+    alarm_interval: float = 2.0
     #: vehicle/state counts only while its parts are younger than this.
     vehicle_state_age: float = 2.5
     #: Without vehicle/state flight is blocked: nobody could tell flight from ground.
     require_vehicle_state: bool = True
     #: Without a landed state, armed and higher than this (m) is in the air.
     takeoff_height: float = 2.0
+    #: An update that comes later than its deadline by more was late: what was not heard meanwhile
+    #: is not held against anybody.
+    late_after: float = 0.2
+    #: Of several supervisors each has another: 0 for the first choice, up to 3.
+    rank: int = 0
+    preflight: PreflightLimits = field(default=PreflightLimits())
+    profile: Profile = field(default=Profile("device requests only", DEVICE_RULES))
 
     def __post_init__(self) -> None:
-        for name in ("startup_grace", "kill_to_deploy_delay"):
-            if not 0.0 <= getattr(self, name) <= 60.0:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 60 s")
-        for name in ("deploy_timeout", "kill_timeout", "resend_interval", "vehicle_state_age"):
+        if not 0.0 <= self.kill_to_deploy_delay <= 60.0:
+            raise ParameterError(
+                f"kill_to_deploy_delay is {self.kill_to_deploy_delay}: need 0 to 60 s"
+            )
+        for name in (
+            "deploy_timeout",
+            "kill_timeout",
+            "resend_interval",
+            "vehicle_state_age",
+            "ladder_step_timeout",
+            "alarm_interval",
+            "late_after",
+        ):
             if not 0.0 < getattr(self, name) <= 60.0:
                 raise ParameterError(f"{name} is {getattr(self, name)}: need above 0, up to 60 s")
         for name in ("required_links", "kill_links", "deploy_links"):
             links = getattr(self, name)
             if not links or not all(links):
                 raise ParameterError(f"{name} is {list(links)}: need at least one link's name")
+        for rung in self.deploy_ladder:
+            if rung.link not in self.deploy_links:
+                raise ParameterError(
+                    f"deploy_ladder names {rung}: need a link of deploy_links "
+                    f"({', '.join(self.deploy_links)})"
+                )
 
     @property
     def links(self) -> tuple[str, ...]:
         """Every link that is followed, each once, the required ones first."""
         return tuple(dict.fromkeys(self.required_links + self.kill_links + self.deploy_links))
+
+    @property
+    def ladder(self) -> tuple[Rung, ...]:
+        """The steps of a deploy, first to last; at least one."""
+        return self.deploy_ladder or tuple(Rung(link) for link in self.deploy_links)
+
+    def limits(self, link: str) -> LinkLimits:
+        """The limits of this link."""
+        return self.link_limits.get(link, _STANDARD)
+
+
+_STANDARD = LinkLimits()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from chute_ros.model import Decision, LinkState, Outcome, VehicleState
+from chute_ros.model import NAN, Decision, LinkState, Outcome, ParachuteStatus, VehicleState
 
 
 class Mode(enum.IntEnum):
@@ -24,18 +24,16 @@ class LinkHeartbeat:
     link_state: LinkState
     device_healthy: bool
     seq: int
+    #: The wall clock here less the stamp of the heartbeat, s; NaN: not known.
+    clock_difference: float = NAN
 
 
 @dataclass(frozen=True)
 class ParachuteReport:
-    """What matters of a ParachuteStatus."""
+    """A ParachuteStatus came."""
 
     link: str
-    device: str
-    deployed: bool
-    faults: tuple[str, ...]
-    #: The device is heard: what a lost one said last is not what it is.
-    alive: bool = True
+    status: ParachuteStatus
 
 
 @dataclass(frozen=True)
@@ -66,6 +64,8 @@ class ArmRequest:
     token: int
     arm: bool
     triggers: int
+    #: Today by the wall clock, days since 1970-01-01; -1: not known.
+    day: int = -1
 
 
 @dataclass(frozen=True)

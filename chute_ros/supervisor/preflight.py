@@ -2,36 +2,55 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 
-from chute_ros.model import LinkState
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.model import (
+    Action,
+    LinkState,
+    ParachuteState,
+    ParachuteStatus,
+    SafetyFlags,
+    TriggerFlags,
+    flag_names,
+)
+from chute_ros.supervisor import flight
+from chute_ros.supervisor.config import PreflightLimits, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.state import LinkEvidence, State
+from chute_ros.supervisor.state import State
+
+_EPOCH = datetime.date(1970, 1, 1).toordinal()
+#: A wall clock that says less was never set.
+_FIRST_DAY = datetime.date(2024, 1, 1).toordinal() - _EPOCH
 
 
 def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, now: float) -> str:
-    """What is wrong with one link; empty: nothing. Missing, stale, lost and unhealthy differ."""
-    state = evidence.state(config, now)
-    if state is LinkState.NEVER_SEEN:
+    """What is wrong with one link; empty: nothing. Missing, stale, lost, regained and unhealthy
+    differ."""
+    limits = config.limits(link)
+    judged = evidence.judged(limits, now)
+    if judged is LinkJudgement.NEVER_SEEN:
         who = "node" if math.isnan(evidence.heard) else "device"
         return f"{link}: its {who} was never heard"
-    if state in (LinkState.STALE, LinkState.LOST):
-        silence, limit = now - evidence.heard, config.heartbeat.stale_after
-        if evidence.silent(limit, now):
-            text = f"heartbeat of its node {silence:.2f} s old (limit {limit:g} s)"
-            return f"{link}: {state.name}, {text}"
-        return f"{link}: its device is {state.name}" + _faults(evidence)
+    if judged is LinkJudgement.REGAINED:
+        heard = now - evidence.regained_at
+        return f"{link}: REGAINED, heard again for {heard:.2f} s (need {limits.regain_after:g} s)"
+    if judged is not LinkJudgement.OK:
+        silence = now - evidence.heard
+        if evidence.silent(limits.stale_after, now):
+            text = f"heartbeat of its node {silence:.2f} s old (limit {limits.stale_after:g} s)"
+            return f"{link}: {judged.name}, {text}"
+        return f"{link}: its device is {judged.name}" + _faults(evidence)
     if not evidence.device_healthy:
         return f"{link}: its device is not healthy" + _faults(evidence)
     return ""
 
 
 def _faults(evidence: LinkEvidence) -> str:
-    faults = [
-        f"{device} {fault}" for device, all_ in sorted(evidence.faults.items()) for fault in all_
-    ]
+    devices = sorted(evidence.devices.items())
+    faults = [f"{name} {fault}" for name, status in devices for fault in status.faults]
     faults += [f"{device} is released" for device in sorted(evidence.deployed)]
     return f" ({'; '.join(faults)})" if faults else ""
 
@@ -39,8 +58,7 @@ def _faults(evidence: LinkEvidence) -> str:
 def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
     """Every reason against taking off now; empty: none."""
     problem = {
-        link: link_problem(config, link, state.links.get(link, LinkEvidence()), now)
-        for link in config.links
+        link: link_problem(config, link, state.evidence(link), now) for link in config.links
     }
     against = [link for link in config.required_links if problem[link]]
     for links in (config.kill_links, config.deploy_links):
@@ -50,6 +68,11 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     reasons = [problem[link] for link in dict.fromkeys(against)]
     reasons += [
         f"{device} asks to block flight: {why}" for device, why in state.device_blocks.items()
+    ]
+    reasons += [
+        f"rule '{rule.name}': {rule.says or 'fulfilled'}"
+        for rule in config.profile.rules
+        if rule.action is Action.FLIGHT_BLOCK and state.rule(rule.name).latched
     ]
     if config.require_vehicle_state and (text := _vehicle_problem(config, state, now)):
         reasons.append(text)
@@ -69,11 +92,81 @@ def _vehicle_problem(config: SupervisorConfig, state: State, now: float) -> str:
     return ""
 
 
-def arm_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
-    """Every reason against arming the parachute now; empty: none."""
-    reasons = block_reasons(config, state, now)
+def arm_reasons(config: SupervisorConfig, state: State, day: int, now: float) -> tuple[str, ...]:
+    """Every reason against arming the parachute now; empty: none. day: today by the wall clock,
+    days since 1970-01-01."""
+    reasons = [*block_reasons(config, state, now)]
     if state.mode is not Mode.ACTIVE:
-        reasons += (f"supervisor mode is {state.mode.name} (need ACTIVE)",)
+        reasons.append(f"supervisor mode is {state.mode.name} (need ACTIVE)")
     if state.stage not in (Stage.READY, Stage.ARMED):
-        reasons += (f"the vehicle is {state.stage.name} (need READY)",)
-    return reasons
+        reasons.append(f"the vehicle is {state.stage.name} (need READY)")
+    if 0 <= day < _FIRST_DAY:
+        said = datetime.date.fromordinal(_EPOCH + day).isoformat()
+        reasons.append(f"the wall clock says {said} (need 2024-01-01 or later)")
+    for link in config.links:
+        reasons += _clock(config, link, state.evidence(link).clock_difference)
+    for link in config.deploy_links:
+        for status in state.evidence(link).devices.values():
+            if status.link_state is LinkState.OK:
+                told = _device(config.preflight, status, day)
+                reasons += [f"{link} {status.device}: {text}" for text in told]
+    reasons += _battery(config, state, now)
+    # What is said in the air about the ground is noise; here a still vehicle is known to stand.
+    if moves := flight.moving(config, state, now):
+        reasons.append(f"the vehicle moves: {moves}")
+    return tuple(reasons)
+
+
+def _clock(config: SupervisorConfig, link: str, difference: float) -> list[str]:
+    limit = config.preflight.max_clock_difference
+    if abs(difference) > limit:
+        return [f"{link}: its clock differs by {difference:+.3f} s (limit {limit:g} s)"]
+    return []
+
+
+def _device(limits: PreflightLimits, status: ParachuteStatus, day: int) -> list[str]:
+    told = []
+    if status.state not in (ParachuteState.READY, ParachuteState.TAKEOFF, ParachuteState.ARMED):
+        told.append(f"its state is {status.state.name} (need READY, TAKEOFF or ARMED)")
+    if status.deployed:
+        told.append("it is released")
+    if status.error_flags:
+        told.append(f"errors {', '.join(flag_names(status.error_flags))} (need none)")
+    told += _packed(limits, status.packed_date, day)
+    self_arms = bool(status.armed_triggers & TriggerFlags.ATS_AUTO_ARM)
+    if limits.require_self_arm and not self_arms:
+        told.append("ATS_AUTO_ARM is off (need on: it arms itself above its height)")
+    if limits.forbid_ground_cleared and status.safety_flags & SafetyFlags.GROUND_CLEARED:
+        told.append("GROUND_CLEARED is set on the ground (need not set)")
+    if status.backup_voltage < limits.min_backup_voltage:
+        told.append(
+            f"backup voltage {status.backup_voltage:.2f} V (need {limits.min_backup_voltage:g} V)"
+        )
+    return told
+
+
+def _packed(limits: PreflightLimits, packed_date: str, day: int) -> list[str]:
+    try:
+        packed = datetime.date.fromisoformat(packed_date).toordinal() - _EPOCH
+    except ValueError:
+        return ["no pack date (need one)"] if limits.require_pack_date else []
+    if day < 0:
+        return []
+    age = day - packed
+    if age < -1:
+        return [f"packed on {packed_date}, {-age} days from now"]
+    if 0 < limits.max_pack_age < age:
+        return [f"packed on {packed_date}, {age} days ago (limit {limits.max_pack_age})"]
+    return []
+
+
+def _battery(config: SupervisorConfig, state: State, now: float) -> list[str]:
+    limits, told = config.preflight, []
+    for name, least, unit in (
+        ("battery_remaining", limits.min_battery_remaining, ""),
+        ("battery_voltage", limits.min_battery_voltage, " V"),
+    ):
+        value = flight.measured(config, state, name, now)
+        if value < least:
+            told.append(f"{name} {value:.2f}{unit} (need {least:g}{unit})")
+    return told

@@ -16,9 +16,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.state import State
 
-CODEC = Codec(
-    SupervisorConfig, State, *typing.get_args(i.Input), *typing.get_args(i.Output)
-)
+CODEC = Codec(SupervisorConfig, State, *typing.get_args(i.Input), *typing.get_args(i.Output))
 
 
 @dataclass(frozen=True)

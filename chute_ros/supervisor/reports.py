@@ -6,61 +6,69 @@ import math
 from dataclasses import replace
 from types import MappingProxyType
 
-from chute_ros.model import Outcome
+from chute_ros.model import Armed, LinkState, Outcome
+from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.epochs import LARGEST_EPOCH, epoch_above
+from chute_ros.supervisor.measurements import samples_of
 from chute_ros.supervisor.requests import Requests
-from chute_ros.supervisor.state import State
-from chute_ros.supervisor.steps import SLOTS
-
-_LARGEST_EPOCH = 2**32 - 1
 
 
 class Reports(Requests):
     """Takes reports in. Nobody but a link that is configured is listened to."""
 
-    def __init__(self, config: SupervisorConfig, state: State, now: float) -> None:
-        super().__init__(config, state, now)
-        #: Links that said in this very turn that a parachute is released.
-        self.told_released: set[str] = set()
-
     def heartbeat(self, one: i.LinkHeartbeat) -> None:
         """A node lives. One whose count does not rise has restarted; a lost one may have."""
         if one.link not in self.config.links:
             return
-        before = self.evidence(one.link)
+        before, limits = self.evidence(one.link), self.config.limits(one.link)
         known = not math.isnan(before.heard)
-        silent = before.silent(self.config.heartbeat.lost_after, self.now)
-        evidence = replace(
-            before,
-            heard=self.now,
-            reported=one.link_state,
-            device_healthy=one.device_healthy,
-            seq=one.seq,
-        )
-        self.set_evidence(one.link, evidence)
+        silent = before.silent(limits.lost_after, self.now)
+        self.set_evidence(one.link, before.with_heartbeat(one, limits, self.now))
         if known and (silent or one.seq <= before.seq):
             # It may know of no decision; what still holds for it is decided anew.
             why = f"{one.link} {'is back' if silent else 'restarted'}"
-            for slot in SLOTS:
+            for slot in self.slots:
                 pending = self.pending(slot)
                 if pending is not None and one.link in pending.targets:
                     self.renew(slot, why)
 
     def parachute(self, one: i.ParachuteReport) -> None:
-        """One device on a link says whether it is released."""
+        """One device on a link tells its picture."""
         if one.link not in self.config.links:
             return
-        evidence = self.evidence(one.link)
-        deployed = evidence.deployed - {one.device}
-        if one.deployed and one.alive:
-            deployed |= {one.device}
-            self.told_released.add(one.link)
-        elif one.alive:
-            before = self.state.released_before - {(one.link, one.device)}
+        status, alive = one.status, one.status.link_state is LinkState.OK
+        self.set_evidence(one.link, self.evidence(one.link).with_status(status, self.now))
+        if alive and not status.deployed:
+            before = self.state.released_before - {(one.link, status.device)}
             self.state = replace(self.state, released_before=before)
-        faults = MappingProxyType({**evidence.faults, one.device: one.faults})
-        self.set_evidence(one.link, replace(evidence, deployed=deployed, faults=faults))
+
+    def vehicle(self, one: i.VehicleReport) -> None:
+        """What the vehicle is told to be, and each measurement in it as evidence."""
+        state, new = self.state, one.state
+        limits = self.config.profile.limits
+        samples = samples_of(new, self.now, state.home)
+        measurements = {
+            name: state.measured(name).with_sample(sample, limits[name])
+            for name, sample in samples.items()
+        }
+        was_disarmed = state.vehicle.armed is Armed.DISARMED
+        self.state = replace(
+            state,
+            vehicle=new,
+            vehicle_received=self.now,
+            measurements=MappingProxyType({**state.measurements, **measurements}),
+        )
+        if not state.airborne:
+            self.state = replace(self.state, reboots_before=new.reboot_count)
+        elif new.rebooted_in_flight and new.reboot_count > state.reboots_before:
+            if not state.rebooted:
+                text = "the autopilot started anew in flight"
+                self.outputs.append(i.Say(text, alarm=True))
+            self.state = replace(self.state, rebooted=True)
+        if was_disarmed and new.armed is Armed.ARMED:
+            height = flight.measured(self.config, self.state, "height", self.now)
+            self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
 
     def action_report(self, one: i.ActionReport) -> None:
         """How far a node got with a decision, and which is the newest that it knows."""
@@ -76,7 +84,7 @@ class Reports(Requests):
             self._overtake(one)
 
     def _take_outcome(self, one: i.ActionReport) -> None:
-        for slot in SLOTS:
+        for slot in self.slots:
             pending = self.pending(slot)
             if pending is None or one.link not in pending.targets:
                 continue
@@ -103,7 +111,7 @@ class Reports(Requests):
 
     def _overtaken(self, number: tuple[int, int], link: str) -> bool:
         """A node that saw a later decision of ours before this one refuses this one as older."""
-        others = [self.pending(slot) for slot in SLOTS]
+        others = [self.pending(slot) for slot in self.slots]
         return any(
             other is not None and link in other.targets and other.number > number
             for other in others
@@ -111,14 +119,14 @@ class Reports(Requests):
 
     def _overtake(self, one: i.ActionReport) -> None:
         """A node refuses what is older than it has seen: go on above that."""
-        if one.newest_epoch >= _LARGEST_EPOCH:
+        epoch = epoch_above(one.newest_epoch, self.config.rank)
+        if epoch > LARGEST_EPOCH:
             self.alarm(f"{one.link} has seen epoch {one.newest_epoch}, the largest: restart it")
             return
-        epoch = one.newest_epoch + 1
         text = f"{one.link} has seen epoch {one.newest_epoch}: going on as {epoch}"
         self.outputs.append(i.Say(text))
         self.state = replace(self.state, epoch=epoch)
-        for slot in SLOTS:
+        for slot in self.slots:
             pending = self.pending(slot)
             # What every target has begun with goes on there; a second order would start it again.
             if pending is not None and (slot == "block" or pending.not_begun()):

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import MappingProxyType
 
-from chute_ros.model import Action, Armed
+from chute_ros.model import Action
+from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.gate import against_person
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.orders import ON_GROUND, Orders
 from chute_ros.supervisor.preflight import arm_reasons
-from chute_ros.supervisor.steps import Steps
+from chute_ros.supervisor.rules import DeviceCondition, DeviceFact
+from chute_ros.supervisor.state import ASK_LASTS, Ask
 
-ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
-#: What a vehicle says so soon after a kill was decided may be from before it, s.
-_KILL_SETTLES = 0.2
 #: Devices whose wish to block flight is remembered: made-up names must not grow us.
 MOST_DEVICE_BLOCKS = 64
-_DEPLOY_ALLOWED = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
 
 
-class Requests(Steps):
+class Requests(Orders):
     """Every request with a token is answered exactly once, now or when its outcome is known."""
 
     def arm_request(self, one: i.ArmRequest) -> None:
         """Arming needs every pre-flight check; disarming only the ground."""
         if one.arm:
-            wrong = arm_reasons(self.config, self.state, self.now)
+            wrong = arm_reasons(self.config, self.state, one.day, self.now)
         elif self.state.stage in ON_GROUND or self._down():
             wrong = ()
         else:
@@ -44,44 +45,27 @@ class Requests(Steps):
         self.finish(one.token, one.success, one.success, one.message)
 
     def kill_request(self, one: i.KillRequest) -> None:
-        """Never refused while ACTIVE; one that is under way is joined."""
+        """A person's is never refused while ACTIVE; a device's is evidence for the rules."""
         reason = f"{one.by}: {one.reason}"
-        if self.state.mode is not i.Mode.ACTIVE:
-            self.only_say(Action.KILL, one.by, (reason,))
-            self._nothing_sent(one.token)
+        if not one.token:
+            self._device_asks(one)
             return
-        self.end_kill()
-        if one.token:
-            self.state = replace(self.state, kill_tokens=(*self.state.kill_tokens, one.token))
-        if listed(self.state.stage, Stimulus.KILL):
-            self.move(Stimulus.KILL, reason)
-        if not self._kill_joined(one.token):
-            self.fire(Action.KILL, one.by, (reason,))
+        self.order_kill(one.by, (reason,), one.token)
+        if self.state.mode is not i.Mode.ACTIVE:
+            self._nothing_sent(one.token)
 
-    def _kill_under_way(self) -> bool:
-        """A kill is on its way and may still be confirmed."""
-        kill = self.state.kill
-        return kill is not None and not kill.confirmed and not self.kill_failed(kill)
-
-    def _kill_joined(self, token: int) -> bool:
-        """Does a kill that was decided already serve this request?
-
-        A person who asks after the confirmation sees motors that turn, and is obeyed again. A
-        device repeats itself; that must not become a new decision each time.
-        """
-        kill = self.state.kill
-        if token or kill is None or self._kill_under_way():
-            return self._kill_under_way()
-        if kill.confirmed and self._armed_since(kill.decided_at + _KILL_SETTLES):
-            return False
-        wait = self.config.kill_timeout if kill.confirmed else self.config.resend_interval
-        return self.now < kill.decided_at + wait
-
-    def _armed_since(self, when: float) -> bool:
-        """The vehicle says, and said after when, that its motors are armed (again)."""
-        said_at = self.state.vehicle_received - self.state.vehicle.armed_age
-        fresh = self.now - said_at <= self.config.vehicle_state_age
-        return self.state.vehicle.armed is Armed.ARMED and fresh and said_at > when
+    def _device_asks(self, one: i.KillRequest) -> None:
+        asks = {who: ask for who, ask in self.state.asks.items() if self.now < ask.at + ASK_LASTS}
+        if one.by in asks or len(asks) < MOST_DEVICE_BLOCKS:
+            asks[one.by] = Ask(self.now, one.by.partition(" ")[0], one.reason)
+        rules = dict(self.state.rules)
+        for rule in self.config.profile.rules:
+            # Asked anew is a new occasion, whatever became of the last.
+            if any(c == DeviceCondition(DeviceFact.ASKS_FOR_KILL) for c in rule.conditions):
+                rules[rule.name] = replace(self.state.rule(rule.name), latched=False)
+        self.state = replace(
+            self.state, asks=MappingProxyType(asks), rules=MappingProxyType(rules)
+        )
 
     def block_request(self, one: i.BlockRequest) -> None:
         """Blocks flight on the ground as an unhealthy link does; in the air it is remembered."""
@@ -101,50 +85,25 @@ class Requests(Steps):
 
     def deploy_request(self, one: i.DeployRequest) -> None:
         """Refused on the ground unless forced; one that is under way is joined."""
-        stage = self.state.stage
-        in_air = self.state.in_air(self.config, self.now)
+        wrong = against_person(self.config, self.state, one.force, self.now)
         reason = f"operator{', forced' if one.force else ''}: {one.reason or 'no reason given'}"
-        wrong = ""
-        if stage is Stage.DEPLOYED:
-            wrong = "a parachute is out already"
-        elif stage not in _DEPLOY_ALLOWED and not one.force:
-            unknown = " (nothing fresh says whether it is in the air)" if in_air is None else ""
-            wrong = f"the vehicle is {stage.name}, not in flight{unknown}; "
-            wrong += "force deploys all the same"
         if wrong:
             self.finish(one.token, False, False, "refused: " + wrong)
         elif self.state.mode is not i.Mode.ACTIVE:
-            for action in (Action.KILL, Action.DEPLOY):
-                self.only_say(action, "operator", (reason,))
+            self.order_deploy("operator", (reason,))
             self._nothing_sent(one.token)
         else:
             tokens = (*self.state.deploy_tokens, one.token)
             self.state = replace(self.state, deploy_tokens=tokens)
-            if not self.state.deploy_reason:
-                self._begin_deploy(reason)
-
-    def _begin_deploy(self, reason: str) -> None:
-        """The kill first, unless one is on its way or confirmed."""
-        if self.state.stage in ON_GROUND:
-            self.note_released()
-        self.end_kill()
-        kill, since = self.state.kill, self.now
-        if self.state.stage is Stage.KILLING and self._kill_under_way():
-            assert kill is not None
-            since = kill.decided_at
-        elif self.state.stage is not Stage.KILLING or kill is None or not kill.confirmed:
-            self.move(Stimulus.KILL, reason)
-            self.fire(Action.KILL, "operator", (reason,))
-        due = since + self.config.kill_to_deploy_delay
-        self.state = replace(self.state, deploy_reason=reason, deploy_due=due)
+            self.order_deploy("operator", (reason,))
 
     def reset_request(self, one: i.ResetRequest) -> None:
         """Back to the start, on the ground only."""
         stage = self.state.stage
-        in_air = self.state.in_air(self.config, self.now)
+        in_air = flight.in_air(self.config, self.state, self.now)
         if in_air or stage is Stage.IN_FLIGHT:
             self.finish(one.token, False, False, "refused: the vehicle is in the air")
-        elif in_air is None and self.state.deploy_reason:
+        elif in_air is None and self.state.deploy_rule:
             text = "refused: a deploy is under way and nothing fresh says that it is on the ground"
             self.finish(one.token, False, False, text)
         elif not listed(stage, Stimulus.RESET):
@@ -157,9 +116,15 @@ class Requests(Steps):
                 started_at=self.now,
                 block=None,
                 kill=None,
-                deploy=None,
+                deploys=(),
                 flown=False,
+                airborne=False,
+                killed_in_flight=False,
+                rebooted=False,
+                rules=MappingProxyType({}),
+                asks=MappingProxyType({}),
                 alarms=(),
+                alarm_at=math.nan,
                 # A device that still wants it asks again; one that was exchanged cannot.
                 device_blocks=MappingProxyType({}),
             )
@@ -178,7 +143,7 @@ class Requests(Steps):
             return
         if before is i.Mode.ACTIVE:
             self.give_up_waiting(f"mode changed to {one.mode.name}")
-            self.state = replace(self.state, kill=None, deploy=None)
+            self.state = replace(self.state, kill=None, deploys=())
             if stage is Stage.DEPLOYING:
                 self.move(Stimulus.DEPLOY_FAILED, "the mode was changed")
             block = self.state.block
@@ -193,14 +158,15 @@ class Requests(Steps):
         else:
             # What was said in the other mode was not sent; what holds now is decided anew.
             self.state = replace(self.state, block=None)
-        self.state = replace(self.state, mode=one.mode)
+        # What was only said in one mode is done in the other.
+        self.state = replace(self.state, mode=one.mode, rules=MappingProxyType({}))
         self.finish(one.token, True, True, f"mode {one.mode.name}")
 
     def _down(self) -> bool:
         """Known to be on the ground, and no deploy on its way."""
-        if self.state.deploy_reason:
+        if self.state.deploy_rule:
             return False
-        return self.state.in_air(self.config, self.now) is False
+        return flight.in_air(self.config, self.state, self.now) is False
 
     def _nothing_sent(self, token: int) -> None:
         text = f"refused: mode is {self.state.mode.name}; nothing is sent"

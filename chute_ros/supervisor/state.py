@@ -7,45 +7,27 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome, VehicleState
+from chute_ros.model import Action, Decision, Outcome, VehicleState
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import Measured
 
 #: A flight block that nobody reports on is sent at least so often, s.
 _RAREST_RESEND = 1.0
-_NOTHING: MappingProxyType[str, tuple[str, ...]] = MappingProxyType({})
+#: A device that asks for a kill is taken to want it for so long, s.
+ASK_LASTS = 1.0
 
 
 @dataclass(frozen=True)
-class LinkEvidence:
-    """What is known of one link. heard: monotonic s of the newest heartbeat; NaN: never."""
+class Ask:
+    """A device asked for a kill at this monotonic time, s."""
 
-    heard: float = math.nan
-    reported: LinkState = LinkState.NEVER_SEEN
-    device_healthy: bool = False
-    seq: int = 0
-    #: The devices on this link whose own status says released.
-    deployed: frozenset[str] = frozenset()
-    #: Faults of each device on this link, in words.
-    faults: Mapping[str, tuple[str, ...]] = field(default_factory=lambda: _NOTHING)
-
-    def silent(self, limit: float, now: float) -> bool:
-        """The node itself, not only its device, was not heard for limit s, or never.
-
-        Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
-        """
-        return not now < self.heard + limit
-
-    def state(self, config: SupervisorConfig, now: float) -> LinkState:
-        """The worse of what the node says of its wire, and what its silence says of itself."""
-        if math.isnan(self.heard):
-            return LinkState.NEVER_SEEN
-        if self.silent(config.heartbeat.lost_after, now):
-            return LinkState.LOST
-        if self.silent(config.heartbeat.stale_after, now) and self.reported is LinkState.OK:
-            return LinkState.STALE
-        return self.reported
+    at: float
+    link: str
+    reason: str
 
 
 @dataclass(frozen=True)
@@ -120,19 +102,44 @@ class State:
     stage: Stage = Stage.STARTUP
     stage_since: float = math.nan
     mode: Mode = Mode.ACTIVE
+    #: It holds the lease: what it decides is sent. One that follows only looks on.
+    leading: bool = True
     next_id: int = 1
+    updated_at: float = math.nan
+    #: Updates that came later than their deadline allows.
+    late_count: int = 0
     links: Mapping[str, LinkEvidence] = field(default_factory=lambda: MappingProxyType({}))
     vehicle: VehicleState = field(default=VehicleState())
     vehicle_received: float = math.nan
+    measurements: Mapping[str, Measured] = field(default_factory=lambda: MappingProxyType({}))
+    rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
+    #: "link device" -> its newest wish for a kill.
+    asks: Mapping[str, Ask] = field(default_factory=lambda: MappingProxyType({}))
     block: Pending | None = None
     kill: Pending | None = None
-    deploy: Pending | None = None
-    #: Why a deploy follows the kill; empty: none does.
-    deploy_reason: str = ""
+    #: One for each step of the ladder that was begun.
+    deploys: tuple[Pending, ...] = ()
+    #: Rule and reasons of the deploy that follows the kill; empty: none does.
+    deploy_rule: str = ""
+    deploy_reasons: tuple[str, ...] = ()
     #: When it leaves at the latest. A kill that is decided again does not put it off.
     deploy_due: float = math.nan
     #: It was in the air since the start or the reset.
     flown: bool = False
+    #: It took off and has not landed since, or was not seen to.
+    airborne: bool = False
+    #: The kill that is under way, or was the last, was decided in flight.
+    killed_in_flight: bool = False
+    #: Since when the vehicle says that it stands and nothing contradicts it.
+    down_since: float = math.nan
+    #: The autopilot started anew since the take-off.
+    rebooted: bool = False
+    #: Restarts of the autopilot that had been counted on the ground.
+    reboots_before: int = 0
+    #: Height when it was armed, m; 0: not seen.
+    armed_height: float = 0.0
+    #: Degrees; where it took off.
+    home: tuple[float, float] | None = None
     #: (link, device) that were released before the flight: they say nothing of what happens in it.
     released_before: frozenset[tuple[str, str]] = frozenset()
     #: "link device" of those that asked to block flight and have not released it -> why.
@@ -143,33 +150,42 @@ class State:
     kill_tokens: tuple[int, ...] = ()
     deploy_tokens: tuple[int, ...] = ()
     alarms: tuple[str, ...] = ()
+    #: When the alarm that does not stop is said next.
+    alarm_at: float = math.nan
+
+    @property
+    def deploy(self) -> Pending | None:
+        """The newest step of the ladder."""
+        return self.deploys[-1] if self.deploys else None
+
+    def measured(self, name: str) -> Measured:
+        """What is known of a measurement."""
+        return self.measurements.get(name, _NEVER_MEASURED)
+
+    def evidence(self, link: str) -> LinkEvidence:
+        """What is known of a link."""
+        return self.links.get(link, _NEVER_HEARD)
+
+    def rule(self, name: str) -> RuleEvidence:
+        """What is known of a rule."""
+        return self.rules.get(name, _NEVER_COUNTED)
 
     def released(self, config: SupervisorConfig) -> frozenset[tuple[str, str]]:
         """(link, device) of every parachute that says that it is released."""
         return frozenset(
             (link, device)
             for link in config.deploy_links
-            if link in self.links
-            for device in self.links[link].deployed
+            for device in self.evidence(link).deployed
         )
 
-    def disarmed(self, config: SupervisorConfig, now: float) -> bool:
-        """Does the autopilot say, freshly, that the motors are off?"""
-        age = self.vehicle.armed_age + (now - self.vehicle_received)
-        return age <= config.vehicle_state_age and self.vehicle.armed is Armed.DISARMED
+    def newly_released(self, config: SupervisorConfig, now: float) -> frozenset[tuple[str, str]]:
+        """Those that were not before the flight, on links that are heard."""
+        return frozenset(
+            (link, device)
+            for link, device in self.released(config) - self.released_before
+            if self.evidence(link).is_heard(config.limits(link), now)
+            or now < self.evidence(link).released_at + config.limits(link).lost_after
+        )
 
-    def in_air(self, config: SupervisorConfig, now: float) -> bool | None:
-        """Is the vehicle in the air? None: nothing that is fresh says so or otherwise."""
-        vehicle, waited = self.vehicle, now - self.vehicle_received
 
-        def fresh(age: float) -> bool:
-            return age + waited <= config.vehicle_state_age
-
-        if fresh(vehicle.landed_state_age) and vehicle.landed_state is not LandedState.UNKNOWN:
-            return vehicle.landed_state is not LandedState.ON_GROUND
-        if fresh(vehicle.armed_age) and vehicle.armed is Armed.DISARMED:
-            return False
-        if fresh(vehicle.armed_age) and fresh(vehicle.height_age):
-            armed = vehicle.armed is Armed.ARMED
-            return armed and vehicle.height > config.takeoff_height
-        return None
+_NEVER_MEASURED, _NEVER_HEARD, _NEVER_COUNTED = Measured(), LinkEvidence(), RuleEvidence()

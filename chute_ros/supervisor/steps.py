@@ -9,11 +9,12 @@ from typing import Literal
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage, Stimulus, next_stage
-from chute_ros.supervisor.state import LinkEvidence, Pending, State
+from chute_ros.supervisor.state import Pending, State
 
-Slot = Literal["block", "kill", "deploy"]
-SLOTS: tuple[Slot, ...] = ("block", "kill", "deploy")
+#: A decision that may be on its way; a number is that of the deploy's step, from 0.
+Slot = Literal["block", "kill"] | int
 
 
 class Steps:
@@ -33,23 +34,51 @@ class Steps:
         text = f"{before.name} -> {after.name}: {stimulus.value}"
         self.outputs.append(i.Say(f"{text} ({why})" if why else text))
 
+    @property
+    def slots(self) -> tuple[Slot, ...]:
+        """Every decision that may be on its way."""
+        return ("block", "kill", *range(len(self.state.deploys)))
+
     def fire(self, action: Action, rule: str, reasons: tuple[str, ...]) -> None:
         """The only place from which a kill or a deploy leaves. Default is deny."""
-        if self.state.mode is not i.Mode.ACTIVE:
+        state = self.state
+        if not state.leading or state.mode is i.Mode.INHIBITED:
+            return
+        if state.mode is i.Mode.SHADOW:
             self.only_say(action, rule, reasons)
         elif action is Action.KILL:
             self.decide("kill", action, rule, reasons, self.config.kill_links)
-        elif self.state.stage is Stage.DEPLOYING and self.state.kill is not None:
-            self.decide("deploy", action, rule, reasons, self.config.deploy_links)
+        elif state.stage is Stage.DEPLOYING and state.kill is not None:
+            step = len(state.deploys)
+            if step < len(self.config.ladder) and not any(d.confirmed for d in state.deploys):
+                rung = self.config.ladder[step]
+                self.decide(step, action, rule, reasons, (rung.link,), rung.device)
 
     def only_say(self, action: Action, rule: str, reasons: tuple[str, ...]) -> None:
-        """In SHADOW a kill or a deploy is published as what would have been done."""
-        if self.state.mode is i.Mode.SHADOW:
-            slot: Slot = "kill" if action is Action.KILL else "deploy"
-            links = self.config.kill_links if slot == "kill" else self.config.deploy_links
-            self.decide(slot, action, rule, reasons, links)
-            # Nobody carries it out, so nothing is awaited.
-            self.put(slot, None)
+        """In SHADOW a kill or a deploy is published as what would have been done; nobody carries
+        it out, so nothing is awaited."""
+        first = self.config.ladder[0]
+        links = self.config.kill_links if action is Action.KILL else (first.link,)
+        device = "" if action is Action.KILL else first.device
+        self.publish(action, rule, reasons, links, device)
+
+    def publish(
+        self,
+        action: Action,
+        rule: str,
+        reasons: tuple[str, ...],
+        targets: tuple[str, ...],
+        device: str = "",
+    ) -> Decision:
+        """A new decision under the next number, in SHADOW only as what would have been done."""
+        state = self.state
+        shadow = state.mode is i.Mode.SHADOW
+        decision = Decision(
+            state.epoch, state.next_id, action, rule, reasons, targets, shadow, device
+        )
+        self.outputs.append(i.Decide(decision))
+        self.state = replace(state, next_id=state.next_id + 1)
+        return decision
 
     def decide(
         self,
@@ -58,13 +87,10 @@ class Steps:
         rule: str,
         reasons: tuple[str, ...],
         targets: tuple[str, ...],
+        device: str = "",
     ) -> None:
-        """Publish a new decision, in SHADOW only as what would have been done."""
-        state = self.state
-        shadow = state.mode is i.Mode.SHADOW
-        decision = Decision(state.epoch, state.next_id, action, rule, reasons, targets, shadow)
-        self.outputs.append(i.Decide(decision))
-        self.state = replace(state, next_id=state.next_id + 1)
+        """Publish a new decision and await what comes of it."""
+        decision = self.publish(action, rule, reasons, targets, device)
         self.put(slot, Pending(decision, targets, self.now, self.now))
 
     def wanted(self, slot: Slot) -> bool:
@@ -106,7 +132,7 @@ class Steps:
     ) -> Pending:
         d = pending.decision
         reasons = d.reasons if why in d.reasons else (*d.reasons, why)
-        self.decide(slot, d.action, d.rule, reasons, targets)
+        self.decide(slot, d.action, d.rule, reasons, targets, d.device)
         renewed = self.pending(slot)
         assert renewed is not None
         return renewed
@@ -127,16 +153,27 @@ class Steps:
         """The decision in this slot."""
         if slot == "block":
             return self.state.block
-        return self.state.kill if slot == "kill" else self.state.deploy
+        return self.state.kill if slot == "kill" else self.state.deploys[slot]
 
-    def put(self, slot: Slot, pending: Pending | None) -> None:
+    def put(self, slot: Slot, pending: Pending) -> None:
         """Remember a decision."""
         if slot == "block":
             self.state = replace(self.state, block=pending)
         elif slot == "kill":
             self.state = replace(self.state, kill=pending)
         else:
-            self.state = replace(self.state, deploy=pending)
+            deploys = self.state.deploys
+            self.state = replace(
+                self.state, deploys=(*deploys[:slot], pending, *deploys[slot + 1 :])
+            )
+
+    def deploy_reached(self, outcome: Outcome) -> bool:
+        """A step of the deploy has got this far, or further."""
+        return any(deploy.reached(outcome) for deploy in self.state.deploys)
+
+    def deploy_details(self) -> str:
+        """What was reported last on each step of the deploy, in words."""
+        return "; ".join(d.newest_details() for d in self.state.deploys if d.details)
 
     def alarm(self, text: str) -> None:
         """Something that stays until a reset."""
@@ -178,7 +215,7 @@ class Steps:
         """Answer everyone who waits for the deploy."""
         for token in self.state.deploy_tokens:
             self.finish(token, success, accepted, message)
-        self.state = replace(self.state, deploy_tokens=(), deploy_reason="")
+        self.state = replace(self.state, deploy_tokens=(), deploy_rule="", deploy_reasons=())
 
     def give_up_waiting(self, why: str) -> None:
         """What was asked for is not pursued any more."""
@@ -187,7 +224,7 @@ class Steps:
 
     def evidence(self, link: str) -> LinkEvidence:
         """What is known of a link."""
-        return self.state.links.get(link, LinkEvidence())
+        return self.state.evidence(link)
 
     def set_evidence(self, link: str, evidence: LinkEvidence) -> None:
         """Remember what is known of a link."""

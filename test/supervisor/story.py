@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome, VehicleState
+from chute_ros.model import (
+    Action,
+    Armed,
+    Decision,
+    LandedState,
+    LinkState,
+    Outcome,
+    ParachuteState,
+    ParachuteStatus,
+    VehicleState,
+)
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
@@ -23,6 +33,20 @@ STANDING = VehicleState(
 IDLING = VehicleState(
     armed=Armed.ARMED, armed_age=0.0, landed_state=LandedState.ON_GROUND, landed_state_age=0.0
 )
+
+
+def parachute(
+    link: str = LINK,
+    device: str = "1/161",
+    deployed: bool = False,
+    faults: tuple[str, ...] = (),
+    alive: bool = True,
+) -> i.ParachuteReport:
+    """A parachute tells its picture; one that is not alive is told of by its node."""
+    state = ParachuteState.LAUNCHED if deployed else ParachuteState.READY
+    link_state = LinkState.OK if alive else LinkState.LOST
+    status = ParachuteStatus(device, link_state, state, deployed=deployed, faults=faults)
+    return i.ParachuteReport(link, status)
 
 
 @dataclass

@@ -8,6 +8,7 @@ from story import LINK, START, Story
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import Action, Armed, VehicleState
+from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.steps import Steps
@@ -16,7 +17,6 @@ from chute_ros.supervisor.steps import Steps
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"startup_grace": -0.1}, "startup_grace is -0.1: need 0 to 60 s"),
         ({"kill_to_deploy_delay": 61.0}, "kill_to_deploy_delay is 61.0"),
         ({"deploy_timeout": 0.0}, "deploy_timeout is 0.0: need above 0"),
         ({"resend_interval": float("nan")}, "resend_interval is nan"),
@@ -42,23 +42,23 @@ def test_every_link_is_followed_once() -> None:
         (Armed.ARMED, 2.1, True),
         (Armed.ARMED, 1.9, False),
         (Armed.DISARMED, 50.0, False),
-        (Armed.UNKNOWN, 50.0, False),
+        (Armed.UNKNOWN, 50.0, None),
     ],
 )
 def test_without_a_landed_state_armed_and_high_is_in_the_air(
-    armed: Armed, height: float, in_air: bool
+    armed: Armed, height: float, in_air: bool | None
 ) -> None:
     vehicle = VehicleState(armed=armed, armed_age=0.0, height=height, height_age=0.1)
     story = Story()
-    state = replace(story.state, vehicle=vehicle, vehicle_received=START)
-    assert state.in_air(story.config, START + 0.1) is in_air
+    story.at(0.0, i.VehicleReport(vehicle))
+    assert flight.in_air(story.config, story.state, START + 0.1) is in_air
 
 
 def test_an_unknown_height_says_nothing() -> None:
     vehicle = VehicleState(armed=Armed.ARMED, armed_age=0.0)
     story = Story()
-    state = replace(story.state, vehicle=vehicle, vehicle_received=START)
-    assert state.in_air(story.config, START) is None
+    story.at(0.0, i.VehicleReport(vehicle))
+    assert flight.in_air(story.config, story.state, START) is None
 
 
 def test_a_deploy_does_not_leave_before_its_kill_whoever_asks() -> None:

@@ -1,7 +1,7 @@
 """A person's deploy: refused for stated reasons, the kill first, each step until confirmed."""
 
 import pytest
-from story import LINK, Story
+from story import LINK, Story, parachute
 
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import inputs as i
@@ -12,7 +12,7 @@ K, D = Action.KILL, Action.DEPLOY
 
 
 def out(link: str = LINK, device: str = "1/161", deployed: bool = True) -> i.ParachuteReport:
-    return i.ParachuteReport(link, device, deployed, ())
+    return parachute(link, device, deployed, ())
 
 
 def deploying(config: SupervisorConfig | None = None) -> Story:
@@ -251,7 +251,7 @@ def test_a_released_parachute_on_the_ground_fires_nothing_and_is_named() -> None
 
 def test_what_a_lost_parachute_said_last_is_not_believed_and_it_is_deployed_all_the_same() -> None:
     story = Story().ready()
-    story.at(0.1, out(), i.ParachuteReport(LINK, "1/161", True, (), alive=False))
+    story.at(0.1, out(), parachute(LINK, "1/161", True, (), alive=False))
     story.at(10.0, i.DeployRequest(5, True, "once more"))
     story.at(10.1, story.report(K, Outcome.CONFIRMED))
     assert len(story.decisions(D)) == 1

@@ -3,9 +3,10 @@
 import itertools
 
 import pytest
-from story import FLYING, IDLING, LINK, STANDING, Story
+from story import FLYING, IDLING, LINK, STANDING, Story, parachute
 
 from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
@@ -61,7 +62,7 @@ def test_missing_stale_lost_and_unhealthy_are_different(
 
 def test_the_faults_of_the_device_are_named() -> None:
     story = Story().ready()
-    story.at(0.1, i.ParachuteReport(LINK, "1/161", False, ("LOW_POWER",)))
+    story.at(0.1, parachute(LINK, "1/161", False, ("LOW_POWER",)))
     story.at(0.1, story.heartbeat(healthy=False))
     assert "1/161 LOW_POWER" in reasons(story)
 
@@ -80,7 +81,11 @@ def test_a_silent_node_is_stale_and_then_lost_each_at_its_limit() -> None:
 def test_a_link_that_comes_back_releases_flight_again() -> None:
     story = Story().ready()
     story.at(2.0)
-    story.at(2.1, story.heartbeat())
+    story.at(2.1, story.heartbeat(), i.VehicleReport(STANDING))
+    assert "REGAINED, heard again for 0.00 s (need 1 s)" in reasons(story)
+    story.alive(3.05)
+    assert story.state.stage is Stage.BLOCKED
+    story.alive(3.25)
     assert story.state.stage is Stage.READY
     assert story.decisions()[-1].action is Action.FLIGHT_BLOCK_RELEASE
 
@@ -92,7 +97,7 @@ def test_a_link_that_is_not_required_does_not_block() -> None:
 
 def test_a_link_that_is_not_ours_is_not_followed() -> None:
     story = Story().ready()
-    story.at(0.0, story.heartbeat("stranger"), i.ParachuteReport("stranger", "9", True, ()))
+    story.at(0.0, story.heartbeat("stranger"), parachute("stranger", "9", True, ()))
     assert set(story.state.links) == {LINK}
 
 
@@ -109,7 +114,7 @@ def test_a_restarted_node_hears_of_the_block_again() -> None:
 
 def test_a_node_that_restarts_before_its_second_heartbeat_is_noticed_too() -> None:
     story = Story()
-    story.at(0.0, i.ParachuteReport(LINK, "1/161", False, ()))
+    story.at(0.0, parachute(LINK, "1/161", False, ()))
     story.at(0.1, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
     assert len(story.decisions()) == 1
     story.at(0.2, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
@@ -196,8 +201,8 @@ def test_after_landing_a_link_that_is_not_healthy_blocks_the_next_flight() -> No
 
 def test_a_vehicle_state_that_is_old_says_nothing() -> None:
     story = Story().ready()
-    assert story.state.in_air(story.config, 1000.0 + 2.0) is False
-    assert story.state.in_air(story.config, 1000.0 + 3.0) is None
+    assert flight.in_air(story.config, story.state, 1000.0 + 2.0) is False
+    assert flight.in_air(story.config, story.state, 1000.0 + 3.0) is None
 
 
 def test_a_lying_epoch_is_left_behind_and_what_holds_is_decided_anew() -> None:
@@ -205,8 +210,8 @@ def test_a_lying_epoch_is_left_behind_and_what_holds_is_decided_anew() -> None:
     old = story.newest(Action.FLIGHT_BLOCK_RELEASE)
     report = i.ActionReport(old.epoch, old.id, LINK, Outcome.FAILED, "older", newest_epoch=900)
     story.at(0.1, report)
-    assert story.state.epoch == 901
-    assert story.newest(Action.FLIGHT_BLOCK_RELEASE).epoch == 901
+    assert story.state.epoch == 904
+    assert story.newest(Action.FLIGHT_BLOCK_RELEASE).epoch == 904
 
 
 def test_a_report_of_a_stranger_moves_no_epoch() -> None:

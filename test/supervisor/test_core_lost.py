@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from story import FLYING, LINK, STANDING, START, Story
+from story import FLYING, LINK, STANDING, START, Story, parachute
 
 from chute_ros.model import Action, Armed, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -17,7 +17,7 @@ TWO = SupervisorConfig(deploy_links=(LINK, "upf_can"))
 
 
 def out(link: str = LINK, device: str = "1/161", deployed: bool = True) -> i.ParachuteReport:
-    return i.ParachuteReport(link, device, deployed, ())
+    return parachute(link, device, deployed, ())
 
 
 def falling(config: SupervisorConfig | None = None) -> Story:
@@ -252,9 +252,9 @@ def test_a_device_that_has_begun_under_the_old_epoch_is_not_told_to_begin_again(
     story = deploying()
     deploy = story.newest(D)
     story.at(1.2, i.ActionReport(7, deploy.id, LINK, Outcome.ACCEPTED, "acknowledged", 900))
-    assert story.state.epoch == 901
+    assert story.state.epoch == 904
     assert len(story.decisions(D)) == 1
-    story.at(1.3, i.ActionReport(7, deploy.id, LINK, Outcome.CONFIRMED, "deployed", 901))
+    story.at(1.3, i.ActionReport(7, deploy.id, LINK, Outcome.CONFIRMED, "deployed", 904))
     assert story.state.stage is Stage.DEPLOYED
 
 
@@ -263,7 +263,7 @@ def test_a_device_that_refused_the_old_epoch_is_told_under_the_new_one() -> None
     deploy = story.newest(D)
     story.at(1.2, i.ActionReport(7, deploy.id, LINK, Outcome.FAILED, "older", newest_epoch=900))
     assert story.state.stage is Stage.DEPLOYING
-    assert story.newest(D).epoch == 901
+    assert story.newest(D).epoch == 904
     story.at(1.2 + 8.0)
     assert story.state.stage is Stage.FAULT
 
@@ -303,7 +303,7 @@ def test_a_deploy_that_was_given_up_is_not_sent_to_a_node_that_comes_later() -> 
 
 def test_a_deploy_stops_when_a_parachute_is_out() -> None:
     story = deploying(TWO)
-    story.at(1.15, story.report(D, Outcome.CONFIRMED))
+    story.at(1.15, story.report(D, Outcome.CONFIRMED, link="upf_can"))
     count = len(story.outputs)
     story.at(12.0)
     assert not [o for _, o in story.outputs[count:] if isinstance(o, i.Decide)]
@@ -341,8 +341,8 @@ def test_one_that_was_out_before_the_flight_stops_no_motors_at_take_off() -> Non
 def test_one_that_was_out_before_the_flight_does_not_stand_for_the_one_that_is_needed() -> None:
     story = Story(TWO).ready()
     story.at(0.1, out("upf_can", "33"), i.VehicleReport(STANDING))
-    story.at(0.2, i.VehicleReport(FLYING))
-    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    story.at(0.2, i.VehicleReport(FLYING), story.heartbeat())
+    story.at(1.0, i.DeployRequest(5, False, "it falls"), story.heartbeat())
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     assert len(story.decisions(D)) == 1
     assert story.answers(5) == []
@@ -380,7 +380,7 @@ def test_one_that_was_out_before_and_was_lost_for_a_while_is_no_news_in_flight()
     story = Story(TWO).ready()
     story.at(0.1, out("upf_can", "33"), i.VehicleReport(STANDING))
     story.at(0.2, i.VehicleReport(FLYING))
-    story.at(0.3, i.ParachuteReport("upf_can", "33", True, (), alive=False))
+    story.at(0.3, parachute("upf_can", "33", True, (), alive=False))
     story.at(0.4, out("upf_can", "33"))
     assert story.decisions(K) == []
 
@@ -449,7 +449,7 @@ def test_shadow_says_that_it_would_have_stopped_the_motors_under_an_open_canopy(
 def test_shadow_names_the_device_that_asked() -> None:
     story = Story(mode=i.Mode.SHADOW).flying()
     story.at(1.0, i.KillRequest(0, "upf_can 33", "launching"))
-    assert story.newest(K).rule == "upf_can 33"
+    assert story.newest(K).rule == "device asks for a kill"
 
 
 def test_a_mode_that_comes_and_goes_within_one_turn_stops_the_deploy() -> None:

@@ -1,7 +1,7 @@
 """Arm, kill, reset and mode: what is done, and what is refused for which stated reason."""
 
 import pytest
-from story import LINK, STANDING, Story
+from story import LINK, STANDING, Story, parachute
 
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import inputs as i
@@ -97,7 +97,7 @@ def test_a_second_kill_joins_one_that_is_under_way() -> None:
 
 def test_a_kill_under_an_open_canopy_is_not_refused() -> None:
     story = Story().flying()
-    story.at(1.0, i.ParachuteReport(LINK, "1/161", True, ()))
+    story.at(1.0, parachute(LINK, "1/161", True, ()))
     story.at(1.1, story.report(K, Outcome.SENT))
     story.at(20.0, i.KillRequest(1, "operator", "they turn"))
     assert len(story.decisions(K)) == 2
@@ -106,7 +106,7 @@ def test_a_kill_under_an_open_canopy_is_not_refused() -> None:
 def test_a_device_may_ask_for_a_kill_and_nobody_waits_for_the_answer() -> None:
     story = Story().flying()
     story.at(1.0, i.KillRequest(0, "upf_can 33", "about to launch"))
-    assert story.newest(K).rule == "upf_can 33"
+    assert story.newest(K).rule == "device asks for a kill"
     story.at(9.0)
     assert not [o for _, o in story.outputs if isinstance(o, i.Finish)]
 
@@ -125,6 +125,7 @@ def test_a_reset_in_the_starting_stage_is_refused() -> None:
 
 def test_a_reset_on_the_ground_begins_again_and_answers_who_waits() -> None:
     story = Story().flying()
+    story.alive(0.9)
     story.at(1.0, i.KillRequest(1, "operator", "stop"))
     story.at(1.1, i.VehicleReport(STANDING))
     story.at(1.2, i.ResetRequest(2))

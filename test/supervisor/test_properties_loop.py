@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from story import FLYING, LINK, START
+from story import FLYING, LINK, START, parachute
 
 from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -160,7 +160,7 @@ class Loop:
         beat = i.LinkHeartbeat(node.link, LinkState.OK, True, node.seq)
         node.seq += self.now >= node.up_at
         if self.now >= node.up_at:
-            status = i.ParachuteReport(node.link, "1", node.released, ())
+            status = parachute(node.link, "1", node.released, ())
             self.send(f"from {node.link}", lambda: self.feed(beat))
             self.send(f"from {node.link}", lambda: self.feed(status))
         self.at(self.now + 0.1, lambda: self.beat(node))
@@ -205,9 +205,10 @@ def test_wires_that_are_only_slow_make_no_device_fire_twice(
     loop.at(START + when, lambda: loop.feed(i.DeployRequest(1, False, "it falls")))
     loop.run(START + 6.0)
     assert loop.answers[1].success
+    assert any(D in [action for _, action in node.acted] for node in loop.nodes.values())
     for node in loop.nodes.values():
         actions = [action for _, action in node.acted]
-        assert actions.count(D) == 1
+        assert actions.count(D) <= 1
         assert actions.count(K) == (node.link in CONFIG.kill_links)
 
 

@@ -1,0 +1,119 @@
+"""One picture of the vehicle from several sources, each part with its own source and age.
+
+For each part of the picture (readings.PARTS) the newest word of every source is kept, with the
+time of its receipt; a source that says that it does not know a part any more takes its earlier
+word back. Of the sources that give a part, the first in the user's order counts as long as its
+word is fresh; when that is old, the first other one with a fresh word; when all are old, the
+newest. Old words keep their true age: the supervisor decides how old is too old.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.model import LinkState, VehicleState
+from chute_ros.nodes import vehicle_readings as readings
+
+#: The source with chute_msgs/VehicleState, and the one with MAVROS's topics. Both know the
+#: autopilot itself, the other sources do not.
+VEHICLE_STATE, MAVROS = "vehicle/state", "mavros"
+AUTOPILOTS = (VEHICLE_STATE, MAVROS)
+#: How old a word may be, s, before another source's word on the same part counts instead.
+FRESH = 1.0
+
+#: A link in order of preference: who hears the autopilot knows more of it than who lost it.
+_PREFERENCE = (LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.NEVER_SEEN)
+
+
+@dataclass(frozen=True)
+class _Word:
+    """What a source said of a part, and the monotonic time (s) of its receipt."""
+
+    values: readings.Values
+    received: float
+
+
+class VehicleMerge:
+    """The newest words of some sources, and the picture that they make together.
+
+    sources: names, the preferred ones first. lost_after: an autopilot's source that is silent for
+    longer (s) has lost it. Times are monotonic seconds.
+    """
+
+    def __init__(self, sources: Sequence[str], lost_after: float) -> None:
+        self._sources = tuple(sources)
+        self._lost_after = lost_after
+        self._words: dict[str, dict[str, _Word]] = {source: {} for source in sources}
+        self._vehicle = VehicleState()
+
+    def hear(self, source: str, parts: readings.Parts, now: float) -> None:
+        """A message of source came now and says this."""
+        for part, values in parts.items():
+            self._store(source, part, values, now)
+
+    def hear_state(self, state: VehicleState, now: float) -> None:
+        """A message on vehicle/state came now; its parts are as old as it says."""
+        self._vehicle = state
+        for part, values in readings.vehicle_state(state).items():
+            age = getattr(state, f"{part}_age", 0.0)
+            # A part from the future would look fresh for longer than it is.
+            self._store(VEHICLE_STATE, part, values, now - max(0.0, age))
+
+    def state(self, now: float) -> VehicleState:
+        """The picture at now. source names those who gave a part of it."""
+        fields: dict[str, Any] = {}
+        givers = set()
+        for part, names in readings.PARTS.items():
+            source = self._source(part, now)
+            if source is None:
+                continue
+            givers.add(source)
+            word = self._words[source][part]
+            fields.update(zip(names, word.values, strict=True))
+            fields[f"{part}_age"] = now - word.received
+        link_state, system_status = self._autopilot(now)
+        return VehicleState(
+            source=", ".join(source for source in self._sources if source in givers),
+            link_state=link_state,
+            system_status=system_status,
+            # Only vehicle/state follows the autopilot's clock; a restart once seen stays seen.
+            uptime=self._vehicle.uptime,
+            reboot_count=self._vehicle.reboot_count,
+            rebooted_in_flight=self._vehicle.rebooted_in_flight,
+            **fields,
+        )
+
+    def _store(
+        self, source: str, part: str, values: readings.Values | None, received: float
+    ) -> None:
+        if values is None:
+            self._words[source].pop(part, None)
+        else:
+            self._words[source][part] = _Word(values, received)
+
+    def _source(self, part: str, now: float) -> str | None:
+        """Whose word on this part counts; None: nobody knows."""
+        givers = [source for source in self._sources if part in self._words[source]]
+        for source in givers:
+            if now - self._words[source][part].received <= FRESH:
+                return source
+        return max(givers, key=lambda one: self._words[one][part].received, default=None)
+
+    def _autopilot(self, now: float) -> tuple[LinkState, int]:
+        """State of the link to the autopilot by the source that hears it best, and its MAV_STATE.
+
+        Where no source knows the autopilot: OK, for the picture is told when a source was heard.
+        """
+        told = [self._link(source, now) for source in self._sources if source in AUTOPILOTS]
+        return min(told, key=lambda one: _PREFERENCE.index(one[0]), default=(LinkState.OK, 0))
+
+    def _link(self, source: str, now: float) -> tuple[LinkState, int]:
+        word = self._words[source].get(readings.AUTOPILOT)
+        if word is None:
+            return LinkState.NEVER_SEEN, 0
+        if now - word.received > self._lost_after:
+            return LinkState.LOST, 0
+        link_state, system_status = word.values
+        return link_state, system_status

@@ -1,0 +1,205 @@
+"""Where the safety supervisor learns of the vehicle: its topics, made into one picture.
+
+With vehicle/state alone, the default, each message is passed on as it came. With other sources
+(nav_msgs/Odometry, sensor_msgs/Imu, MAVROS's topics) or several, they are merged by part.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from chute_msgs.msg import VehicleState
+from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from sensor_msgs.msg import BatteryState, Imu, NavSatFix
+from std_msgs.msg import Float64
+
+from chute_ros import model
+from chute_ros.errors import ParameterError
+from chute_ros.nodes import messages, qos
+from chute_ros.nodes import vehicle_readings as readings
+from chute_ros.nodes.parameters import Parameter
+from chute_ros.nodes.vehicle_merge import MAVROS, VEHICLE_STATE, VehicleMerge
+
+ODOMETRY, IMU = "odometry", "imu"
+SOURCES = (VEHICLE_STATE, ODOMETRY, IMU, MAVROS)
+
+VEHICLE_PARAMETERS = (
+    Parameter(
+        "vehicle_sources",
+        [VEHICLE_STATE],
+        f"where the vehicle's picture comes from, the preferred first: {', '.join(SOURCES)}",
+    ),
+    Parameter(
+        "odometry_topic",
+        "odometry",
+        "nav_msgs/Odometry of source odometry: height over its origin, vertical speed, attitude",
+    ),
+    Parameter(
+        "imu_topic", "imu", "sensor_msgs/Imu of source imu: attitude, length of the acceleration"
+    ),
+    Parameter(
+        "mavros_state_topic", "mavros/state", "mavros_msgs/State of source mavros: armed, link"
+    ),
+    Parameter(
+        "mavros_extended_state_topic",
+        "mavros/extended_state",
+        "mavros_msgs/ExtendedState of source mavros: landed state",
+    ),
+    Parameter(
+        "mavros_battery_topic",
+        "mavros/battery",
+        "sensor_msgs/BatteryState of source mavros: voltage, remaining charge",
+    ),
+    Parameter(
+        "mavros_position_topic",
+        "mavros/global_position/global",
+        "sensor_msgs/NavSatFix of source mavros: position",
+    ),
+    Parameter(
+        "mavros_height_topic",
+        "mavros/global_position/rel_alt",
+        "std_msgs/Float64 of source mavros: height above home, m",
+    ),
+)
+
+#: Sensors may send hundreds of messages a second: the picture is told no more often than this, s.
+TELL_INTERVAL = 0.02
+
+Reader = Callable[[Any], readings.Parts]
+
+
+class VehicleSources:
+    """Subscribes to what the parameters name and tells what the vehicle is by then.
+
+    values: the node's parameters, VEHICLE_PARAMETERS among them, and vehicle_state_age (s): a
+    source of the autopilot that is silent for longer has lost it. tell(state) is called by the
+    node's executor. clock: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        values: Mapping[str, Any],
+        tell: Callable[[model.VehicleState], object],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._node, self._values, self._tell, self._clock = node, values, tell, clock
+        sources = _checked(values["vehicle_sources"])
+        self._merge = VehicleMerge(sources, values["vehicle_state_age"])
+        self._told_at = -math.inf
+        self._refused: set[str] = set()
+        inputs = {source: self._inputs(source) for source in sources if source != VEHICLE_STATE}
+        # Runs only while something waits for the end of the interval.
+        self._timer = node.create_timer(
+            TELL_INTERVAL, self._tell_now, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
+        self._timer.cancel()
+        if VEHICLE_STATE in sources:
+            callback = self._pass_on if sources == [VEHICLE_STATE] else self._vehicle_state
+            node.create_subscription(VehicleState, VEHICLE_STATE, callback, qos.STATUS)
+        for source, kinds in inputs.items():
+            for kind, parameter, read in kinds:
+                self._subscribe(kind, parameter, partial(self._heard, source, parameter, read))
+
+    def _inputs(self, source: str) -> list[tuple[Any, str, Reader]]:
+        """Type, parameter with the topic, and reader of each topic of a source."""
+        if source == ODOMETRY:
+            return [(Odometry, "odometry_topic", readings.odometry)]
+        if source == IMU:
+            return [(Imu, "imu_topic", readings.imu)]
+        state, extended_state = _mavros_messages()
+        return [
+            (state, "mavros_state_topic", readings.mavros_state),
+            (extended_state, "mavros_extended_state_topic", readings.mavros_extended_state),
+            (BatteryState, "mavros_battery_topic", readings.battery),
+            (NavSatFix, "mavros_position_topic", readings.position),
+            (Float64, "mavros_height_topic", readings.relative_altitude),
+        ]
+
+    def _subscribe(self, kind: Any, parameter: str, callback: Callable[[Any], None]) -> None:
+        topic = self._values[parameter]
+        # Best effort matches every publisher, and volatile brings nothing of before.
+        profile: QoSProfile = qos_profile_sensor_data
+        try:
+            self._node.create_subscription(kind, topic, callback, profile)
+        except (InvalidTopicNameException, ValueError) as error:
+            raise ParameterError(
+                f"parameter {parameter} is {topic!r}: need the name of a topic "
+                f"({str(error).splitlines()[0]})"
+            ) from error
+
+    # -- messages -------------------------------------------------------------------------------
+
+    def _pass_on(self, message: VehicleState) -> None:
+        self._tell(messages.vehicle_state_from(message))
+
+    def _vehicle_state(self, message: VehicleState) -> None:
+        now = self._clock()
+        self._merge.hear_state(messages.vehicle_state_from(message), now)
+        self._tell_soon(now)
+
+    def _heard(self, source: str, parameter: str, read: Reader, message: Any) -> None:
+        header = getattr(message, "header", None)
+        child = getattr(message, "child_frame_id", "")
+        foreign = readings.foreign_frame(header.frame_id if header else "", child)
+        if foreign:
+            self._refuse(parameter, foreign)
+            return
+        now = self._clock()
+        self._merge.hear(source, read(message), now)
+        self._tell_soon(now)
+
+    def _refuse(self, parameter: str, frame: str) -> None:
+        if parameter not in self._refused:
+            self._refused.add(parameter)
+            self._node.get_logger().error(
+                f"{self._values[parameter]}: frame {frame!r} has its axes pointing down, not as "
+                f"REP 103 has them: not used; set {parameter} to a topic with z up (said once)"
+            )
+
+    # -- telling --------------------------------------------------------------------------------
+
+    def _tell_soon(self, now: float) -> None:
+        """At once, or together with what else comes until the interval is over."""
+        if now - self._told_at >= TELL_INTERVAL:
+            self._tell_now()
+        elif self._timer.is_canceled():
+            self._timer.reset()
+
+    def _tell_now(self) -> None:
+        self._timer.cancel()
+        self._told_at = self._clock()
+        self._tell(self._merge.state(self._told_at))
+
+
+def _checked(sources: list[str]) -> list[str]:
+    """sources, or ParameterError where one is unknown, is there twice, or none is there."""
+    wrong = [name for name in sources if name not in SOURCES or sources.count(name) > 1]
+    if sources and not wrong:
+        return list(sources)
+    raise ParameterError(
+        f"parameter vehicle_sources is {sources!r}: need one or more of {', '.join(SOURCES)}, "
+        f"each once; {f'{wrong[0]!r} is wrong' if wrong else 'it is empty'}"
+    )
+
+
+def _mavros_messages() -> tuple[Any, Any]:
+    # Not at the top: few have MAVROS, and nobody else needs its messages.
+    try:
+        from mavros_msgs.msg import ExtendedState, State
+    except ImportError as error:
+        distribution = os.environ.get("ROS_DISTRO", "<distro>")
+        raise ParameterError(
+            f"parameter vehicle_sources names {MAVROS!r}, but mavros_msgs cannot be imported: "
+            f"install ros-{distribution}-mavros-msgs, or take {MAVROS!r} out ({error})"
+        ) from error
+    return State, ExtendedState

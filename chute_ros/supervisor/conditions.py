@@ -1,0 +1,130 @@
+"""Whether a condition holds now, with its value and its limit in words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from chute_ros.model import Armed, LinkState, ParachuteState
+from chute_ros.supervisor import flight
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
+from chute_ros.supervisor.rules import (
+    ALL,
+    ANY,
+    AutopilotCondition,
+    AutopilotFact,
+    Condition,
+    DeviceCondition,
+    DeviceFact,
+    LinkCondition,
+    MeasurementCondition,
+)
+from chute_ros.supervisor.state import ASK_LASTS, State
+
+_EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
+
+
+@dataclass(frozen=True)
+class Finding:
+    """holds None: it cannot be said. samples: so many distinct ones came so far; -1: none do."""
+
+    holds: bool | None
+    text: str
+    samples: int = -1
+
+
+def find(config: SupervisorConfig, state: State, condition: Condition, now: float) -> Finding:
+    """Look at what is known now."""
+    if isinstance(condition, MeasurementCondition):
+        return _measurement(config, state, condition, now)
+    if isinstance(condition, LinkCondition):
+        return _link(config, state, condition, now)
+    if isinstance(condition, AutopilotCondition):
+        return _autopilot(config, state, condition, now)
+    return _device(config, state, condition, now)
+
+
+def _measurement(
+    config: SupervisorConfig, state: State, condition: MeasurementCondition, now: float
+) -> Finding:
+    name = condition.measurement
+    above, below = condition.above, condition.below
+    limits = [f"above {above:g}"] if not math.isnan(above) else []
+    limits += [f"below {below:g}"] if not math.isnan(below) else []
+    limit = " and ".join(limits)
+    samples = state.measured(name).count
+    why = flight.unusable(config, state, name, now)
+    if why:
+        return Finding(None, f"{name} cannot be used: {why} (asked for: {limit})", samples)
+    value = state.measured(name).value
+    # A limit that is not asked for is NaN, and nothing is beyond it.
+    holds = not (value <= above or value >= below)
+    return Finding(holds, f"{name} {value:.2f} ({limit})", samples)
+
+
+def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:
+    names = config.required_links if condition.link in (ANY, ALL) else (condition.link,)
+    wanted = " or ".join(judgement.name for judgement in condition.judged)
+    told, so = [], []
+    for name in names:
+        evidence, limits = state.links.get(name, LinkEvidence()), config.limits(name)
+        judged = evidence.judged(limits, now)
+        if judged is LinkJudgement.NEVER_SEEN and now < state.started_at + limits.startup_grace:
+            told.append(f"{name} is still starting")
+            so.append(False)
+            continue
+        told.append(f"{name} is {judged.name}, heard {now - evidence.heard:.2f} s ago")
+        so.append(judged in condition.judged)
+    holds = all(so) if condition.link == ALL else any(so)
+    return Finding(holds, f"link {', '.join(told)} (asked for: {wanted})")
+
+
+def _autopilot(
+    config: SupervisorConfig, state: State, condition: AutopilotCondition, now: float
+) -> Finding:
+    vehicle, fact = state.vehicle, condition.fact
+    if fact is AutopilotFact.REBOOTED:
+        return Finding(state.rebooted, f"autopilot restarts in flight {int(state.rebooted)}")
+    if fact is AutopilotFact.LOST:
+        silence, limit = now - state.vehicle_received, config.vehicle_state_age
+        if math.isnan(silence):
+            return Finding(None, "autopilot never heard")
+        lost = silence > limit or vehicle.link_state is LinkState.LOST
+        text = f"autopilot link {vehicle.link_state.name}, vehicle/state {silence:.2f} s old"
+        return Finding(lost, f"{text} (lost after {limit:g} s)")
+    if fact is AutopilotFact.DISARMED:
+        said = flight.armed(config, state, now)
+        return Finding(said is Armed.DISARMED, f"autopilot says {said.name}")
+    status = vehicle.system_status
+    if now - state.vehicle_received > config.vehicle_state_age:
+        return Finding(None, "autopilot's own state is old")
+    return Finding(status in _EMERGENCY, f"autopilot's own state is {status} (6 or 8)")
+
+
+def _device(
+    config: SupervisorConfig, state: State, condition: DeviceCondition, now: float
+) -> Finding:
+    names = config.links if condition.link == ANY else (condition.link,)
+    if condition.fact is DeviceFact.ASKS_FOR_KILL:
+        # One whose link is not among ours may ask all the same: to kill is the safe side.
+        asks = [
+            f"{who}: {ask.reason}"
+            for who, ask in state.asks.items()
+            if now < ask.at + ASK_LASTS and (condition.link == ANY or ask.link in names)
+        ]
+        return Finding(bool(asks), "; ".join(asks) or "no device asks for a kill")
+    if condition.fact is DeviceFact.DEPLOYED:
+        out = sorted(one for one in state.newly_released(config, now) if one[0] in names)
+        who = ", ".join(" ".join(one) for one in out)
+        return Finding(
+            bool(out), f"{who}: its own status says deployed" if out else "no parachute is out"
+        )
+    wrong = [
+        f"{name} {device} is ABNORMAL ({'; '.join(status.faults) or 'no reason given'})"
+        for name in names
+        for device, status in state.links.get(name, LinkEvidence()).devices.items()
+        if status.state is ParachuteState.ABNORMAL
+        and state.links[name].is_heard(config.limits(name), now)
+    ]
+    return Finding(bool(wrong), "; ".join(wrong) or "no device is ABNORMAL")

@@ -1,0 +1,104 @@
+"""The deploy as it goes on: it waits for the kill, climbs its ladder, ends with a confirmation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from chute_ros.model import Action, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.policy import Policy
+from chute_ros.supervisor.state import Pending, State
+
+
+def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> float:
+    """When the newest step of the ladder is given up, monotonic s."""
+    if len(state.deploys) >= len(config.ladder):
+        return step.decided_at + config.deploy_timeout
+    return step.decided_at + config.ladder_step_timeout
+
+
+class Deploying(Policy):
+    """What follows a deploy that was ordered."""
+
+    def look_at_parachutes(self) -> None:
+        """One that says that it is released ends every deploy, whoever fired it."""
+        out = sorted(self.state.newly_released(self.config, self.now))
+        if out and listed(self.state.stage, Stimulus.PARACHUTE_OPEN):
+            said = f"{', '.join(map(' '.join, out))} says deployed"
+            self.move(Stimulus.PARACHUTE_OPEN, said)
+
+    def look_at_kill(self) -> None:
+        """The deploy follows the kill's confirmation, or its delay."""
+        kill = self.state.kill
+        if kill is None:
+            return
+        self.end_kill()
+        if self.state.stage is not Stage.KILLING or not self.state.deploy_rule:
+            return
+        if kill.confirmed or self.now >= self.state.deploy_due:
+            if kill.unreported():
+                # A node that misses the kill must not see the deploy first: it would refuse the
+                # kill as older from then on.
+                self.send_again("kill")
+            waited = self.now - kill.decided_at
+            why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
+            limit = f"limit {self.config.kill_to_deploy_delay:g} s"
+            self.move(Stimulus.DEPLOY_DUE, why)
+            self._fire(f"{why} ({limit})")
+
+    def look_at_deploy(self) -> None:
+        """Confirmed, one step further, or at the end of the ladder."""
+        if self.state.stage is Stage.DEPLOYING and self.state.deploys:
+            if self.deploy_reached(Outcome.CONFIRMED):
+                self.move(Stimulus.PARACHUTE_OPEN, self.deploy_details())
+            else:
+                self._climb()
+        self._answer()
+        self._alarm_again()
+
+    def _climb(self) -> None:
+        """Step by step, each with its limit. One whose node is silent is sent, not awaited."""
+        for _ in self.config.ladder:
+            step = self.state.deploys[-1]
+            text = step.newest_details() or "no device node reported"
+            waited = self.now - step.decided_at
+            last = len(self.state.deploys) >= len(self.config.ladder)
+            link = step.targets[0]
+            silent = self.evidence(link).silent(self.config.limits(link).lost_after, self.now)
+            over = step.all_failed() or self.now >= step_deadline(self.config, self.state, step)
+            if not over and (last or not silent):
+                return
+            if last:
+                first = self.state.deploys[0].decided_at
+                self.move(Stimulus.DEPLOY_FAILED, text)
+                self.alarm(f"no parachute confirmed within {self.now - first:.1f} s: {text}")
+                alarm_at = self.now + self.config.alarm_interval
+                self.state = replace(self.state, alarm_at=alarm_at)
+                return
+            number = len(self.state.deploys)
+            rung = self.config.ladder[number - 1]
+            why = "its node is silent" if silent and not over else f"not confirmed: {text}"
+            self._fire(
+                f"step {number} of {len(self.config.ladder)}, {rung}: {why} ({waited:.2f} s)"
+            )
+
+    def _fire(self, why: str) -> None:
+        self.fire(Action.DEPLOY, self.state.deploy_rule, (*self.state.deploy_reasons, why))
+
+    def _answer(self) -> None:
+        accepted, text = self.deploy_reached(Outcome.ACCEPTED), self.deploy_details()
+        if self.state.stage is Stage.FAULT:
+            self.finish_deploy(False, accepted, text or "no device node reported")
+        elif self.state.stage is Stage.DEPLOYED and self.state.deploy_tokens:
+            reported = not self.state.deploys or self.deploy_reached(Outcome.CONFIRMED)
+            if reported or self.now >= self.state.stage_since + self.config.report_wait:
+                self.finish_deploy(True, accepted, text or "its own status says deployed")
+
+    def _alarm_again(self) -> None:
+        """The end of the ladder without a parachute is an alarm that does not stop."""
+        if self.state.stage is Stage.FAULT and self.now >= self.state.alarm_at:
+            self.outputs.append(i.Say(f"still no parachute: {self.state.alarms[-1]}", alarm=True))
+            alarm_at = self.now + self.config.alarm_interval
+            self.state = replace(self.state, alarm_at=alarm_at)

@@ -1,0 +1,109 @@
+"""Is the vehicle in the air, moving, disarmed? What is known, fused; what contradicts is named.
+
+A landed state or a disarmed one that a falling vehicle reports is not believed: the land detector
+of an autopilot takes a steady fall for standing still, and must not veto the parachute.
+"""
+
+from __future__ import annotations
+
+import math
+
+from chute_ros.model import Armed, LandedState
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.state import State
+
+#: Less specific force than this is free fall, m/s^2 (half of what a body at rest feels).
+FREE_FALL = 4.9
+#: An autopilot that started anew in flight must say for so long that it stands, s.
+_LANDED_HOLD_AFTER_REBOOT = 10.0
+
+
+def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
+    """A measurement, or NaN where it cannot be used."""
+    limits = config.profile.limits[name]
+    if name == "height" and state.rebooted:
+        return math.nan  # it counts from where the autopilot started anew
+    return state.measured(name).usable(limits, now)
+
+
+def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> str:
+    """Why a measurement cannot be used; empty: it can."""
+    if name == "height" and state.rebooted:
+        return "the autopilot started anew in flight, and its height with it"
+    return state.measured(name).unusable(config.profile.limits[name], now)
+
+
+def moving(config: SupervisorConfig, state: State, now: float) -> str:
+    """How the vehicle moves as nothing on the ground does, in words; empty: it does not."""
+    speed = measured(config, state, "vertical_speed", now)
+    if abs(speed) > config.profile.moving_speed:
+        limit = config.profile.moving_speed
+        return f"vertical_speed {speed:.1f} m/s (nothing on the ground beyond {limit:g})"
+    force = measured(config, state, "acceleration", now)
+    if force < FREE_FALL:
+        return f"acceleration {force:.1f} m/s^2 (nothing on the ground below {FREE_FALL:g})"
+    return ""
+
+
+def fresh(config: SupervisorConfig, state: State, age: float, now: float) -> bool:
+    """Is a part of vehicle/state that had this age when it came still young enough?"""
+    return age + (now - state.vehicle_received) <= config.vehicle_state_age
+
+
+def armed(config: SupervisorConfig, state: State, now: float) -> Armed:
+    """What the autopilot says freshly of its motors."""
+    if fresh(config, state, state.vehicle.armed_age, now):
+        return state.vehicle.armed
+    return Armed.UNKNOWN
+
+
+def says_down(config: SupervisorConfig, state: State, now: float) -> bool | None:
+    """Does the autopilot say freshly that the vehicle stands? None: it says nothing of it."""
+    landed = state.vehicle.landed_state
+    known = fresh(config, state, state.vehicle.landed_state_age, now)
+    if known and landed is not LandedState.UNKNOWN:
+        return landed is LandedState.ON_GROUND
+    if armed(config, state, now) is Armed.DISARMED:
+        return True
+    return None
+
+
+def down_undisputed(config: SupervisorConfig, state: State, now: float) -> bool:
+    """The autopilot says that the vehicle stands, and nothing contradicts it."""
+    return says_down(config, state, now) is True and not moving(config, state, now)
+
+
+def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
+    """Is the vehicle in the air? None: nothing that is fresh says so or otherwise."""
+    down = says_down(config, state, now)
+    if state.airborne:
+        if down is None:
+            return True if armed(config, state, now) is Armed.ARMED else None
+        if not down or moving(config, state, now):
+            return True
+        return None if now < landed_at(config, state) else False
+    if down is not None:
+        # One that has not flown and whose motors are off does not fly, whatever drifts.
+        if not down and armed(config, state, now) is Armed.DISARMED:
+            return False
+        return not down
+    height = measured(config, state, "height", now)
+    if armed(config, state, now) is Armed.ARMED and not math.isnan(height):
+        return height - state.armed_height > config.takeoff_height
+    return None
+
+
+def landed_at(config: SupervisorConfig, state: State) -> float:
+    """When one that says that it stands is believed, monotonic s; NaN: it does not say so."""
+    hold = config.profile.landed_hold
+    if state.rebooted:
+        hold = max(hold, _LANDED_HOLD_AFTER_REBOOT)
+    return state.down_since + hold
+
+
+def disarmed(config: SupervisorConfig, state: State, now: float) -> bool:
+    """Are the motors off, as far as that is believed? In the air it is not, from an autopilot
+    that started anew there or of a vehicle that falls."""
+    if armed(config, state, now) is not Armed.DISARMED:
+        return False
+    return not (state.airborne and (state.rebooted or moving(config, state, now)))

@@ -1,0 +1,71 @@
+"""The one gate before a deploy: who wants it, in which state, and every reason against it.
+
+What must hold whatever the profile says: silence alone never deploys; nothing deploys on the
+ground or disarmed, unless a person forces it; below the minimum height only what the profile
+allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from chute_ros.supervisor import flight
+from chute_ros.supervisor.conditions import Finding
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.rules import BelowMinimum, Rule, is_silence
+from chute_ros.supervisor.state import State
+
+#: Where a person may deploy without force.
+_IN_FLIGHT = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
+
+
+def against_person(config: SupervisorConfig, state: State, force: bool, now: float) -> str:
+    """Why a person's deploy is refused; empty: it is not."""
+    if state.stage is Stage.DEPLOYED:
+        return "a parachute is out already"
+    if state.stage in _IN_FLIGHT or force:
+        return ""
+    unknown = ""
+    if flight.in_air(config, state, now) is None:
+        unknown = " (nothing fresh says whether it is in the air)"
+    return f"the vehicle is {state.stage.name}, not in flight{unknown}; force deploys all the same"
+
+
+def against_rule(
+    config: SupervisorConfig, state: State, rule: Rule, findings: Sequence[Finding], now: float
+) -> str:
+    """Why the deploy of a rule is denied; empty: it is not."""
+    if state.stage is not Stage.IN_FLIGHT and not (
+        state.stage is Stage.KILLING and state.killed_in_flight
+    ):
+        return f"the vehicle is {state.stage.name}, not in flight"
+    if flight.down_undisputed(config, state, now) and not _killed(state):
+        return "the vehicle says that it stands, and nothing contradicts it"
+    if flight.disarmed(config, state, now) and not _killed(state):
+        return "the motors are disarmed, and nothing says that it falls"
+    if _killed(state) and flight.in_air(config, state, now) is False:
+        return "the vehicle has come down"
+    told = [
+        finding
+        for condition, finding in zip(rule.conditions, findings, strict=True)
+        if finding.holds and not is_silence(condition)
+    ]
+    if not told:
+        return "only silence speaks for it, and silence alone never deploys"
+    return ""
+
+
+def too_low(config: SupervisorConfig, state: State, now: float) -> str:
+    """That the vehicle is below the minimum height, in words; empty: it is not, or nobody knows
+    (a height that cannot be used is absent, not zero)."""
+    profile = config.profile
+    height = flight.measured(config, state, "height", now)
+    if profile.below_minimum is BelowMinimum.DEPLOY or not height < profile.minimum_height:
+        return ""
+    return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"
+
+
+def _killed(state: State) -> bool:
+    """Our own kill was decided in flight: motors that are off are its effect."""
+    return state.killed_in_flight and state.stage is Stage.KILLING

@@ -1,0 +1,151 @@
+"""What is known of each link: never seen, ok, stale, lost, and regained are five different things.
+
+NEVER_SEEN --heard--> OK --stale limit--> STALE --lost limit--> LOST
+                      ^ ^                                        |
+   heard for          | '------------------heard-----.           | heard
+   regain_after s     |                              |           v
+                      '----------------------------- REGAINED <--'
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from chute_ros.errors import ParameterError
+from chute_ros.model import LinkState, ParachuteStatus
+from chute_ros.supervisor.inputs import LinkHeartbeat
+
+_NOTHING: MappingProxyType[str, ParachuteStatus] = MappingProxyType({})
+#: Devices of one link that are remembered: made-up names must not grow us.
+MOST_DEVICES = 16
+
+
+class LinkJudgement(enum.IntEnum):
+    """How the supervisor sees a link; numbers of chute_msgs/SafetyState.link_states."""
+
+    NEVER_SEEN = 0
+    OK = 1
+    STALE = 2
+    LOST = 3
+    #: Heard again after LOST, not yet for long enough to be relied on.
+    REGAINED = 4
+
+
+@dataclass(frozen=True)
+class LinkLimits:
+    """Limits of one link, s: silence of its node until stale and lost, how long it must be heard
+    without a break after it was lost, and how long it may take to come up after the start."""
+
+    stale_after: float = 0.5
+    lost_after: float = 1.0
+    regain_after: float = 1.0
+    startup_grace: float = 10.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.stale_after < self.lost_after <= 600.0:
+            raise ParameterError(
+                f"stale_after {self.stale_after} s and lost_after {self.lost_after} s: "
+                "need 0 < stale_after < lost_after, up to 600 s"
+            )
+        for name in ("regain_after", "startup_grace"):
+            if not 0.0 <= getattr(self, name) <= 60.0:
+                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 60 s")
+
+
+@dataclass(frozen=True)
+class LinkEvidence:
+    """What is known of one link. heard: monotonic s of the newest heartbeat; NaN: never."""
+
+    heard: float = math.nan
+    reported: LinkState = LinkState.NEVER_SEEN
+    device_healthy: bool = False
+    seq: int = 0
+    #: Monotonic s since when it was heard without a break, after it was lost; NaN: never lost.
+    regained_at: float = math.nan
+    lost_count: int = 0
+    #: The wall clock here less that of the sender's newest heartbeat, s: the way and the
+    #: difference of the clocks. NaN: not known.
+    clock_difference: float = math.nan
+    #: When a device last said that it is released, monotonic s; NaN: never.
+    released_at: float = math.nan
+    #: The newest picture of each device on this link.
+    devices: Mapping[str, ParachuteStatus] = field(default_factory=lambda: _NOTHING)
+
+    @property
+    def deployed(self) -> frozenset[str]:
+        """The devices whose own status said released when they were last heard."""
+        return frozenset(name for name, status in self.devices.items() if status.deployed)
+
+    def silent(self, limit: float, now: float) -> bool:
+        """The node itself, not only its device, was not heard for limit s, or never.
+
+        Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        """
+        return not now < self.heard + limit
+
+    def judged(self, limits: LinkLimits, now: float) -> LinkJudgement:
+        """The worse of what the node says of its wire, and what its silence says of itself."""
+        if math.isnan(self.heard):
+            return LinkJudgement.NEVER_SEEN
+        if self.silent(limits.lost_after, now):
+            return LinkJudgement.LOST
+        if self.reported is not LinkState.OK:
+            return LinkJudgement(int(self.reported))
+        if self.silent(limits.stale_after, now):
+            return LinkJudgement.STALE
+        if now < self.regained_at + limits.regain_after:
+            return LinkJudgement.REGAINED
+        return LinkJudgement.OK
+
+    def is_heard(self, limits: LinkLimits, now: float) -> bool:
+        """What it says counts now; what a lost one said last is not what it is."""
+        return self.judged(limits, now) in (LinkJudgement.OK, LinkJudgement.REGAINED)
+
+    def with_heartbeat(self, one: LinkHeartbeat, limits: LinkLimits, now: float) -> LinkEvidence:
+        """After a heartbeat. One lost, or stale while it was being regained, begins anew."""
+        before = self.judged(limits, now)
+        unsteady = now < self.regained_at + limits.regain_after
+        regained_at, lost_count = self.regained_at, self.lost_count
+        if before is LinkJudgement.LOST or (before is LinkJudgement.STALE and unsteady):
+            regained_at = now
+        newly_lost = one.link_state is LinkState.LOST and self.reported is not LinkState.LOST
+        fell_silent = self.silent(limits.lost_after, now) and not math.isnan(self.heard)
+        if newly_lost or fell_silent:
+            lost_count += 1
+        return replace(
+            self,
+            heard=now,
+            reported=one.link_state,
+            device_healthy=one.device_healthy,
+            seq=one.seq,
+            regained_at=regained_at,
+            lost_count=lost_count,
+            clock_difference=one.clock_difference,
+        )
+
+    def with_status(self, status: ParachuteStatus, now: float) -> LinkEvidence:
+        """After a device told its picture. A lost one's "released" is neither taken nor taken
+        back."""
+        devices, released_at = dict(self.devices), self.released_at
+        if status.link_state is not LinkState.OK and status.device in devices:
+            status = replace(status, deployed=devices[status.device].deployed)
+        elif status.link_state is not LinkState.OK:
+            status = replace(status, deployed=False)
+        elif status.deployed:
+            released_at = now
+        if status.device not in devices and len(devices) >= MOST_DEVICES:
+            return self
+        devices[status.device] = status
+        return replace(self, devices=MappingProxyType(devices), released_at=released_at)
+
+    def deadlines(self, limits: LinkLimits) -> tuple[float, ...]:
+        """When it is judged differently without anything being heard."""
+        return (
+            self.heard + limits.stale_after,
+            self.heard + limits.lost_after,
+            self.regained_at + limits.regain_after,
+        )

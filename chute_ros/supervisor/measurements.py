@@ -1,0 +1,205 @@
+"""Measurements of the vehicle as evidence: each has an age and can be unusable, with the reason.
+
+An old one is absent, not zero. What cannot be (not a number, out of range, a jump beyond physics,
+time that ran backwards, a value that does not change any more) is not used. A jump that the
+samples after it confirm is believed: the world, or the source, did change.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from chute_ros.errors import ParameterError
+from chute_ros.model import VehicleState
+
+#: Samples in a row that must agree before a jump, or a clock that was set back, is believed.
+CONFIRMING_SAMPLES = 3
+#: Two messages may tell the same sample: what was measured less than this apart is one, s.
+_SAME_SAMPLE = 0.005
+#: So much may a sample's time lie before that of the one before it: the way is not always as long.
+_JITTER = 0.1
+_EARTH_RADIUS = 6_371_000.0  # m
+DEGREES = 180.0 / math.pi
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a measurement may be: range, unit/s of change and unit that it may jump besides, age
+    and how long it may stay the same to the last bit, s (0: for ever)."""
+
+    minimum: float
+    maximum: float
+    rate: float
+    jump: float
+    max_age: float
+    stuck_after: float
+
+    def __post_init__(self) -> None:
+        if not self.minimum < self.maximum:
+            raise ParameterError(f"range {self.minimum} to {self.maximum}: need a larger second")
+        for name in ("rate", "jump", "stuck_after"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 or more")
+        if not 0.0 < self.max_age <= 60.0:
+            raise ParameterError(f"max_age is {self.max_age}: need above 0, up to 60 s")
+
+
+#: Every measurement by name, with limits for any vehicle; a profile may set others.
+STANDARD_LIMITS: dict[str, Limits] = {
+    # m above take-off, up positive
+    "height": Limits(-500.0, 50_000.0, 400.0, 10.0, 1.0, 5.0),
+    # m/s, up positive
+    "vertical_speed": Limits(-400.0, 400.0, 200.0, 5.0, 1.0, 5.0),
+    # degrees between the vehicle's axis and the vertical, 0 upright to 180
+    "tilt_deg": Limits(0.0, 180.0, 2000.0, 60.0, 0.5, 5.0),
+    # m/s^2, length of the specific force: 9.8 at rest, 0 in free fall
+    "acceleration": Limits(0.0, 2000.0, 100_000.0, 200.0, 0.5, 5.0),
+    # m over ground from where it took off
+    "distance_from_home": Limits(0.0, 20_000_000.0, 400.0, 30.0, 2.0, 0.0),
+    # V
+    "battery_voltage": Limits(0.0, 1000.0, 100.0, 60.0, 10.0, 0.0),
+    # remaining charge, 0 to 1
+    "battery_remaining": Limits(0.0, 1.0, 0.5, 0.3, 10.0, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One measurement as it came. measured_at: monotonic s; NaN: never received."""
+
+    value: float
+    measured_at: float
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is known of one measurement. measured_at: monotonic s of the newest that was taken."""
+
+    value: float = math.nan
+    measured_at: float = math.nan
+    #: Monotonic s since which the value has been the same to the last bit.
+    same_since: float = math.nan
+    #: Samples taken so far; a rule counts the distinct ones.
+    count: int = 0
+    #: Why the newest sample was not taken; empty: it was.
+    rejected: str = ""
+    #: The newest that was not taken, and how many like it came in a row.
+    candidate: float = math.nan
+    candidate_at: float = math.nan
+    candidates: int = 0
+
+    def unusable(self, limits: Limits, now: float) -> str:
+        """Why it cannot be used now; empty: it can."""
+        if math.isnan(self.measured_at):
+            return self.rejected or "never received"
+        age = now - self.measured_at
+        if age > limits.max_age:
+            return self.rejected or f"old: {age:.2f} s (limit {limits.max_age:g} s)"
+        if self.rejected:
+            return self.rejected
+        same = self.measured_at - self.same_since
+        if 0.0 < limits.stuck_after <= same:
+            return f"stuck at {self.value:g} for {same:.1f} s (limit {limits.stuck_after:g} s)"
+        return ""
+
+    def usable(self, limits: Limits, now: float) -> float:
+        """The value, or NaN where it cannot be used."""
+        return math.nan if self.unusable(limits, now) else self.value
+
+    def with_sample(self, sample: Sample, limits: Limits) -> Measured:
+        """After one sample; the same one told again changes nothing."""
+        if math.isnan(sample.measured_at):
+            return self
+        for known in (self.measured_at, self.candidate_at):
+            if abs(sample.measured_at - known) < _SAME_SAMPLE:
+                return self
+        wrong = self._impossible(sample, limits)
+        if wrong:
+            return replace(
+                self, rejected=wrong, candidate=math.nan, candidate_at=math.nan, candidates=0
+            )
+        doubtful = self._doubtful(sample, limits)
+        if doubtful:
+            agrees = self.candidates > 0 and not _jumps(
+                self.candidate, self.candidate_at, sample, limits
+            )
+            candidates = self.candidates + 1 if agrees else 1
+            if candidates < CONFIRMING_SAMPLES:
+                return replace(
+                    self,
+                    rejected=doubtful,
+                    candidate=sample.value,
+                    candidate_at=sample.measured_at,
+                    candidates=candidates,
+                )
+        if not doubtful and sample.measured_at < self.measured_at:
+            return self  # overtaken on its way by the one that is known
+        same = sample.value == self.value and not doubtful
+        return Measured(
+            value=sample.value,
+            measured_at=sample.measured_at,
+            same_since=self.same_since if same else sample.measured_at,
+            count=self.count + 1,
+        )
+
+    def _impossible(self, sample: Sample, limits: Limits) -> str:
+        if not math.isfinite(sample.value):
+            return f"{sample.value} is not a number"
+        if not limits.minimum <= sample.value <= limits.maximum:
+            return f"{sample.value:g} is out of {limits.minimum:g} to {limits.maximum:g}"
+        return ""
+
+    def _doubtful(self, sample: Sample, limits: Limits) -> str:
+        if math.isnan(self.measured_at):
+            return ""
+        if sample.measured_at < self.measured_at - _JITTER:
+            return f"time ran backwards by {self.measured_at - sample.measured_at:.2f} s"
+        # After a silence nobody knows what lay between: only what follows closely can jump.
+        if sample.measured_at - self.measured_at > limits.max_age:
+            return ""
+        if _jumps(self.value, self.measured_at, sample, limits):
+            step = sample.value - self.value
+            return f"jumped by {step:+g} in {sample.measured_at - self.measured_at:.3f} s"
+        return ""
+
+
+def _jumps(value: float, at: float, sample: Sample, limits: Limits) -> bool:
+    allowed = limits.jump + limits.rate * abs(sample.measured_at - at)
+    return abs(sample.value - value) > allowed
+
+
+def samples_of(
+    vehicle: VehicleState, received: float, home: tuple[float, float] | None
+) -> Mapping[str, Sample]:
+    """Every measurement in a VehicleState. received: monotonic s; home: degrees."""
+    distance = math.nan
+    if home is not None:
+        distance = distance_between(home, (vehicle.latitude, vehicle.longitude))
+    told = {
+        "height": (vehicle.height, vehicle.height_age),
+        "vertical_speed": (vehicle.vertical_speed, vehicle.vertical_speed_age),
+        "tilt_deg": (vehicle.tilt * DEGREES, vehicle.attitude_age),
+        "acceleration": (vehicle.acceleration, vehicle.acceleration_age),
+        "battery_voltage": (vehicle.battery_voltage, vehicle.battery_age),
+        "battery_remaining": (vehicle.battery_remaining, vehicle.battery_age),
+    }
+    if home is not None:
+        told["distance_from_home"] = (distance, vehicle.position_age)
+    return {name: Sample(value, received - age) for name, (value, age) in told.items()}
+
+
+def distance_between(one: tuple[float, float], other: tuple[float, float]) -> float:
+    """Way over ground between two (latitude, longitude) in degrees, m (haversine formula)."""
+    latitude_1, longitude_1, latitude_2, longitude_2 = (
+        math.radians(angle) for angle in (*one, *other)
+    )
+    half = (
+        math.sin((latitude_2 - latitude_1) / 2) ** 2
+        + math.cos(latitude_1)
+        * math.cos(latitude_2)
+        * math.sin((longitude_2 - longitude_1) / 2) ** 2
+    )
+    # NaN goes through; rounding must not leave the domain of asin.
+    return 2.0 * _EARTH_RADIUS * math.asin(min(1.0, math.sqrt(half)) if half == half else math.nan)

@@ -1,0 +1,86 @@
+"""Kill and deploy as people, devices and rules order them: the kill first, each once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from chute_ros.model import Action, Armed
+from chute_ros.supervisor import flight
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.steps import Steps
+
+ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
+#: What a vehicle says so soon after a kill was decided may be from before it, s.
+_KILL_SETTLES = 0.2
+
+
+class Orders(Steps):
+    """An order of the same kind that is under way is joined."""
+
+    def order_kill(self, rule: str, reasons: tuple[str, ...], token: int = 0) -> None:
+        """Stop the motors. token not 0: a person waits for it."""
+        if self.state.mode is not i.Mode.ACTIVE:
+            self.fire(Action.KILL, rule, reasons)
+            return
+        self.end_kill()
+        if token:
+            self.state = replace(self.state, kill_tokens=(*self.state.kill_tokens, token))
+        self._to_killing("; ".join(reasons))
+        if not self._kill_joined(token):
+            self.fire(Action.KILL, rule, reasons)
+
+    def order_deploy(self, rule: str, reasons: tuple[str, ...]) -> None:
+        """The kill first, unless one is on its way or confirmed; the deploy follows it."""
+        if self.state.mode is not i.Mode.ACTIVE:
+            for action in (Action.KILL, Action.DEPLOY):
+                self.fire(action, rule, reasons)
+            return
+        if self.state.deploy_rule:
+            return
+        if self.state.stage in ON_GROUND:
+            self.note_released()
+        self.end_kill()
+        kill, since = self.state.kill, self.now
+        if self.state.stage is Stage.KILLING and self._kill_under_way():
+            assert kill is not None
+            since = kill.decided_at
+        elif self.state.stage is not Stage.KILLING or kill is None or not kill.confirmed:
+            self._to_killing("; ".join(reasons))
+            self.fire(Action.KILL, rule, reasons)
+        due = since + self.config.kill_to_deploy_delay
+        self.state = replace(
+            self.state, deploy_rule=rule, deploy_reasons=reasons, deploy_due=due, deploys=()
+        )
+
+    def _to_killing(self, why: str) -> None:
+        if listed(self.state.stage, Stimulus.KILL):
+            if self.state.stage is not Stage.KILLING:
+                flying = self.state.stage in (Stage.IN_FLIGHT, Stage.FAULT)
+                self.state = replace(self.state, killed_in_flight=flying and self.state.airborne)
+            self.move(Stimulus.KILL, why)
+
+    def _kill_under_way(self) -> bool:
+        """A kill is on its way and may still be confirmed."""
+        kill = self.state.kill
+        return kill is not None and not kill.confirmed and not self.kill_failed(kill)
+
+    def _kill_joined(self, token: int) -> bool:
+        """Does a kill that was decided already serve this request?
+
+        A person who asks after the confirmation sees motors that turn, and is obeyed again. A
+        device repeats itself; that must not become a new decision each time.
+        """
+        kill = self.state.kill
+        if token or kill is None or self._kill_under_way():
+            return self._kill_under_way()
+        if kill.confirmed and self._armed_since(kill.decided_at + _KILL_SETTLES):
+            return False
+        wait = self.config.kill_timeout if kill.confirmed else self.config.resend_interval
+        return self.now < kill.decided_at + wait
+
+    def _armed_since(self, when: float) -> bool:
+        """The vehicle says, and said after when, that its motors are armed (again)."""
+        said_at = self.state.vehicle_received - self.state.vehicle.armed_age
+        said = flight.armed(self.config, self.state, self.now)
+        return said is Armed.ARMED and said_at > when

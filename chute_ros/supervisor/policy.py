@@ -1,0 +1,149 @@
+"""The rules at work: each counted at every update, the gravest of the fulfilled ones acted on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from chute_ros.model import Action
+from chute_ros.supervisor import flight
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions import Finding, find
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.counter import RuleEvidence
+from chute_ros.supervisor.gate import against_rule, too_low
+from chute_ros.supervisor.reports import Reports
+from chute_ros.supervisor.rules import BelowMinimum, Clears, MeasurementCondition, Rule
+from chute_ros.supervisor.state import State
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One rule as it stands now."""
+
+    rule: Rule
+    evidence: RuleEvidence
+    findings: tuple[Finding, ...]
+
+    def reasons(self) -> tuple[str, ...]:
+        """Each true condition with its value and limit, and the counter."""
+        told = tuple(finding.text for finding in self.findings if finding.holds)
+        if self.rule.hold <= 0.0:
+            return told
+        return (*told, f"counter {self.evidence.level:.2f} s of {self.rule.hold:g} s")
+
+
+def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
+    """Look at one rule's conditions. Its counter must have been brought up to now before."""
+    findings = tuple(find(config, state, condition, now) for condition in rule.conditions)
+    weight = sum(
+        condition.weight
+        for condition, finding in zip(rule.conditions, findings, strict=True)
+        if finding.holds
+    )
+    told = [finding.samples for finding in findings if finding.samples >= 0]
+    seen = sum(told) if told else -1
+    evidence = state.rule(rule.name).seeing(weight >= rule.needed - 1e-9, seen)
+    return Judged(rule, evidence, findings)
+
+
+def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequence[float]:
+    """When a rule's counter is full or empty, or what it rests on too old."""
+    deadlines = []
+    for rule in config.profile.rules:
+        evidence = state.rule(rule.name)
+        if state.stage not in rule.states:
+            continue
+        deadlines.append(evidence.deadline(rule, now))
+        if evidence.holds:
+            deadlines += [
+                state.measured(condition.measurement).measured_at
+                + config.profile.limits[condition.measurement].max_age
+                for condition in rule.conditions
+                if isinstance(condition, MeasurementCondition)
+            ]
+    return deadlines
+
+
+class Policy(Reports):
+    """Counts and acts."""
+
+    def count_rules(self, passed: float) -> None:
+        """Bring every counter up to now, before anything new is taken in."""
+        counted = {
+            rule.name: self.state.rule(rule.name).counted(rule, passed)
+            for rule in self.config.profile.rules
+        }
+        self.state = replace(self.state, rules=MappingProxyType(counted))
+
+    def look_at_rules(self) -> None:
+        """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
+        fulfilled: list[Judged] = []
+        stage = self.state.stage
+        for rule in self.config.profile.rules:
+            if stage not in rule.states:
+                # What was counted in another state says nothing about the next time.
+                latched = self.state.rule(rule.name).latched and rule.clears is Clears.NEVER
+                self._remember(rule, RuleEvidence(latched=latched))
+                continue
+            judged = judge(self.config, self.state, rule, self.now)
+            self._remember(rule, self._cleared(rule, judged.evidence))
+            if judged.evidence.fulfilled(rule) and not self.state.rule(rule.name).latched:
+                fulfilled.append(judged)
+        # A stable sort: of two that want the same, the one that the profile names first.
+        for judged in sorted(fulfilled, key=lambda one: -one.rule.action):
+            self._act(judged)
+
+    def _cleared(self, rule: Rule, evidence: RuleEvidence) -> RuleEvidence:
+        if not evidence.latched:
+            return evidence
+        by_itself = rule.clears is Clears.BY_ITSELF and evidence.cleared()
+        disarmed = rule.clears is Clears.ON_DISARM and flight.disarmed(
+            self.config, self.state, self.now
+        )
+        if by_itself or disarmed:
+            self.outputs.append(i.Say(f"rule '{rule.name}' has cleared"))
+            return replace(evidence, latched=False, denied="")
+        return evidence
+
+    def _act(self, judged: Judged) -> None:
+        rule, reasons = judged.rule, judged.reasons()
+        if not self.state.leading or self.state.mode is i.Mode.INHIBITED:
+            return
+        if self.state.stage not in rule.states:
+            return  # a graver one has just moved it on
+        action, lowered = rule.action, ""
+        if action is Action.DEPLOY:
+            denied = against_rule(self.config, self.state, rule, judged.findings, self.now)
+            lowered = too_low(self.config, self.state, self.now) if not denied else ""
+            if lowered and self.config.profile.below_minimum is BelowMinimum.NOTHING:
+                denied = lowered
+            if denied:
+                self._deny(rule, denied, reasons)
+                return
+            if lowered:
+                action, reasons = Action.KILL, (*reasons, f"no deploy: {lowered}")
+        evidence = self.state.rule(rule.name)
+        self._remember(rule, replace(evidence, latched=True, denied=""))
+        if action is Action.DEPLOY:
+            self.order_deploy(rule.name, reasons)
+        elif action is Action.KILL:
+            self.order_kill(rule.name, reasons)
+        else:
+            text = f"rule '{rule.name}': {rule.says or '; '.join(reasons)}"
+            self.outputs.append(i.Say(f"{text} ({'; '.join(reasons)})", alarm=True))
+
+    def _deny(self, rule: Rule, why: str, reasons: tuple[str, ...]) -> None:
+        evidence = self.state.rule(rule.name)
+        # The reason without its figures, which change all the time: it is said once.
+        kind = why.partition(" is below")[0].rstrip("0123456789.- m")
+        if evidence.denied != kind:
+            self.outputs.append(
+                i.Say(f"rule '{rule.name}' wants a deploy ({'; '.join(reasons)}): denied, {why}")
+            )
+            self._remember(rule, replace(evidence, denied=kind))
+
+    def _remember(self, rule: Rule, evidence: RuleEvidence) -> None:
+        rules = {**self.state.rules, rule.name: evidence}
+        self.state = replace(self.state, rules=MappingProxyType(rules))

@@ -1,0 +1,157 @@
+"""What a rule is: conditions, how many must hold for how long, where it lives, what follows.
+
+Rules are data, read from a profile (profile_reader.py); here are only their types.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from chute_ros.model import Action
+from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+
+#: Instead of a link's name: it is enough if one is so, or all must be.
+ANY, ALL = "any", "all"
+
+
+class Clears(enum.Enum):
+    """When a rule that was acted on is done with."""
+
+    NEVER = "never"  # until a reset
+    ON_DISARM = "on_disarm"
+    BY_ITSELF = "by_itself"  # when its counter has leaked to 0
+
+
+class BelowMinimum(enum.Enum):
+    """What a profile allows below its minimum height, where a rule wants a deploy."""
+
+    DEPLOY = "deploy"
+    KILL = "kill"
+    NOTHING = "nothing"
+
+
+class AutopilotFact(enum.Enum):
+    """What can be true of the autopilot."""
+
+    LOST = "lost"  # vehicle/state, or the autopilot behind it, is silent
+    REBOOTED = "rebooted"  # it started anew in flight
+    DISARMED = "disarmed"  # it says that the motors are off
+    EMERGENCY = "emergency"  # it says MAV_STATE_EMERGENCY or MAV_STATE_FLIGHT_TERMINATION
+
+
+class DeviceFact(enum.Enum):
+    """What can be true of a device on a link."""
+
+    ASKS_FOR_KILL = "asks_for_kill"
+    DEPLOYED = "deployed"
+    ABNORMAL = "abnormal"
+
+
+@dataclass(frozen=True)
+class MeasurementCondition:
+    """A usable measurement is above, or below, a limit (NaN: not asked for)."""
+
+    measurement: str
+    above: float = math.nan
+    below: float = math.nan
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class LinkCondition:
+    """A link, any or all of the required ones, is judged as one of these. Silence proves
+    nothing about the vehicle: alone it never deploys."""
+
+    link: str
+    judged: tuple[LinkJudgement, ...]
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class AutopilotCondition:
+    """The autopilot is so."""
+
+    fact: AutopilotFact
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class DeviceCondition:
+    """A device on this link (or any) is so."""
+
+    fact: DeviceFact
+    link: str = ANY
+    weight: float = 1.0
+
+
+Condition = MeasurementCondition | LinkCondition | AutopilotCondition | DeviceCondition
+
+
+def is_silence(condition: Condition) -> bool:
+    """Does it tell only that somebody is not heard?"""
+    if isinstance(condition, AutopilotCondition):
+        return condition.fact is AutopilotFact.LOST
+    return isinstance(condition, LinkCondition)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule. Fulfilled once the weights of the true conditions have been at least needed, for
+    hold s by a counter that goes up while they are and leaks leak s each s while they are not."""
+
+    name: str
+    conditions: tuple[Condition, ...]
+    #: NONE: it only raises an alarm.
+    action: Action
+    states: tuple[Stage, ...]
+    needed: float
+    hold: float = 0.0
+    leak: float = 0.5
+    #: Distinct samples that must have shown it, where it rests on measurements.
+    samples: int = 1
+    clears: Clears = Clears.NEVER
+    says: str = ""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The rules of one kind of vehicle and what goes with them."""
+
+    name: str
+    rules: tuple[Rule, ...]
+    #: m above take-off.
+    minimum_height: float = 0.0
+    below_minimum: BelowMinimum = BelowMinimum.DEPLOY
+    #: Faster than this (m/s, up or down), no landed state is believed.
+    moving_speed: float = 2.0
+    #: How long a vehicle that flew must say that it has landed, s.
+    landed_hold: float = 0.0
+    limits: Mapping[str, Limits] = field(
+        default_factory=lambda: MappingProxyType(dict(STANDARD_LIMITS))
+    )
+
+
+#: What holds for any vehicle: the motors stop when its parachute asks for it, or is out.
+DEVICE_RULES = (
+    Rule(
+        "device asks for a kill",
+        (DeviceCondition(DeviceFact.ASKS_FOR_KILL),),
+        Action.KILL,
+        tuple(Stage),
+        needed=1.0,
+        clears=Clears.BY_ITSELF,
+    ),
+    Rule(
+        "parachute open",
+        (DeviceCondition(DeviceFact.DEPLOYED),),
+        Action.KILL,
+        (Stage.IN_FLIGHT, Stage.DEPLOYED),
+        needed=1.0,
+    ),
+)

@@ -1,0 +1,155 @@
+"""Which source counts for which part of the picture, and how old it is told to be."""
+
+import dataclasses
+import math
+
+import pytest
+
+from chute_ros.model import Armed, LandedState, LinkState, VehicleState
+from chute_ros.nodes.vehicle_merge import VehicleMerge
+
+LEVEL, TILTED = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)
+OK = (LinkState.OK, 4)
+
+
+def merge(*sources):
+    return VehicleMerge(sources, lost_after=2.5)
+
+
+def test_before_anything_was_heard_nothing_is_known():
+    state = merge("odometry", "imu").state(10.0)
+    assert unknown(state) == unknown(VehicleState())
+    assert (state.source, state.armed, state.landed_state) == ("", 0, 0)
+
+
+def test_each_part_has_its_own_age():
+    one = merge("odometry", "imu")
+    one.hear("odometry", {"height": (12.0,), "vertical_speed": None, "attitude": None}, 10.0)
+    one.hear("imu", {"attitude": TILTED, "acceleration": (9.8,)}, 10.25)
+    state = one.state(10.5)
+    assert (state.height, state.height_age) == (12.0, 0.5)
+    assert (state.tilt, state.attitude_age) == (1.0, 0.25)
+    assert (state.acceleration, state.acceleration_age) == (9.8, 0.25)
+    assert math.isnan(state.vertical_speed)
+    assert math.isnan(state.vertical_speed_age)
+    assert state.source == "odometry, imu"
+
+
+def test_the_order_of_the_list_decides_while_the_first_is_fresh():
+    one = merge("imu", "odometry")
+    one.hear("imu", {"attitude": LEVEL}, 10.0)
+    one.hear("odometry", {"attitude": TILTED}, 10.9)
+    assert one.state(11.0).tilt == 0.0
+    assert one.state(11.0).source == "imu"
+    late = one.state(11.01)
+    assert (late.tilt, late.source) == (1.0, "odometry")
+    assert late.attitude_age == pytest.approx(0.11)
+
+
+def test_when_all_are_old_the_newest_counts_and_stays_as_old_as_it_is():
+    one = merge("imu", "odometry")
+    one.hear("odometry", {"attitude": TILTED}, 10.0)
+    one.hear("imu", {"attitude": LEVEL}, 11.0)
+    assert (one.state(20.0).tilt, one.state(20.0).attitude_age) == (0.0, 9.0)
+
+
+def test_a_source_that_does_not_know_any_more_gives_way_at_once():
+    one = merge("imu", "odometry")
+    one.hear("imu", {"attitude": LEVEL}, 10.0)
+    one.hear("odometry", {"attitude": TILTED}, 10.0)
+    one.hear("imu", {"attitude": None}, 10.01)
+    assert one.state(10.01).tilt == 1.0
+    one.hear("odometry", {"attitude": None}, 10.02)
+    assert math.isnan(one.state(10.02).tilt)
+    assert math.isnan(one.state(10.02).attitude_age)
+
+
+def test_the_ages_that_vehicle_state_brings_grow_by_the_time_since():
+    one = merge("vehicle/state", "imu")
+    told = VehicleState(
+        link_state=LinkState.OK,
+        armed=Armed.ARMED,
+        armed_age=0.5,
+        landed_state=LandedState.IN_AIR,
+        landed_state_age=0.25,
+        height=30.0,
+        height_age=0.125,
+        battery_voltage=22.0,
+        battery_age=3.0,
+        system_status=4,
+        uptime=99.0,
+        reboot_count=1,
+        rebooted_in_flight=True,
+    )
+    one.hear_state(told, 10.0)
+    one.hear("imu", {"acceleration": (0.5,)}, 10.5)
+    state = one.state(10.5)
+    assert state == dataclasses.replace(
+        told,
+        source="vehicle/state, imu",
+        armed_age=1.0,
+        landed_state_age=0.75,
+        height_age=0.625,
+        battery_age=3.5,
+        acceleration=0.5,
+        acceleration_age=0.0,
+        # NaN is not equal to itself unless it is the same object.
+        **{name: getattr(state, name) for name in unknown(state)},
+    )
+    assert unknown(state) == unknown(told) - {"acceleration", "acceleration_age"}
+
+
+def unknown(state):
+    values = dataclasses.asdict(state)
+    return {name for name, value in values.items() if value != value}
+
+
+def test_what_vehicle_state_forgets_is_forgotten():
+    one = merge("vehicle/state", "imu")
+    one.hear_state(VehicleState(armed=Armed.ARMED, armed_age=0.0), 10.0)
+    one.hear_state(VehicleState(reboot_count=1), 10.1)
+    state = one.state(10.1)
+    assert (state.armed, state.reboot_count) == (Armed.UNKNOWN, 1)
+    assert math.isnan(state.armed_age)
+
+
+def test_an_age_below_zero_makes_nothing_younger_than_new():
+    one = merge("vehicle/state", "imu")
+    one.hear_state(VehicleState(height=1.0, height_age=-5.0), 10.0)
+    assert one.state(10.25).height_age == 0.25
+
+
+@pytest.mark.parametrize(
+    ("sources", "told", "link_state", "system_status"),
+    [
+        (("odometry",), {}, LinkState.OK, 0),
+        (("mavros", "odometry"), {}, LinkState.NEVER_SEEN, 0),
+        (("mavros",), {"mavros": (10.0, OK)}, LinkState.OK, 4),
+        (("mavros", "imu"), {"mavros": (7.4, OK)}, LinkState.LOST, 0),
+        (("mavros",), {"mavros": (10.0, (LinkState.LOST, 0))}, LinkState.LOST, 0),
+        (
+            ("vehicle/state", "mavros"),
+            {"vehicle/state": (10.0, (LinkState.LOST, 4)), "mavros": (9.0, (LinkState.OK, 5))},
+            LinkState.OK,
+            5,
+        ),
+        (
+            ("vehicle/state", "mavros"),
+            {"vehicle/state": (10.0, (LinkState.STALE, 4)), "mavros": (1.0, (LinkState.OK, 5))},
+            LinkState.STALE,
+            4,
+        ),
+        (
+            ("mavros", "vehicle/state"),
+            {"vehicle/state": (10.0, OK), "mavros": (9.9, (LinkState.OK, 5))},
+            LinkState.OK,
+            5,
+        ),
+    ],
+)
+def test_the_autopilot_is_lost_only_when_nobody_hears_it(sources, told, link_state, system_status):
+    one = merge(*sources)
+    for source, (at, word) in told.items():
+        one.hear(source, {"autopilot": word}, at)
+    state = one.state(10.0)
+    assert (state.link_state, state.system_status) == (link_state, system_status)
