@@ -116,7 +116,9 @@ class Rule:
     #: Distinct samples that must have shown it, where it rests on measurements.
     samples: int = 1
     clears: Clears = Clears.NEVER
+    #: What it means, and where its values come from, in words.
     says: str = ""
+    source: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,250 @@
+"""Reads a profile of rules from YAML text, and says for each mistake its line and the fix.
+
+The form of the file is described in docs/rules.md.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from chute_ros.errors import ParameterError, ProfileError
+from chute_ros.model import Action
+from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+from chute_ros.supervisor.rules import (
+    ALL,
+    ANY,
+    AutopilotCondition,
+    AutopilotFact,
+    BelowMinimum,
+    Clears,
+    Condition,
+    DeviceCondition,
+    DeviceFact,
+    LinkCondition,
+    MeasurementCondition,
+    Profile,
+    Rule,
+    is_silence,
+)
+from chute_ros.supervisor.yaml_lines import LineReader, Where, compose
+
+_Kind = TypeVar("_Kind", bound=enum.Enum)
+#: What a rule may want. ALARM: it is only said.
+_ACTIONS = {
+    "ALARM": Action.NONE,
+    "FLIGHT_BLOCK": Action.FLIGHT_BLOCK,
+    "KILL": Action.KILL,
+    "DEPLOY": Action.DEPLOY,
+}
+_RULE_KEYS = (
+    *("says", "source", "states", "conditions", "needed", "for", "leak", "samples"),
+    *("action", "clears"),
+)
+_CONDITION_KEYS = ("measurement", "link", "autopilot", "device")
+_PROFILE_KEYS = (
+    *("profile", "minimum_height", "below_minimum", "moving_speed", "landed_hold"),
+    *("measurements", "rules"),
+)
+
+
+class _ProfileLines(LineReader):
+    """links: the names of those that are followed."""
+
+    def __init__(self, name: str, links: Sequence[str]) -> None:
+        super().__init__(name)
+        self._links = links
+
+    def link(self, where: Where, what: str, besides: tuple[str, ...]) -> str:
+        """The name of a link that the supervisor follows."""
+        return self.choice(where, what, (*besides, *self._links))
+
+
+def read_profile(text: str, name: str, links: Sequence[str]) -> Profile:
+    """The profile in text. name: of the file, for the mistakes; links: those that are followed.
+
+    ProfileError lists every mistake with its line and the fix.
+    """
+    reader = _ProfileLines(name, links)
+    profile = _profile(reader, compose(text, name))
+    if reader.mistakes:
+        raise ProfileError("\n".join(reader.mistakes))
+    return profile
+
+
+def _profile(reader: _ProfileLines, where: Where) -> Profile:
+    entries = reader.mapping(where, _PROFILE_KEYS, "a profile")
+    for key in ("profile", "rules"):
+        if key not in entries:
+            reader.wrong(where.line, f"{key} is missing: a profile needs its name and its rules")
+    profile = Profile(name="", rules=())
+    if "profile" in entries:
+        profile = replace(profile, name=reader.text(entries["profile"], "profile"))
+    if "minimum_height" in entries:
+        height = reader.number(entries["minimum_height"], "minimum_height", 0.0, 100_000.0)
+        profile = replace(profile, minimum_height=height)
+    if "landed_hold" in entries:
+        hold = reader.number(entries["landed_hold"], "landed_hold", 0.0, 60.0)
+        profile = replace(profile, landed_hold=hold)
+    if "moving_speed" in entries:
+        speed = reader.number(entries["moving_speed"], "moving_speed", 0.1, 100.0)
+        profile = replace(profile, moving_speed=speed)
+    if "below_minimum" in entries:
+        word = reader.choice(
+            entries["below_minimum"], "below_minimum", [one.value for one in BelowMinimum]
+        )
+        profile = replace(profile, below_minimum=BelowMinimum(word))
+    if "measurements" in entries:
+        profile = replace(profile, limits=_limits(reader, entries["measurements"]))
+    rules = []
+    if "rules" in entries:
+        for name, one in reader.mapping(entries["rules"], (), "rules").items():
+            rules.append(_rule(reader, name, one))
+    return replace(profile, rules=tuple(rules))
+
+
+def _limits(reader: _ProfileLines, where: Where) -> MappingProxyType[str, Limits]:
+    limits = dict(STANDARD_LIMITS)
+    names = [field.name for field in fields(Limits)]
+    for name, one in reader.mapping(where, STANDARD_LIMITS, "measurements").items():
+        for key, value in reader.mapping(one, names, f"measurement {name}").items():
+            number = reader.number(value, f"{key} of {name}")
+            try:
+                limits[name] = replace(limits[name], **{key: number})
+            except ParameterError as error:
+                reader.wrong(value.line, f"{name}: {error}")
+    return MappingProxyType(limits)
+
+
+def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
+    what = f"rule '{name}'"
+    entries = reader.mapping(where, _RULE_KEYS, what)
+    for key in ("conditions", "action", "states"):
+        if key not in entries and entries:
+            reader.wrong(where.line, f"{what} has no {key}: add it")
+    conditions: list[Condition] = []
+    if "conditions" in entries:
+        for one in reader.many(entries["conditions"], f"conditions of {what}"):
+            condition = _condition(reader, what, one)
+            if condition is not None:
+                conditions.append(condition)
+    states: list[Stage] = []
+    if "states" in entries:
+        for one in reader.many(entries["states"], f"states of {what}"):
+            states.append(Stage[reader.choice(one, f"a state of {what}", Stage.__members__)])
+    action = Action.NONE
+    if "action" in entries:
+        action = _ACTIONS[reader.choice(entries["action"], f"action of {what}", _ACTIONS)]
+    weights = sum(condition.weight for condition in conditions)
+    needed = weights
+    if "needed" in entries:
+        needed = reader.number(entries["needed"], f"needed of {what}", 1e-6, 1e6)
+        if conditions and needed > weights + 1e-9:
+            text = f"needed of {what} is {needed:g}: the weights of its conditions add up to only"
+            reader.wrong(entries["needed"].line, f"{text} {weights:g}")
+    rule = Rule(name, tuple(conditions), action, tuple(states), needed)
+    rule = _timing(reader, what, entries, rule)
+    if action is Action.DEPLOY and conditions:
+        _check_deploy(reader, what, where.line, rule)
+    return rule
+
+
+def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: Rule) -> Rule:
+    readers: dict[str, Callable[[Where], dict[str, Any]]] = {
+        "for": lambda w: {"hold": reader.number(w, f"for of {what}", 0.0, 600.0)},
+        "leak": lambda w: {"leak": reader.number(w, f"leak of {what}", 0.0, 100.0)},
+        "samples": lambda w: {"samples": int(_whole(reader, w, f"samples of {what}"))},
+        "clears": lambda w: {"clears": _member(reader, w, f"clears of {what}", Clears)},
+        "says": lambda w: {"says": reader.text(w, f"says of {what}")},
+        "source": lambda w: {"source": reader.text(w, f"source of {what}")},
+    }
+    for key, read in readers.items():
+        if key in entries:
+            rule = replace(rule, **read(entries[key]))
+    return rule
+
+
+def _whole(reader: _ProfileLines, where: Where, what: str) -> float:
+    value = reader.number(where, what, 1, 1000)
+    if not math.isnan(value) and value != int(value):
+        reader.wrong(where.line, f"{what} is {value:g}: need a whole number")
+    return 1.0 if math.isnan(value) else value
+
+
+def _member(reader: _ProfileLines, where: Where, what: str, kind: type[_Kind]) -> _Kind:
+    return kind(reader.choice(where, what, [one.value for one in kind]))
+
+
+def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | None:
+    entries = reader.mapping(
+        where, (*_CONDITION_KEYS, "above", "below", "is", "weight"), f"a condition of {what}"
+    )
+    kinds = [key for key in _CONDITION_KEYS if key in entries]
+    weight = 1.0
+    if "weight" in entries:
+        weight = reader.number(entries["weight"], f"weight in {what}", 1e-6, 1e6)
+    if "measurement" in kinds and len(kinds) == 1:
+        return _measurement(reader, what, where, entries, weight)
+    if not kinds or (len(kinds) > 1 and set(kinds) != {"device", "link"}):
+        text = f"a condition of {what} needs one of {', '.join(_CONDITION_KEYS)}"
+        reader.wrong(where.line, f"{text}; it has {', '.join(kinds) or 'none'}")
+        return None
+    for key in ("above", "below"):
+        if key in entries:
+            reader.wrong(entries[key].line, f"{key} belongs to a measurement: remove it here")
+    if "is" in entries and kinds != ["link"]:
+        reader.wrong(entries["is"].line, "`is` belongs to a link: remove it here")
+    if "autopilot" in kinds:
+        fact = _member(reader, entries["autopilot"], f"autopilot in {what}", AutopilotFact)
+        return AutopilotCondition(fact, weight)
+    if "device" in kinds:
+        device = _member(reader, entries["device"], f"device in {what}", DeviceFact)
+        link = ANY
+        if "link" in entries:
+            link = reader.link(entries["link"], f"link in {what}", (ANY,))
+        return DeviceCondition(device, link, weight)
+    link = reader.link(entries["link"], f"link in {what}", (ANY, ALL))
+    if "is" not in entries:
+        text = f"a condition of {what} on a link needs `is`"
+        reader.wrong(where.line, f"{text}: one or more of {', '.join(LinkJudgement.__members__)}")
+        return None
+    judged = [
+        LinkJudgement[reader.choice(one, f"is in {what}", LinkJudgement.__members__)]
+        for one in reader.many(entries["is"], f"is in {what}")
+    ]
+    return LinkCondition(link, tuple(judged), weight)
+
+
+def _measurement(
+    reader: _ProfileLines, what: str, where: Where, entries: dict[str, Where], weight: float
+) -> MeasurementCondition:
+    name = reader.choice(entries["measurement"], f"measurement in {what}", STANDARD_LIMITS)
+    if "is" in entries:
+        reader.wrong(entries["is"].line, "`is` belongs to a link: use above or below")
+    if "above" not in entries and "below" not in entries:
+        reader.wrong(where.line, f"{name} in {what} has no limit: add above or below")
+    limits = {
+        key: reader.number(entries[key], f"{key} of {name} in {what}")
+        for key in ("above", "below")
+        if key in entries
+    }
+    if len(limits) == 2 and not limits["above"] < limits["below"]:
+        reader.wrong(where.line, f"{name} in {what} can never be: above must be less than below")
+    return MeasurementCondition(name, weight=weight, **limits)
+
+
+def _check_deploy(reader: _ProfileLines, what: str, line: int, rule: Rule) -> None:
+    """What the gate would never let through is a mistake of the profile."""
+    silence = sum(condition.weight for condition in rule.conditions if is_silence(condition))
+    if silence >= rule.needed - 1e-9:
+        text = f"{what} would deploy on silence alone, which is never done"
+        reader.wrong(line, f"{text}: raise needed above {silence:g}, or add a measurement")
+    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING}:
+        text = f"{what} would deploy out of flight, which is never done"
+        reader.wrong(line, f"{text}: its states may be IN_FLIGHT and KILLING")

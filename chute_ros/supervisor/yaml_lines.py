@@ -1,0 +1,116 @@
+"""Values of a YAML file with their lines, and what is wrong with them in words."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import yaml
+
+from chute_ros.errors import ProfileError
+
+
+class Where:
+    """A value of the file with its line, and its children alike."""
+
+    def __init__(self, node: yaml.Node | None, value: Any, line: int) -> None:
+        self.node, self.value, self.line = node, value, line
+
+
+class LineReader:
+    """Reads values that must be of some kind; collects the mistakes, so that all are told at once.
+    name: of the file."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.mistakes: list[str] = []
+
+    def wrong(self, line: int, text: str) -> None:
+        """One more mistake."""
+        self.mistakes.append(f"{self.name}, line {line}: {text}")
+
+    def mapping(self, where: Where, allowed: Iterable[str], what: str) -> dict[str, Where]:
+        """The entries of a mapping; an unknown key is a mistake."""
+        if not isinstance(where.node, yaml.MappingNode):
+            self.wrong(where.line, f"{what} is {where.value!r}: need `key: value` lines")
+            return {}
+        entries: dict[str, Where] = {}
+        allowed = tuple(allowed)
+        for key_node, node in where.node.value:
+            key, line = str(key_node.value), key_node.start_mark.line + 1
+            if allowed and key not in allowed:
+                near = difflib.get_close_matches(key, allowed, 1)
+                fix = f"did you mean {near[0]}? " if near else ""
+                self.wrong(line, f"{what} has no {key!r}: {fix}it may have {', '.join(allowed)}")
+            elif key in entries:
+                self.wrong(line, f"{key!r} is there twice: remove one")
+            else:
+                entries[key] = where_of(node)
+        return entries
+
+    def number(
+        self, where: Where, what: str, least: float = -math.inf, most: float = math.inf
+    ) -> float:
+        """A number in a range."""
+        value = where.value
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.wrong(where.line, f"{what} is {value!r}: need a number")
+        elif not least <= value <= most:  # NaN as well
+            self.wrong(where.line, f"{what} is {value}: need {least:g} to {most:g}")
+        else:
+            return float(value)
+        return math.nan
+
+    def choice(self, where: Where, what: str, choices: Iterable[str]) -> str:
+        """One word of several."""
+        choices = tuple(choices)
+        if where.value in choices:
+            return str(where.value)
+        near = difflib.get_close_matches(str(where.value), choices, 1)
+        fix = f" (did you mean {near[0]}?)" if near else ""
+        self.wrong(where.line, f"{what} is {where.value!r}: need {' or '.join(choices)}{fix}")
+        return choices[0]
+
+    def text(self, where: Where, what: str) -> str:
+        """Words."""
+        if not isinstance(where.value, str) or not where.value.strip():
+            self.wrong(where.line, f"{what} is {where.value!r}: need words")
+            return ""
+        return " ".join(where.value.split())
+
+    def many(self, where: Where, what: str) -> list[Where]:
+        """The entries of a list; one alone may stand without brackets."""
+        if isinstance(where.node, yaml.SequenceNode):
+            if not where.node.value:
+                self.wrong(where.line, f"{what} is empty: need at least one")
+            return [where_of(node) for node in where.node.value]
+        return [where]
+
+
+def compose(text: str, name: str) -> Where:
+    """The root of a YAML text; ProfileError if it is none. name: of the file."""
+    try:
+        return where_of(yaml.compose(text, Loader=yaml.SafeLoader))
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        line = mark.line + 1 if mark is not None else 1
+        raise ProfileError(f"{name}, line {line}: not YAML: {error.problem}") from None
+    except (yaml.YAMLError, ValueError) as error:
+        raise ProfileError(f"{name}, line 1: not YAML: {error}") from None
+
+
+def where_of(node: yaml.Node | None) -> Where:
+    """A node of the file."""
+    if node is None:
+        return Where(None, None, 1)
+    value = node.value
+    if isinstance(node, yaml.ScalarNode):
+        try:
+            value = yaml.safe_load(node.value) if node.style is None else node.value
+        except yaml.YAMLError:
+            value = node.value
+    else:
+        value = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
+    return Where(node, value, node.start_mark.line + 1)
