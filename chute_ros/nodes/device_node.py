@@ -34,7 +34,11 @@ from chute_ros.nodes.inbox import Inbox
 from chute_ros.nodes.link_log import log_event
 from chute_ros.nodes.parameters import Parameter, declare
 from chute_ros.nodes.request_desk import CallFailed, RequestDesk
-from chute_ros.nodes.supervisor_watch import SupervisorWatch
+from chute_ros.nodes.supervisor_watch import (
+    BLOCK_FLIGHT,
+    WATCH_PARAMETERS,
+    SupervisorWatch,
+)
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Notice,
@@ -54,6 +58,7 @@ COMMON_PARAMETERS = (
         10.0,
     ),
     Parameter("heartbeat_rate", 10.0, "rate of safety/heartbeat, Hz", 1.0, 100.0),
+    *WATCH_PARAMETERS,
 )
 #: Our own link's heartbeat stops when the executor was silent for this long, s.
 OWNER_SILENCE = 1.0
@@ -75,6 +80,13 @@ class CarriedOut:
 
     decision: model.Decision
     text: str
+
+
+def block_reason(decision: model.Decision) -> str:
+    """Why this decision keeps the vehicle on the ground; empty: it lets it go."""
+    if decision.action is model.Action.FLIGHT_BLOCK_RELEASE:
+        return ""
+    return "; ".join(decision.reasons) or decision.rule
 
 
 class DeviceNode(Node, ABC):
@@ -103,10 +115,14 @@ class DeviceNode(Node, ABC):
         #: The newest picture of each device.
         self.statuses: dict[str, model.ParachuteStatus] = {}
         self._received_at = (0, 0.0)
+        #: Why flight is blocked by decision; empty: it is not.
+        self._decided_block = ""
         self._seq = count()
         self._loop_faults = 0
         self._summary: Summary | None = None
-        self._supervisor = SupervisorWatch(self.values["max_decision_age"], self.wall)
+        self._supervisor = SupervisorWatch(
+            self.values["max_decision_age"], self.values["supervisor_lost_after"], self.wall
+        )
         self._status_publisher = self.create_publisher(
             ParachuteStatus, "parachute/status", qos.STATUS
         )
@@ -195,13 +211,24 @@ class DeviceNode(Node, ABC):
 
         self.in_link(run)
 
-    def deploy_for(self, decision: model.Decision, force: bool) -> None:
-        """Deploy for a decision, at the latest once a parachute is heard."""
-        self.desk.deploy_for(
-            decision,
-            lambda link, token, now: link.deploy(token, force, now),
-            self.values["give_up_after"],
-        )
+    def flight_block(self, reason: str) -> None:
+        """Keep a vehicle that stands on the ground for reason, or no longer (empty)."""
+        self.in_link(lambda link, now: link.flight_block(reason, now))
+
+    def carry_out_flight_block(
+        self, decision: model.Decision, blocked: str, released: str
+    ) -> None:
+        """What the supervisor decided of it, reported with one of the two texts."""
+        self._decided_block = block_reason(decision)
+        text = blocked if self._decided_block else released
+        reason = self._decided_block
+        self.carry_out_at_once(decision, lambda link, now: link.flight_block(reason, now), text)
+
+    def deploy_for(
+        self, decision: model.Decision, begin: Callable[[Any, int, float], None]
+    ) -> None:
+        """Have begin(link, token, now) called for a decision, once a parachute is heard."""
+        self.desk.deploy_for(decision, begin, self.values["give_up_after"])
 
     def in_link(self, function: Callable[[Any, float], None]) -> None:
         """Have function(link, now) called in the link's thread."""
@@ -286,6 +313,20 @@ class DeviceNode(Node, ABC):
             self.deliver([self.summarise(link, now)])
 
         self.in_link(answer)
+        lost = self._supervisor.look()
+        if lost is not None:
+            self._supervisor_lost(lost)
+
+    def _supervisor_lost(self, lost: bool) -> None:
+        """Nobody would stop the motors: a vehicle that stands stays where it is."""
+        log = self.get_logger()
+        blocks = self.values["on_supervisor_lost"] == BLOCK_FLIGHT
+        if lost:
+            log.error(f"the supervisor is lost: {'flight is blocked' if blocks else 'held'}")
+        else:
+            log.warning("the supervisor is back")
+        if blocks:
+            self.flight_block("the supervisor is lost" if lost else self._decided_block)
 
     def _publish_heartbeat(self, summary: Summary) -> None:
         self._summary = summary

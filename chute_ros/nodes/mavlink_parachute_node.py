@@ -85,13 +85,13 @@ class MavlinkParachuteNode(DeviceNode):
         if decision.action is model.Action.KILL:
             self.desk.request_for(decision, lambda link, token, now: link.kill(token, now))
         elif decision.action is model.Action.DEPLOY:
-            self.deploy_for(decision, self.values["deploy_arms_trigger"])
+            force, device = self.values["deploy_arms_trigger"], decision.device
+            self.deploy_for(
+                decision, lambda link, token, now: link.deploy(token, force, now, device)
+            )
         elif decision.action is not model.Action.NONE:
-            blocked = decision.action is model.Action.FLIGHT_BLOCK
-            reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""
-            text = "arming on the ground is undone" if blocked else "arming is left alone"
-            self.carry_out_at_once(
-                decision, lambda link, now: link.flight_block(reason, now), text
+            self.carry_out_flight_block(
+                decision, "arming on the ground is undone", "arming is left alone"
             )
 
     def arm_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:

@@ -62,7 +62,32 @@ def vehicle_state_from(message: VehicleState) -> model.VehicleState:
     values["link_state"] = _known(model.LinkState, values["link_state"])
     values["armed"] = _known(model.Armed, values["armed"])
     values["landed_state"] = _known(model.LandedState, values["landed_state"])
+    for name, value in values.items():
+        if name.endswith("_age") and value < 0.0:
+            values[name] = model.NAN
     return model.VehicleState(**values)
+
+
+def parachute_from(message: ParachuteStatus) -> model.ParachuteStatus:
+    """What a device node published on parachute/status; a number without a name reads as
+    unknown."""
+    return model.ParachuteStatus(
+        device=message.device,
+        link_state=_known(model.LinkState, message.link_state),
+        state=_known(model.ParachuteState, message.state),
+        armed=message.armed,
+        deployed=message.deployed,
+        deployment_trigger=message.deployment_trigger,
+        armed_triggers=model.TriggerFlags(message.armed_triggers),
+        error_flags=model.ErrorFlags(message.error_flags),
+        safety_flags=model.SafetyFlags(message.safety_flags),
+        ats_arm_altitude=message.ats_arm_altitude,
+        height=message.height,
+        backup_voltage=message.backup_voltage,
+        uptime=message.uptime,
+        packed_date=message.packed_date,
+        faults=tuple(message.faults),
+    )
 
 
 def link_state(message: LinkHeartbeat) -> model.LinkState:
@@ -80,7 +105,7 @@ def decision(one: model.Decision, stamp: Time) -> SafetyDecision:
     message = SafetyDecision()
     message.header.stamp = stamp
     message.epoch, message.id, message.action = one.epoch, one.id, int(one.action)
-    message.rule, message.shadow = one.rule, one.shadow
+    message.rule, message.shadow, message.device = one.rule, one.shadow, one.device
     message.reasons, message.targets = list(one.reasons), list(one.targets)
     return message
 
@@ -95,6 +120,7 @@ def decision_from(message: SafetyDecision) -> model.Decision:
         tuple(message.reasons),
         tuple(message.targets),
         message.shadow,
+        message.device,
     )
 
 

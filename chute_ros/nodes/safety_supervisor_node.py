@@ -2,10 +2,15 @@
 
 One loop does it all: every message and request becomes an input of the core; one timer, set to the
 core's next deadline, wakes it when nothing comes. Its heartbeat comes from that loop alone.
+
+What goes wrong inside: an input that the core cannot take is left out, reported, and the loop goes
+on. If the core fails without any input, the supervisor falls silent: a standby takes over, and the
+device nodes do what on_supervisor_lost says.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from itertools import count
 from operator import attrgetter
@@ -18,23 +23,25 @@ from chute_msgs.msg import (
     SafetyDecision,
     SafetyRequest,
     SafetyState,
-    VehicleState,
 )
-from chute_msgs.srv import Arm, Deploy, Kill, SetMode
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rclpy.task import Future
-from std_srvs.srv import Trigger
 
+from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.parameters import declare
+from chute_ros.nodes.supervisor_health import Health
+from chute_ros.nodes.supervisor_lease import LeaseKeeper
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
-from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from, lease_from
+from chute_ros.nodes.supervisor_services import SupervisorServices
+from chute_ros.nodes.vehicle_sources import VehicleSources
 from chute_ros.supervisor import inputs
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import next_deadline, step_down, take_over, update
+from chute_ros.supervisor.epochs import epoch_above
+from chute_ros.supervisor.lease import Event
 from chute_ros.supervisor.state import State
 
 HEARTBEAT_INTERVAL = 0.1  # s
@@ -50,22 +57,24 @@ class SafetySupervisorNode(Node):
         super().__init__("safety_supervisor", **options)
         self.values = declare(self, PARAMETERS)
         self.config = config_from(self.values)
+        lease = lease_from(self.values, self.get_name())
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
         self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         now = time.monotonic()
         # Rises from start to start; a device node that knows a higher one makes us go on above it.
-        epoch = max(1, int(time.time()) & 0xFFFFFFFF)
-        self.state = State(epoch, now, mode=inputs.Mode[self.values["mode"]])
-        self._tokens = count(1)
-        self._waiting: dict[int, Future] = {}
+        epoch = epoch_above(max(0, int(time.time()) & 0xFFFFFFFF), lease.rank)
+        self.state = State(
+            epoch, now, mode=inputs.Mode[self.values["mode"]], leading=not lease.standby
+        )
         self._misasked: set[str] = set()
+        self._health = Health()
+        self.services_offered = SupervisorServices(self, self.wall, self._turn)
         self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
         self._seq = count()
         self._beat_at = now
         self._state_at = now
-        self._latest = 0.0
         self._published: State | None = None
         self._decision_publisher = self.create_publisher(
             SafetyDecision, "safety/decision", qos.DECISION
@@ -77,24 +86,21 @@ class SafetySupervisorNode(Node):
         self._diagnostics_publisher = self.create_publisher(
             DiagnosticArray, "/diagnostics", qos.STATUS
         )
+        self.lease = LeaseKeeper(
+            self, lease, self.wall, lambda: self.state, self._lease_event, self._follow
+        )
         for kind, topic, callback, profile in (
             (LinkHeartbeat, "safety/heartbeat", self._heartbeat, qos.STATUS),
             (ParachuteStatus, "parachute/status", self._parachute, qos.STATUS),
-            (VehicleState, "vehicle/state", self._vehicle, qos.STATUS),
             (ActionReport, "safety/action", self._action, qos.DECISION),
             (SafetyRequest, "safety/request", self._device_request, qos.STATUS),
         ):
-            self.create_subscription(kind, topic, callback, profile)
-        # A service that awaits its outcome must not keep the decision loop from running.
-        group = ReentrantCallbackGroup()
-        for kind, name, callback in (
-            (Arm, "safety/arm", self._arm),
-            (Deploy, "safety/deploy", self._deploy),
-            (Kill, "safety/kill", self._kill),
-            (Trigger, "safety/reset", self._reset),
-            (SetMode, "safety/set_mode", self._set_mode),
-        ):
-            self.create_service(kind, name, callback, callback_group=group)
+            self.create_subscription(
+                kind, topic, callback, profile, event_callbacks=self._health.watch(topic)
+            )
+        self._vehicle_sources = VehicleSources(self, self.values, self._vehicle)
+        if self.lease.leading:
+            self.services_offered.open()
         self.create_timer(1.0, self._diagnose, clock=self._steady)
         self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self._steady)
         self._turn()
@@ -104,27 +110,46 @@ class SafetySupervisorNode(Node):
     def _turn(self, *new: inputs.Input) -> None:
         """Give the core what came, do what it says, sleep until its next deadline."""
         now = time.monotonic()
-        self.state, outputs = update(self.config, self.state, new, now)
-        for output in outputs:
-            self._do(output, now)
+        self.lease.look(now)
+        try:
+            before = self.state
+            self.state, outputs = update(self.config, before, new, now)
+        except Exception as error:  # noqa: BLE001 - the loop must go on, and say so
+            self._health.failed(error, new)
+            self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
+            if not new:
+                # The core cannot even look at the clock: silence tells everybody.
+                self._sleep(now + HEARTBEAT_INTERVAL)
+                return
+            outputs = ()
+        self._carry_out(outputs, now)
         self._arming.give_up(now)
         if now >= self._beat_at:
             self._beat(now)
-        if self._changed() or now >= self._state_at:
+        if self.lease.leading and (self._changed() or now >= self._state_at):
             self._publish_state(now)
-        wake = min(next_deadline(self.config, self.state, now), self._beat_at, self._state_at)
+        deadline = next_deadline(self.config, self.state, now)
+        self._sleep(min(deadline, self.lease.deadline(), self._beat_at))
+
+    def _sleep(self, wake: float) -> None:
         self._timer.timer_period_ns = max(1_000_000, int((wake - time.monotonic()) * 1e9))
         self._timer.reset()
+
+    def _carry_out(self, outputs: tuple[inputs.Output, ...], now: float) -> None:
+        if any(isinstance(output, inputs.Decide) for output in outputs):
+            self.lease.tell(now)
+        for output in outputs:
+            self._do(output, now)
 
     def _do(self, output: inputs.Output, now: float) -> None:
         if isinstance(output, inputs.Decide):
             self._publish_decision(output)
         elif isinstance(output, inputs.Finish):
-            future = self._waiting.pop(output.token, None)
-            if future is not None:
-                future.set_result(output)
+            self.services_offered.finished(output)
         elif isinstance(output, inputs.ArmDevices):
             self._arming.begin(output, now)
+        elif isinstance(output, inputs.Refused):
+            self.lease.refused(output.newest_epoch, now)
         else:
             log = self.get_logger()
             log.error(output.text) if output.alarm else log.info(output.text)
@@ -134,34 +159,54 @@ class SafetySupervisorNode(Node):
         self._decision_publisher.publish(messages.decision(decision, self.wall.now().to_msg()))
         if not output.again:
             shadow = " (SHADOW, not sent)" if decision.shadow else ""
+            device = f" device {decision.device}" if decision.device else ""
             self.get_logger().warning(
                 f"decision {decision.epoch}.{decision.id} {decision.action.name}{shadow} by rule "
-                f"'{decision.rule}' to {', '.join(decision.targets)}: "
+                f"'{decision.rule}' to {', '.join(decision.targets)}{device}: "
                 f"{'; '.join(decision.reasons)}"
             )
+
+    # -- the lease ------------------------------------------------------------------------------
+
+    def _lease_event(self, event: Event) -> None:
+        now = time.monotonic()
+        if self.lease.leading:
+            epoch = self.lease.next_epoch()
+            self.get_logger().warning(f"leads from now on, epoch {epoch}: {event.value}")
+            self.state, outputs = take_over(self.config, self.state, epoch, now)
+            self.services_offered.open()
+        else:
+            self.get_logger().warning(f"only looks on from now on: {event.value}")
+            self.state, outputs = step_down(self.config, self.state, event.value, now)
+            self.services_offered.close()
+        self._carry_out(outputs, now)
+        self.lease.tell(now)
+
+    def _follow(self, state: State) -> None:
+        self.state = state
 
     # -- inputs ---------------------------------------------------------------------------------
 
     def _heartbeat(self, message: LinkHeartbeat) -> None:
-        if not message.supervisor:
-            state = messages.link_state(message)
-            self._turn(
-                inputs.LinkHeartbeat(message.link, state, message.device_healthy, message.seq)
-            )
-
-    def _parachute(self, message: ParachuteStatus) -> None:
+        if message.supervisor:
+            return
+        sent = messages.seconds(message.header.stamp)
+        difference = messages.seconds(self.wall.now().to_msg()) - sent if sent else math.nan
         self._turn(
-            inputs.ParachuteReport(
+            inputs.LinkHeartbeat(
                 message.link,
-                message.device,
-                message.deployed,
-                tuple(message.faults),
-                message.link_state == ParachuteStatus.LINK_OK,
+                messages.link_state(message),
+                message.device_healthy,
+                message.seq,
+                difference,
             )
         )
 
-    def _vehicle(self, message: VehicleState) -> None:
-        self._turn(inputs.VehicleReport(messages.vehicle_state_from(message)))
+    def _parachute(self, message: ParachuteStatus) -> None:
+        self._turn(inputs.ParachuteReport(message.link, messages.parachute_from(message)))
+
+    def _vehicle(self, state: model.VehicleState) -> None:
+        self._turn(inputs.VehicleReport(state))
 
     def _action(self, message: ActionReport) -> None:
         self._turn(
@@ -190,62 +235,22 @@ class SafetySupervisorNode(Node):
                 "FLIGHT_BLOCK_RELEASE 3 (said once for each link)"
             )
 
-    # -- services -------------------------------------------------------------------------------
-
-    async def _ask(self, make: Any) -> inputs.Finish:
-        token = next(self._tokens)
-        self._waiting[token] = future = Future()
-        self._turn(make(token))
-        return await future
-
-    async def _arm(self, request: Any, response: Any) -> Any:
-        end = await self._ask(lambda t: inputs.ArmRequest(t, request.arm, request.triggers))
-        response.success, response.message = end.success, end.message
-        return response
-
-    async def _deploy(self, request: Any, response: Any) -> Any:
-        end = await self._ask(lambda t: inputs.DeployRequest(t, request.force, request.reason))
-        response.success, response.accepted = end.success, end.accepted
-        response.message = end.message
-        return response
-
-    async def _kill(self, request: Any, response: Any) -> Any:
-        reason = request.reason or "no reason given"
-        end = await self._ask(lambda t: inputs.KillRequest(t, "operator", reason))
-        response.success, response.accepted = end.success, end.accepted
-        response.message = end.message
-        return response
-
-    async def _reset(self, request: Any, response: Any) -> Any:
-        end = await self._ask(inputs.ResetRequest)
-        response.success, response.message = end.success, end.message
-        return response
-
-    async def _set_mode(self, request: Any, response: Any) -> Any:
-        if request.mode not in inputs.Mode._value2member_map_:
-            response.message = f"mode {request.mode}: need ACTIVE 0, SHADOW 1 or INHIBITED 2"
-            return response
-        mode = inputs.Mode(request.mode)
-        self.get_logger().warning(f"set_mode {mode.name}: {request.reason!r}")
-        end = await self._ask(lambda t: inputs.ModeRequest(t, mode, request.force))
-        response.success, response.message = end.success, end.message
-        return response
-
     # -- outputs --------------------------------------------------------------------------------
 
     def _beat(self, now: float) -> None:
-        self._latest = now - self._beat_at
+        self._health.beat_late = now - self._beat_at
         self._beat_at = max(self._beat_at + HEARTBEAT_INTERVAL, now)
         message = LinkHeartbeat(
             link=self.get_name(),
             link_state=LinkHeartbeat.LINK_OK,
             seq=next(self._seq) % 2**32,
-            device_healthy=True,
+            device_healthy=self.lease.leading,
             age=0.0,
             supervisor=True,
         )
         message.header.stamp = self.wall.now().to_msg()
         self._heartbeat_publisher.publish(message)
+        self.lease.tell(now)
 
     def _changed(self) -> bool:
         before, now = self._published, self.state
@@ -258,7 +263,9 @@ class SafetySupervisorNode(Node):
         self._state_publisher.publish(state_message(self.config, self.state, now, stamp))
 
     def _diagnose(self) -> None:
-        task = decisions_task(
-            self.diagnostic_name, self.config, self.state, time.monotonic(), self._latest
-        )
-        self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), [task]))
+        name, now = self.diagnostic_name, time.monotonic()
+        tasks = [
+            decisions_task(name, self.config, self.state, now),
+            self._health.task(name, self.state, self.lease, now),
+        ]
+        self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), tasks))

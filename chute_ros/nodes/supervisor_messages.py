@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import SafetyState
+from chute_msgs.msg import RuleState, SafetyState
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
 from chute_ros.nodes import diagnostics
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.flight import unusable
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons
-from chute_ros.supervisor.state import LinkEvidence, State
+from chute_ros.supervisor.rules import Rule
+from chute_ros.supervisor.state import State
 
 
 def state_message(config: SupervisorConfig, state: State, now: float, stamp: Time) -> SafetyState:
@@ -30,13 +33,19 @@ def state_message(config: SupervisorConfig, state: State, now: float, stamp: Tim
     )
     message.header.stamp = stamp
     for link in config.links:
-        evidence = state.links.get(link, LinkEvidence())
+        evidence = state.evidence(link)
         message.links.append(link)
-        message.link_states.append(int(evidence.state(config, now)))
+        message.link_states.append(int(evidence.judged(config.limits(link), now)))
         message.link_ages.append(now - evidence.heard)
         message.devices_healthy.append(evidence.device_healthy)
+    message.rules = [_rule_message(config, state, rule, now) for rule in config.profile.rules]
+    message.unusable = [
+        f"{name}: {why}"
+        for name in config.profile.limits
+        if (why := unusable(config, state, name, now))
+    ]
     newest = max(
-        (p.decision for p in (state.block, state.kill, state.deploy) if p is not None),
+        (p.decision for p in (state.block, state.kill, *state.deploys) if p is not None),
         key=lambda decision: decision.id,
         default=None,
     )
@@ -48,9 +57,9 @@ def state_message(config: SupervisorConfig, state: State, now: float, stamp: Tim
 
 
 def decisions_task(
-    name: str, config: SupervisorConfig, state: State, now: float, heartbeat_late: float
+    name: str, config: SupervisorConfig, state: State, now: float
 ) -> DiagnosticStatus:
-    """The same in diagnostics. heartbeat_late: how late the newest own heartbeat was, s."""
+    """The same in diagnostics."""
     reasons = block_reasons(config, state, now)
     level = diagnostics.OK
     if state.alarms or state.stage is Stage.FAULT:
@@ -62,14 +71,43 @@ def decisions_task(
         "mode": state.mode.name,
         "epoch": state.epoch,
         "decisions": state.next_id - 1,
-        "newest heartbeat late by (s)": heartbeat_late,
+        "profile": config.profile.name,
+        "device asked to kill": ", ".join(state.asks),
     }
     for link in config.links:
-        evidence = state.links.get(link, LinkEvidence())
-        values[f"{link}: link"] = evidence.state(config, now).name
+        evidence = state.evidence(link)
+        values[f"{link}: link"] = evidence.judged(config.limits(link), now).name
+        values[f"{link}: times lost"] = evidence.lost_count
+        values[f"{link}: clock differs by (s)"] = evidence.clock_difference
         values[f"{link}: heartbeat age (s)"] = now - evidence.heard
         values[f"{link}: device healthy"] = evidence.device_healthy
+    for rule in config.profile.rules:
+        counted = state.rule(rule.name)
+        latched = ", acted on" if counted.latched else ""
+        values[f"rule {rule.name}"] = f"{counted.level:.2f} s of {rule.hold:g} s{latched}"
+    for measurement in config.profile.limits:
+        value = state.measured(measurement).value
+        why = unusable(config, state, measurement, now)
+        values[measurement] = f"{value:.2f}" if not why else f"unusable: {why}"
     return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")
+
+
+def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float) -> RuleState:
+    judged = judge(config, state, rule, now)
+    counted = state.rule(rule.name)
+    alive = state.stage in rule.states
+    marks = {True: "[x]", False: "[ ]", None: "[?]"}
+    return RuleState(
+        name=rule.name,
+        action=int(rule.action),
+        alive=alive,
+        fulfilled=alive and counted.fulfilled(rule),
+        latched=counted.latched,
+        level=counted.level,
+        hold=rule.hold,
+        conditions=[f"{marks[one.holds]} {one.text}" for one in judged.findings] if alive else [],
+        denied=counted.denied,
+    )
 
 
 def _flight_blocked(state: State) -> bool:

@@ -1,4 +1,8 @@
-"""What a device node knows of the supervisor: is it there, and do the clocks agree?"""
+"""What a device node knows of the supervisor: is it there, and do the clocks agree?
+
+A supervisor that was heard and falls silent is lost: then the node does what its parameter
+on_supervisor_lost says. Of several supervisors one leads, and only that one counts.
+"""
 
 from __future__ import annotations
 
@@ -11,25 +15,52 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock
 
 from chute_ros.nodes import diagnostics, messages
+from chute_ros.nodes.parameters import Parameter
 
-#: A supervisor that is silent for longer (s) is an error; it beats ten times a second.
-_SILENCE = 1.0
+HOLD, BLOCK_FLIGHT = "hold", "block_flight"
+WATCH_PARAMETERS = (
+    Parameter(
+        "supervisor_lost_after",
+        1.0,
+        "a supervisor that was heard and is silent for this long is lost, s",
+        0.2,
+        60.0,
+    ),
+    Parameter(
+        "on_supervisor_lost",
+        BLOCK_FLIGHT,
+        "what then: hold goes on with what was decided last; block_flight keeps a vehicle that "
+        "stands on the ground there, and does nothing to one that flies",
+        choices=(HOLD, BLOCK_FLIGHT),
+    ),
+)
 
 
 class SupervisorWatch:
-    """limit: oldest decision that is acted on, s; wall: the clock of stamps."""
+    """limit: oldest decision that is acted on, s; lost_after: s; wall: the clock of stamps."""
 
-    def __init__(self, limit: float, wall: Clock) -> None:
-        self._limit, self._wall = limit, wall
+    def __init__(self, limit: float, lost_after: float, wall: Clock) -> None:
+        self._limit, self._lost_after, self._wall = limit, lost_after, wall
         self._heard = math.nan
         self._delay = math.nan
+        self._lost = False
+        self._times_lost = 0
 
     def heartbeat(self, message: LinkHeartbeat) -> None:
-        """Anybody's heartbeat came."""
-        if message.supervisor:
+        """Anybody's heartbeat came. A supervisor that only looks on does not say healthy."""
+        if message.supervisor and message.device_healthy:
             self._heard = time.monotonic()
             sent = messages.seconds(message.header.stamp)
             self._delay = messages.seconds(self._wall.now().to_msg()) - sent
+
+    def look(self) -> bool | None:
+        """True: it has just been lost; False: it is back; None: nothing has changed."""
+        lost = time.monotonic() - self._heard > self._lost_after
+        if lost is self._lost:
+            return None
+        self._lost = lost
+        self._times_lost += int(lost)
+        return lost
 
     def task(self, name: str, values: Mapping[str, object]) -> DiagnosticStatus:
         """For diagnostics, with values beside."""
@@ -37,10 +68,10 @@ class SupervisorWatch:
         level, text = diagnostics.OK, "heard"
         if math.isnan(age):
             level, text = diagnostics.STALE, "never heard"
-        elif age > _SILENCE:
+        elif age > self._lost_after:
             level, text = diagnostics.ERROR, f"silent for {age:.1f} s"
         elif abs(self._delay) > self._limit / 2:
             level = diagnostics.ERROR
             text = f"clocks differ: its heartbeat seems {self._delay:.3f} s old"
-        every = {"heartbeat age (s)": age, **values}
+        every = {"heartbeat age (s)": age, "times lost": self._times_lost, **values}
         return diagnostics.status(name, "supervisor", level, text, every, "")

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes.device_node import DeviceNode, Summary
+from chute_ros.nodes.device_node import DeviceNode, Summary, block_reason
 from chute_ros.nodes.dump_files import DumpFiles
 from chute_ros.nodes.link_log import log_event
 from chute_ros.nodes.telem_message import telem, without_place
@@ -100,7 +100,7 @@ class UmbilicalNode(DeviceNode):
         if decision.action is model.Action.KILL:
             # The motor's valve is closed: that is what stops a hybrid motor.
             # And nothing launches after it until the supervisor releases flight.
-            reason = f"killed: {'; '.join(decision.reasons) or decision.rule}"
+            reason = self._decided_block = f"killed: {block_reason(decision)}"
 
             def kill(link: UmbilicalLink, token: int, now: float) -> None:
                 link.flight_block(reason, now)
@@ -108,13 +108,11 @@ class UmbilicalNode(DeviceNode):
 
             self.desk.request_for(decision, kill)
         elif decision.action is model.Action.DEPLOY:
-            self.deploy_for(decision, self.values["decided_deploy_forces"])
+            force = self.values["decided_deploy_forces"]
+            self.deploy_for(decision, lambda link, token, now: link.deploy(token, force, now))
         elif decision.action is not model.Action.NONE:
-            blocked = decision.action is model.Action.FLIGHT_BLOCK
-            reason = ("; ".join(decision.reasons) or decision.rule) if blocked else ""
-            text = "launch is refused" if blocked else "launch is left to the gate"
-            self.carry_out_at_once(
-                decision, lambda link, now: link.flight_block(reason, now), text
+            self.carry_out_flight_block(
+                decision, "launch is refused", "launch is left to the gate"
             )
 
     def arm_link(self, link: UmbilicalLink, token: int, request: Any, now: float) -> None:

@@ -39,6 +39,8 @@ from chute_ros.transport.can_wire import make_can_wire
 from chute_ros.transport.data_types import load_data_types
 from chute_ros.transport.loop import WireLoop
 
+#: As the device of a decision to deploy: the triggers, past the controller.
+TRIGGER = "trigger"
 _TRIGGER_STATES = {
     "NOT_READY": TriggerStatus.NOT_READY,
     "READY": TriggerStatus.READY,
@@ -115,7 +117,7 @@ class UpfCanNode(DeviceNode):
 
     def carry_out(self, decision: model.Decision) -> None:
         if decision.action is model.Action.DEPLOY:
-            self.deploy_for(decision, self.values["decided_deploy_forces"])
+            self._deploy_decided(decision)
         elif decision.action is model.Action.KILL:
             text = "a UPF parachute stops no motors: take upf_can out of kill_links"
             self.decisions.report(decision, model.Outcome.FAILED, text)
@@ -123,6 +125,22 @@ class UpfCanNode(DeviceNode):
             # The device asks for it and does nothing about it itself.
             text = "noted; nothing goes to the device"
             self.decisions.report(decision, model.Outcome.CONFIRMED, text)
+
+    def flight_block(self, reason: str) -> None:
+        """A UPF parachute asks for it and does nothing about it itself."""
+
+    def _deploy_decided(self, decision: model.Decision) -> None:
+        force, device = self.values["decided_deploy_forces"], decision.device
+        if device == TRIGGER:
+            self.deploy_for(decision, lambda link, token, now: link.fire_triggers(token, now))
+        elif device and not device.isdecimal():
+            text = f'device {device!r}: need a DroneCAN node id or "{TRIGGER}"; nothing was sent'
+            self.decisions.report(decision, model.Outcome.FAILED, text)
+        else:
+            node_id = int(device or 0)
+            self.deploy_for(
+                decision, lambda link, token, now: link.deploy(token, force, now, node_id)
+            )
 
     def arm_link(self, link: UpfLink, token: int, request: Any, now: float) -> None:
         link.arm(token, request.arm, request.triggers, now)

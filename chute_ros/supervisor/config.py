@@ -98,6 +98,8 @@ class SupervisorConfig:
     late_after: float = 0.2
     #: Of several supervisors each has another: 0 for the first choice, up to 3.
     rank: int = 0
+    #: Others may run: whom a device refuses as older yields instead of going on above.
+    standby: bool = False
     preflight: PreflightLimits = field(default=PreflightLimits())
     profile: Profile = field(default=Profile("device requests only", DEVICE_RULES))
 

@@ -18,6 +18,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.deploying import Deploying, step_deadline
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.measurements import on_earth
 from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons
@@ -39,6 +40,32 @@ def update(
         turn.take(one)
     turn.look()
     turn.state = replace(turn.state, updated_at=now)
+    return turn.state, tuple(turn.outputs)
+
+
+def take_over(
+    config: SupervisorConfig, state: State, epoch: int, now: float
+) -> tuple[State, tuple[i.Output, ...]]:
+    """Lead from now on, under this epoch: what has not been begun is decided anew, so that no shot
+    is lost; what a device has begun goes on there, so that there is no second one."""
+    state = replace(state, leading=True, epoch=epoch)
+    turn = _Update(config, state, now)
+    for slot in turn.slots:
+        pending = turn.pending(slot)
+        if pending is not None and (slot == "block" or pending.not_begun()):
+            turn.renew(slot, "another supervisor took over")
+    turn.look()
+    turn.state = replace(turn.state, updated_at=now)
+    return turn.state, tuple(turn.outputs)
+
+
+def step_down(
+    config: SupervisorConfig, state: State, why: str, now: float
+) -> tuple[State, tuple[i.Output, ...]]:
+    """Only look on from now on; who waits for an outcome is told that another decides."""
+    turn = _Update(config, state, now)
+    turn.give_up_waiting(f"another supervisor decides now: {why}")
+    turn.state = replace(turn.state, leading=False, updated_at=now)
     return turn.state, tuple(turn.outputs)
 
 
@@ -129,11 +156,17 @@ class _Update(Deploying):
             self.mode_request(one)
 
     def look(self) -> None:
-        """What follows from all that is known now."""
+        """What follows from all that is known now. One that follows only counts: what it was
+        told by the leader is what was decided."""
+        if not self.state.leading:
+            self._note_down()
+            self.look_at_rules()
+            return
         self._look_at_vehicle()
-        self._look_at_links()
         self.look_at_parachutes()
         self.look_at_rules()
+        # After the rules, of which one may block flight.
+        self._look_at_links()
         self.look_at_kill()
         self.look_at_deploy()
         self._block_or_release()
@@ -147,7 +180,7 @@ class _Update(Deploying):
             if stage in (Stage.STARTUP, Stage.BLOCKED):
                 self.alarm(f"in the air although {stage.name}")
             self.move(Stimulus.TAKEN_OFF)
-            self._took_off()
+            self._took_off(anew=stage is not Stage.LANDED)
         elif in_air is False and listed(stage, Stimulus.LANDED):
             self.move(Stimulus.LANDED)
             self.state = replace(self.state, airborne=False, rebooted=False)
@@ -163,12 +196,22 @@ class _Update(Deploying):
         elif math.isnan(self.state.down_since):
             self.state = replace(self.state, down_since=self.now)
 
-    def _took_off(self) -> None:
-        vehicle, home = self.state.vehicle, self.state.home
+    def _took_off(self, anew: bool) -> None:
+        """anew: it stood disarmed before; otherwise it bounced, or was not down at all."""
+        vehicle, home = self.state.vehicle, None if anew else self.state.home
         here = (vehicle.latitude, vehicle.longitude)
-        if home is None and not any(map(math.isnan, here)):
+        if home is None and on_earth(*here):
             home = here
-        self.state = replace(self.state, flown=True, airborne=True, home=home)
+        measurements = dict(self.state.measurements)
+        if home != self.state.home:
+            measurements.pop("distance_from_home", None)  # it was that from another place
+        self.state = replace(
+            self.state,
+            flown=True,
+            airborne=True,
+            home=home,
+            measurements=MappingProxyType(measurements),
+        )
 
     def _look_at_links(self) -> None:
         reasons = block_reasons(self.config, self.state, self.now)
@@ -182,7 +225,7 @@ class _Update(Deploying):
 
     def _block_or_release(self) -> None:
         """Flight is blocked on the ground until READY, and after a deploy until a reset."""
-        if self.state.mode is i.Mode.INHIBITED or not self.state.leading:
+        if self.state.mode is i.Mode.INHIBITED:
             return
         if self.state.stage in (Stage.READY, Stage.ARMED):
             action = Action.FLIGHT_BLOCK_RELEASE
@@ -204,8 +247,6 @@ class _Update(Deploying):
             self.decide("block", action, "links", reasons, self.config.links)
 
     def _send_again(self) -> None:
-        if not self.state.leading:
-            return
         for slot in self.slots:
             pending = self.pending(slot)
             if pending is None or pending.decision.shadow or not self._worth_sending(pending):

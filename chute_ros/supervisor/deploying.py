@@ -50,11 +50,11 @@ class Deploying(Policy):
 
     def look_at_deploy(self) -> None:
         """Confirmed, one step further, or at the end of the ladder."""
-        if self.state.stage is Stage.DEPLOYING and self.state.deploys:
-            if self.deploy_reached(Outcome.CONFIRMED):
-                self.move(Stimulus.PARACHUTE_OPEN, self.deploy_details())
-            else:
-                self._climb()
+        confirmed = self.deploy_reached(Outcome.CONFIRMED)
+        if confirmed and self.state.stage in (Stage.DEPLOYING, Stage.FAULT):
+            self.move(Stimulus.PARACHUTE_OPEN, self.deploy_details())
+        elif self.state.stage is Stage.DEPLOYING and self.state.deploys:
+            self._climb()
         self._answer()
         self._alarm_again()
 
@@ -97,8 +97,9 @@ class Deploying(Policy):
                 self.finish_deploy(True, accepted, text or "its own status says deployed")
 
     def _alarm_again(self) -> None:
-        """The end of the ladder without a parachute is an alarm that does not stop."""
-        if self.state.stage is Stage.FAULT and self.now >= self.state.alarm_at:
+        """The end of the ladder without a parachute is an alarm that does not stop until one is
+        out or a person resets, whatever is tried meanwhile."""
+        if self.state.stage is not Stage.DEPLOYED and self.now >= self.state.alarm_at:
             self.outputs.append(i.Say(f"still no parachute: {self.state.alarms[-1]}", alarm=True))
             alarm_at = self.now + self.config.alarm_interval
             self.state = replace(self.state, alarm_at=alarm_at)

@@ -46,8 +46,9 @@ def moving(config: SupervisorConfig, state: State, now: float) -> str:
 
 
 def fresh(config: SupervisorConfig, state: State, age: float, now: float) -> bool:
-    """Is a part of vehicle/state that had this age when it came still young enough?"""
-    return age + (now - state.vehicle_received) <= config.vehicle_state_age
+    """Is a part of vehicle/state that had this age when it came still young enough? One that
+    claims to come from the future came just now."""
+    return max(age, 0.0) + (now - state.vehicle_received) <= config.vehicle_state_age
 
 
 def armed(config: SupervisorConfig, state: State, now: float) -> Armed:

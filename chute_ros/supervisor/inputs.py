@@ -173,4 +173,11 @@ class Say:
     alarm: bool = False
 
 
-Output = Decide | ArmDevices | Finish | Say
+@dataclass(frozen=True)
+class Refused:
+    """A device has seen a newer epoch, of another supervisor: somebody else leads."""
+
+    newest_epoch: int
+
+
+Output = Decide | ArmDevices | Finish | Say | Refused

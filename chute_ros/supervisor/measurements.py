@@ -95,6 +95,8 @@ class Measured:
         if math.isnan(self.measured_at):
             return self.rejected or "never received"
         age = now - self.measured_at
+        if age < -_JITTER:
+            return f"its time lies {-age:.2f} s in the future"
         if age > limits.max_age:
             return self.rejected or f"old: {age:.2f} s (limit {limits.max_age:g} s)"
         if self.rejected:
@@ -191,7 +193,10 @@ def samples_of(
 
 
 def distance_between(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Way over ground between two (latitude, longitude) in degrees, m (haversine formula)."""
+    """Way over ground between two (latitude, longitude) in degrees, m (haversine formula); NaN:
+    one is no place on earth."""
+    if not (on_earth(*one) and on_earth(*other)):
+        return math.nan
     latitude_1, longitude_1, latitude_2, longitude_2 = (
         math.radians(angle) for angle in (*one, *other)
     )
@@ -201,5 +206,10 @@ def distance_between(one: tuple[float, float], other: tuple[float, float]) -> fl
         * math.cos(latitude_2)
         * math.sin((longitude_2 - longitude_1) / 2) ** 2
     )
-    # NaN goes through; rounding must not leave the domain of asin.
-    return 2.0 * _EARTH_RADIUS * math.asin(min(1.0, math.sqrt(half)) if half == half else math.nan)
+    # Rounding must not leave the domain of asin.
+    return 2.0 * _EARTH_RADIUS * math.asin(min(1.0, math.sqrt(half)))
+
+
+def on_earth(latitude: float, longitude: float) -> bool:
+    """Is it a place? Degrees."""
+    return abs(latitude) <= 90.0 and abs(longitude) <= 360.0  # NaN is not

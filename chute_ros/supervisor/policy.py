@@ -14,7 +14,13 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.gate import against_rule, too_low
 from chute_ros.supervisor.reports import Reports
-from chute_ros.supervisor.rules import BelowMinimum, Clears, MeasurementCondition, Rule
+from chute_ros.supervisor.rules import (
+    AutopilotCondition,
+    BelowMinimum,
+    Clears,
+    MeasurementCondition,
+    Rule,
+)
 from chute_ros.supervisor.state import State
 
 
@@ -56,6 +62,8 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
         if state.stage not in rule.states:
             continue
         deadlines.append(evidence.deadline(rule, now))
+        if any(isinstance(condition, AutopilotCondition) for condition in rule.conditions):
+            deadlines.append(state.vehicle_received + config.vehicle_state_age)
         if evidence.holds:
             deadlines += [
                 state.measured(condition.measurement).measured_at

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from chute_ros.model import Armed, LinkState, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.epochs import LARGEST_EPOCH, epoch_above
+from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.measurements import samples_of
 from chute_ros.supervisor.requests import Requests
 
@@ -80,7 +80,11 @@ class Reports(Requests):
         foreign = same and one.newest_id >= self.state.next_id
         if not foreign:
             self._take_outcome(one)
-        if of_our_epoch and (foreign or one.newest_epoch > self.state.epoch):
+        if (
+            of_our_epoch
+            and self.state.leading
+            and (foreign or one.newest_epoch > self.state.epoch)
+        ):
             self._overtake(one)
 
     def _take_outcome(self, one: i.ActionReport) -> None:
@@ -118,7 +122,11 @@ class Reports(Requests):
         )
 
     def _overtake(self, one: i.ActionReport) -> None:
-        """A node refuses what is older than it has seen: go on above that."""
+        """A node refuses what is older than it has seen: go on above that, unless it is another
+        supervisor's."""
+        if self.config.standby and one.newest_epoch % RANKS != self.config.rank:
+            self.outputs.append(i.Refused(one.newest_epoch))
+            return
         epoch = epoch_above(one.newest_epoch, self.config.rank)
         if epoch > LARGEST_EPOCH:
             self.alarm(f"{one.link} has seen epoch {one.newest_epoch}, the largest: restart it")

@@ -109,7 +109,7 @@ class Steps:
     def renew(self, slot: Slot, why: str) -> None:
         """Decide again, under a new number, what is still to be carried out."""
         pending = self.pending(slot)
-        if pending is None or not self.wanted(slot):
+        if pending is None or not self.wanted(slot) or not self.state.leading:
             return
         if pending.confirmed and slot != "block":
             return
@@ -122,6 +122,8 @@ class Steps:
         """The same under a new number, to those that have not reported; what is known stays."""
         pending = self.pending(slot)
         assert pending is not None
+        if not self.state.leading:
+            return
         new = self._under_new_number(slot, pending, pending.unreported(), why)
         earlier = pending.earlier | {pending.number}
         renewed = replace(pending, decision=new.decision, earlier=earlier, sent_at=self.now)

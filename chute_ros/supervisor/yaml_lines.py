@@ -109,7 +109,7 @@ def where_of(node: yaml.Node | None) -> Where:
     if isinstance(node, yaml.ScalarNode):
         try:
             value = yaml.safe_load(node.value) if node.style is None else node.value
-        except yaml.YAMLError:
+        except (yaml.YAMLError, ValueError):  # as of 2024-13-45, a date that is none
             value = node.value
     else:
         value = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"

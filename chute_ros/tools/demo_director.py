@@ -35,6 +35,7 @@ class Director:
         self.parachutes: dict[str, ParachuteStatus] = {}
         #: When a parachute's own status first said deployed; 0: not yet.
         self.deployed_at = 0.0
+        self._statuses = 0
         self.safety = SafetyState()
         self.decisions: list[tuple[float, SafetyDecision]] = []
         self.reports: list[tuple[float, ActionReport]] = []
@@ -91,6 +92,22 @@ class Director:
                 raise StepFailedError(f"{what}: not within {seconds:g} s\n{logs}")
             self._executor.spin_once(timeout_sec=0.05)
 
+    def until_granted(self, what: str, seconds: float, ask: Callable[[], Any]) -> None:
+        """Ask again with each new picture of a parachute until it succeeds; StepFailedError with
+        the reason if it has not within seconds."""
+        end = time.monotonic() + seconds
+        while True:
+            answer = ask()
+            self.until(f"{what} is answered", 10.0, answer.done)
+            if answer.result().success:
+                return
+            if time.monotonic() >= end:
+                raise StepFailedError(f"{what}: {answer.result().message}")
+            self.until("a parachute tells its picture", 5.0, self._newer_than(self._statuses))
+
+    def _newer_than(self, statuses: int) -> Callable[[], bool]:
+        return lambda: self._statuses > statuses
+
     def stage(self, stage: Stage) -> Callable[[], bool]:
         """The supervisor says that the vehicle is in this stage."""
         return lambda: self.safety.state == stage
@@ -137,6 +154,7 @@ class Director:
             self.track.append((time.monotonic(), message.height))
 
     def _parachute(self, message: ParachuteStatus) -> None:
+        self._statuses += 1
         self.parachutes[message.link] = message
         if message.deployed and not self.deployed_at:
             self.deployed_at = time.monotonic()

@@ -64,6 +64,8 @@ class Rig:
             *node,
             *_parameter("required_links", f"[{links}]"),
             *_parameter("deploy_links", f"[{', '.join(self.links)}]"),
+            # Where the parachute decides by itself, nothing else shall.
+            *_parameter("profile", "by_hand" if self.automatic else "multirotor"),
         )
         start(
             "mavlink",

@@ -13,8 +13,6 @@ from chute_ros.tools.demo_rig import Rig
 from chute_ros.tools.pilot import Pilot
 
 FAILURE_HEIGHT = 60.0  # m
-#: The operator presses the button when it sinks faster than this, m/s.
-OPERATOR_SINK = -4.0
 #: What counts as carried by the canopy, and as a soft touchdown, m/s.
 CANOPY_SINK = -6.5
 
@@ -29,7 +27,7 @@ def fly(rig: Rig, director: Director, pilot: Pilot) -> None:
     if rig.automatic:
         _automatic_deployment(director)
     else:
-        _operator_deploys(director)
+        _supervisor_deploys(director)
     _descend(director)
     _summary(director, rig)
 
@@ -63,10 +61,8 @@ def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
     director.say("supervisor", "READY: every required link is healthy")
 
     director.say("operator", "arms the parachute")
-    answer = director.ask_arm()
-    director.until("arming is answered", 10.0, answer.done)
-    if not answer.result().success:
-        raise StepFailedError(f"arming: {answer.result().message}")
+    # A parachute that has just been plugged in does not know its height at once.
+    director.until_granted("arming", 5.0, director.ask_arm)
     director.until("it is seen armed", 5.0, lambda: director.all_parachutes(lambda p: p.armed))
     for link, one in director.parachutes.items():
         names = ", ".join(flag_names(TriggerFlags(one.armed_triggers)))
@@ -96,23 +92,27 @@ def _fail(director: Director, pilot: Pilot) -> None:
     pilot.fail_motor()
 
 
-def _operator_deploys(director: Director) -> None:
-    director.until("it falls", 5.0, lambda: director.vehicle.vertical_speed < OPERATOR_SINK)
-    director.say("operator", f"sees {director.vehicle.vertical_speed:.1f} m/s and calls deploy")
-    answer = director.ask_deploy("it falls")
-    director.until("the deploy is answered", 15.0, answer.done)
-    result = answer.result()
-    director.say(
-        "operator", f"success={result.success} accepted={result.accepted}: {result.message}"
-    )
-    if not result.success:
-        raise StepFailedError(f"deploy: {result.message}")
-    for step in (Outcome.ACCEPTED, Outcome.CONFIRMED):
+def _supervisor_deploys(director: Director) -> None:
+    """Its rules see the failure; the kill goes before the deploy, each until it is confirmed."""
+    for action, steps in (
+        (Action.KILL, (Outcome.SENT,)),
+        (Action.DEPLOY, (Outcome.ACCEPTED, Outcome.CONFIRMED)),
+    ):
 
-        def reported(step: Outcome = step) -> bool:
-            return director.outcome(Action.DEPLOY, step) is not None
+        def decided(action: Action = action) -> bool:
+            return any(decision.action == action for _, decision in director.decisions)
 
-        director.until(f"the deploy is reported {step.name}", 5.0, reported)
+        director.until(f"{action.name} is decided", 10.0, decided)
+        decision = next(one for _, one in director.decisions if one.action == action)
+        director.say("supervisor", f"{action.name} by rule '{decision.rule}':")
+        for reason in decision.reasons:
+            director.say("", f"  {reason}")
+        for step in steps:
+
+            def reported(action: Action = action, step: Outcome = step) -> bool:
+                return director.outcome(action, step) is not None
+
+            director.until(f"the {action.name} is reported {step.name}", 10.0, reported)
 
 
 def _automatic_deployment(director: Director) -> None:

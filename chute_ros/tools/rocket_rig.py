@@ -31,6 +31,7 @@ class RocketRig:
             for name in ("required_links", "kill_links", "deploy_links")
             for part in ("-p", f"{name}:={links}")
         ]
+        supervisor += ["-p", "profile:=rocket"]
         start = self.processes.start
         start("supervisor", "chute_ros.nodes.safety_supervisor", *node, *supervisor)
         start(

@@ -53,8 +53,9 @@ class StubLink(Node):
             source="1/1",
             link_state=int(LinkState.OK),
             armed=VehicleState.DISARMED,
-            landed_state=1,
-            height=0.0,
+            armed_age=0.0,
+            landed_state=VehicleState.ON_GROUND,
+            landed_state_age=0.0,
         )
         self._vehicle.publish(stamped(self, vehicle))
 

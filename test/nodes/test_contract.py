@@ -38,6 +38,7 @@ PUBLISHED = {
     "safety_supervisor": {
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
         "safety/decision": ("SafetyDecision", DECISION),
+        "safety/lease": ("SupervisorLease", STATUS),
         "safety/state": ("SafetyState", (1, LATCHED)),
         "/diagnostics": ("DiagnosticArray", STATUS),
     },
@@ -57,6 +58,7 @@ SUBSCRIBED = {
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
         "safety/request": ("SafetyRequest", STATUS),
         "safety/action": ("ActionReport", DECISION),
+        "safety/lease": ("SupervisorLease", STATUS),
     },
 }
 SERVICES = {

@@ -122,7 +122,8 @@ def test_whom_it_remembers_is_published_at_once_though_nothing_else_changes(read
 def test_a_device_that_asks_for_a_kill_gets_it(ready):
     request(ready, SafetyRequest.KILL, reason="about to launch")
     kill = ready.await_decision(Action.KILL)
-    assert kill.rule == "upf_can 33"
+    assert kill.rule == "device asks for a kill"
+    assert "upf_can 33: about to launch" in kill.reasons
     assert "about to launch" in kill.reasons[0]
 
 

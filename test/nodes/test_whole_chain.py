@@ -25,12 +25,12 @@ HEIGHT = 20.0
 class Flight:
     """One vehicle, from the ground up."""
 
-    def __init__(self, bench, knobs=NO_FAULTS, height=HEIGHT, **parameters):
+    def __init__(self, bench, knobs=NO_FAULTS, height=HEIGHT, profile="by_hand", **parameters):
         self.bench, self.knobs, self.height = bench, knobs, height
         self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
         self.vehicle = bench.follow(VehicleState, "vehicle/state")
         self.parachute = bench.follow(ParachuteStatus, "parachute/status")
-        bench.add(SafetySupervisorNode, startup_grace=0.5)
+        bench.add(SafetySupervisorNode, startup_grace=0.5, profile=profile)
         node = bench.add(MavlinkParachuteNode, **quick(**parameters))
         self.network = f"udpout:{LOCAL}:{port_of(node.loop)}"
         self.autopilot = Autopilot()
@@ -59,6 +59,10 @@ class Flight:
         """Released, armed, and up."""
         self.plug_parachute_in()
         self.await_stage(SafetyState.READY)
+        self.bench.until(
+            lambda: not self.parachute[-1].safety_flags & ParachuteStatus.SAFETY_GROUND_CLEARED,
+            "the parachute has heard of its height",
+        )
         answer = self.bench.call(Arm, "safety/arm", arm=True)
         assert answer.success, answer.message
         self.act("arm")
@@ -119,6 +123,17 @@ def test_with_three_packets_of_ten_lost_each_way_it_still_deploys(bench, loss):
     assert flight.module.releases
     assert flight.module.deployment
     assert not flight.autopilot.model.armed
+
+
+def test_nobody_has_to_call_for_it_the_rules_of_the_vehicle_see_the_fall(bench):
+    flight = Flight(bench, profile="multirotor")
+    flight.take_off()
+    flight.act("fail-motor")
+    flight.await_stage(SafetyState.DEPLOYED)
+    flight.check_order_on_the_wire()
+    assert flight.module.deployment == DeploymentTrigger.DRONE
+    fallen = [rule for rule in flight.safety[-1].rules if rule.latched]
+    assert "free fall" in {rule.name for rule in fallen}
 
 
 def test_an_autopilot_that_takes_no_kill_does_not_keep_the_parachute_in(bench):

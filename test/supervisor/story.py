@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from chute_ros.model import (
     Action,
@@ -19,6 +22,8 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.profile_reader import read_profile
+from chute_ros.supervisor.rules import Condition, MeasurementCondition, Profile, Rule
 from chute_ros.supervisor.state import State
 
 LINK = "mavlink_parachute"
@@ -33,6 +38,81 @@ STANDING = VehicleState(
 IDLING = VehicleState(
     armed=Armed.ARMED, armed_age=0.0, landed_state=LandedState.ON_GROUND, landed_state_age=0.0
 )
+#: What a vehicle that flies well says besides; tilt in degrees.
+FLYING_WELL: dict[str, Any] = {
+    "armed": Armed.ARMED,
+    "landed_state": LandedState.IN_AIR,
+    "link_state": LinkState.OK,
+    "system_status": 4,
+    "height": 50.0,
+    "vertical_speed": 0.1,
+    "tilt": 5.0,
+    "acceleration": 9.8,
+    "battery_remaining": 0.8,
+    "latitude": 48.0,
+    "longitude": 11.0,
+}
+_AGES = {
+    "armed": "armed_age",
+    "landed_state": "landed_state_age",
+    "height": "height_age",
+    "vertical_speed": "vertical_speed_age",
+    "tilt": "attitude_age",
+    "acceleration": "acceleration_age",
+    "battery_remaining": "battery_age",
+    "battery_voltage": "battery_age",
+    "latitude": "position_age",
+    "longitude": "position_age",
+}
+#: A real sensor is never the same to the last bit; so much a told value wanders.
+_NOISE = 1e-9
+PROFILES = Path(__file__).parents[2] / "config" / "profiles"
+
+
+def vehicle(age: float = 0.0, **told: Any) -> i.VehicleReport:
+    """The vehicle tells these parts, each measured age s ago. tilt: degrees."""
+    if "tilt" in told:
+        told = {**told, "tilt": math.radians(told["tilt"])}
+    ages = {_AGES[name]: age for name in told if name in _AGES}
+    return i.VehicleReport(VehicleState(**{**ages, **told}))
+
+
+def falling(t: float, height: float = 100.0) -> dict[str, float]:
+    """What a vehicle tells t s after its motors stopped at this height; it drags at 20 m/s."""
+    speed = 20.0 * math.tanh(9.81 * t / 20.0)
+    way = 20.0**2 / 9.81 * math.log(math.cosh(9.81 * t / 20.0))
+    force = 9.81 * (speed / 20.0) ** 2
+    return {"height": height - way, "vertical_speed": -speed, "acceleration": force}
+
+
+def rule(
+    *conditions: Condition,
+    action: Action = Action.DEPLOY,
+    states: tuple[Stage, ...] = (Stage.IN_FLIGHT, Stage.KILLING),
+    **settings: Any,
+) -> Rule:
+    """A rule that needs all its conditions, at once unless hold says otherwise."""
+    settings.setdefault("needed", sum(condition.weight for condition in conditions))
+    settings.setdefault("name", "tested")
+    return Rule(conditions=conditions, action=action, states=states, **settings)
+
+
+#: It sinks faster than 12 m/s.
+SINKS = MeasurementCondition("vertical_speed", below=-12.0)
+
+
+def with_rules(
+    *rules: Rule, profile: dict[str, Any] | None = None, **settings: Any
+) -> SupervisorConfig:
+    """Settings with a profile of these rules."""
+    return SupervisorConfig(profile=Profile("tested", rules, **(profile or {})), **settings)
+
+
+def shipped(name: str, **settings: Any) -> SupervisorConfig:
+    """Settings with a profile as it is shipped."""
+    config = SupervisorConfig(**settings)
+    text = (PROFILES / f"{name}.yaml").read_text(encoding="utf-8")
+    return SupervisorConfig(profile=read_profile(text, name, config.links), **settings)
 
 
 def parachute(
@@ -59,6 +139,7 @@ class Story:
     def __post_init__(self) -> None:
         self.t = 0.0
         self.seq = 0
+        self.noise = 0
         self.state = State(epoch=7, started_at=START, mode=self.mode)
         self.outputs: list[tuple[float, i.Output]] = []
 
@@ -91,6 +172,38 @@ class Story:
         """Healthy heartbeats ten times a second from now to until."""
         while self.t + 0.1 <= until + 1e-9:
             self.at(self.t + 0.1, *[self.heartbeat(link) for link in links or (LINK,)])
+
+    def told(self, **told: Any) -> i.VehicleReport:
+        """What a vehicle says that flies well but for what is named; with noise as of a sensor."""
+        self.noise = (self.noise + 1) % 97
+        parts = {**FLYING_WELL, **told}
+        for name, value in parts.items():
+            if type(value) is float and name in _AGES:
+                parts[name] = value + _NOISE * self.noise
+        return vehicle(**parts)
+
+    def fly(self, until: float, every: float = 0.05, **told: Any) -> Story:
+        """Heartbeats and the vehicle's state from now to until; what is not named is well."""
+        start, steps = self.t, round((until - self.t) / every)
+        for step in range(1, steps + 1):
+            self.at(start + step * every, self.heartbeat(), self.told(**told))
+        return self
+
+    def fall(self, until: float, height: float = 100.0, **told: Any) -> Story:
+        """As fly, with motors that stop now at this height."""
+        start, steps = self.t, round((until - self.t) / 0.05)
+        for step in range(1, steps + 1):
+            parts = {**falling(step * 0.05, height), **told}
+            self.at(start + step * 0.05, self.heartbeat(), self.told(**parts))
+        return self
+
+    def fired(self) -> list[str]:
+        """Every kill and deploy, each once, in their order."""
+        return [d.action.name for d in self.decisions() if d.action >= Action.KILL]
+
+    def said(self) -> str:
+        """All lines of the log."""
+        return "\n".join(o.text for _, o in self.outputs if isinstance(o, i.Say))
 
     def ready(self) -> Story:
         """Links healthy, standing on the ground."""

@@ -1,6 +1,5 @@
 """Settings that contradict themselves stop the start; a vehicle's place without a landed state."""
 
-from dataclasses import replace
 from typing import Any
 
 import pytest

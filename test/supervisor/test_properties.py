@@ -1,7 +1,5 @@
 """What must always hold, for any order and timing of inputs."""
 
-import math
-
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from story import FLYING, LINK, STANDING, START, parachute

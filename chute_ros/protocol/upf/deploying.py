@@ -51,6 +51,15 @@ class Deploying:
         else:
             self._requests.refuse(token, self._devices.no_controller(node_id))
 
+    def fire_triggers(self, token: int, now: float) -> None:
+        """Past the controller, which has not released in time or is not there."""
+        trigger = self._devices.trigger()
+        if trigger is None:
+            self._requests.refuse(token, "no trigger was ever heard; nothing was sent")
+        else:
+            self._requests.make_way_for_release(now)
+            self._by_trigger(token, trigger, now)
+
     def update(self, now: float) -> bool:
         """Look at the clock; whether something was put among the calls."""
         for node_id in self._last_resort.answered_by():

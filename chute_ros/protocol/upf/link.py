@@ -195,6 +195,13 @@ class UpfLink:
         if self._deploying.update(now):
             self._drive(now)
 
+    def fire_triggers(self, token: int, now: float) -> None:
+        """Fire the triggers directly, whatever the controller does: the end of a ladder."""
+        self._deploying.fire_triggers(token, now)
+        self._drive(now)
+        if self._deploying.update(now):
+            self._drive(now)
+
     def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
         """Ask something of a device: ends in one ErrandFinished. node_id 0: the chosen one."""
         self._desk.errand(token, node_id, make, now)

@@ -1,0 +1,42 @@
+"""Where the profiles of rules are: the ones that are shipped, by name, and the user's, by path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from chute_ros.errors import ParameterError, ProfileError
+from chute_ros.supervisor.profile_reader import read_profile
+from chute_ros.supervisor.rules import Profile
+
+#: Beside the package in the repository, and in its share folder once installed.
+_BESIDE = Path(__file__).resolve().parents[2] / "config" / "profiles"
+
+
+def load_profile(named: str, links: Sequence[str]) -> Profile:
+    """The profile with this name or path; links: those that the supervisor follows.
+
+    ParameterError if there is none; ProfileError lists what is wrong in it, with lines.
+    """
+    is_path = "/" in named or named.endswith((".yaml", ".yml"))
+    path = Path(named).expanduser() if is_path else _folder() / f"{named}.yaml"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        shipped = ", ".join(sorted(file.stem for file in _folder().glob("*.yaml")))
+        raise ParameterError(
+            f"parameter profile is {named!r}: {path} cannot be read ({error}); need one of "
+            f"{shipped}, or the path of a file"
+        ) from None
+    try:
+        return read_profile(text, str(path), links)
+    except ProfileError as error:
+        raise ProfileError(f"parameter profile is {named!r}:\n{error}") from None
+
+
+def _folder() -> Path:
+    if _BESIDE.is_dir():
+        return _BESIDE
+    from ament_index_python.packages import get_package_share_directory
+
+    return Path(get_package_share_directory("chute_ros")) / "config" / "profiles"

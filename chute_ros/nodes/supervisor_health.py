@@ -1,0 +1,73 @@
+"""The supervisor watches itself: late updates, lost messages, mistakes inside, and its lease."""
+
+from __future__ import annotations
+
+import math
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.event_handler import SubscriptionEventCallbacks
+
+from chute_ros.nodes import diagnostics
+from chute_ros.nodes.supervisor_lease import LeaseKeeper
+from chute_ros.supervisor import inputs
+from chute_ros.supervisor.state import State
+
+#: A mistake inside, or messages that were lost, are shown as an error for so many looks (s).
+_SHOWN_FOR = 60
+
+
+class Health:
+    """Counts, and tells it in diagnostics."""
+
+    def __init__(self) -> None:
+        #: How late the newest own heartbeat was, s.
+        self.beat_late = 0.0
+        #: The newest mistake in words; empty: none.
+        self.newest = ""
+        self._failures = 0
+        self._lost: dict[str, int] = {}
+        self._seen = (0, 0, 0)
+        self._shown = 0
+
+    def watch(self, topic: str) -> SubscriptionEventCallbacks:
+        """For the subscription of an input: counts the messages that its queue lost."""
+
+        def lost(event: object) -> None:
+            count = getattr(event, "total_count_change", 1)
+            self._lost[topic] = self._lost.get(topic, 0) + count
+
+        return SubscriptionEventCallbacks(message_lost=lost)
+
+    def failed(self, error: Exception, new: tuple[inputs.Input, ...]) -> None:
+        """The core could not take this."""
+        self._failures += 1
+        what = ", ".join(type(one).__name__ for one in new) or "a look at the clock"
+        self.newest = f"left out {what}: {type(error).__name__}: {error}"
+
+    def task(self, name: str, state: State, lease: LeaseKeeper, now: float) -> DiagnosticStatus:
+        """For diagnostics."""
+        lost = sum(self._lost.values())
+        seen = (self._failures, lost, state.late_count)
+        self._shown = _SHOWN_FOR if seen != self._seen else max(0, self._shown - 1)
+        self._seen = seen
+        level, text = diagnostics.OK, "leads" if lease.leading else "looks on"
+        if lease.trouble():
+            level, text = diagnostics.ERROR, lease.trouble()
+        elif self._shown:
+            level = diagnostics.ERROR
+            text = f"mistakes inside {seen[0]}, messages lost {seen[1]}, updates late {seen[2]}"
+        elif not lease.leading and math.isnan(lease.lease.leader_heard):
+            level, text = diagnostics.WARN, "looks on, and hears no leader"
+        values: dict[str, object] = {
+            "leads": lease.leading,
+            "leader": lease.config.name if lease.leading else lease.lease.leader,
+            "rank": lease.config.rank,
+            "hot standby": lease.config.standby,
+            "newest heartbeat late by (s)": self.beat_late,
+            "updates late": state.late_count,
+            "mistakes inside": self._failures,
+            "newest mistake": self.newest,
+            "heard from the leader (s ago)": now - lease.lease.leader_heard,
+        }
+        values |= {f"messages lost on {topic}": n for topic, n in sorted(self._lost.items())}
+        return diagnostics.status(name, "itself", level, text, values, "")

@@ -1,0 +1,116 @@
+"""The lease among the supervisors of one vehicle, over ROS: their claims on safety/lease."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from chute_msgs.msg import SupervisorLease
+from rclpy.clock import Clock
+from rclpy.node import Node
+
+from chute_ros.errors import RecordError
+from chute_ros.nodes import qos
+from chute_ros.supervisor import handover
+from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
+from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.state import State
+
+
+class LeaseKeeper:
+    """state: gives the supervisor's; happened: told of each event; follow: given the state that
+    the leader told. All in the decision loop's thread."""
+
+    def __init__(
+        self,
+        node: Node,
+        config: LeaseConfig,
+        wall: Clock,
+        state: Callable[[], State],
+        happened: Callable[[Event], None],
+        follow: Callable[[State], None],
+    ) -> None:
+        self.config = config
+        self.lease = Lease.begin(config, time.monotonic())
+        self._node, self._wall = node, wall
+        self._state, self._happened, self._follow = state, happened, follow
+        #: It has taken over from another, or followed one.
+        self._experienced = False
+        self._complained: set[str] = set()
+        self._publisher = node.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
+        node.create_subscription(SupervisorLease, "safety/lease", self._claim, qos.STATUS)
+
+    @property
+    def leading(self) -> bool:
+        """What it decides is sent."""
+        return self.lease.role is Role.LEADING
+
+    def deadline(self) -> float:
+        """When look has something to do, monotonic s; infinity: never."""
+        return self.lease.deadline(self.config)
+
+    def look(self, now: float) -> None:
+        """Before each turn: does it still lead, must it take over?"""
+        self.lease, event = self.lease.looked(self.config, now)
+        if event is not None:
+            self._happened(event)
+
+    def refused(self, newest_epoch: int, now: float) -> None:
+        """A device has seen a newer leader."""
+        if self.leading:
+            self.lease, event = self.lease.refused(newest_epoch, now)
+            self._happened(event)
+
+    def next_epoch(self) -> int:
+        """For taking over."""
+        return self.lease.next_epoch(self.config, self._state().epoch)
+
+    def tell(self, now: float) -> None:
+        """Renew the lease; before a decision leaves, so that whoever takes over knows of it."""
+        claim, state = self._own(), self._state()
+        message = SupervisorLease(
+            name=claim.name,
+            rank=claim.rank,
+            epoch=claim.epoch,
+            leading=claim.leading,
+            empty=claim.empty,
+            state=handover.told(state, now) if claim.leading and self.config.standby else "",
+        )
+        message.header.stamp = self._wall.now().to_msg()
+        self._publisher.publish(message)
+
+    def trouble(self) -> str:
+        """What is wrong with the supervisors' settings; empty: nothing."""
+        if self.lease.same_rank:
+            name, rank = self.lease.same_rank, self.config.rank
+            return f"{name} has rank {rank} as well: give each supervisor its own"
+        return ""
+
+    def _own(self) -> Claim:
+        state = self._state()
+        empty = not self._experienced and not state.flown and state.stage in ON_GROUND
+        return Claim(self.config.name, self.config.rank, state.epoch, self.leading, empty)
+
+    def _claim(self, message: SupervisorLease) -> None:
+        if message.name == self.config.name:
+            return
+        now = time.monotonic()
+        other = Claim(message.name, message.rank, message.epoch, message.leading, message.empty)
+        self.lease, event = self.lease.heard(self.config, self._own(), other, now)
+        if event is not None:
+            self._happened(event)
+        if message.leading and not self.leading and message.state:
+            self._experienced = True
+            try:
+                self._follow(handover.followed(self._state(), message.state, now))
+            except RecordError as error:
+                self._complain(f"cannot follow {message.name}: {error}")
+        elif message.leading and self.leading and not self.config.standby:
+            self._complain(
+                f"{message.name} leads as well: set hot_standby and different ranks, or stop one"
+            )
+
+    def _complain(self, text: str) -> None:
+        if text not in self._complained and len(self._complained) < 16:
+            self._complained.add(text)
+            self._node.get_logger().error(text)

@@ -1,0 +1,102 @@
+"""The supervisor's services: there only while it leads, so that a caller reaches the one that
+decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import date
+from itertools import count
+from typing import Any
+
+from chute_msgs.srv import Arm, Deploy, Kill, SetMode
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock
+from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from chute_ros.nodes import messages
+from chute_ros.supervisor import inputs
+
+_EPOCH = date(1970, 1, 1).toordinal()
+
+
+class SupervisorServices:
+    """feed: gives the core an input; its answers come back through finished."""
+
+    def __init__(self, node: Node, wall: Clock, feed: Callable[[inputs.Input], None]) -> None:
+        self._node, self._wall, self._feed = node, wall, feed
+        self._tokens = count(1)
+        self._waiting: dict[int, Future] = {}
+        # A service that awaits its outcome must not keep the decision loop from running.
+        self._group = ReentrantCallbackGroup()
+        self._services: list[Service] = []
+
+    def open(self) -> None:
+        """Offer them."""
+        if self._services:
+            return
+        for kind, name, callback in (
+            (Arm, "safety/arm", self._arm),
+            (Deploy, "safety/deploy", self._deploy),
+            (Kill, "safety/kill", self._kill),
+            (Trigger, "safety/reset", self._reset),
+            (SetMode, "safety/set_mode", self._set_mode),
+        ):
+            self._services.append(
+                self._node.create_service(kind, name, callback, callback_group=self._group)
+            )
+
+    def close(self) -> None:
+        """Another decides now."""
+        for service in self._services:
+            self._node.destroy_service(service)
+        self._services.clear()
+
+    def finished(self, output: inputs.Finish) -> None:
+        """The core has answered."""
+        future = self._waiting.pop(output.token, None)
+        if future is not None:
+            future.set_result(output)
+
+    async def _ask(self, make: Callable[[int], inputs.Input]) -> inputs.Finish:
+        token = next(self._tokens)
+        self._waiting[token] = future = Future()
+        self._feed(make(token))
+        return await future
+
+    async def _arm(self, request: Any, response: Any) -> Any:
+        today = date.fromtimestamp(messages.seconds(self._wall.now().to_msg()))
+        day = max(0, today.toordinal() - _EPOCH)
+        end = await self._ask(lambda t: inputs.ArmRequest(t, request.arm, request.triggers, day))
+        response.success, response.message = end.success, end.message
+        return response
+
+    async def _deploy(self, request: Any, response: Any) -> Any:
+        end = await self._ask(lambda t: inputs.DeployRequest(t, request.force, request.reason))
+        response.success, response.accepted = end.success, end.accepted
+        response.message = end.message
+        return response
+
+    async def _kill(self, request: Any, response: Any) -> Any:
+        reason = request.reason or "no reason given"
+        end = await self._ask(lambda t: inputs.KillRequest(t, "operator", reason))
+        response.success, response.accepted = end.success, end.accepted
+        response.message = end.message
+        return response
+
+    async def _reset(self, request: Any, response: Any) -> Any:
+        end = await self._ask(inputs.ResetRequest)
+        response.success, response.message = end.success, end.message
+        return response
+
+    async def _set_mode(self, request: Any, response: Any) -> Any:
+        if request.mode not in inputs.Mode._value2member_map_:
+            response.message = f"mode {request.mode}: need ACTIVE 0, SHADOW 1 or INHIBITED 2"
+            return response
+        mode = inputs.Mode(request.mode)
+        self._node.get_logger().warning(f"set_mode {mode.name}: {request.reason!r}")
+        end = await self._ask(lambda t: inputs.ModeRequest(t, mode, request.force))
+        response.success, response.message = end.success, end.message
+        return response

@@ -1,0 +1,93 @@
+"""What a leading supervisor tells those that follow, so that one can go on where it stopped.
+
+Links and measurements are not in it: each supervisor hears them itself. What is in it is what was
+decided and what became of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+
+from chute_ros.errors import RecordError
+from chute_ros.supervisor.codec import Codec
+from chute_ros.supervisor.state import Pending, State
+
+_CODEC = Codec(State)
+
+
+def told(state: State, now: float) -> str:
+    """The state for those that follow, as JSON, with its times as ages at now (monotonic s)."""
+    kept = State(
+        epoch=state.epoch,
+        started_at=state.started_at,
+        stage=state.stage,
+        stage_since=state.stage_since,
+        mode=state.mode,
+        next_id=state.next_id,
+        rules=state.rules,
+        asks=state.asks,
+        block=state.block,
+        kill=state.kill,
+        deploys=state.deploys,
+        deploy_rule=state.deploy_rule,
+        deploy_reasons=state.deploy_reasons,
+        deploy_due=state.deploy_due,
+        flown=state.flown,
+        airborne=state.airborne,
+        killed_in_flight=state.killed_in_flight,
+        down_since=state.down_since,
+        rebooted=state.rebooted,
+        reboots_before=state.reboots_before,
+        armed_height=state.armed_height,
+        home=state.home,
+        released_before=state.released_before,
+        device_blocks=state.device_blocks,
+        block_refused=state.block_refused,
+        alarms=state.alarms,
+        alarm_at=state.alarm_at,
+    )
+    return _CODEC.to_json(_moved(kept, -now))
+
+
+def followed(state: State, text: str, now: float) -> State:
+    """state with what the leader told just now (monotonic s of this host). RecordError: another
+    version wrote it."""
+    leader = _CODEC.from_json(text)
+    if not isinstance(leader, State):
+        raise RecordError(f"not a state: {text[:80]!r}")
+    leader = _moved(leader, now)
+    return replace(
+        leader,
+        leading=False,
+        updated_at=state.updated_at,
+        late_count=state.late_count,
+        links=state.links,
+        vehicle=state.vehicle,
+        vehicle_received=state.vehicle_received,
+        measurements=state.measurements,
+    )
+
+
+def _moved(state: State, by: float) -> State:
+    """Every time moved by so many s."""
+    return replace(
+        state,
+        started_at=state.started_at + by,
+        stage_since=state.stage_since + by,
+        asks=MappingProxyType({w: replace(a, at=a.at + by) for w, a in state.asks.items()}),
+        block=_moved_pending(state.block, by),
+        kill=_moved_pending(state.kill, by),
+        deploys=tuple(
+            replace(d, decided_at=d.decided_at + by, sent_at=d.sent_at + by) for d in state.deploys
+        ),
+        deploy_due=state.deploy_due + by,
+        down_since=state.down_since + by,
+        alarm_at=state.alarm_at + by,
+    )
+
+
+def _moved_pending(pending: Pending | None, by: float) -> Pending | None:
+    if pending is None:
+        return None
+    return replace(pending, decided_at=pending.decided_at + by, sent_at=pending.sent_at + by)

@@ -1,0 +1,163 @@
+"""Which of several supervisors leads: one holds a lease and renews it; when it falls silent the
+next takes over; when two lead after a split, one yields.
+
+The table is the whole truth: a pair that it does not list raises.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, replace
+
+from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.supervisor.epochs import RANKS, epoch_above
+
+#: One whose decisions a device refused as older does not lead for so long, s.
+_STAND_BACK = 5.0
+
+
+class Role(enum.Enum):
+    """What a supervisor does with its decisions."""
+
+    LEADING = "leading"  # sends them
+    FOLLOWING = "following"  # looks on, with the leader's state
+
+
+class Event(enum.Enum):
+    """What can happen to the lease."""
+
+    SILENCE = "no leader was heard for the lease's time"
+    OUTRANKED = "another leads with the better claim"
+    OVERSLEPT = "this one did not look for longer than the lease's time"
+    REFUSED = "a device has seen a newer leader"
+
+
+TRANSITIONS: dict[tuple[Role, Event], Role] = {
+    (Role.FOLLOWING, Event.SILENCE): Role.LEADING,
+    (Role.LEADING, Event.OUTRANKED): Role.FOLLOWING,
+    (Role.LEADING, Event.OVERSLEPT): Role.FOLLOWING,
+    (Role.LEADING, Event.REFUSED): Role.FOLLOWING,
+}
+
+
+def next_role(role: Role, event: Event) -> Role:
+    """The role after event; TransitionError for a pair that the table does not list."""
+    try:
+        return TRANSITIONS[role, event]
+    except KeyError:
+        raise TransitionError(f"one that is {role.value} cannot take '{event.value}'") from None
+
+
+@dataclass(frozen=True)
+class LeaseConfig:
+    """name: of the node; rank: 0 for the first choice; standby: others may run; timeout: a leader
+    that is silent for so long has lost the lease, s; listen: how long one that starts looks for a
+    leader before it leads, s (finding each other on the network takes its time)."""
+
+    name: str
+    rank: int = 0
+    standby: bool = False
+    timeout: float = 0.5
+    listen: float = 4.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.rank < RANKS:
+            raise ParameterError(f"rank is {self.rank}: need 0 to {RANKS - 1}, each its own")
+        if not 0.15 <= self.timeout <= 60.0:
+            raise ParameterError(f"lease_timeout is {self.timeout}: need 0.15 to 60 s")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What a supervisor says of itself, ten times a second."""
+
+    name: str
+    rank: int
+    epoch: int
+    leading: bool
+    #: It leads since its start without having taken anything over, and has seen no flight.
+    empty: bool
+
+    @property
+    def strength(self) -> tuple[bool, int]:
+        """Of two that lead the stronger goes on: who knows of a flight, then who came later."""
+        return not self.empty, self.epoch
+
+
+@dataclass(frozen=True)
+class Lease:
+    """Times are monotonic s; NaN: has not happened."""
+
+    role: Role
+    #: Since when a leader is looked for.
+    waiting_since: float
+    looked_at: float = math.nan
+    leader: str = ""
+    leader_heard: float = math.nan
+    #: The highest epoch of any claim.
+    highest: int = 0
+    stand_back_until: float = -math.inf
+    #: Another has the same rank; empty: none.
+    same_rank: str = ""
+
+    @classmethod
+    def begin(cls, config: LeaseConfig, now: float) -> Lease:
+        """One that is alone leads at once; one of several looks for a leader first."""
+        role = Role.FOLLOWING if config.standby else Role.LEADING
+        return cls(role, now + config.listen if config.standby else now)
+
+    def deadline(self, config: LeaseConfig) -> float:
+        """When a follower takes over if no leader is heard, monotonic s; infinity: it leads."""
+        if self.role is Role.LEADING:
+            return math.inf
+        # Of several followers the first in rank takes over first.
+        wait = config.timeout * (1 + config.rank)
+        unheard = math.isnan(self.leader_heard)
+        since = self.waiting_since if unheard else self.leader_heard
+        return max(since + wait, self.stand_back_until)
+
+    def looked(self, config: LeaseConfig, now: float) -> tuple[Lease, Event | None]:
+        """Look at the clock; what happened, if anything."""
+        overslept = now - self.looked_at > config.timeout
+        lease = replace(self, looked_at=now)
+        if self.role is Role.LEADING:
+            if config.standby and overslept:
+                return lease._moved(Event.OVERSLEPT, now), Event.OVERSLEPT
+            return lease, None
+        if overslept:
+            # What a leader said meanwhile is still to be read: it was not silent, we were deaf.
+            waiting = max(self.waiting_since, now)
+            return replace(lease, waiting_since=waiting, leader_heard=math.nan), None
+        if now >= self.deadline(config):
+            return lease._moved(Event.SILENCE, now), Event.SILENCE
+        return lease, None
+
+    def heard(
+        self, config: LeaseConfig, own: Claim, other: Claim, now: float
+    ) -> tuple[Lease, Event | None]:
+        """Another supervisor's claim came."""
+        same = other.name if other.rank == config.rank else self.same_rank
+        lease = replace(self, highest=max(self.highest, other.epoch), same_rank=same)
+        if not other.leading:
+            return lease, None
+        if self.role is Role.FOLLOWING:
+            return replace(lease, leader=other.name, leader_heard=now), None
+        if other.strength > own.strength:
+            lease = replace(lease._moved(Event.OUTRANKED, now), leader=other.name)
+            return replace(lease, leader_heard=now), Event.OUTRANKED
+        return lease, None
+
+    def refused(self, newest_epoch: int, now: float) -> tuple[Lease, Event]:
+        """A device has seen a higher epoch of another rank: somebody leads whom we do not hear."""
+        lease = replace(self, highest=max(self.highest, newest_epoch))
+        lease = lease._moved(Event.REFUSED, now)
+        return replace(lease, stand_back_until=now + _STAND_BACK), Event.REFUSED
+
+    def next_epoch(self, config: LeaseConfig, own: int) -> int:
+        """For one that takes over: above every epoch that it knows of."""
+        return epoch_above(max(self.highest, own), config.rank)
+
+    def _moved(self, event: Event, now: float) -> Lease:
+        role = next_role(self.role, event)
+        return replace(self, role=role, waiting_since=now, leader="", leader_heard=math.nan)

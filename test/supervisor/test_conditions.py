@@ -1,0 +1,269 @@
+"""Each condition holds, does not hold, or cannot be said, with its value and limit in words."""
+
+import math
+
+import pytest
+from story import LINK, SINKS, START, Story, parachute, rule, vehicle, with_rules
+
+from chute_ros.model import Armed, LinkState, ParachuteState, ParachuteStatus
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions import Finding, find
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.rules import (
+    ALL,
+    ANY,
+    AutopilotCondition,
+    AutopilotFact,
+    Condition,
+    DeviceCondition,
+    DeviceFact,
+    LinkCondition,
+    MeasurementCondition,
+    is_silence,
+)
+
+TWO = SupervisorConfig((LINK, "upf_can"), deploy_links=(LINK, "upf_can"))
+
+
+def look(story: Story, condition: Condition) -> Finding:
+    return find(story.config, story.state, condition, START + story.t)
+
+
+# -- measurements --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "value", "holds", "words"),
+    [
+        (math.nan, -12.0, -12.01, True, "vertical_speed -12.01 (below -12)"),
+        (math.nan, -12.0, -12.0, False, "vertical_speed -12.00 (below -12)"),
+        (8.0, math.nan, 8.01, True, "vertical_speed 8.01 (above 8)"),
+        (8.0, math.nan, 8.0, False, "vertical_speed 8.00 (above 8)"),
+        (-3.0, 3.0, 0.0, True, "vertical_speed 0.00 (above -3 and below 3)"),
+        (-3.0, 3.0, 3.0, False, "vertical_speed 3.00 (above -3 and below 3)"),
+        (-3.0, 3.0, -3.0, False, "vertical_speed -3.00 (above -3 and below 3)"),
+    ],
+)
+def test_a_measurement_holds_beyond_its_limit_not_at_it(
+    above: float, below: float, value: float, holds: bool, words: str
+) -> None:
+    story = Story()
+    story.at(0.0, vehicle(vertical_speed=value))
+    found = look(story, MeasurementCondition("vertical_speed", above, below))
+    assert found == Finding(holds, words, samples=1)
+
+
+def test_what_cannot_be_used_says_nothing_about_the_vehicle() -> None:
+    story = Story()
+    story.at(0.0)
+    assert look(story, SINKS).holds is None
+    assert "vertical_speed cannot be used: never received" in look(story, SINKS).text
+    story.at(0.1, vehicle(vertical_speed=-30.0))
+    assert look(story, SINKS).holds
+    story.at(1.2)
+    assert look(story, SINKS).holds is None
+    assert "old: 1.10 s (limit 1 s) (asked for: below -12)" in look(story, SINKS).text
+
+
+# -- links ---------------------------------------------------------------------------------------
+
+LOST = (LinkJudgement.LOST,)
+
+
+def test_a_link_is_judged_by_name() -> None:
+    story = Story(TWO)
+    story.at(0.0, story.heartbeat(LINK), story.heartbeat("upf_can"))
+    story.alive(1.2)
+    assert not look(story, LinkCondition(LINK, LOST)).holds
+    found = look(story, LinkCondition("upf_can", LOST))
+    assert found.holds
+    assert found.text == "link upf_can is LOST, heard 1.20 s ago (asked for: LOST)"
+    either = LinkCondition(LINK, (LinkJudgement.LOST, LinkJudgement.OK))
+    assert look(story, either).holds
+
+
+@pytest.mark.parametrize(("which", "holds"), [(ANY, True), (ALL, False)])
+def test_any_is_one_of_the_required_links_and_all_is_each(which: str, holds: bool) -> None:
+    story = Story(TWO)
+    story.at(0.0, story.heartbeat(LINK), story.heartbeat("upf_can"))
+    story.alive(1.2)
+    assert look(story, LinkCondition(which, LOST)).holds is holds
+    story.at(9.0)
+    assert look(story, LinkCondition(which, LOST)).holds
+
+
+def test_a_link_that_is_still_starting_is_not_held_against_it() -> None:
+    story = Story(TWO)
+    story.at(5.0, story.heartbeat(LINK))
+    never = LinkCondition(ANY, (LinkJudgement.NEVER_SEEN,))
+    assert not look(story, never).holds
+    assert "upf_can is still starting" in look(story, never).text
+    story.at(10.0)
+    assert look(story, never).holds
+
+
+# -- the autopilot -------------------------------------------------------------------------------
+
+
+def autopilot(story: Story, fact: AutopilotFact) -> Finding:
+    return look(story, AutopilotCondition(fact))
+
+
+def test_an_autopilot_that_was_never_heard_is_not_lost() -> None:
+    story = Story()
+    story.at(60.0)
+    assert autopilot(story, AutopilotFact.LOST) == Finding(None, "autopilot never heard")
+
+
+def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None:
+    story = Story()
+    story.at(0.0, vehicle(link_state=LinkState.OK))
+    story.at(2.5)
+    assert autopilot(story, AutopilotFact.LOST).holds is False
+    story.at(2.51)
+    assert autopilot(story, AutopilotFact.LOST) == Finding(
+        True, "autopilot link OK, vehicle/state 2.51 s old (lost after 2.5 s)"
+    )
+    story.at(3.0, vehicle(link_state=LinkState.LOST))
+    assert autopilot(story, AutopilotFact.LOST).holds is True
+
+
+def test_an_autopilot_that_says_disarmed_must_say_so_freshly() -> None:
+    story = Story()
+    story.at(0.0, vehicle(armed=Armed.DISARMED))
+    assert autopilot(story, AutopilotFact.DISARMED) == Finding(True, "autopilot says DISARMED")
+    story.at(2.6)
+    assert autopilot(story, AutopilotFact.DISARMED) == Finding(False, "autopilot says UNKNOWN")
+
+
+@pytest.mark.parametrize(
+    ("status", "holds"), [(0, False), (4, False), (5, False), (6, True), (8, True)]
+)
+def test_an_autopilot_that_terminates_says_so(status: int, holds: bool) -> None:
+    story = Story()
+    story.at(0.0, vehicle(system_status=status))
+    found = autopilot(story, AutopilotFact.EMERGENCY)
+    assert found == Finding(holds, f"autopilot's own state is {status} (6 or 8)")
+    story.at(2.6)
+    assert autopilot(story, AutopilotFact.EMERGENCY).holds is None, "what is old is absent"
+
+
+def test_an_autopilot_that_restarts_counts_in_flight_only() -> None:
+    story = Story().ready()
+    story.at(0.1, story.told(armed=Armed.DISARMED, reboot_count=1, rebooted_in_flight=True))
+    assert autopilot(story, AutopilotFact.REBOOTED).holds is False
+    story.fly(1.0, reboot_count=1, rebooted_in_flight=True)
+    assert autopilot(story, AutopilotFact.REBOOTED).holds is False, "it was counted before"
+    story.fly(1.1, reboot_count=2, rebooted_in_flight=True)
+    found = autopilot(story, AutopilotFact.REBOOTED)
+    assert found == Finding(True, "autopilot restarts in flight 1")
+    assert story.said().count("the autopilot started anew in flight") == 1
+
+
+# -- devices -------------------------------------------------------------------------------------
+
+
+def device(story: Story, fact: DeviceFact, link: str = ANY) -> Finding:
+    return look(story, DeviceCondition(fact, link))
+
+
+def test_a_device_that_asks_for_a_kill_wants_it_for_a_second() -> None:
+    story = Story(TWO)
+    story.at(0.0, i.KillRequest(0, "upf_can 33", "about to launch"))
+    found = device(story, DeviceFact.ASKS_FOR_KILL)
+    assert found == Finding(True, "upf_can 33: about to launch")
+    assert device(story, DeviceFact.ASKS_FOR_KILL, "upf_can").holds
+    assert not device(story, DeviceFact.ASKS_FOR_KILL, LINK).holds
+    story.at(1.1)
+    assert device(story, DeviceFact.ASKS_FOR_KILL) == Finding(False, "no device asks for a kill")
+
+
+def test_one_that_is_not_ours_may_ask_for_a_kill_all_the_same() -> None:
+    story = Story()
+    story.at(0.0, i.KillRequest(0, "stranger 9", "fire"))
+    assert device(story, DeviceFact.ASKS_FOR_KILL).holds
+
+
+def test_a_parachute_that_is_out_is_named_with_its_link() -> None:
+    story = Story(TWO).flying()
+    assert device(story, DeviceFact.DEPLOYED) == Finding(False, "no parachute is out")
+    story.at(0.1, story.heartbeat("upf_can"), parachute("upf_can", "33", deployed=True))
+    found = device(story, DeviceFact.DEPLOYED)
+    assert found == Finding(True, "upf_can 33: its own status says deployed")
+    assert not device(story, DeviceFact.DEPLOYED, LINK).holds
+
+
+def test_a_device_that_is_abnormal_says_why() -> None:
+    story = Story(TWO)
+    broken = ParachuteStatus("33", LinkState.OK, ParachuteState.ABNORMAL, faults=("POD", "IMU"))
+    silent = ParachuteStatus("34", LinkState.OK, ParachuteState.ABNORMAL)
+    story.at(0.0, story.heartbeat("upf_can"), i.ParachuteReport("upf_can", broken))
+    assert device(story, DeviceFact.ABNORMAL) == Finding(True, "upf_can 33 is ABNORMAL (POD; IMU)")
+    story.at(0.1, i.ParachuteReport("upf_can", silent))
+    assert "upf_can 34 is ABNORMAL (no reason given)" in device(story, DeviceFact.ABNORMAL).text
+    assert not device(story, DeviceFact.ABNORMAL, LINK).holds
+    story.at(1.1)
+    assert device(story, DeviceFact.ABNORMAL) == Finding(False, "no device is ABNORMAL")
+
+
+# -- which of them are only silence --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("condition", "silence"),
+    [
+        (LinkCondition(ANY, LOST), True),
+        (LinkCondition(LINK, (LinkJudgement.OK,)), True),
+        (AutopilotCondition(AutopilotFact.LOST), True),
+        (AutopilotCondition(AutopilotFact.REBOOTED), False),
+        (AutopilotCondition(AutopilotFact.DISARMED), False),
+        (AutopilotCondition(AutopilotFact.EMERGENCY), False),
+        (DeviceCondition(DeviceFact.DEPLOYED), False),
+        (SINKS, False),
+    ],
+)
+def test_what_tells_only_that_somebody_is_not_heard(condition: Condition, silence: bool) -> None:
+    assert is_silence(condition) is silence
+
+
+# -- k of n with weights -------------------------------------------------------------------------
+
+TILT = MeasurementCondition("tilt_deg", above=60.0)
+FALLS = MeasurementCondition("acceleration", below=2.0)
+HEAVY = MeasurementCondition("height", above=500.0, weight=2.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "fires"),
+    [
+        ({}, False),
+        ({"tilt": 61.0}, False),
+        ({"acceleration": 1.0}, False),
+        ({"tilt": 61.0, "acceleration": 1.0}, True),
+        ({"height": 501.0}, True),
+        ({"height": 501.0, "tilt": 61.0, "acceleration": 1.0}, True),
+    ],
+)
+def test_the_weights_of_those_that_hold_must_reach_what_is_needed(
+    told: dict[str, float], fires: bool
+) -> None:
+    story = Story(with_rules(rule(TILT, FALLS, HEAVY, needed=2.0))).flying()
+    story.fly(0.2, **{"height": 499.0, **told})
+    assert bool(story.fired()) is fires
+
+
+def test_only_those_that_hold_are_told_as_reasons() -> None:
+    story = Story(with_rules(rule(TILT, FALLS, HEAVY, needed=2.0, hold=0.1))).flying()
+    story.fly(0.3, tilt=61.0, acceleration=1.0)
+    reasons = "; ".join(story.decisions()[-1].reasons)
+    assert "tilt_deg 61.00 (above 60); acceleration 1.00 (below 2); counter 0.10 s of 0.1 s" in (
+        reasons
+    )
+    assert "height" not in reasons
+
+
+def test_one_that_cannot_be_said_counts_as_not_holding() -> None:
+    story = Story(with_rules(rule(TILT, FALLS))).flying()
+    story.fly(0.5, tilt=61.0, acceleration=math.nan)
+    assert story.fired() == []

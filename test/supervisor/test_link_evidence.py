@@ -1,0 +1,199 @@
+"""Each link is never seen, ok, stale, lost or regained, by limits of its own."""
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from story import LINK, STANDING, Story
+
+from chute_ros.errors import ParameterError
+from chute_ros.model import LinkState, ParachuteState, ParachuteStatus
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.link_evidence import (
+    MOST_DEVICES,
+    LinkEvidence,
+    LinkJudgement,
+    LinkLimits,
+)
+from chute_ros.supervisor.machine import Stage
+
+J = LinkJudgement
+LIMITS = LinkLimits(stale_after=0.5, lost_after=1.0, regain_after=1.0, startup_grace=10.0)
+
+
+def heard(*times: float, limits: LinkLimits = LIMITS, **said: Any) -> LinkEvidence:
+    """After healthy heartbeats at these times."""
+    evidence = LinkEvidence()
+    for seq, t in enumerate(times):
+        one = i.LinkHeartbeat(LINK, said.get("state", LinkState.OK), True, seq)
+        evidence = evidence.with_heartbeat(one, limits, t)
+    return evidence
+
+
+@pytest.mark.parametrize(
+    ("times", "now", "judged"),
+    [
+        ((), 5.0, J.NEVER_SEEN),
+        ((1.0,), 1.0, J.OK),
+        ((1.0,), 1.49, J.OK),
+        ((1.0,), 1.5, J.STALE),
+        ((1.0,), 1.99, J.STALE),
+        ((1.0,), 2.0, J.LOST),
+        ((1.0,), 900.0, J.LOST),
+        # Stale and back: it was never lost, so nothing is to be regained.
+        ((1.0, 1.8), 1.8, J.OK),
+        # Lost and back: heard for a whole second without a break before it is relied on.
+        ((1.0, 5.0), 5.0, J.REGAINED),
+        ((1.0, 5.0, 5.4, 5.8), 5.99, J.REGAINED),
+        ((1.0, 5.0, 5.4, 5.8), 6.0, J.OK),
+        # A break while it is being regained begins the wait anew.
+        ((1.0, 5.0, 5.6), 6.05, J.REGAINED),
+        ((1.0, 5.0, 5.6, 6.0, 6.4), 6.59, J.REGAINED),
+        ((1.0, 5.0, 5.6, 6.0, 6.4), 6.6, J.OK),
+    ],
+)
+def test_silence_is_judged_by_its_length(
+    times: tuple[float, ...], now: float, judged: LinkJudgement
+) -> None:
+    assert heard(*times).judged(LIMITS, now) is judged
+
+
+@pytest.mark.parametrize(
+    ("said", "judged"),
+    [
+        (LinkState.NEVER_SEEN, J.NEVER_SEEN),
+        (LinkState.STALE, J.STALE),
+        (LinkState.LOST, J.LOST),
+        (LinkState.OK, J.OK),
+    ],
+)
+def test_a_node_that_lives_tells_of_its_device(said: LinkState, judged: LinkJudgement) -> None:
+    assert heard(1.0, state=said).judged(LIMITS, 1.1) is judged
+
+
+def test_the_silence_of_the_node_is_worse_than_what_it_said_last() -> None:
+    assert heard(1.0, state=LinkState.STALE).judged(LIMITS, 2.0) is J.LOST
+
+
+def test_a_device_that_was_lost_behind_a_living_node_is_regained_like_a_node() -> None:
+    evidence = heard(1.0, 1.1, state=LinkState.LOST)
+    evidence = evidence.with_heartbeat(i.LinkHeartbeat(LINK, LinkState.OK, True, 9), LIMITS, 1.2)
+    assert evidence.judged(LIMITS, 1.2) is J.REGAINED
+    assert evidence.lost_count == 1
+
+
+def test_each_loss_is_counted_once() -> None:
+    assert heard(1.0, 1.4, 1.8).lost_count == 0
+    assert heard(1.0, 5.0, 9.0, 9.4).lost_count == 2
+
+
+def test_links_have_limits_of_their_own() -> None:
+    slow = LinkLimits(2.0, 4.0, regain_after=0.0)
+    assert heard(1.0, limits=slow).judged(slow, 2.9) is J.OK
+    assert heard(1.0).judged(LIMITS, 2.9) is J.LOST
+    assert heard(1.0, 9.0, limits=slow).judged(slow, 9.0) is J.OK, "nothing to wait for"
+
+
+def test_a_slow_link_is_followed_by_its_own_limits_in_the_whole_core() -> None:
+    slow = LinkLimits(2.0, 4.0, 1.0, startup_grace=20.0)
+    story = Story(SupervisorConfig((LINK, "slow"), link_limits={"slow": slow}))
+    for n in range(15):
+        story.at(n * 0.1, story.heartbeat(), i.VehicleReport(STANDING))
+        if n == 0:
+            story.at(0.0, story.heartbeat("slow"))
+    assert story.state.stage is Stage.READY
+    story.alive(2.1)
+    assert story.state.stage is Stage.BLOCKED
+    assert "slow: STALE, heartbeat of its node 2.00 s old (limit 2 s)" in story.said()
+
+
+def test_while_it_starts_a_silent_link_is_no_fault_before_the_grace_of_the_slowest_is_over() -> (
+    None
+):
+    slow = LinkLimits(startup_grace=20.0)
+    story = Story(SupervisorConfig((LINK, "slow"), link_limits={"slow": slow}))
+    story.at(19.9)
+    assert story.state.stage is Stage.STARTUP
+    story.at(20.1)
+    assert story.state.stage is Stage.BLOCKED
+
+
+def test_a_link_that_flaps_at_its_limit_keeps_flight_blocked_and_fires_nothing() -> None:
+    story = Story().ready()
+    for n in range(1, 21):
+        # Once a second: just lost each time, just heard again each time.
+        story.at(n * 1.01, story.heartbeat(), i.VehicleReport(STANDING))
+        assert story.state.stage is Stage.BLOCKED
+    assert story.fired() == []
+    assert story.state.links[LINK].lost_count == 20
+    for n in range(1, 13):
+        story.at(20.2 + n * 0.1, story.heartbeat(), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.READY
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ((0.0, 1.0), "stale_after 0.0 s and lost_after 1.0 s: need 0 < stale_after < lost_after"),
+        ((1.0, 1.0), "need 0 < stale_after < lost_after"),
+        ((1.0, 601.0), "up to 600 s"),
+        ((math.nan, 1.0), "stale_after nan"),
+        ((0.5, 1.0, -1.0), "regain_after is -1.0: need 0 to 60 s"),
+        ((0.5, 1.0, 1.0, 61.0), "startup_grace is 61.0: need 0 to 60 s"),
+    ],
+)
+def test_limits_that_contradict_themselves_say_so(wrong: tuple[float, ...], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        LinkLimits(*wrong)
+
+
+def status(
+    device: str = "1/161", deployed: bool = False, state: LinkState = LinkState.OK
+) -> ParachuteStatus:
+    return ParachuteStatus(device, state, ParachuteState.READY, deployed=deployed)
+
+
+def test_what_a_device_said_released_stays_so_while_it_is_lost() -> None:
+    evidence = LinkEvidence().with_status(status(deployed=True), 3.0)
+    evidence = evidence.with_status(status(deployed=False, state=LinkState.LOST), 4.0)
+    assert evidence.deployed == {"1/161"}
+    assert evidence.released_at == 3.0
+
+
+def test_a_lost_device_cannot_say_that_it_is_released() -> None:
+    for known in (LinkEvidence(), LinkEvidence().with_status(status(), 3.0)):
+        evidence = known.with_status(status(deployed=True, state=LinkState.LOST), 4.0)
+        assert evidence.deployed == set()
+        assert math.isnan(evidence.released_at)
+
+
+def test_made_up_devices_do_not_grow_it_and_the_known_ones_go_on_being_heard() -> None:
+    evidence = LinkEvidence()
+    for n in range(100):
+        evidence = evidence.with_status(status(f"made up {n}"), 1.0)
+    assert len(evidence.devices) == MOST_DEVICES
+    evidence = evidence.with_status(status("made up 0", deployed=True), 2.0)
+    assert evidence.deployed == {"made up 0"}
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 3.0), st.sampled_from(LinkState)), max_size=30))
+def test_between_two_heartbeats_a_link_only_gets_worse_or_is_relied_on_after_its_wait(
+    beats: list[tuple[float, LinkState]],
+) -> None:
+    now, evidence = 100.0, LinkEvidence()
+    for seq, (wait, said) in enumerate(beats):
+        judged = {evidence.judged(LIMITS, now + wait * part) for part in (0.0, 0.3, 0.6, 0.99)}
+        if J.NEVER_SEEN in judged:
+            assert judged <= {J.NEVER_SEEN, J.LOST}
+        now += wait
+        before = evidence.judged(LIMITS, now)
+        evidence = evidence.with_heartbeat(i.LinkHeartbeat(LINK, said, True, seq), LIMITS, now)
+        after = evidence.judged(LIMITS, now)
+        if before is J.LOST:
+            assert after is not J.OK, "never relied on at the first heartbeat after a loss"
+        if said is LinkState.OK and before is J.OK:
+            assert after is J.OK
+        assert evidence.is_heard(LIMITS, now) == (said is LinkState.OK)
