@@ -36,6 +36,8 @@ setup(
             "sim_autopilot = chute_ros.sim.sim_autopilot:main",
             "sim_flight_computer = chute_ros.sim.sim_flight_computer:main",
             "demo = chute_ros.tools.demo:main",
+            "replay = chute_ros.tools.replay:main",
+            "report = chute_ros.tools.report:main",
         ],
     },
 )

@@ -24,6 +24,8 @@ from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
+#: What people ask for, besides a kill, which devices want as well.
+_PERSONS = (i.ArmRequest, i.DeployRequest, i.ResetRequest, i.ModeRequest)
 #: A limit that an age may just reach has passed this much later, s.
 _JUST_AFTER = 1e-6
 
@@ -131,7 +133,10 @@ class _Update(Deploying):
         self.outputs.append(i.Say(f"{text}: silence meanwhile does not count", alarm=True))
 
     def take(self, one: i.Input) -> None:
-        """One input, in the order in which it came."""
+        """One input, in the order in which it came. One that follows does nothing for people."""
+        if not self.state.leading and isinstance(one, _PERSONS):
+            self.finish(one.token, False, False, "refused: another supervisor decides")
+            return
         if isinstance(one, i.LinkHeartbeat):
             self.heartbeat(one)
         elif isinstance(one, i.ParachuteReport):

@@ -31,6 +31,7 @@ class Event(enum.Enum):
     OUTRANKED = "another leads with the better claim"
     OVERSLEPT = "this one did not look for longer than the lease's time"
     REFUSED = "a device has seen a newer leader"
+    OVERTAKES = "another leads with a higher epoch and the weaker claim"
 
 
 TRANSITIONS: dict[tuple[Role, Event], Role] = {
@@ -38,6 +39,7 @@ TRANSITIONS: dict[tuple[Role, Event], Role] = {
     (Role.LEADING, Event.OUTRANKED): Role.FOLLOWING,
     (Role.LEADING, Event.OVERSLEPT): Role.FOLLOWING,
     (Role.LEADING, Event.REFUSED): Role.FOLLOWING,
+    (Role.LEADING, Event.OVERTAKES): Role.LEADING,
 }
 
 
@@ -146,6 +148,9 @@ class Lease:
         if other.strength > own.strength:
             lease = replace(lease._moved(Event.OUTRANKED, now), leader=other.name)
             return replace(lease, leader_heard=now), Event.OUTRANKED
+        if other.epoch > own.epoch:
+            # It will yield; but devices have perhaps seen its numbers.
+            return lease, Event.OVERTAKES
         return lease, None
 
     def refused(self, newest_epoch: int, now: float) -> tuple[Lease, Event]:

@@ -126,7 +126,7 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
     what = f"rule '{name}'"
     entries = reader.mapping(where, _RULE_KEYS, what)
     for key in ("conditions", "action", "states"):
-        if key not in entries and entries:
+        if key not in entries and where.is_mapping:
             reader.wrong(where.line, f"{what} has no {key}: add it")
     conditions: list[Condition] = []
     if "conditions" in entries:

@@ -50,6 +50,9 @@ class Requests(Orders):
         if not one.token:
             self._device_asks(one)
             return
+        if not self.state.leading:
+            self.finish(one.token, False, False, "refused: another supervisor decides")
+            return
         self.order_kill(one.by, (reason,), one.token)
         if self.state.mode is not i.Mode.ACTIVE:
             self._nothing_sent(one.token)

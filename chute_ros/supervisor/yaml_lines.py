@@ -18,6 +18,11 @@ class Where:
     def __init__(self, node: yaml.Node | None, value: Any, line: int) -> None:
         self.node, self.value, self.line = node, value, line
 
+    @property
+    def is_mapping(self) -> bool:
+        """Has it `key: value` lines?"""
+        return isinstance(self.node, yaml.MappingNode)
+
 
 class LineReader:
     """Reads values that must be of some kind; collects the mistakes, so that all are told at once.
@@ -47,7 +52,8 @@ class LineReader:
             elif key in entries:
                 self.wrong(line, f"{key!r} is there twice: remove one")
             else:
-                entries[key] = where_of(node)
+                # The line of the key: a mapping begins only on the line after it.
+                entries[key] = Where(node, where_of(node).value, line)
         return entries
 
     def number(
@@ -75,10 +81,11 @@ class LineReader:
 
     def text(self, where: Where, what: str) -> str:
         """Words."""
-        if not isinstance(where.value, str) or not where.value.strip():
+        words = where.value if isinstance(where.node, yaml.ScalarNode) else None
+        if not isinstance(words, str) or not words.strip():
             self.wrong(where.line, f"{what} is {where.value!r}: need words")
             return ""
-        return " ".join(where.value.split())
+        return " ".join(words.split())
 
     def many(self, where: Where, what: str) -> list[Where]:
         """The entries of a list; one alone may stand without brackets."""

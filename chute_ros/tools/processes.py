@@ -56,10 +56,17 @@ class Processes:
         """All that were started."""
         return list(self._running)
 
+    def send_signal(self, name: str, number: signal.Signals) -> None:
+        """To one of them; one that was killed is not watched any more."""
+        self._running[name].send_signal(number)
+        if number is signal.SIGKILL:
+            self._running.pop(name).wait(END_TIMEOUT)
+
     def end(self) -> None:
         """SIGINT to all, SIGKILL to those that do not end."""
         for process in self._running.values():
             if process.poll() is None:
+                process.send_signal(signal.SIGCONT)  # one that is stopped hears nothing else
                 process.send_signal(signal.SIGINT)
         for process in self._running.values():
             try:

@@ -29,6 +29,11 @@ class StubLink(Node):
         #: How far it gets with a decision.
         self.outcomes = [Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED]
         self.arm_requests, self.arm_succeeds = [], True
+        self.flying = False
+        #: It does not hear decisions.
+        self.deaf = False
+        #: Numbers of the decisions that it acted on.
+        self.acted = []
         self.decisions = []
         self._seq = itertools.count()
         self._beats = self.create_publisher(LinkHeartbeat, "safety/heartbeat", qos.STATUS)
@@ -52,9 +57,9 @@ class StubLink(Node):
         vehicle = VehicleState(
             source="1/1",
             link_state=int(LinkState.OK),
-            armed=VehicleState.DISARMED,
+            armed=VehicleState.ARMED if self.flying else VehicleState.DISARMED,
             armed_age=0.0,
-            landed_state=VehicleState.ON_GROUND,
+            landed_state=VehicleState.IN_AIR if self.flying else VehicleState.ON_GROUND,
             landed_state_age=0.0,
         )
         self._vehicle.publish(stamped(self, vehicle))
@@ -65,22 +70,32 @@ class StubLink(Node):
         return response
 
     def _decision(self, message):
+        if self.deaf:
+            return
         new = all((d.epoch, d.id) != (message.epoch, message.id) for d in self.decisions)
         self.decisions.append(message)
         if self.get_name() not in message.targets or message.shadow or not new:
             return
+        self.acted.append((message.epoch, message.id, Action(message.action)))
         block = message.action in (Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE)
         for outcome in [Outcome.CONFIRMED] if block else self.outcomes:
-            report = ActionReport(
-                epoch=message.epoch,
-                id=message.id,
-                action=message.action,
-                link=self.get_name(),
-                outcome=int(outcome),
-                detail="by the stub",
-                newest_epoch=message.epoch,
-            )
-            self._reports.publish(stamped(self, report))
+            self._report(message, outcome)
+
+    def report_newest(self, action, outcome):
+        """It gets further with the newest decision of this action."""
+        self._report(next(d for d in reversed(self.decisions) if d.action == action), outcome)
+
+    def _report(self, message, outcome):
+        report = ActionReport(
+            epoch=message.epoch,
+            id=message.id,
+            action=message.action,
+            link=self.get_name(),
+            outcome=int(outcome),
+            detail="by the stub",
+            newest_epoch=message.epoch,
+        )
+        self._reports.publish(stamped(self, report))
 
 
 class Scene:

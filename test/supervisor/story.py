@@ -52,6 +52,8 @@ FLYING_WELL: dict[str, Any] = {
     "latitude": 48.0,
     "longitude": 11.0,
 }
+#: What one that stands with its motors off says.
+DOWN: dict[str, Any] = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
 _AGES = {
     "armed": "armed_age",
     "landed_state": "landed_state_age",

@@ -186,7 +186,7 @@ def test_one_that_is_not_ours_may_ask_for_a_kill_all_the_same() -> None:
 
 
 def test_a_parachute_that_is_out_is_named_with_its_link() -> None:
-    story = Story(TWO).flying()
+    story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can"))).flying()
     assert device(story, DeviceFact.DEPLOYED) == Finding(False, "no parachute is out")
     story.at(0.1, story.heartbeat("upf_can"), parachute("upf_can", "33", deployed=True))
     found = device(story, DeviceFact.DEPLOYED)

@@ -1,0 +1,156 @@
+"""What happened in a recorded flight: decisions with what came of them, requests with their
+answers, alarms, and the rows of its timeline."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import typing
+from dataclasses import dataclass, field
+
+from chute_ros.model import Action, Decision
+from chute_ros.supervisor import inputs as i
+from chute_ros.tools.recording import Recording
+from chute_ros.tools.stage_tones import ACTION_TONES, OUTCOME_TONES
+from chute_ros.tools.timeline_rows import Mark
+
+#: The inputs by which somebody asks for something.
+_REQUESTS = tuple(kind for kind in typing.get_args(i.Input) if kind.__name__.endswith("Request"))
+
+
+@dataclass
+class Decided:
+    """A decision, when it was made (s from the start), and how it went on."""
+
+    at: float
+    decision: Decision
+    #: How often it was sent again, nobody having reported on it.
+    again: int = 0
+    #: (s since the decision, report), each step of each link once.
+    reports: list[tuple[float, i.ActionReport]] = field(default_factory=list)
+
+    @property
+    def tone(self) -> str:
+        """Its colour."""
+        return ACTION_TONES[self.decision.action]
+
+    @property
+    def name(self) -> str:
+        """Its action in words."""
+        return self.decision.action.name.replace("_", " ").lower()
+
+
+@dataclass
+class Asked:
+    """A request, when it came (s from the start), and its answer."""
+
+    at: float
+    what: str
+    details: str
+    #: Seconds until the answer, and the answer; None: none came, or none is given.
+    answer: tuple[float, i.Finish] | None = None
+
+
+@dataclass
+class FlightStory:
+    """All of it, each list in the order of time. said: (s from the start, line of the log)."""
+
+    decisions: list[Decided] = field(default_factory=list)
+    requests: list[Asked] = field(default_factory=list)
+    said: list[tuple[float, i.Say]] = field(default_factory=list)
+
+    @property
+    def alarms(self) -> list[tuple[float, str]]:
+        """What was said as an alarm."""
+        return [(at, say.text) for at, say in self.said if say.alarm]
+
+    @property
+    def fired(self) -> list[float]:
+        """When a kill or a deploy was decided, and when it was reported on, s."""
+        moments = []
+        for one in self.decisions:
+            if one.decision.action in (Action.KILL, Action.DEPLOY):
+                moments += [one.at, *(one.at + after for after, _ in one.reports)]
+        return moments
+
+    def decision_marks(self) -> list[Mark]:
+        """Each decision with its number in the table."""
+        return [
+            Mark(one.at, str(number), f"{one.name} by '{one.decision.rule}'", one.tone)
+            for number, one in enumerate(self.decisions, 1)
+        ]
+
+    def report_marks(self) -> list[Mark]:
+        """Each report of a link on a kill or a deploy."""
+        marks = []
+        for number, one in enumerate(self.decisions, 1):
+            if one.decision.action not in (Action.KILL, Action.DEPLOY):
+                continue
+            for after, report in one.reports:
+                text = f"{report.link}: {one.name} {report.outcome.name}: {report.detail}"
+                tone = OUTCOME_TONES[report.outcome]
+                marks.append(Mark(one.at + after, f"{number} {report.outcome.name}", text, tone))
+        return marks
+
+    def alarm_marks(self) -> list[Mark]:
+        """Each alarm."""
+        return [Mark(at, "!", text, "bad") for at, text in self.alarms]
+
+
+def tell(recording: Recording) -> FlightStory:
+    """The story of a recording."""
+    story = FlightStory()
+    decided: dict[tuple[int, int], Decided] = {}
+    waiting: dict[int, Asked] = {}
+    for recorded in recording.turns:
+        at = recording.seconds(recorded.wall)
+        for one in recorded.turn.inputs:
+            if isinstance(one, i.ActionReport):
+                _report(decided.get((one.epoch, one.id)), at, one)
+            elif isinstance(one, _REQUESTS):
+                asked = Asked(at, _words(type(one).__name__), fields_of(one))
+                story.requests.append(asked)
+                token = getattr(one, "token", 0)
+                if token:
+                    waiting[token] = asked
+        for output in recorded.turn.outputs:
+            if isinstance(output, i.Decide):
+                key = (output.decision.epoch, output.decision.id)
+                if key in decided:
+                    decided[key].again += 1
+                else:
+                    decided[key] = Decided(at, output.decision)
+                    story.decisions.append(decided[key])
+            elif isinstance(output, i.Finish):
+                answered = waiting.pop(output.token, None)
+                if answered is not None:
+                    answered.answer = (at - answered.at, output)
+            elif isinstance(output, i.Say):
+                story.said.append((at, output))
+    return story
+
+
+def fields_of(one: object) -> str:
+    """The fields of an input in words, but the token, which says nothing to a person."""
+    told = []
+    for each in dataclasses.fields(one):  # type: ignore[arg-type]
+        value = getattr(one, each.name)
+        if each.name == "token" or value in ("", ()):
+            continue
+        if isinstance(value, enum.Enum):
+            value = value.name
+        told.append(f"{each.name.replace('_', ' ')}: {value}")
+    return ", ".join(told)
+
+
+def _report(decided: Decided | None, at: float, report: i.ActionReport) -> None:
+    if decided is None:
+        return  # of a decision before the recording, or of another supervisor
+    known = {(one.link, one.outcome, one.detail) for _, one in decided.reports}
+    if (report.link, report.outcome, report.detail) not in known:
+        decided.reports.append((at - decided.at, report))
+
+
+def _words(name: str) -> str:
+    """ "DeployRequest" -> "deploy"."""
+    return name.removesuffix("Request").lower()

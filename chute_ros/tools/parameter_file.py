@@ -1,0 +1,105 @@
+"""The settings of the supervisor from a ROS parameter file, as its node would start with them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from chute_ros.errors import ParameterError
+from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
+from chute_ros.nodes.parameters import Parameter
+from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.tools.replaying import Other
+
+NODE = "safety_supervisor"
+#: What ROS gives every node.
+_EVERYWHERE = {"use_sim_time", "start_type_description_service", "qos_overrides"}
+
+
+def other_from(path: Path, node: str) -> Other:
+    """What the file asks for; ParameterError says what is wrong with it. node: the whole name of
+    the node that flew."""
+    given = _given(path, node)
+    known = {one.name: one for one in (*PARAMETERS, *BLACK_BOX_PARAMETERS)}
+    for name in given:
+        if name.partition(".")[0] not in {*known, *_EVERYWHERE}:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f": did you mean {near[0]}?" if near else ""
+            raise ParameterError(f"{path}: {NODE} has no parameter {name}{hint}")
+    for name, parameter in known.items():
+        if name in given:
+            _check(path, parameter, given[name])
+    values = {name: given.get(name, one.default) for name, one in known.items()}
+    try:
+        config = config_from(values)
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+    return Other(config, Mode[given["mode"]] if "mode" in given else None)
+
+
+def _given(path: Path, node: str) -> dict[str, Any]:
+    """Name -> value of what the file has for this node, the later over the earlier."""
+    try:
+        whole = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror or error}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path} is no YAML: {' '.join(str(error).split())}") from None
+    found: dict[str, Any] = {}
+    sections = 0
+    for name, section in _sections(whole, ""):
+        if any(_matches(name, one) for one in (node, f"/{NODE}")):
+            sections += 1
+            found.update(section)
+    if not sections:
+        raise ParameterError(
+            f"{path} has no ros__parameters for {node}: need for example "
+            f"'/**/{NODE}:' with 'ros__parameters:' below"
+        )
+    return found
+
+
+def _sections(part: Any, name: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Name of a node, with wildcards -> its parameters; names may be nested."""
+    if not isinstance(part, dict):
+        return
+    for key, value in part.items():
+        if key == "ros__parameters":
+            yield name, value if isinstance(value, dict) else {}
+        else:
+            yield from _sections(value, f"{name}/{str(key).strip('/')}")
+
+
+def _matches(pattern: str, node: str) -> bool:
+    """As ROS: * is one name, ** any number of them."""
+    if pattern in ("/**", node):
+        return True
+    parts, names = pattern.split("/")[1:], node.split("/")[1:]
+    if parts[0] == "**":
+        tail = parts[1:]
+        names = names[len(names) - len(tail) :]
+        parts = tail
+    return len(parts) == len(names) and all(map(fnmatchcase, names, parts))
+
+
+def _check(path: Path, parameter: Parameter, value: Any) -> None:
+    """As the node's declaration does."""
+    kind = type(parameter.default)
+    good = type(value) is kind
+    if good and kind is list:
+        good = all(isinstance(one, str) for one in value)
+    if good and parameter.choices:
+        good = value in parameter.choices
+    if good and parameter.minimum is not None and parameter.maximum is not None:
+        good = parameter.minimum <= value <= parameter.maximum
+    if not good:
+        raise ParameterError(
+            f"{path}: parameter {parameter.name} of {NODE} is {value!r}: "
+            f"need {parameter.allowed()} ({parameter.description})"
+        )

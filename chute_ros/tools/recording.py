@@ -1,0 +1,131 @@
+"""Reads what a black box wrote: the turns of the core, and the messages around them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from chute_msgs.msg import SupervisorRecord
+from rclpy.serialization import deserialize_message
+
+from chute_ros.errors import RecordError
+from chute_ros.nodes.box_writer import RECORD
+from chute_ros.nodes.message_definitions import type_hash, type_name
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.record import CODEC, Turn
+from chute_ros.supervisor.state import State
+from chute_ros.tools.mcap_entries import Entry, McapEntries
+from chute_ros.tools.progress import Progress
+
+
+@dataclass(frozen=True)
+class RecordedTurn:
+    """A turn of the core. wall: Unix ns; number: rises by one with each turn of one supervisor;
+    config, state: the settings, and what was remembered before it, where they were written."""
+
+    wall: int
+    number: int
+    turn: Turn
+    config: SupervisorConfig | None = None
+    state: State | None = None
+
+
+@dataclass
+class Recording:
+    """What files hold. messages: by the relative name of their topic, with their wall clock (Unix
+    ns); remarks: what was not in order, one line each."""
+
+    turns: list[RecordedTurn] = field(default_factory=list)
+    messages: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    #: The namespace of the vehicle, as in "/drone1"; empty: none.
+    namespace: str = ""
+
+    @property
+    def start(self) -> int:
+        """Wall clock of the first turn, Unix ns."""
+        return self.turns[0].wall
+
+    def seconds(self, wall: int) -> float:
+        """From the start to this moment (Unix ns)."""
+        return (wall - self.start) / 1e9
+
+
+def files_of(paths: Iterable[Path]) -> list[Path]:
+    """The files themselves; a folder stands for all files in it, in their order."""
+    files: list[Path] = []
+    for path in paths:
+        files += sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    if not files:
+        raise RecordError(f"{', '.join(map(str, paths))}: there is no .mcap file in it")
+    return files
+
+
+def read(files: Iterable[Path], kinds: Mapping[str, Any]) -> Recording:
+    """The turns, and the messages of these topics (relative name -> class), of files in their
+    order; RecordError if there is nothing that could be replayed."""
+    recording = Recording()
+    for path in files:
+        _Reader(recording, path, {RECORD: SupervisorRecord, **kinds}).read()
+    if not recording.turns:
+        told = "; ".join(recording.remarks) or "no turn of a supervisor is in it"
+        raise RecordError(f"{', '.join(map(str, files))}: {told}")
+    return recording
+
+
+class _Reader:
+    """Adds one file to a recording."""
+
+    def __init__(self, recording: Recording, path: Path, kinds: Mapping[str, Any]) -> None:
+        self._into, self._path, self._kinds = recording, path, kinds
+        #: Id of a channel -> relative name of its topic; empty: not asked for, or not readable.
+        self._names: dict[int, str] = {}
+
+    def read(self) -> None:
+        entries = McapEntries(self._path)
+        size = self._path.stat().st_size if self._path.exists() else 0
+        progress = Progress(f"reading {self._path.name}", size)
+        for entry in entries:
+            progress.at(entries.position)
+            if entry.channel.id not in self._names:
+                self._names[entry.channel.id] = self._name(entry)
+            name = self._names[entry.channel.id]
+            if name == RECORD:
+                self._into.turns.append(self._turn(entry))
+            elif name:
+                message = deserialize_message(entry.data, self._kinds[name])
+                self._into.messages.setdefault(name, []).append((entry.time, message))
+        self._into.remarks += entries.remarks
+
+    def _name(self, entry: Entry) -> str:
+        """What the topic of a channel is called here."""
+        topic = entry.channel.topic
+        for name, kind in self._kinds.items():
+            if not topic.endswith(f"/{name.lstrip('/')}"):
+                continue
+            known = entry.channel.metadata.get("topic_type_hash", "")
+            if entry.schema.name == type_name(kind) and known in ("", type_hash(kind)):
+                if name == RECORD:
+                    self._into.namespace = topic.removesuffix(f"/{name}")
+                return name
+            text = f"{self._path}: {topic} was written by another version of chute_msgs"
+            if name == RECORD:
+                raise RecordError(f"{text}: read it with that one")
+            self._into.remarks.append(f"{text}: left out")
+        return ""
+
+    def _turn(self, entry: Entry) -> RecordedTurn:
+        message = deserialize_message(entry.data, SupervisorRecord)
+        try:
+            turn = Turn(
+                message.monotonic,
+                tuple(CODEC.from_json(one) for one in message.inputs),
+                tuple(CODEC.from_json(one) for one in message.outputs),
+            )
+            config = CODEC.from_json(message.config) if message.config else None
+            state = CODEC.from_json(message.state) if message.state else None
+        except RecordError as error:
+            raise RecordError(f"{self._path}: turn {entry.number} {error}") from None
+        return RecordedTurn(entry.time, entry.number, turn, config, state)

@@ -1,0 +1,118 @@
+"""Writes docs/states.md and docs/states.svg from the tables of the supervisor (make docs).
+
+With --check it only says which of them is out of date.
+"""
+
+from __future__ import annotations
+
+import argparse
+import enum
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from chute_ros.supervisor import lease, machine
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.state_drawing import drawing
+
+TEXT, PICTURE = Path("docs/states.md"), Path("docs/states.svg")
+#: Stages that are meant never to be left, or never to be reached from STARTUP: none is.
+MAY_BE_FINAL: frozenset[Stage] = frozenset()
+MAY_BE_UNREACHED: frozenset[Stage] = frozenset()
+
+_HEAD = """\
+# States
+
+Written by `make docs` from the tables in `chute_ros/supervisor/machine.py` and
+`chute_ros/supervisor/lease.py`. A pair of state and stimulus that a table does not list is an
+error of the program: it raises `TransitionError`.
+
+## The vehicle
+
+![The stages of a flight and what leads from one to the next](states.svg)
+
+A supervisor begins in STARTUP.
+"""
+_LEASE = """\
+## Which of several supervisors leads
+
+One that runs alone begins as LEADING; one of several begins as FOLLOWING and looks for a leader.
+"""
+
+
+def states_text() -> str:
+    """The whole of docs/states.md."""
+    parts = [
+        _HEAD,
+        _mermaid(machine.TRANSITIONS, first=Stage.STARTUP.name),
+        _table(machine.Stage, machine.Stimulus, machine.TRANSITIONS),
+        _meanings(machine.Stimulus, "stimulus"),
+        _LEASE,
+        _mermaid(lease.TRANSITIONS),
+        _table(lease.Role, lease.Event, lease.TRANSITIONS),
+        _meanings(lease.Event, "event"),
+    ]
+    return "\n".join(parts)
+
+
+def unreached(transitions: Mapping[tuple[Stage, machine.Stimulus], Stage]) -> set[Stage]:
+    """The stages to which nothing leads from STARTUP."""
+    reached, new = {Stage.STARTUP}, {Stage.STARTUP}
+    while new:
+        new = {after for (before, _), after in transitions.items() if before in new} - reached
+        reached |= new
+    return set(Stage) - reached
+
+
+def never_left(transitions: Mapping[tuple[Stage, machine.Stimulus], Stage]) -> set[Stage]:
+    """The stages from which nothing leads to another."""
+    return set(Stage) - {before for (before, _), after in transitions.items() if after != before}
+
+
+def main() -> None:
+    """Write, or check, the files of the repository in the present folder."""
+    options = argparse.ArgumentParser("state_diagram", description=__doc__)
+    options.add_argument("--check", action="store_true", help="write nothing")
+    check = options.parse_args().check
+    texts = {TEXT: states_text(), PICTURE: drawing()}
+    old = [str(p) for p, text in texts.items() if not p.is_file() or p.read_text() != text]
+    if check and old:
+        sys.exit(f"out of date: {', '.join(old)}; run: make docs")
+    if not check:
+        for path, text in texts.items():
+            path.write_text(text)
+
+
+def _mermaid(transitions: Mapping[tuple[enum.Enum, enum.Enum], enum.Enum], first: str = "") -> str:
+    lines = ["```mermaid", "stateDiagram-v2"]
+    lines += [f"    [*] --> {first}"] if first else []
+    lines += [
+        f"    {before.name} --> {after.name}: {stimulus.name}"
+        for (before, stimulus), after in transitions.items()
+    ]
+    return "\n".join([*lines, "```", ""])
+
+
+def _table(
+    states: type[enum.Enum],
+    stimuli: type[enum.Enum],
+    transitions: Mapping[tuple[enum.Enum, enum.Enum], enum.Enum],
+) -> str:
+    """One row a stimulus, one column a state; a dash: the pair is not listed."""
+    names = [state.name for state in states]
+    lines = [f"| | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
+    for stimulus in stimuli:
+        after = [transitions.get((state, stimulus)) for state in states]
+        cells = [one.name if one is not None else "-" for one in after]
+        lines.append(f"| {stimulus.name} | {' | '.join(cells)} |")
+    return "\n".join([*lines, ""])
+
+
+def _meanings(stimuli: type[enum.Enum], what: str) -> str:
+    lines = [f"| {what} | meaning |", "|---|---|"]
+    lines += [f"| {one.name} | {one.value} |" for one in stimuli]
+    return "\n".join([*lines, ""])
+
+
+if __name__ == "__main__":
+    main()

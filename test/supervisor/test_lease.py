@@ -1,0 +1,204 @@
+"""Of several supervisors one leads: who takes over, who yields, and under which number."""
+
+import math
+from dataclasses import replace
+from itertools import product
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
+from chute_ros.supervisor.lease import (
+    TRANSITIONS,
+    Claim,
+    Event,
+    Lease,
+    LeaseConfig,
+    Role,
+    next_role,
+)
+
+FIRST = LeaseConfig("a", 0, standby=True, timeout=0.5, listen=4.0)
+SECOND = LeaseConfig("b", 1, standby=True, timeout=0.5, listen=4.0)
+T = 1000.0
+
+
+def claim(name: str, rank: int, epoch: int, leading: bool = True, empty: bool = False) -> Claim:
+    return Claim(name, rank, epoch, leading, empty)
+
+
+def leading(config: LeaseConfig, since: float = T) -> Lease:
+    return Lease(Role.LEADING, since, looked_at=since)
+
+
+def following(config: LeaseConfig, heard: float = T) -> Lease:
+    return Lease(Role.FOLLOWING, T - 10.0, looked_at=heard, leader="a", leader_heard=heard)
+
+
+@pytest.mark.parametrize(("role", "event"), list(product(Role, Event)))
+def test_a_pair_that_the_table_does_not_list_raises(role: Role, event: Event) -> None:
+    if (role, event) in TRANSITIONS:
+        assert next_role(role, event) is TRANSITIONS[role, event]
+    else:
+        with pytest.raises(TransitionError, match=event.value):
+            next_role(role, event)
+
+
+def test_one_that_is_alone_leads_at_once_however_long_it_slept() -> None:
+    alone = LeaseConfig("a")
+    lease = Lease.begin(alone, T)
+    assert lease.role is Role.LEADING
+    assert lease.deadline(alone) == math.inf
+    lease, event = lease.looked(alone, T)
+    lease, event = lease.looked(alone, T + 60.0)
+    assert (lease.role, event) == (Role.LEADING, None)
+
+
+def test_one_of_several_that_starts_looks_for_a_leader_before_it_leads() -> None:
+    lease = Lease.begin(FIRST, T)
+    assert lease.role is Role.FOLLOWING
+    assert lease.deadline(FIRST) == pytest.approx(T + 4.5)
+    event = None
+    for tenth in range(45):
+        lease, event = lease.looked(FIRST, T + tenth * 0.1)
+        assert event is None
+    lease, event = lease.looked(FIRST, T + 4.5)
+    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+
+
+def test_one_that_starts_beside_a_leader_follows_it() -> None:
+    lease = Lease.begin(SECOND, T)
+    own = claim("b", 1, 5, leading=False, empty=True)
+    for tenth in range(100):
+        lease, event = lease.heard(SECOND, own, claim("a", 0, 8), T + tenth * 0.1)
+        assert event is None
+        lease, event = lease.looked(SECOND, T + tenth * 0.1)
+        assert event is None
+    assert (lease.role, lease.leader) == (Role.FOLLOWING, "a")
+
+
+@pytest.mark.parametrize(("config", "wait"), [(FIRST, 0.5), (SECOND, 1.0)])
+def test_silence_of_the_leader_is_a_takeover_the_first_in_rank_first(
+    config: LeaseConfig, wait: float
+) -> None:
+    lease = following(config)
+    for tenth in range(1, round(wait * 10)):
+        lease, event = lease.looked(config, T + tenth * 0.1)
+        assert event is None
+    lease, event = lease.looked(config, T + wait)
+    assert event is Event.SILENCE
+    assert lease.role is Role.LEADING
+
+
+def test_a_follower_that_was_deaf_itself_does_not_take_its_deafness_for_silence() -> None:
+    lease = following(SECOND)
+    lease, event = lease.looked(SECOND, T + 3.0)
+    assert event is None
+    # What the leader said meanwhile is read now.
+    lease, event = lease.heard(
+        SECOND, claim("b", 1, 8, leading=False), claim("a", 0, 8), T + 3.001
+    )
+    lease, event = lease.looked(SECOND, T + 3.4)
+    assert (lease.role, event) == (Role.FOLLOWING, None)
+    # And if it did fall silent, the takeover is only later.
+    for tenth in range(35, 42):
+        lease, event = lease.looked(SECOND, T + tenth * 0.1)
+    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+
+
+def test_a_leader_that_was_stopped_has_lost_its_lease() -> None:
+    lease = leading(FIRST)
+    lease, event = lease.looked(FIRST, T + 0.5)
+    assert event is None
+    lease, event = lease.looked(FIRST, T + 1.1)
+    assert (lease.role, event) == (Role.FOLLOWING, Event.OVERSLEPT)
+    # Nobody took over: it leads again after the lease's time.
+    for tenth in range(12, 17):
+        lease, event = lease.looked(FIRST, T + tenth * 0.1)
+    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+
+
+def test_of_two_that_lead_the_one_that_came_later_goes_on() -> None:
+    lease, event = leading(FIRST).heard(FIRST, claim("a", 0, 8), claim("b", 1, 9), T)
+    assert (lease.role, event, lease.leader) == (Role.FOLLOWING, Event.OUTRANKED, "b")
+    lease, event = leading(SECOND).heard(SECOND, claim("b", 1, 9), claim("a", 0, 8), T)
+    assert (lease.role, event) == (Role.LEADING, None)
+
+
+def test_one_that_knows_of_nothing_yields_to_one_that_knows_of_a_flight() -> None:
+    # It was started in flight and did not find the leader in time: its number is the higher.
+    fresh, flying = claim("b", 1, 9, empty=True), claim("a", 0, 8)
+    lease, event = leading(SECOND).heard(SECOND, fresh, flying, T)
+    assert (lease.role, event) == (Role.FOLLOWING, Event.OUTRANKED)
+    lease, event = leading(FIRST).heard(FIRST, flying, fresh, T)
+    assert (lease.role, event) == (Role.LEADING, Event.OVERTAKES)
+    assert lease.next_epoch(FIRST, 8) == 12, "above the one that devices may have seen"
+
+
+@given(
+    st.integers(0, RANKS - 1),
+    st.integers(0, RANKS - 1),
+    st.integers(0, 40),
+    st.integers(0, 40),
+    st.booleans(),
+    st.booleans(),
+)
+def test_of_two_leaders_exactly_one_yields(
+    rank: int, other_rank: int, seen: int, other_seen: int, empty: bool, other_empty: bool
+) -> None:
+    if rank == other_rank:
+        return
+    one = LeaseConfig("a", rank, standby=True)
+    other = LeaseConfig("b", other_rank, standby=True)
+    mine = claim("a", rank, epoch_above(seen, rank), empty=empty)
+    theirs = claim("b", other_rank, epoch_above(other_seen, other_rank), empty=other_empty)
+    _, first = leading(one).heard(one, mine, theirs, T)
+    _, second = leading(other).heard(other, theirs, mine, T)
+    assert (first is Event.OUTRANKED) != (second is Event.OUTRANKED)
+
+
+def test_a_follower_is_no_rival() -> None:
+    lease, event = leading(FIRST).heard(
+        FIRST, claim("a", 0, 8), claim("b", 1, 99, leading=False), T
+    )
+    assert (lease.role, event, lease.highest) == (Role.LEADING, None, 99)
+
+
+def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -> None:
+    lease, event = leading(FIRST).refused(9, T)
+    assert (lease.role, event) == (Role.FOLLOWING, Event.REFUSED)
+    for tenth in range(1, 50):
+        lease, event = lease.looked(FIRST, T + tenth * 0.1)
+        assert event is None
+    lease, event = lease.looked(FIRST, T + 5.0)
+    assert event is Event.SILENCE
+    assert lease.next_epoch(FIRST, 8) == 12
+
+
+def test_two_of_one_rank_are_noticed() -> None:
+    lease, _ = leading(FIRST).heard(FIRST, claim("a", 0, 8), claim("c", 0, 4), T)
+    assert lease.same_rank == "c"
+    lease, _ = lease.heard(FIRST, claim("a", 0, 8), claim("b", 1, 5, leading=False), T)
+    assert lease.same_rank == "c"
+
+
+@given(st.integers(0, LARGEST_EPOCH), st.integers(0, RANKS - 1))
+def test_each_rank_has_its_own_epochs_each_above_the_last(seen: int, rank: int) -> None:
+    epoch = epoch_above(seen, rank)
+    assert seen < epoch <= seen + RANKS
+    assert epoch % RANKS == rank
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"rank": 4}, "rank is 4: need 0 to 3"),
+        ({"rank": -1}, "rank is -1"),
+        ({"timeout": 0.1}, "lease_timeout is 0.1: need 0.15 to 60 s"),
+    ],
+)
+def test_a_wrong_setting_says_what_is_allowed(settings: dict[str, float], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        replace(FIRST, **settings)

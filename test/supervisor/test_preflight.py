@@ -1,0 +1,254 @@
+"""Arming runs every pre-flight check and returns each that fails, with its value and limit."""
+
+import datetime
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from story import DOWN, LINK, SINKS, STANDING, START, Story, rule, vehicle, with_rules
+
+from chute_ros.model import (
+    Action,
+    ErrorFlags,
+    LinkState,
+    ParachuteState,
+    ParachuteStatus,
+    SafetyFlags,
+    TriggerFlags,
+)
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import PreflightLimits, SupervisorConfig
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import arm_reasons, block_reasons
+from chute_ros.supervisor.rules import Clears, DeviceCondition, DeviceFact
+
+TODAY = (datetime.date(2026, 7, 1) - datetime.date(1970, 1, 1)).days
+GOOD = ParachuteStatus(
+    "1/161",
+    LinkState.OK,
+    ParachuteState.READY,
+    armed_triggers=TriggerFlags.ATS_AUTO_ARM,
+    backup_voltage=4.0,
+    packed_date="2026-06-01",
+)
+STRICT = PreflightLimits(
+    require_pack_date=True,
+    require_self_arm=True,
+    min_battery_voltage=21.0,
+    min_backup_voltage=3.5,
+)
+
+
+def standing(limits: PreflightLimits = STRICT, **told: Any) -> Story:
+    """On the ground with healthy links."""
+    story = Story(SupervisorConfig(preflight=limits))
+    battery = {"battery_remaining": 0.9, "battery_voltage": 24.0, "battery_age": 0.0}
+    state = replace(STANDING, **{**battery, **told})
+    story.at(0.0, story.heartbeat(), i.VehicleReport(state), i.ParachuteReport(LINK, GOOD))
+    return story
+
+
+def reasons(story: Story, day: int = TODAY) -> tuple[str, ...]:
+    return arm_reasons(story.config, story.state, day, START + story.t)
+
+
+def with_device(limits: PreflightLimits = STRICT, **changes: Any) -> Story:
+    """Standing, with a parachute that tells something else."""
+    story = standing(limits)
+    story.at(0.0, i.ParachuteReport(LINK, replace(GOOD, **changes)))
+    return story
+
+
+def test_when_all_is_well_it_arms() -> None:
+    story = standing()
+    assert reasons(story) == ()
+    outputs = story.at(0.1, i.ArmRequest(1, True, 0, TODAY))
+    assert i.ArmDevices(1, True, 0, (LINK,)) in outputs
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"state": ParachuteState.NOT_READY}, "its state is NOT_READY (need READY, TAKEOFF or"),
+        ({"state": ParachuteState.UNKNOWN}, "its state is UNKNOWN"),
+        ({"state": ParachuteState.ABNORMAL}, "its state is ABNORMAL"),
+        ({"deployed": True}, "it is released"),
+        (
+            {"error_flags": ErrorFlags.LOW_POWER | ErrorFlags.IMU_ERROR},
+            "errors IMU_ERROR, LOW_POWER (need none)",
+        ),
+        ({"error_flags": ErrorFlags(1 << 30)}, "errors bit 30 (need none)"),
+        ({"packed_date": ""}, "no pack date (need one)"),
+        ({"packed_date": "last spring"}, "no pack date (need one)"),
+        ({"packed_date": "2025-06-30"}, "packed on 2025-06-30, 366 days ago (limit 365)"),
+        ({"packed_date": "2026-07-03"}, "packed on 2026-07-03, 2 days from now"),
+        ({"armed_triggers": TriggerFlags.ATS}, "ATS_AUTO_ARM is off (need on: it arms itself"),
+        (
+            {"safety_flags": SafetyFlags.GROUND_CLEARED},
+            "GROUND_CLEARED is set on the ground (need not set)",
+        ),
+        ({"backup_voltage": 3.49}, "backup voltage 3.49 V (need 3.5 V)"),
+    ],
+)
+def test_what_is_wrong_with_a_device_is_said_in_words(changes: dict[str, Any], words: str) -> None:
+    told = reasons(with_device(**changes))
+    assert len(told) == 1
+    assert told[0].startswith(f"{LINK} 1/161: {words}")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"state": ParachuteState.TAKEOFF},
+        {"state": ParachuteState.ARMED},
+        {"packed_date": "2025-07-01"},
+        {"packed_date": "2026-07-02"},  # made where the day has begun
+        {"safety_flags": SafetyFlags.ON_GROUND},
+        {"backup_voltage": 3.5},
+        {"backup_voltage": math.nan},  # it does not say
+    ],
+)
+def test_what_is_just_right_is_nothing_against_it(changes: dict[str, Any]) -> None:
+    assert reasons(with_device(**changes)) == ()
+
+
+@pytest.mark.parametrize(
+    ("limits", "changes"),
+    [
+        ({"require_pack_date": False}, {"packed_date": ""}),
+        ({"max_pack_age": 0}, {"packed_date": "1999-01-01"}),
+        ({"require_self_arm": False}, {"armed_triggers": TriggerFlags(0)}),
+        ({"forbid_ground_cleared": False}, {"safety_flags": SafetyFlags.GROUND_CLEARED}),
+        ({"min_backup_voltage": 0.0}, {"backup_voltage": 0.0}),
+    ],
+)
+def test_each_check_can_be_left_out(limits: dict[str, Any], changes: dict[str, Any]) -> None:
+    assert reasons(with_device(replace(STRICT, **limits), **changes)) == ()
+
+
+def test_where_today_is_not_known_the_age_of_the_pack_is_not_held_against_it() -> None:
+    assert reasons(with_device(packed_date="1999-01-01"), day=-1) == ()
+
+
+def test_a_wall_clock_that_was_never_set_is_named() -> None:
+    told = reasons(standing(), day=0)
+    assert "the wall clock says 1970-01-01 (need 2024-01-01 or later)" in told
+
+
+def test_a_device_that_is_lost_is_told_of_by_its_link_not_by_its_last_words() -> None:
+    story = with_device(error_flags=ErrorFlags.LOW_POWER, link_state=LinkState.LOST)
+    assert reasons(story) == ()
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        ({"battery_remaining": 0.29}, "battery_remaining 0.29 (need 0.3)"),
+        ({"battery_voltage": 20.9}, "battery_voltage 20.90 V (need 21 V)"),
+    ],
+)
+def test_an_empty_battery_is_said_with_its_limit(told: dict[str, float], words: str) -> None:
+    assert reasons(standing(**told)) == (words,)
+
+
+def test_a_full_battery_and_one_that_is_not_told_are_nothing_against_it() -> None:
+    assert reasons(standing(battery_remaining=0.3, battery_voltage=21.0)) == ()
+    assert reasons(standing(battery_age=math.nan)) == ()
+
+
+@pytest.mark.parametrize("difference", [0.26, -0.26])
+def test_a_clock_that_differs_is_said_with_its_limit(difference: float) -> None:
+    story = standing()
+    beat = i.LinkHeartbeat(LINK, LinkState.OK, True, 9, clock_difference=difference)
+    story.at(0.1, beat)
+    assert reasons(story) == (f"{LINK}: its clock differs by {difference:+.3f} s (limit 0.25 s)",)
+    story.at(0.2, replace(beat, seq=10, clock_difference=0.25))
+    assert reasons(story) == ()
+
+
+@pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
+def test_the_mode_is_named(mode: i.Mode) -> None:
+    story = standing()
+    story.at(0.0, i.ModeRequest(1, mode, force=False))
+    assert f"supervisor mode is {mode.name} (need ACTIVE)" in reasons(story)
+
+
+def test_a_vehicle_that_moves_is_not_armed() -> None:
+    story = standing(vertical_speed=-3.0, vertical_speed_age=0.0)
+    (told,) = reasons(story)
+    assert told == "the vehicle moves: vertical_speed -3.0 m/s (nothing on the ground beyond 2)"
+
+
+def test_every_reason_is_told_at_once() -> None:
+    story = with_device(state=ParachuteState.ABNORMAL, error_flags=ErrorFlags.GPS_ERROR)
+    story.at(0.1, i.ModeRequest(1, i.Mode.SHADOW, force=False), story.heartbeat(healthy=False))
+    story.at(0.2, i.BlockRequest("upf_can", "33", True, "ABNORMAL"))
+    story.at(3.0, i.ArmRequest(2, True, 0, 0))
+    message = story.answer(2).message
+    for words in (
+        "refused: ",
+        f"{LINK}: LOST, heartbeat of its node 2.90 s old (limit 0.5 s)",
+        "upf_can 33 asks to block flight: ABNORMAL",
+        "vehicle/state: armed or not is 3.0 s old (limit 2.5 s)",
+        "supervisor mode is SHADOW (need ACTIVE)",
+        "the vehicle is BLOCKED (need READY)",
+        "the wall clock says 1970-01-01",
+        "1/161: its state is ABNORMAL",
+        "1/161: errors GPS_ERROR",
+    ):
+        assert words in message
+
+
+def test_a_regained_link_is_not_yet_good_enough_to_arm() -> None:
+    story = standing()
+    story.at(5.0, story.heartbeat(), i.VehicleReport(STANDING))
+    assert f"{LINK}: REGAINED, heard again for 0.00 s (need 1 s)" in reasons(story)
+
+
+def test_disarming_needs_only_the_ground() -> None:
+    story = standing()
+    story.at(5.0)
+    assert story.state.stage is Stage.BLOCKED
+    outputs = story.at(5.1, i.ArmRequest(1, False, 0))
+    assert i.ArmDevices(1, False, 0, (LINK,)) in outputs
+
+
+# -- rules that block flight ---------------------------------------------------------------------
+
+LOW = rule(
+    replace(SINKS, measurement="battery_voltage", below=22.0),
+    action=Action.FLIGHT_BLOCK,
+    states=(Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED),
+    clears=Clears.BY_ITSELF,
+    name="low battery",
+    says="land and charge",
+)
+
+
+def test_a_rule_may_block_flight_at_once_and_releases_it_by_itself() -> None:
+    story = Story(with_rules(LOW)).ready()
+    outputs = story.at(0.1, vehicle(**DOWN, battery_voltage=21.0))
+    assert story.state.stage is Stage.BLOCKED
+    assert any(isinstance(o, i.Decide) for o in outputs), "not only at the next update"
+    told = block_reasons(story.config, story.state, START + story.t)
+    assert told == ("rule 'low battery': land and charge",)
+    story.at(0.2, story.heartbeat(), vehicle(**DOWN, battery_voltage=23.0))
+    assert story.state.stage is Stage.READY
+    assert "rule 'low battery' has cleared" in story.said()
+
+
+def test_a_rule_without_words_blocks_all_the_same() -> None:
+    story = Story(with_rules(replace(LOW, says=""))).ready()
+    story.at(0.1, vehicle(**DOWN, battery_voltage=21.0))
+    told = block_reasons(story.config, story.state, START + story.t)
+    assert told == ("rule 'low battery': fulfilled",)
+
+
+def test_a_rule_of_another_action_blocks_nothing() -> None:
+    broken = rule(DeviceCondition(DeviceFact.ABNORMAL), action=Action.NONE, states=(Stage.READY,))
+    story = Story(with_rules(broken)).ready()
+    abnormal = replace(GOOD, state=ParachuteState.ABNORMAL)
+    story.at(0.1, i.ParachuteReport(LINK, abnormal))
+    assert story.state.stage is Stage.READY
+    assert len(story.alarms()) == 1

@@ -1,0 +1,144 @@
+"""A flight decided by the real core and recorded by the real black box, as fast as it goes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from chute_msgs.msg import SafetyState
+
+from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
+from chute_ros.nodes.black_box import BlackBox
+from chute_ros.nodes.box_folder import BoxFolder
+from chute_ros.nodes.recorded_topics import recorded_topics
+from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.core import update
+from chute_ros.supervisor.state import State
+
+LINK = "mavlink_parachute"
+NAMESPACE = "/drone1"
+#: Monotonic s and Unix ns at the start.
+START, WALL = 1000.0, 1_780_000_000 * 10**9
+#: What the core is told ten times a second.
+STEP = 0.1
+FALLS_AT, DEPLOY_AT, END = 6.0, 7.0, 12.0
+
+
+def plain_config() -> SupervisorConfig:
+    """As the node has it without any settings, but nothing fires by itself."""
+    values = {one.name: one.default for one in PARAMETERS}
+    return config_from({**values, "profile": "by_hand"})
+
+
+class Namespace:
+    """What the black box asks of a node."""
+
+    def resolve_topic_name(self, name: str) -> str:
+        return name if name.startswith("/") else f"{NAMESPACE}/{name}"
+
+
+class Flight:
+    """On the ground from 0 s, in the air from 2 s; it falls from 6 s, a person deploys at 7 s."""
+
+    def __init__(self, folder: Path, config: SupervisorConfig | None = None, **box: Any) -> None:
+        self.folder = folder
+        self.t = 0.0
+        self.config = config or plain_config()
+        self.state = State(epoch=7, started_at=START)
+        self.reason = "it falls"
+        limit, most = box.pop("limit", 64_000_000), box.pop("most_files", 32)
+        self.box = BlackBox(
+            BoxFolder(str(folder), f"{NAMESPACE}/safety_supervisor", most),
+            recorded_topics(Namespace()),
+            limit,
+            wall=lambda: WALL + round(self.t * 1e9),
+        )
+        self.outputs: list[i.Output] = []
+        self._seq = 0
+        self._due: list[tuple[float, i.ActionReport]] = []
+
+    def turn(self, *inputs: i.Input) -> None:
+        """One update of the core, recorded."""
+        before = self.state
+        self.state, outputs = update(self.config, before, inputs, START + self.t)
+        self.box.turn(START + self.t, inputs, outputs, before, self.config)
+        self.outputs += outputs
+        for output in outputs:
+            if isinstance(output, i.Decide) and not output.again:
+                self._answer(output)
+
+    def fly(self, until: float = END) -> Flight:
+        """Go on to this moment, s from the start."""
+        while self.t < until - 1e-9:
+            inputs: list[i.Input] = [self._heartbeat(), i.VehicleReport(self._vehicle())]
+            inputs += [report for due, report in self._due if due <= self.t]
+            self._due = [one for one in self._due if one[0] > self.t]
+            if abs(self.t - DEPLOY_AT) < STEP / 2:
+                inputs.append(i.DeployRequest(1, False, self.reason))
+            self.turn(*inputs)
+            self._publish_state()
+            self.t = round(self.t + STEP, 6)
+        return self
+
+    def land(self) -> Path:
+        """End the recording; the newest file."""
+        self.box.close()
+        return self.files()[-1]
+
+    def files(self) -> list[Path]:
+        return sorted(self.folder.glob("*.mcap"))
+
+    def decided(self) -> list[Action]:
+        """What was decided, each once, in this order."""
+        decides = (one for one in self.outputs if isinstance(one, i.Decide) and not one.again)
+        return [one.decision.action for one in decides]
+
+    def _heartbeat(self) -> i.LinkHeartbeat:
+        self._seq += 1
+        return i.LinkHeartbeat(LINK, LinkState.OK, True, self._seq)
+
+    def _vehicle(self) -> VehicleState:
+        flying = 2.0 <= self.t < 10.0
+        height = min(40.0, (self.t - 2.0) * 10.0)
+        speed = 10.0 if height < 40.0 else 0.0
+        if self.t >= FALLS_AT:
+            height, speed = max(0.0, 40.0 - (self.t - FALLS_AT) * 12.0), -12.0
+        return VehicleState(
+            source="1/1",
+            link_state=LinkState.OK,
+            armed=Armed.ARMED if flying else Armed.DISARMED,
+            armed_age=0.0,
+            landed_state=LandedState.IN_AIR if flying else LandedState.ON_GROUND,
+            landed_state_age=0.0,
+            height=height if flying else 0.0,
+            height_age=0.0,
+            vertical_speed=speed if flying else 0.0,
+            vertical_speed_age=0.0,
+        )
+
+    def _answer(self, output: i.Decide) -> None:
+        """The device carries out what was decided, step by step."""
+        decision = output.decision
+        for number, outcome in enumerate((Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED)):
+            report = i.ActionReport(
+                decision.epoch, decision.id, LINK, outcome, f"step {number}", decision.epoch
+            )
+            self._due.append((self.t + 0.05 + 0.1 * number, report))
+
+    def _publish_state(self) -> None:
+        message = SafetyState(epoch=7, state=int(self.state.stage), links=[LINK])
+        message.link_states, message.devices_healthy = [int(LinkState.OK)], [True]
+        message.link_ages = [0.0]
+        self.box.message("safety/state", message)
+
+
+def run(main: Any, monkeypatch: Any, *arguments: object) -> int:
+    """Call the main function of a tool as from the command line; its exit code."""
+    monkeypatch.setattr("sys.argv", ["tool", *map(str, arguments)])
+    try:
+        main()
+    except SystemExit as end:
+        return int(end.code or 0)
+    return 0

@@ -1,0 +1,156 @@
+"""What was recorded is read back, whatever became of the file."""
+
+import random
+import zlib
+
+import pytest
+from chute_msgs.msg import SafetyState
+from flight_bench import END, NAMESPACE, START, STEP, WALL, Flight
+from mcap.writer import Writer
+
+from chute_ros.errors import RecordError
+from chute_ros.supervisor import inputs as i
+from chute_ros.tools.mcap_entries import McapEntries
+from chute_ros.tools.recording import files_of, read
+
+KINDS = {"safety/state": SafetyState}
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    one = Flight(tmp_path_factory.mktemp("flight")).fly()
+    one.land()
+    return one
+
+
+@pytest.fixture(scope="module")
+def whole(flight):
+    return flight.files()[0].read_bytes()
+
+
+def turns_of(path, data):
+    path.write_bytes(data)
+    try:
+        return len(read([path], {}).turns)
+    except RecordError:
+        return 0
+
+
+def test_every_turn_and_message_comes_back_in_its_order(flight):
+    recording = read(flight.files(), KINDS)
+    assert recording.remarks == []
+    assert recording.namespace == NAMESPACE
+    turns = recording.turns
+    assert len(turns) == round(END / STEP)
+    assert [one.number for one in turns] == list(range(1, len(turns) + 1))
+    assert turns[0].wall == WALL
+    assert turns[0].turn.now == START
+    assert [output for one in turns for output in one.turn.outputs] == flight.outputs
+    assert turns[0].config == flight.config
+    assert turns[0].state is not None
+    assert turns[1].state is None, "the state is written at the beginning, not each time"
+    assert len(recording.messages["safety/state"]) == len(turns)
+
+
+def test_what_is_not_asked_for_is_not_taken_apart(flight):
+    assert read(flight.files(), {}).messages == {}
+
+
+def test_a_folder_stands_for_its_files_in_their_order(flight):
+    assert files_of([flight.folder]) == flight.files()
+    assert files_of(flight.files()) == flight.files()
+
+
+def test_a_folder_without_files_is_told(tmp_path):
+    with pytest.raises(RecordError, match=r"there is no \.mcap file in it"):
+        files_of([tmp_path])
+
+
+def test_a_file_cut_anywhere_near_its_end_or_elsewhere_is_read_as_far_as_it_goes(
+    whole, tmp_path, flight
+):
+    all_turns = round(END / STEP)
+    tail = range(len(whole) - 4096, len(whole), 23)
+    ends = [*tail, *random.Random(1).sample(range(len(whole)), 60)]
+    previous = 0
+    for end in sorted(ends):
+        turns = turns_of(tmp_path / "cut.mcap", whole[:end])
+        assert previous <= turns <= all_turns, f"cut at {end}: a longer file never tells less"
+        previous = turns
+    assert previous == all_turns, "what follows the last chunk is only the index"
+
+
+def test_a_cut_file_is_told_to_be_one(whole, tmp_path):
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(whole[: len(whole) * 3 // 4])
+    entries = McapEntries(path)
+    assert list(entries)
+    assert [remark for remark in entries.remarks if "ends in the middle" in remark]
+
+
+def test_zeros_at_the_end_as_some_disks_leave_them_are_no_harm(whole, tmp_path):
+    turns = turns_of(tmp_path / "zeros.mcap", whole + bytes(5000))
+    assert turns == round(END / STEP)
+
+
+def test_bytes_that_changed_cost_what_is_around_them_and_raise_nothing_else(whole, tmp_path):
+    chance = random.Random(2)
+    for _ in range(60):
+        data = bytearray(whole)
+        for _ in range(chance.randint(1, 4)):
+            data[chance.randrange(len(data))] ^= chance.randint(1, 255)
+        turns_of(tmp_path / "changed.mcap", bytes(data))
+
+
+@pytest.mark.parametrize("data", [b"", b"no mcap at all", bytes(100), b"\x89MCAP0\r\n"])
+def test_what_is_no_recording_is_told_in_one_line(data, tmp_path):
+    path = tmp_path / "wrong.mcap"
+    path.write_bytes(data)
+    with pytest.raises(RecordError, match="is no MCAP file") as caught:
+        read([path], {})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(RecordError, match="No such file"):
+        read([tmp_path / "nothing.mcap"], {})
+
+
+def test_a_file_of_somebody_else_has_no_turns(tmp_path):
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/chatter", "cdr", schema)
+        writer.add_message(channel, 1, b"\0\1\0\0\1\0\0\0\0", 1)
+        writer.finish()
+    with pytest.raises(RecordError, match="no turn of a supervisor"):
+        read([path], {})
+
+
+def forged(path, topic, schema_name, metadata, data):
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        schema = writer.register_schema(schema_name, "ros2msg", b"")
+        channel = writer.register_channel(topic, "cdr", schema, metadata)
+        writer.add_message(channel, 1, data, 1)
+        writer.finish()
+
+
+def test_a_recording_of_another_version_is_told(tmp_path):
+    path = tmp_path / "old.mcap"
+    about = {"topic_type_hash": "RIHS01_" + zlib.crc32(b"old").to_bytes(4, "big").hex()}
+    forged(path, "/safety/record", "chute_msgs/msg/SupervisorRecord", about, b"")
+    with pytest.raises(RecordError, match="another version of chute_msgs"):
+        read([path], {})
+
+
+def test_inputs_that_this_version_does_not_know_are_told(flight, tmp_path, monkeypatch):
+    from chute_ros.supervisor.codec import Codec
+    from chute_ros.tools import recording
+
+    monkeypatch.setattr(recording, "CODEC", Codec(i.DeployRequest))
+    with pytest.raises(RecordError, match=r"class \w+ is not known: written by another version"):
+        read(flight.files(), {})
