@@ -42,8 +42,9 @@ build: ## build both packages
 lint: ## ruff, mypy and the import rule
 	@$(UNDERLAY) && exec scripts/lint.sh
 
-docs: build ## write the parameter tables of README.md and config/ anew
-	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m chute_ros.tools.parameter_docs
+docs: build ## write README.md's tables, config/ and docs/states.* anew
+	@$(OVERLAY) && export PYTHONPATH="$$PWD:$$PYTHONPATH" \
+	    && python3 -m chute_ros.tools.parameter_docs && python3 -m chute_ros.tools.state_diagram
 
 lock: ## refresh requirements/*.lock
 	@$(UNDERLAY) && exec scripts/lock.sh

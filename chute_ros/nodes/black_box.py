@@ -52,6 +52,7 @@ class BlackBox:
         self._wall = wall
         self._waiting: deque[Kept | KeptTurn] = deque()
         self._turns = self._left_out = self._lost = self._unwritable = self._written = 0
+        self._after: State | None = None
         self._error = self._last_error = ""
         #: Until when everything that came was written, and is on the disk; monotonic s.
         self._taken_until = self._kept_until = time.monotonic()
@@ -76,11 +77,14 @@ class BlackBox:
         inputs: tuple[i.Input, ...],
         outputs: tuple[i.Output, ...],
         before: State,
+        after: State,
         config: SupervisorConfig,
     ) -> None:
         """Keep a turn of the core: when (monotonic s), what came, what came of it, what was
-        remembered before it and the settings."""
-        self._turns += 1
+        remembered before and after it and the settings."""
+        # What changed between two turns is no turn: the missing number tells of it.
+        self._turns += 1 if before is self._after else 2
+        self._after = after
         if len(self._waiting) >= MOST_WAITING:
             self._left_out += 1
         else:

@@ -44,7 +44,8 @@ class Kept(NamedTuple):
 
 
 class KeptTurn(NamedTuple):
-    """A turn of the core; number: rises by one with each, whether it is kept or not."""
+    """A turn of the core; number: rises by one with each, whether it is kept or not, and by one
+    more where what is remembered was changed in between."""
 
     time: int
     number: int

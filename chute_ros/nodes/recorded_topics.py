@@ -11,6 +11,7 @@ from chute_msgs.msg import (
     SafetyDecision,
     SafetyRequest,
     SafetyState,
+    SupervisorLease,
     SupervisorRecord,
     Telem,
     TriggerStatus,
@@ -27,14 +28,15 @@ from chute_ros.nodes.mcap_file import Topic
 _OWN: dict[str, tuple[Any, Any]] = {
     "safety/heartbeat": (LinkHeartbeat, qos.STATUS),
     "parachute/status": (ParachuteStatus, qos.STATUS),
-    "vehicle/state": (VehicleState, qos.STATUS),
     "safety/request": (SafetyRequest, qos.STATUS),
     "safety/action": (ActionReport, qos.DECISION),
     "safety/decision": (SafetyDecision, qos.DECISION),
     "safety/state": (SafetyState, qos.LATCHED),
 }
-#: What is heard only to be kept.
+#: What is heard only to be kept, or elsewhere as well.
 BESIDES: dict[str, tuple[Any, Any]] = {
+    "vehicle/state": (VehicleState, qos.STATUS),
+    "safety/lease": (SupervisorLease, qos.STATUS),
     "upf/trigger_status": (TriggerStatus, qos.STATUS),
     "umbilical/telem": (Telem, qos.STATUS),
     "/diagnostics": (DiagnosticArray, qos.STATUS),

@@ -111,17 +111,13 @@ class SafetySupervisorNode(Node):
         """Give the core what came, do what it says, sleep until its next deadline."""
         now = time.monotonic()
         self.lease.look(now)
-        try:
-            before = self.state
-            self.state, outputs = update(self.config, before, new, now)
-        except Exception as error:  # noqa: BLE001 - the loop must go on, and say so
-            self._health.failed(error, new)
-            self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
-            if not new:
-                # The core cannot even look at the clock: silence tells everybody.
-                self._sleep(now + HEARTBEAT_INTERVAL)
-                return
-            outputs = ()
+        outputs = self._update(new, now)
+        if outputs is None and new:
+            outputs = self._update((), now)
+        if outputs is None:
+            # The core cannot even look at the clock: silence tells everybody.
+            self._sleep(now + HEARTBEAT_INTERVAL)
+            return
         self._carry_out(outputs, now)
         self._arming.give_up(now)
         if now >= self._beat_at:
@@ -130,6 +126,18 @@ class SafetySupervisorNode(Node):
             self._publish_state(now)
         deadline = next_deadline(self.config, self.state, now)
         self._sleep(min(deadline, self.lease.deadline(), self._beat_at))
+
+    def _update(
+        self, new: tuple[inputs.Input, ...], now: float
+    ) -> tuple[inputs.Output, ...] | None:
+        """One turn of the core; None: it failed, the state is as before, and it was reported."""
+        try:
+            self.state, outputs = update(self.config, self.state, new, now)
+        except Exception as error:  # noqa: BLE001 - the loop must go on, and say so
+            self._health.failed(error, new)
+            self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
+            return None
+        return outputs
 
     def _sleep(self, wake: float) -> None:
         self._timer.timer_period_ns = max(1_000_000, int((wake - time.monotonic()) * 1e9))

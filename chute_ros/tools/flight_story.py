@@ -9,11 +9,13 @@ import typing
 from dataclasses import dataclass, field
 
 from chute_ros.model import Action, Decision
+from chute_ros.nodes.messages import decision_from
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.recording import Recording
 from chute_ros.tools.stage_tones import ACTION_TONES, OUTCOME_TONES
 from chute_ros.tools.timeline_rows import Mark
 
+DECISION = "safety/decision"
 #: The inputs by which somebody asks for something.
 _REQUESTS = tuple(kind for kind in typing.get_args(i.Input) if kind.__name__.endswith("Request"))
 
@@ -98,9 +100,10 @@ class FlightStory:
 
 
 def tell(recording: Recording) -> FlightStory:
-    """The story of a recording."""
+    """The story of a recording, of which DECISION was read as well."""
     story = FlightStory()
-    decided: dict[tuple[int, int], Decided] = {}
+    decided = _published(recording)
+    in_turns: set[tuple[int, int]] = set()
     waiting: dict[int, Asked] = {}
     for recorded in recording.turns:
         at = recording.seconds(recorded.wall)
@@ -116,17 +119,18 @@ def tell(recording: Recording) -> FlightStory:
         for output in recorded.turn.outputs:
             if isinstance(output, i.Decide):
                 key = (output.decision.epoch, output.decision.id)
-                if key in decided:
+                if key in in_turns:
                     decided[key].again += 1
                 else:
+                    in_turns.add(key)
                     decided[key] = Decided(at, output.decision)
-                    story.decisions.append(decided[key])
             elif isinstance(output, i.Finish):
                 answered = waiting.pop(output.token, None)
                 if answered is not None:
                     answered.answer = (at - answered.at, output)
             elif isinstance(output, i.Say):
                 story.said.append((at, output))
+    story.decisions += sorted(decided.values(), key=lambda one: one.at)
     return story
 
 
@@ -141,6 +145,16 @@ def fields_of(one: object) -> str:
             value = value.name
         told.append(f"{each.name.replace('_', ' ')}: {value}")
     return ", ".join(told)
+
+
+def _published(recording: Recording) -> dict[tuple[int, int], Decided]:
+    """By what was said on the topic: what is decided at a takeover is in no turn."""
+    found: dict[tuple[int, int], Decided] = {}
+    for wall, message in recording.messages.get(DECISION, []):
+        decision = decision_from(message)
+        key = (decision.epoch, decision.id)
+        found.setdefault(key, Decided(recording.seconds(wall), decision))
+    return found
 
 
 def _report(decided: Decided | None, at: float, report: i.ActionReport) -> None:

@@ -10,10 +10,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from chute_msgs.msg import SafetyState
+from chute_msgs.msg import SafetyDecision, SafetyState
 
 from chute_ros.errors import ChuteError
-from chute_ros.tools.flight_story import tell
+from chute_ros.tools.flight_story import DECISION, tell
 from chute_ros.tools.plain_text import plain
 from chute_ros.tools.recording import files_of, read
 from chute_ros.tools.replay_picture import vehicle_curves
@@ -65,7 +65,7 @@ def _report(paths: list[Path], output: Path | None) -> Path:
 
 def report(files: list[Path]) -> str:
     """The page of these files; RecordError if they cannot be read."""
-    recording = read(files, {STATE: SafetyState})
+    recording = read(files, {STATE: SafetyState, DECISION: SafetyDecision})
     story = tell(recording)
     pictures = recording.messages.get(STATE, [])
     states = [(recording.seconds(wall), state) for wall, state in pictures]

@@ -15,8 +15,8 @@ from chute_ros.supervisor.orders import ON_GROUND
 
 Point = tuple[float, float]
 
-_WIDTH, _HEIGHT = 1180, 760
-_BOX = (128.0, 42.0)
+_WIDTH, _HEIGHT = 1170, 740
+_BOX = (132.0, 52.0)
 #: The middle of each box.
 _PLACES: dict[Stage, Point] = {
     Stage.STARTUP: (110, 190),
@@ -36,17 +36,22 @@ _FRAME = (20.0, 35.0, 870.0, 365.0)
 _CORNERS: dict[tuple[Stage, Stage], tuple[Point, ...]] = {
     (Stage.LANDED, Stage.BLOCKED): ((780, 85),),
     (Stage.LANDED, Stage.READY): ((780, 295),),
-    (Stage.IN_FLIGHT, Stage.DEPLOYED): ((1000, 400), (150, 400)),
+    (Stage.IN_FLIGHT, Stage.DEPLOYED): ((1030, 420), (150, 420)),
     (Stage.FAULT, Stage.DEPLOYED): ((110, 690),),
     (Stage.FAULT, Stage.KILLING): ((1080, 690),),
     (Stage.DEPLOYING, Stage.DEPLOYED): ((150, 570),),
     (Stage.KILLING, Stage.DEPLOYING): ((1040, 570),),
 }
+#: Where an arrow leaves the frame, and its corner.
+_EXITS: dict[Stage, tuple[Point, Point]] = {
+    Stage.IN_FLIGHT: ((870, 85), (1080, 85)),
+    Stage.KILLING: ((870, 335), (1055, 335)),
+}
 #: Two arrows between the same boxes run this far apart.
-_APART = 16.0
+_APART = 24.0
 _STYLE = """\
   <style>
-    text { font: 12px sans-serif; text-anchor: middle; dominant-baseline: central; }
+    text { font: 12px sans-serif; text-anchor: middle; }
     .name { font-weight: bold; font-size: 13px; }
     .label, .inside { font-size: 11px; }
     .label { paint-order: stroke; stroke: white; stroke-width: 5px; }
@@ -71,7 +76,7 @@ def drawing() -> str:
         _STYLE,
         f'  <rect width="{_WIDTH}" height="{_HEIGHT}" fill="white"/>\n',
         _rectangle(_FRAME[:2], (_FRAME[2] - _FRAME[0], _FRAME[3] - _FRAME[1]), "frame"),
-        _text((445, 20), "on the ground", ""),
+        _text((445, 25), "on the ground; an arrow from the frame leaves each of them", ""),
     ]
     parts += [_arrow(_frame_path(after), names) for after, names in common.items()]
     inside: dict[Stage, list[str]] = {}
@@ -83,8 +88,9 @@ def drawing() -> str:
         elif not (before in ON_GROUND and stimulus.name in common.get(after, [])):
             between.setdefault((before, after), []).append(stimulus.name)
     for (before, after), names in between.items():
-        beside = _APART / 2 if (after, before) in between else 0.0
-        parts.append(_arrow(_path(before, after, beside), names))
+        # Of two that run side by side each has its label near its beginning.
+        beside, along = (_APART / 2, 0.3) if (after, before) in between else (0.0, 0.5)
+        parts.append(_arrow(_path(before, after, beside), names, along))
     parts += [_box(stage, inside.get(stage, [])) for stage in Stage]
     return "".join([*parts, "</svg>\n"])
 
@@ -101,10 +107,9 @@ def _common() -> dict[Stage, list[str]]:
 
 
 def _frame_path(after: Stage) -> list[Point]:
-    """From the frame's nearest side to a box."""
-    x, y = _PLACES[after]
-    start = (_FRAME[2], min(max(y, _FRAME[1] + 30), _FRAME[3] - 30))
-    return [start, _border(after, start)]
+    """From the frame to a box."""
+    leaves, corner = _EXITS[after]
+    return [leaves, corner, _border(after, corner)]
 
 
 def _path(before: Stage, after: Stage, beside: float) -> list[Point]:
@@ -113,41 +118,44 @@ def _path(before: Stage, after: Stage, beside: float) -> list[Point]:
     (x1, y1), (x2, y2) = _PLACES[before], _PLACES[after]
     length = math.hypot(x2 - x1, y2 - y1)
     dx, dy = -(y2 - y1) / length * beside, (x2 - x1) / length * beside
-    first = corners[0] if corners else (x2, y2)
-    last = corners[-1] if corners else (x1, y1)
-    ends = (_border(before, first), _border(after, last))
-    (a, b), (c, d) = ends
-    return [(a + dx, b + dy), *corners, (c + dx, d + dy)]
+    first = corners[0] if corners else (x2 + dx, y2 + dy)
+    last = corners[-1] if corners else (x1 + dx, y1 + dy)
+    shift = (0.0, 0.0) if corners else (dx, dy)
+    return [_border(before, first, shift), *corners, _border(after, last, shift)]
 
 
-def _border(stage: Stage, towards: Point) -> Point:
-    """Where an arrow meets the box: straight from a corner beside or above it, else along the
-    line to its middle."""
+def _border(stage: Stage, towards: Point, shift: Point = (0.0, 0.0)) -> Point:
+    """Where an arrow meets the box: straight from a point beside or above it, else along the
+    line to its middle, or to what lies beside the middle by shift."""
     (x, y), (px, py) = _PLACES[stage], towards
     half_width, half_height = _BOX[0] / 2, _BOX[1] / 2
     if abs(px - x) < half_width:
         return px, y + math.copysign(half_height, py - y)
     if abs(py - y) < half_height:
         return x + math.copysign(half_width, px - x), py
-    scale = min(half_width / abs(px - x), half_height / abs(py - y))
-    return x + (px - x) * scale, y + (py - y) * scale
+    mx, my = x + shift[0], y + shift[1]
+    over = (math.copysign(half_width, px - x) - shift[0]) / (px - mx)
+    beside = (math.copysign(half_height, py - y) - shift[1]) / (py - my)
+    scale = min(over, beside)
+    return mx + (px - mx) * scale, my + (py - my) * scale
 
 
-def _arrow(points: list[Point], names: list[str]) -> str:
+def _arrow(points: list[Point], names: list[str], along: float = 0.5) -> str:
     way = " ".join(f"{x:.0f},{y:.0f}" for x, y in points)
     # On the longest part there is most room for the label.
     (x1, y1), (x2, y2) = max(itertools.pairwise(points), key=lambda ends: math.dist(*ends))
+    label = (x1 + (x2 - x1) * along, y1 + (y2 - y1) * along + 4)
     line = f'  <polyline class="arrow" points="{way}"/>\n'
-    return line + _text(((x1 + x2) / 2, (y1 + y2) / 2), ", ".join(names), "label")
+    return line + _text(label, ", ".join(names), "label")
 
 
 def _box(stage: Stage, inside: list[str]) -> str:
     (x, y), (width, height) = _PLACES[stage], _BOX
     kind = "box" if stage in ON_GROUND else "box air"
     parts = [_rectangle((x - width / 2, y - height / 2), _BOX, kind)]
-    parts.append(_text((x, y - 8 if inside else y), stage.name, "name"))
-    if inside:
-        parts.append(_text((x, y + 9), ", ".join(inside), "inside"))
+    top = y + 5 - 7.5 * len(inside)
+    parts.append(_text((x, top), stage.name, "name"))
+    parts += [_text((x, top + 15 * n), line, "inside") for n, line in enumerate(inside, start=1)]
     return "".join(parts)
 
 

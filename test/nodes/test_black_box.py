@@ -8,6 +8,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+from dataclasses import replace
 
 import pytest
 from chute_msgs.msg import LinkHeartbeat, SafetyState
@@ -58,7 +59,7 @@ class Recorder:
             now, before = 1000.0 + self.turns * 0.1, self.state
             heard = (i.LinkHeartbeat("mavlink_parachute", LinkState.OK, True, self.turns),)
             self.state, outputs = update(self.config, before, heard, now)
-            self.box.turn(now, heard, outputs, before, self.config)
+            self.box.turn(now, heard, outputs, before, self.state, self.config)
 
     def beat(self, count=1, text="mavlink_parachute"):
         for _ in range(count):
@@ -294,6 +295,17 @@ def test_an_entry_that_is_no_message_costs_only_itself(recorder):
     assert recorder.box.dropped == 3
     assert "left out" in recorder.count("newest failure")
     assert replayed(recorder.files()) == (2, 0)
+
+
+def test_a_state_that_was_changed_between_turns_is_written_again(recorder):
+    recorder.turn(3)
+    recorder.state = replace(recorder.state, epoch=8)  # as by another supervisor that led
+    recorder.turn(3)
+    recorder.box.close()
+    turns = read(recorder.files(), {}).turns
+    states = [one.state.epoch if one.state else None for one in turns]
+    assert states == [7, None, None, 8, None, None]
+    assert replayed(recorder.files()) == (6, 0)
 
 
 def test_the_state_is_written_again_now_and_then(recorder):

@@ -90,7 +90,7 @@ def test_without_it_nothing_is_written_and_nothing_is_said(bench):
     folder = bench.folder / "box"
     node = bench.add(Recording, black_box=False, black_box_folder=str(folder))
     node.recorder.message("safety/record", SupervisorRecord())
-    node.recorder.turn(0.0, (), (), None, None)
+    node.recorder.turn(0.0, (), (), None, None, None)
     assert node.recorder.tasks() == []
     node.recorder.close()
     assert not folder.exists()

@@ -23,6 +23,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.profile_reader import read_profile
+from chute_ros.supervisor.record import Turn
 from chute_ros.supervisor.rules import Condition, MeasurementCondition, Profile, Rule
 from chute_ros.supervisor.state import State
 
@@ -142,6 +143,7 @@ class Story:
         self.t = 0.0
         self.seq = 0
         self.noise = 0
+        self.turns: list[Turn] = []
         self.state = State(epoch=7, started_at=START, mode=self.mode)
         self.outputs: list[tuple[float, i.Output]] = []
 
@@ -158,6 +160,7 @@ class Story:
     def _update(self, inputs: tuple[i.Input, ...], t: float) -> list[i.Output]:
         self.t = t
         self.state, outputs = update(self.config, self.state, inputs, START + t)
+        self.turns.append(Turn(START + t, inputs, outputs))
         self.outputs += [(t, output) for output in outputs]
         return list(outputs)
 

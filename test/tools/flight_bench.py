@@ -63,7 +63,7 @@ class Flight:
         """One update of the core, recorded."""
         before = self.state
         self.state, outputs = update(self.config, before, inputs, START + self.t)
-        self.box.turn(START + self.t, inputs, outputs, before, self.config)
+        self.box.turn(START + self.t, inputs, outputs, before, self.state, self.config)
         self.outputs += outputs
         for output in outputs:
             if isinstance(output, i.Decide) and not output.again:

@@ -42,7 +42,7 @@ def test_every_turn_and_message_comes_back_in_its_order(flight):
     assert recording.namespace == NAMESPACE
     turns = recording.turns
     assert len(turns) == round(END / STEP)
-    assert [one.number for one in turns] == list(range(1, len(turns) + 1))
+    assert [one.number for one in turns] == list(range(2, len(turns) + 2))
     assert turns[0].wall == WALL
     assert turns[0].turn.now == START
     assert [output for one in turns for output in one.turn.outputs] == flight.outputs

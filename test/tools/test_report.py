@@ -5,10 +5,11 @@ from html.parser import HTMLParser
 from types import SimpleNamespace
 
 import pytest
-from chute_msgs.msg import SafetyState
+from chute_msgs.msg import SafetyDecision, SafetyState
 from flight_bench import DEPLOY_AT, Flight, run
 
-from chute_ros.model import Action, LinkState
+from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report
 from chute_ros.tools.state_rows import rules_of, state_rows
@@ -99,6 +100,21 @@ def test_a_request_stands_beside_its_answer(page):
     assert "deploy" in told
     assert "reason: it falls" in told
     assert re.search(r"(success|no success)</b>.* after \d+\.\d+ s", told)
+
+
+def test_what_was_decided_at_a_takeover_is_told_as_it_was_published(tmp_path):
+    flight = Flight(tmp_path).fly(3.0)
+    report_of_it = i.ActionReport(9, 1, "upf_can", Outcome.SENT, "on the wire", 9)
+    message = SafetyDecision(
+        epoch=9, id=1, action=int(Action.KILL), rule="rule", reasons=["another took over"]
+    )
+    flight.box.message("safety/decision", message)
+    flight.turn(report_of_it)
+    flight.land()
+    told = section(report.report(flight.files()), "Decisions")
+    row = next(row for row in told.split("<tr>") if "9.1" in row)
+    assert "another took over" in row
+    assert "upf_can" in row
 
 
 def test_the_timeline_has_states_links_height_and_speed(page):

@@ -1,0 +1,362 @@
+"""Each rule of each shipped profile: just over its limit for just long enough it acts, just under
+it, or for just too short, it does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from story import LINK, Story, parachute, shipped
+
+from chute_ros.model import Action, LinkState, Outcome, ParachuteState, ParachuteStatus
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Stage
+
+K, D = Action.KILL, Action.DEPLOY
+EVERY = 0.05
+LOST = {"link_state": LinkState.LOST}
+REBOOTED = {"reboot_count": 1, "rebooted_in_flight": True}
+ONE_METRE = 1.0 / 111_195.0  # degrees of latitude
+
+
+@dataclass(frozen=True)
+class Case:
+    """One rule: what is just over its limit and just under it, and for how long it must be, s."""
+
+    profile: str
+    rule: str
+    over: dict[str, Any]
+    under: dict[str, Any]
+    hold: float
+    samples: int = 3
+    #: What it says before.
+    before: dict[str, Any] = field(default_factory=dict)
+    #: The measurement jumps; it is believed after three samples.
+    jumps: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.profile}, {self.rule}, {self.over}".replace("<", "").replace(">", "")
+
+    def flying(self) -> Story:
+        story = Story(shipped(self.profile)).ready()
+        return story.fly(0.3, every=EVERY, **self.before)
+
+    def over_for(self, story: Story, samples: int) -> Story:
+        return story.fly(story.t + samples * EVERY, EVERY, **{**self.before, **self.over})
+
+    def enough(self) -> int:
+        """So many samples in a row until it acts."""
+        return max(round(self.hold / EVERY), self.samples - 1) + 1 + 2 * self.jumps
+
+
+def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: Any) -> list[Case]:
+    """Cases of a rule that needs something besides one of these signs of falling."""
+    return [
+        Case(profile, rule, {**less, name: over}, {**less, name: under}, hold, 2)
+        for name, (over, under) in signs.items()
+    ]
+
+
+DEPLOYS = [
+    Case("multirotor", "excess tilt", {"tilt": 60.1}, {"tilt": 59.9}, 0.3),
+    Case("multirotor", "critical sink", {"vertical_speed": -12.1}, {"vertical_speed": -12.0}, 1.0),
+    Case("multirotor", "free fall", {"acceleration": 1.9}, {"acceleration": 2.0}, 0.3),
+    *falls(
+        "multirotor",
+        "autopilot lost and falling",
+        0.3,
+        LOST,
+        vertical_speed=(-6.1, -5.9),
+        tilt=(45.1, 44.9),
+        acceleration=(3.9, 4.1),
+    ),
+    *falls(
+        "multirotor",
+        "autopilot rebooted in flight",
+        0.1,
+        REBOOTED,
+        vertical_speed=(-5.1, -4.9),
+        tilt=(45.1, 44.9),
+        acceleration=(3.9, 4.1),
+    ),
+    *(
+        case
+        for status in (6, 8)
+        for case in falls(
+            "multirotor",
+            "autopilot terminates",
+            0.2,
+            {"system_status": status},
+            vertical_speed=(-6.1, -5.9),
+            tilt=(45.1, 44.9),
+            acceleration=(3.9, 4.1),
+        )
+    ),
+    Case(
+        "multirotor",
+        "battery dead and falling",
+        {"battery_remaining": 0.04, "vertical_speed": -6.1},
+        {"battery_remaining": 0.04, "vertical_speed": -5.9},
+        0.5,
+        before={"battery_remaining": 0.1},
+    ),
+    Case(
+        "multirotor",
+        "battery dead and falling",
+        {"battery_remaining": 0.049, "vertical_speed": -6.1},
+        {"battery_remaining": 0.051, "vertical_speed": -6.1},
+        0.5,
+        before={"battery_remaining": 0.1},
+    ),
+    Case("fixed_wing", "excess tilt", {"tilt": 80.1}, {"tilt": 79.9}, 1.0),
+    Case(
+        "fixed_wing",
+        "critical sink",
+        {"vertical_speed": -15.1},
+        {"vertical_speed": -15.0},
+        1.0,
+        before={"vertical_speed": -5.0},
+    ),
+    Case("fixed_wing", "free fall", {"acceleration": 1.9}, {"acceleration": 2.0}, 1.0),
+    *falls(
+        "fixed_wing",
+        "autopilot lost and falling",
+        1.0,
+        LOST,
+        vertical_speed=(-10.1, -9.9),
+        tilt=(70.1, 69.9),
+        acceleration=(2.9, 3.1),
+    ),
+    *falls(
+        "fixed_wing",
+        "autopilot rebooted in flight",
+        1.0,
+        REBOOTED,
+        vertical_speed=(-10.1, -9.9),
+        tilt=(70.1, 69.9),
+        acceleration=(2.9, 3.1),
+    ),
+    *falls(
+        "fixed_wing",
+        "autopilot terminates",
+        0.5,
+        {"system_status": 8},
+        vertical_speed=(-10.1, -9.9),
+        tilt=(70.1, 69.9),
+        acceleration=(2.9, 3.1),
+    ),
+    Case(
+        "fixed_wing",
+        "battery dead and falling",
+        {"battery_remaining": 0.04, "vertical_speed": -10.1},
+        {"battery_remaining": 0.04, "vertical_speed": -9.9},
+        1.0,
+        before={"battery_remaining": 0.1},
+    ),
+    Case("rocket", "critical sink", {"vertical_speed": -30.1}, {"vertical_speed": -30.0}, 2.0, 5),
+]
+EMPTY = ({"battery_remaining": 0.049}, {"battery_remaining": 0.051})
+BEFORE = {"battery_remaining": 0.1}
+FENCES = [("multirotor", 320.0, 120.0), ("fixed_wing", 400.0, 120.0), ("rocket", 5000.0, 12000.0)]
+ALARMS = [
+    *(Case(p, "autopilot lost", LOST, {}, 0.5, 1) for p in ("multirotor", "fixed_wing")),
+    *(
+        Case(p, "battery dead", *EMPTY, 10.0, before=BEFORE)
+        for p in ("multirotor", "fixed_wing", "rocket")
+    ),
+    *(
+        Case(
+            profile,
+            "geofence left",
+            {"latitude": 48.0 + (radius + 1.0) * ONE_METRE},
+            {"latitude": 48.0 + (radius - 1.0) * ONE_METRE},
+            5.0,
+            jumps=True,
+        )
+        for profile, radius, _ in FENCES
+    ),
+    *(
+        Case(
+            profile,
+            "geofence left",
+            {"height": ceiling + 0.5},
+            {"height": ceiling - 0.5},
+            5.0,
+            before={"height": ceiling - 5.0},
+        )
+        for profile, _, ceiling in FENCES
+    ),
+]
+
+
+def alarms(story: Story, rule: str) -> int:
+    return sum(one.startswith(f"rule '{rule}'") for one in story.alarms())
+
+
+@pytest.mark.parametrize("case", DEPLOYS, ids=str)
+def test_over_its_limit_for_long_enough_it_kills_and_then_deploys(case: Case) -> None:
+    story = case.flying()
+    case.over_for(story, case.enough() - 1)
+    assert story.fired() == []
+    case.over_for(story, 1)
+    assert story.fired() == ["KILL"]
+    kill = story.newest(K)
+    assert kill.rule == case.rule
+    assert f"counter {case.hold:.2f} s of {case.hold:g} s" in kill.reasons
+    case.over_for(story, 10)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.newest(D).rule == case.rule
+    assert story.when(D) == pytest.approx(story.when(K) + 0.5)
+
+
+@pytest.mark.parametrize("case", DEPLOYS, ids=str)
+def test_with_a_confirmed_kill_it_deploys_at_once(case: Case) -> None:
+    story = case.over_for(case.flying(), case.enough())
+    story.at(story.t + 0.02, story.report(K, Outcome.CONFIRMED))
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize("case", DEPLOYS, ids=str)
+def test_over_its_limit_for_just_too_short_it_does_nothing(case: Case) -> None:
+    story = case.flying()
+    case.over_for(story, case.enough() - 2)
+    story.fly(story.t + 3.0, 0.1, **case.before)
+    assert story.fired() == []
+    assert story.state.stage is Stage.IN_FLIGHT
+
+
+@pytest.mark.parametrize("case", DEPLOYS, ids=str)
+def test_just_under_its_limit_for_long_it_does_nothing(case: Case) -> None:
+    story = case.flying()
+    story.fly(story.t + 3 * case.hold + 2.0, EVERY, **{**case.before, **case.under})
+    assert story.fired() == []
+
+
+@pytest.mark.parametrize("case", ALARMS, ids=str)
+def test_over_its_limit_for_long_enough_it_warns_once_and_fires_nothing(case: Case) -> None:
+    story = case.flying()
+    case.over_for(story, case.enough() - 1)
+    assert alarms(story, case.rule) == 0
+    case.over_for(story, 2)
+    assert alarms(story, case.rule) == 1
+    case.over_for(story, 100)
+    assert alarms(story, case.rule) == 1
+    assert story.fired() == []
+
+
+@pytest.mark.parametrize("case", ALARMS, ids=str)
+def test_just_under_its_limit_or_for_too_short_it_does_not_warn(case: Case) -> None:
+    story = case.flying()
+    case.over_for(story, case.enough() - 2)
+    story.fly(story.t + 3 * case.hold + 2.0, EVERY, **{**case.before, **case.under})
+    assert alarms(story, case.rule) == 0
+    assert story.fired() == []
+
+
+EACH = pytest.mark.parametrize("name", ["multirotor", "fixed_wing", "rocket"])
+
+
+@EACH
+def test_every_rule_has_its_story(name: str) -> None:
+    told = {case.rule for case in (*DEPLOYS, *ALARMS) if case.profile == name}
+    told |= {"device asks for a kill", "parachute open", "link lost"}
+    told |= {"flight computer in fault", "flight computer in fault, on its way"}
+    assert {rule.name for rule in shipped(name).profile.rules} <= told
+
+
+@EACH
+def test_a_flight_that_goes_well_fires_and_warns_nothing(name: str) -> None:
+    story = Story(shipped(name)).ready()
+    story.fly(2.0, height=5.0, vertical_speed=3.0)
+    story.fly(20.0, height=50.0, tilt=20.0)
+    story.fly(22.0, height=20.0, vertical_speed=-4.0)
+    assert story.fired() == []
+    assert story.alarms() == []
+
+
+@EACH
+def test_a_device_that_asks_for_a_kill_gets_it_in_any_state(name: str) -> None:
+    for story in (
+        Story(shipped(name)),
+        Story(shipped(name)).ready(),
+        Story(shipped(name)).flying(),
+    ):
+        story.at(0.1, i.KillRequest(0, "upf_can 33", "about to launch"))
+        assert story.fired() == ["KILL"]
+        assert story.newest(K).rule == "device asks for a kill"
+        story.at(0.2, i.KillRequest(0, "upf_can 33", "about to launch"))
+        assert story.fired() == ["KILL"], "it is on its way"
+
+
+@EACH
+def test_an_open_parachute_in_flight_stops_the_motors(name: str) -> None:
+    story = Story(shipped(name)).ready().fly(1.0)
+    story.at(1.1, story.heartbeat(), parachute(deployed=True))
+    assert story.fired() == ["KILL"]
+    assert story.newest(K).rule == "parachute open"
+    assert story.state.stage is Stage.DEPLOYED
+    story.fall(5.0)
+    assert story.fired() == ["KILL"], "it is not deployed again"
+
+
+@EACH
+def test_an_open_parachute_on_the_ground_fires_nothing(name: str) -> None:
+    story = Story(shipped(name)).ready()
+    story.at(0.1, story.heartbeat(), parachute(deployed=True))
+    assert story.fired() == []
+
+
+def abnormal(story: Story) -> None:
+    broken = ParachuteStatus("1/161", LinkState.OK, ParachuteState.ABNORMAL, faults=("IMU",))
+    story.at(story.t, i.ParachuteReport(LINK, broken))
+
+
+@EACH
+def test_a_flight_computer_in_fault_is_an_alarm(name: str) -> None:
+    story = Story(shipped(name)).ready().fly(1.0)
+    abnormal(story)
+    assert sum("flight computer in fault" in one for one in story.alarms()) == 1
+    story.fly(10.0)
+    assert story.fired() == []
+
+
+def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
+    story = Story(shipped("rocket")).ready().fly(1.0)
+    abnormal(story)
+    story.fly(4.0, vertical_speed=-19.9)
+    assert story.fired() == []
+    story.fly(6.0, vertical_speed=-20.1)
+    assert story.fired() == []
+    story.fly(6.6, vertical_speed=-20.1)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.newest(D).rule == "flight computer in fault"
+
+
+def test_a_rocket_coasts_in_free_fall_and_turns_over_without_a_deploy() -> None:
+    story = Story(shipped("rocket")).ready().fly(1.0, acceleration=90.0, vertical_speed=80.0)
+    story.fly(9.0, acceleration=0.3, vertical_speed=10.0, tilt=175.0)
+    story.fly(15.0, acceleration=9.0, vertical_speed=-15.0, tilt=175.0)
+    assert story.fired() == []
+
+
+@EACH
+def test_a_lost_link_in_flight_is_an_alarm_and_no_more(name: str) -> None:
+    story = Story(shipped(name)).ready().fly(1.0)
+    for n in range(1, 200):
+        story.at(1.0 + n * 0.05, story.told())
+    assert alarms(story, "link lost") == 1
+    assert story.fired() == []
+
+
+@pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
+def test_an_autopilot_that_falls_silent_with_everything_else_is_an_alarm_in_its_time(
+    name: str,
+) -> None:
+    story = Story(shipped(name)).ready().fly(1.0)
+    story.at(3.9)
+    assert alarms(story, "autopilot lost") == 0
+    story.at(4.1)
+    assert alarms(story, "autopilot lost") == 1
+    story.at(60.0)
+    assert story.fired() == []

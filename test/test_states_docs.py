@@ -1,0 +1,42 @@
+"""docs/states.* show what the tables say, and the table of the stages has no dead end."""
+
+import xml.etree.ElementTree
+from pathlib import Path
+
+from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus
+from chute_ros.tools import state_diagram
+from chute_ros.tools.state_drawing import drawing
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def test_the_text_is_up_to_date() -> None:
+    text = (ROOT / state_diagram.TEXT).read_text()
+    assert text == state_diagram.states_text(), "run: make docs"
+
+
+def test_the_picture_is_up_to_date() -> None:
+    assert (ROOT / state_diagram.PICTURE).read_text() == drawing(), "run: make docs"
+
+
+def test_every_stage_is_reached_and_left_but_those_that_may_not() -> None:
+    assert state_diagram.unreached(TRANSITIONS) == state_diagram.MAY_BE_UNREACHED
+    assert state_diagram.never_left(TRANSITIONS) == state_diagram.MAY_BE_FINAL
+
+
+def test_a_dead_end_and_a_lost_stage_are_found() -> None:
+    into = {pair: after for pair, after in TRANSITIONS.items() if after is not Stage.LANDED}
+    assert state_diagram.unreached(into) == {Stage.LANDED}
+    out = {pair: after for pair, after in TRANSITIONS.items() if pair[0] is not Stage.KILLING}
+    assert state_diagram.never_left(out) == {Stage.KILLING}
+    itself = {**out, (Stage.KILLING, Stimulus.KILL): Stage.KILLING}
+    assert state_diagram.never_left(itself) == {Stage.KILLING}
+
+
+def test_the_picture_has_every_stage_and_every_stimulus() -> None:
+    root = xml.etree.ElementTree.fromstring(drawing())
+    texts = [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
+    for stage in Stage:
+        assert stage.name in texts
+    told = " ".join(texts)
+    assert [one.name for one in Stimulus if one.name not in told] == []
