@@ -29,3 +29,8 @@ def test_every_executable_is_in_the_readme() -> None:
     scripts = [line.split("=")[0].strip(' "') for line in setup.splitlines() if ":main" in line]
     assert len(scripts) >= 5
     assert [name for name in scripts if f"`{name}`" not in text] == []
+
+
+def test_the_table_of_measurements_is_up_to_date() -> None:
+    text = (ROOT / parameter_docs.RULES).read_text()
+    assert text == parameter_docs.rules_text(text), "run: make docs"

@@ -65,6 +65,18 @@ STANDARD_LIMITS: dict[str, Limits] = {
 }
 
 
+#: The unit of each, for people.
+UNITS: dict[str, str] = {
+    "height": "m above take-off",
+    "vertical_speed": "m/s, up positive",
+    "tilt_deg": "degrees from upright, 0 to 180",
+    "acceleration": "m/s^2, length of the specific force: 9.8 at rest, 0 in free fall",
+    "distance_from_home": "m over ground from where it took off",
+    "battery_voltage": "V",
+    "battery_remaining": "remaining charge, 0 to 1",
+}
+
+
 @dataclass(frozen=True)
 class Sample:
     """One measurement as it came. measured_at: monotonic s; NaN: never received."""

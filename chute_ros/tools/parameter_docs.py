@@ -1,7 +1,7 @@
 """Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
 
-The files in config/ and the tables between the marks in README.md. With --check it only
-says which of them is out of date.
+The files in config/ and the tables between the marks in README.md and docs/rules.md. With
+--check it only says which of them is out of date.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from chute_ros.nodes.parameters import Parameter, Value
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
 from chute_ros.nodes.umbilical_parameters import PARAMETERS as UMBILICAL_PARAMETERS
 from chute_ros.nodes.upf_parameters import PARAMETERS as UPF_PARAMETERS
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
     "mavlink_parachute": (*MAVLINK_PARAMETERS, *COMMON_PARAMETERS),
@@ -25,6 +26,7 @@ NODES: dict[str, tuple[Parameter, ...]] = {
     "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
 README = Path("README.md")
+RULES = Path("docs/rules.md")
 _MAVLINK, _UPF, _UMBILICAL, _SUPERVISOR = NODES
 _BOTH_LINKS = [_MAVLINK, _UPF]
 #: File -> what its vehicle carries, its nodes, and what differs from the defaults.
@@ -41,6 +43,7 @@ CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] =
             (_MAVLINK, "expect_parachute"): False,
             (_SUPERVISOR, "required_links"): _BOTH_LINKS,
             (_SUPERVISOR, "deploy_links"): [_UPF],
+            (_SUPERVISOR, "deploy_ladder"): [_UPF, f"{_UPF}:trigger"],
         },
     ),
     Path("config/both_vehicle.yaml"): (
@@ -49,6 +52,7 @@ CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] =
         {
             (_SUPERVISOR, "required_links"): _BOTH_LINKS,
             (_SUPERVISOR, "deploy_links"): _BOTH_LINKS,
+            (_SUPERVISOR, "deploy_ladder"): [*_BOTH_LINKS, f"{_UPF}:trigger"],
         },
     ),
     Path("config/umbilical_vehicle.yaml"): (
@@ -59,6 +63,7 @@ CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] =
             (_SUPERVISOR, "required_links"): [_UMBILICAL],
             (_SUPERVISOR, "kill_links"): [_UMBILICAL],
             (_SUPERVISOR, "deploy_links"): [_UMBILICAL],
+            (_SUPERVISOR, "profile"): "rocket",
         },
     ),
 }
@@ -88,18 +93,35 @@ def config_text(path: Path) -> str:
 def readme_text(before: str) -> str:
     """README.md with its tables made anew."""
     for node, parameters in NODES.items():
-        begin, end = _BEGIN.format(node), _END.format(node)
-        head, found, rest = before.partition(begin)
-        _, found_end, tail = rest.partition(end)
-        if not found or not found_end:
-            sys.exit(f"{README}: the marks {begin} and {end} are missing")
         rows = ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
         rows += [
             f"| `{p.name}` | `{_yaml(p.default)}` | {p.description} | {_allowed(p)} |"
             for p in parameters
         ]
-        before = head + begin + "\n" + "\n".join(rows) + "\n" + end + tail
+        before = _between(before, README, _BEGIN.format(node), _END.format(node), rows)
     return before
+
+
+def rules_text(before: str) -> str:
+    """docs/rules.md with its table of measurements made anew."""
+    rows = [
+        "| name | unit | range | rate (1/s) | jump | max_age (s) | stuck_after (s) |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    rows += [
+        f"| `{name}` | {UNITS[name]} | {one.minimum:g} to {one.maximum:g} | {one.rate:g} "
+        f"| {one.jump:g} | {one.max_age:g} | {one.stuck_after:g} |"
+        for name, one in STANDARD_LIMITS.items()
+    ]
+    return _between(before, RULES, "<!-- measurements -->", "<!-- end of measurements -->", rows)
+
+
+def _between(before: str, path: Path, begin: str, end: str, rows: list[str]) -> str:
+    head, found, rest = before.partition(begin)
+    _, found_end, tail = rest.partition(end)
+    if not found or not found_end:
+        sys.exit(f"{path}: the marks {begin} and {end} are missing")
+    return head + begin + "\n" + "\n".join(rows) + "\n" + end + tail
 
 
 def main() -> None:
@@ -109,6 +131,7 @@ def main() -> None:
     check = options.parse_args().check
     texts = {path: config_text(path) for path in CONFIGS}
     texts[README] = readme_text(README.read_text())
+    texts[RULES] = rules_text(RULES.read_text())
     old = [str(p) for p, text in texts.items() if not p.is_file() or p.read_text() != text]
     if check and old:
         sys.exit(f"out of date: {', '.join(old)}; run: make docs")

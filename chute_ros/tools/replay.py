@@ -27,6 +27,7 @@ from chute_ros.tools.replay_picture import Track, picture
 from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
 
 SAME, DIFFERS, UNREADABLE = 0, 1, 2
+_PROFILE = "profile.name"
 
 
 def main() -> None:
@@ -104,6 +105,9 @@ def _print_settings(recording: Recording, other: Other) -> None:
     was, would_be = _settings(old), _settings(other.config)
     print("settings that differ:")
     different = [name for name in {**was, **would_be} if was.get(name) != would_be.get(name)]
+    if _PROFILE in different:
+        # Another set of rules differs in everything.
+        different = [name for name in different if name == _PROFILE or "profile." not in name]
     for name in different:
         print(plain(f"  {name}: {was.get(name, 'none')} -> {would_be.get(name, 'none')}"))
     if other.mode is not None:

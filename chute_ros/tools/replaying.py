@@ -33,8 +33,8 @@ class Replayer:
         self._other = other
         self._answers = _Answers()
         self._last = 0
-        self._config: SupervisorConfig | None = None
-        #: What it remembers now; None: that cannot be told.
+        #: Its settings and what it remembers now; None: that cannot be told.
+        self.config: SupervisorConfig | None = None
         self.state: State | None = None
         #: Turns that could not be replayed: what came before them is missing.
         self.skipped = 0
@@ -49,14 +49,14 @@ class Replayer:
             self._begin(recorded.wall, recorded.config, recorded.state, follows)
         elif not follows:
             self.state = None
-        if self.state is None or self._config is None:
+        if self.state is None or self.config is None:
             self.skipped += 1
             return None
         turn = recorded.turn
         inputs = turn.inputs
         if self._other is not None:
             inputs = tuple(self._answers.translated(one) for one in inputs)
-        self.state, outputs = update(self._config, self.state, inputs, turn.now)
+        self.state, outputs = update(self.config, self.state, inputs, turn.now)
         if self._other is not None:
             self._answers.learn(turn.outputs, outputs)
         return outputs
@@ -65,9 +65,9 @@ class Replayer:
         if self._other is None:
             if follows and _text(state) != _text(self.state):
                 self.strayed.append(wall)
-            self._config, self.state = config, state
+            self.config, self.state = config, state
         elif not follows:
-            self._config, self.state = self._other.config, state
+            self.config, self.state = self._other.config, state
             if self._other.mode is not None:
                 self.state = replace(state, mode=self._other.mode)
 

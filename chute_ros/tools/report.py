@@ -17,6 +17,7 @@ from chute_ros.tools.flight_story import DECISION, tell
 from chute_ros.tools.plain_text import plain
 from chute_ros.tools.recording import files_of, read
 from chute_ros.tools.replay_picture import vehicle_curves
+from chute_ros.tools.replayed_states import replayed_states
 from chute_ros.tools.report_page import page
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline import close_up, draw
@@ -67,8 +68,10 @@ def report(files: list[Path]) -> str:
     """The page of these files; RecordError if they cannot be read."""
     recording = read(files, {STATE: SafetyState, DECISION: SafetyDecision})
     story = tell(recording)
-    pictures = recording.messages.get(STATE, [])
-    states = [(recording.seconds(wall), state) for wall, state in pictures]
+    published = recording.messages.get(STATE, [])
+    states = replayed_states(recording) or [
+        (recording.seconds(wall), state) for wall, state in published
+    ]
     rows: list[Row] = [
         *state_rows(states),
         Marks("decisions", story.decision_marks()),

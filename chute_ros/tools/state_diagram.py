@@ -10,11 +10,14 @@ import enum
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from chute_ros.supervisor import lease, machine
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.state_drawing import drawing
 
+_State = TypeVar("_State", bound=enum.Enum)
+_Stimulus = TypeVar("_Stimulus", bound=enum.Enum)
 TEXT, PICTURE = Path("docs/states.md"), Path("docs/states.svg")
 #: Stages that are meant never to be left, or never to be reached from STARTUP: none is.
 MAY_BE_FINAL: frozenset[Stage] = frozenset()
@@ -94,9 +97,9 @@ def _mermaid(transitions: Mapping[tuple[enum.Enum, enum.Enum], enum.Enum], first
 
 
 def _table(
-    states: type[enum.Enum],
-    stimuli: type[enum.Enum],
-    transitions: Mapping[tuple[enum.Enum, enum.Enum], enum.Enum],
+    states: type[_State],
+    stimuli: type[_Stimulus],
+    transitions: Mapping[tuple[_State, _Stimulus], _State],
 ) -> str:
     """One row a stimulus, one column a state; a dash: the pair is not listed."""
     names = [state.name for state in states]
@@ -108,7 +111,7 @@ def _table(
     return "\n".join([*lines, ""])
 
 
-def _meanings(stimuli: type[enum.Enum], what: str) -> str:
+def _meanings(stimuli: type[_Stimulus], what: str) -> str:
     lines = [f"| {what} | meaning |", "|---|---|"]
     lines += [f"| {one.name} | {one.value} |" for one in stimuli]
     return "\n".join([*lines, ""])

@@ -38,7 +38,7 @@ class RuleTold:
 
 
 def state_rows(states: States) -> list[Row]:
-    """Stage, mode, flight block, then every link, then every rule's counter."""
+    """Stage, mode, flight block, every link, and the counter of every rule that moved."""
     if not states:
         return []
     rows: list[Row] = [
@@ -49,7 +49,10 @@ def state_rows(states: States) -> list[Row]:
     rows.append(Band("flight", _segments((at, *_block(one)) for at, one in states)))
     links = dict.fromkeys(link for _, one in states for link in one.links)
     rows += [Band(link, _segments(_link(states, link))) for link in links]
-    rows += [Level(f"rule {rule.name}", _shares(states, rule.name)) for rule in rules_of(states)]
+    for rule in rules_of(states):
+        shares = _shares(states, rule.name)
+        if any(share > 0.0 for _, share in shares):  # the others are in the table only
+            rows.append(Level(f"rule {rule.name}", shares))
     return rows
 
 

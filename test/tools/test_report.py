@@ -1,6 +1,7 @@
 """The report is one page that needs nothing else, and tells what happened."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
@@ -12,6 +13,8 @@ from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report
+from chute_ros.tools.recording import read
+from chute_ros.tools.replayed_states import replayed_states
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline_rows import Band, Level
 
@@ -121,6 +124,20 @@ def test_the_timeline_has_states_links_height_and_speed(page):
     words = {word.strip() for word in Tags(section(page, "Timeline")).words}
     rows = {"state", "mavlink_parachute", "decisions", "alarms", "height", "vertical speed"}
     assert rows | {"m", "m/s", "time from the start, s"} <= words
+
+
+def test_links_are_told_at_every_moment_and_as_published_where_nothing_can_be_replayed(
+    flight, monkeypatch
+):
+    recording = read(flight.files(), {})
+    states = replayed_states(recording)
+    assert len(states) >= len(recording.turns) - 1
+    assert [one.links for _, one in states] == [["mavlink_parachute"]] * len(states)
+    for number, turn in enumerate(recording.turns):
+        recording.turns[number] = replace(turn, state=None, config=None)
+    assert replayed_states(recording) == []
+    monkeypatch.setattr(report, "replayed_states", lambda _: [])
+    assert ">mavlink_parachute</text>" in report.report(flight.files())
 
 
 def test_words_from_a_wire_are_only_words(tmp_path):
