@@ -38,13 +38,15 @@ def await_until() -> Callable[..., None]:
 
 
 @pytest.fixture(scope="session")
-def ros() -> Iterator[str]:
+def ros(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """rclpy in a domain of this run; yields the run's namespace."""
     # Not at the top: the pure tests run without ROS.
     import rclpy
 
     from chute_ros.tools.isolation import isolated_ros
 
+    # What nodes keep, black boxes above all, goes with the run.
+    os.environ["ROS_HOME"] = str(tmp_path_factory.mktemp("ros_home"))
     with isolated_ros() as namespace:
         rclpy.init(args=[])
         yield namespace

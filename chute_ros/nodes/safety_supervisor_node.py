@@ -30,7 +30,9 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
 from chute_ros.nodes.device_arming import DeviceArming
+from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
@@ -39,7 +41,7 @@ from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from, lease
 from chute_ros.nodes.supervisor_services import SupervisorServices
 from chute_ros.nodes.vehicle_sources import VehicleSources
 from chute_ros.supervisor import inputs
-from chute_ros.supervisor.core import next_deadline, step_down, take_over, update
+from chute_ros.supervisor.core import next_deadline, update
 from chute_ros.supervisor.epochs import epoch_above
 from chute_ros.supervisor.lease import Event
 from chute_ros.supervisor.state import State
@@ -55,7 +57,7 @@ class SafetySupervisorNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("safety_supervisor", **options)
-        self.values = declare(self, PARAMETERS)
+        self.values = declare(self, (*PARAMETERS, *BLACK_BOX_PARAMETERS))
         self.config = config_from(self.values)
         lease = lease_from(self.values, self.get_name())
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
@@ -69,6 +71,7 @@ class SafetySupervisorNode(Node):
             epoch, now, mode=inputs.Mode[self.values["mode"]], leading=not lease.standby
         )
         self._misasked: set[str] = set()
+        self._recorder = FlightRecorder(self, self.values)
         self._health = Health()
         self.services_offered = SupervisorServices(self, self.wall, self._turn)
         self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
@@ -131,12 +134,14 @@ class SafetySupervisorNode(Node):
         self, new: tuple[inputs.Input, ...], now: float
     ) -> tuple[inputs.Output, ...] | None:
         """One turn of the core; None: it failed, the state is as before, and it was reported."""
+        before = self.state
         try:
-            self.state, outputs = update(self.config, self.state, new, now)
+            self.state, outputs = update(self.config, before, new, now)
         except Exception as error:  # noqa: BLE001 - the loop must go on, and say so
             self._health.failed(error, new)
             self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
             return None
+        self._recorder.turn(now, new, outputs, before, self.state, self.config)
         return outputs
 
     def _sleep(self, wake: float) -> None:
@@ -164,7 +169,9 @@ class SafetySupervisorNode(Node):
 
     def _publish_decision(self, output: inputs.Decide) -> None:
         decision = output.decision
-        self._decision_publisher.publish(messages.decision(decision, self.wall.now().to_msg()))
+        message = messages.decision(decision, self.wall.now().to_msg())
+        self._decision_publisher.publish(message)
+        self._recorder.message("safety/decision", message)
         if not output.again:
             shadow = " (SHADOW, not sent)" if decision.shadow else ""
             device = f" device {decision.device}" if decision.device else ""
@@ -181,13 +188,13 @@ class SafetySupervisorNode(Node):
         if self.lease.leading:
             epoch = self.lease.next_epoch()
             self.get_logger().warning(f"leads from now on, epoch {epoch}: {event.value}")
-            self.state, outputs = take_over(self.config, self.state, epoch, now)
+            outputs = self._update((inputs.TakeOver(epoch),), now)
             self.services_offered.open()
         else:
             self.get_logger().warning(f"only looks on from now on: {event.value}")
-            self.state, outputs = step_down(self.config, self.state, event.value, now)
+            outputs = self._update((inputs.StepDown(event.value),), now)
             self.services_offered.close()
-        self._carry_out(outputs, now)
+        self._carry_out(outputs or (), now)
         self.lease.tell(now)
 
     def _follow(self, state: State) -> None:
@@ -196,6 +203,7 @@ class SafetySupervisorNode(Node):
     # -- inputs ---------------------------------------------------------------------------------
 
     def _heartbeat(self, message: LinkHeartbeat) -> None:
+        self._recorder.message("safety/heartbeat", message)
         if message.supervisor:
             return
         sent = messages.seconds(message.header.stamp)
@@ -211,12 +219,14 @@ class SafetySupervisorNode(Node):
         )
 
     def _parachute(self, message: ParachuteStatus) -> None:
+        self._recorder.message("parachute/status", message)
         self._turn(inputs.ParachuteReport(message.link, messages.parachute_from(message)))
 
     def _vehicle(self, state: model.VehicleState) -> None:
         self._turn(inputs.VehicleReport(state))
 
     def _action(self, message: ActionReport) -> None:
+        self._recorder.message("safety/action", message)
         self._turn(
             inputs.ActionReport(
                 message.epoch,
@@ -230,6 +240,7 @@ class SafetySupervisorNode(Node):
         )
 
     def _device_request(self, message: SafetyRequest) -> None:
+        self._recorder.message("safety/request", message)
         device, reason = f"{message.link} {message.device}".strip(), message.reason
         if message.request == SafetyRequest.KILL:
             self._turn(inputs.KillRequest(0, device, reason))
@@ -268,12 +279,20 @@ class SafetySupervisorNode(Node):
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL
         stamp = self.wall.now().to_msg()
-        self._state_publisher.publish(state_message(self.config, self.state, now, stamp))
+        message = state_message(self.config, self.state, now, stamp)
+        self._state_publisher.publish(message)
+        self._recorder.message("safety/state", message)
 
     def _diagnose(self) -> None:
         name, now = self.diagnostic_name, time.monotonic()
         tasks = [
             decisions_task(name, self.config, self.state, now),
             self._health.task(name, self.state, self.lease, now),
+            *self._recorder.tasks(),
         ]
         self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), tasks))
+
+    def destroy_node(self) -> None:
+        """The black box ends its file."""
+        self._recorder.close()
+        super().destroy_node()

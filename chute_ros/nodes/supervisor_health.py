@@ -58,7 +58,10 @@ class Health:
             text = f"mistakes inside {seen[0]}, messages lost {seen[1]}, updates late {seen[2]}"
         elif not lease.leading and math.isnan(lease.lease.leader_heard):
             level, text = diagnostics.WARN, "looks on, and hears no leader"
+        elif lease.leading and lease.config.standby and not lease.followers(now):
+            level, text = diagnostics.WARN, "leads, and nobody is ready to take over"
         values: dict[str, object] = {
+            "ready to take over": ", ".join(lease.followers(now)),
             "leads": lease.leading,
             "leader": lease.config.name if lease.leading else lease.lease.leader,
             "rank": lease.config.rank,

@@ -12,6 +12,7 @@ from rclpy.node import Node
 from chute_ros.errors import RecordError
 from chute_ros.nodes import qos
 from chute_ros.supervisor import handover
+from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
 from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.state import State
@@ -36,6 +37,10 @@ class LeaseKeeper:
         self._state, self._happened, self._follow = state, happened, follow
         #: It has taken over from another, or followed one.
         self._experienced = False
+        #: Whose state it has.
+        self._followed = ""
+        #: Who follows this one, and when that was last said, monotonic s.
+        self._followers: dict[str, float] = {}
         self._complained: set[str] = set()
         self._publisher = node.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
         node.create_subscription(SupervisorLease, "safety/lease", self._claim, qos.STATUS)
@@ -74,10 +79,16 @@ class LeaseKeeper:
             epoch=claim.epoch,
             leading=claim.leading,
             empty=claim.empty,
+            leader="" if claim.leading else self._followed,
             state=handover.told(state, now) if claim.leading and self.config.standby else "",
         )
         message.header.stamp = self._wall.now().to_msg()
         self._publisher.publish(message)
+
+    def followers(self, now: float) -> list[str]:
+        """Who follows this one and is ready to take over."""
+        limit = self.config.timeout * RANKS
+        return sorted(name for name, when in self._followers.items() if now - when < limit)
 
     def trouble(self) -> str:
         """What is wrong with the supervisors' settings; empty: nothing."""
@@ -95,20 +106,26 @@ class LeaseKeeper:
         if message.name == self.config.name:
             return
         now = time.monotonic()
+        if message.leader == self.config.name and len(self._followers) < RANKS:
+            self._followers[message.name] = now
         other = Claim(message.name, message.rank, message.epoch, message.leading, message.empty)
         self.lease, event = self.lease.heard(self.config, self._own(), other, now)
         if event is not None:
             self._happened(event)
         if message.leading and not self.leading and message.state:
-            self._experienced = True
-            try:
-                self._follow(handover.followed(self._state(), message.state, now))
-            except RecordError as error:
-                self._complain(f"cannot follow {message.name}: {error}")
+            self._follow_claim(message, now)
         elif message.leading and self.leading and not self.config.standby:
             self._complain(
                 f"{message.name} leads as well: set hot_standby and different ranks, or stop one"
             )
+
+    def _follow_claim(self, message: SupervisorLease, now: float) -> None:
+        try:
+            self._follow(handover.followed(self._state(), message.state, now))
+        except RecordError as error:
+            self._complain(f"cannot follow {message.name}: {error}")
+        else:
+            self._experienced, self._followed = True, message.name
 
     def _complain(self, text: str) -> None:
         if text not in self._complained and len(self._complained) < 16:

@@ -45,32 +45,6 @@ def update(
     return turn.state, tuple(turn.outputs)
 
 
-def take_over(
-    config: SupervisorConfig, state: State, epoch: int, now: float
-) -> tuple[State, tuple[i.Output, ...]]:
-    """Lead from now on, under this epoch: what has not been begun is decided anew, so that no shot
-    is lost; what a device has begun goes on there, so that there is no second one."""
-    state = replace(state, leading=True, epoch=epoch)
-    turn = _Update(config, state, now)
-    for slot in turn.slots:
-        pending = turn.pending(slot)
-        if pending is not None and (slot == "block" or pending.not_begun()):
-            turn.renew(slot, "another supervisor took over")
-    turn.look()
-    turn.state = replace(turn.state, updated_at=now)
-    return turn.state, tuple(turn.outputs)
-
-
-def step_down(
-    config: SupervisorConfig, state: State, why: str, now: float
-) -> tuple[State, tuple[i.Output, ...]]:
-    """Only look on from now on; who waits for an outcome is told that another decides."""
-    turn = _Update(config, state, now)
-    turn.give_up_waiting(f"another supervisor decides now: {why}")
-    turn.state = replace(turn.state, leading=False, updated_at=now)
-    return turn.state, tuple(turn.outputs)
-
-
 def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     """When update has something to decide without any input, later than now; infinity: never."""
     deadlines = [
@@ -157,8 +131,22 @@ class _Update(Deploying):
             self.deploy_request(one)
         elif isinstance(one, i.ResetRequest):
             self.reset_request(one)
+        elif isinstance(one, i.TakeOver):
+            self._take_over(one)
+        elif isinstance(one, i.StepDown):
+            self.give_up_waiting(f"another supervisor decides now: {one.why}")
+            self.state = replace(self.state, leading=False)
         else:
             self.mode_request(one)
+
+    def _take_over(self, one: i.TakeOver) -> None:
+        """What has not been begun is decided anew, so that no shot is lost; what a device has
+        begun goes on there, so that there is no second one."""
+        self.state = replace(self.state, leading=True, epoch=one.epoch)
+        for slot in self.slots:
+            pending = self.pending(slot)
+            if pending is not None and (slot == "block" or pending.not_begun()):
+                self.renew(slot, "another supervisor took over")
 
     def look(self) -> None:
         """What follows from all that is known now. One that follows only counts: what it was

@@ -122,6 +122,20 @@ class ModeRequest:
     force: bool
 
 
+@dataclass(frozen=True)
+class TakeOver:
+    """Lead from now on, under this epoch."""
+
+    epoch: int
+
+
+@dataclass(frozen=True)
+class StepDown:
+    """Only look on from now on; another decides."""
+
+    why: str
+
+
 Input = (
     LinkHeartbeat
     | ParachuteReport
@@ -134,6 +148,8 @@ Input = (
     | DeployRequest
     | ResetRequest
     | ModeRequest
+    | TakeOver
+    | StepDown
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from chute_ros.model import Action, Armed
+from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
@@ -36,8 +36,8 @@ class Orders(Steps):
             for action in (Action.KILL, Action.DEPLOY):
                 self.fire(action, rule, reasons)
             return
-        if self.state.deploy_rule:
-            return
+        if self.state.deploy_rule or self.deploy_reached(Outcome.CONFIRMED):
+            return  # under way, or out already, which is said at the end of this update
         if self.state.stage in ON_GROUND:
             self.note_released()
         self.end_kill()

@@ -22,6 +22,8 @@ class Processes:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        #: Where the children keep what outlives them: allocation tables, black boxes.
+        self.ros_home = folder / "ros_home"
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, module: str, *arguments: str) -> None:
@@ -30,7 +32,11 @@ class Processes:
             self._running[name] = subprocess.Popen(
                 [sys.executable, "-m", module, *arguments],
                 # Buffered, the last words of one that crashes would come before what led to them.
-                env={**os.environ, "PYTHONUNBUFFERED": "1"},
+                env={
+                    **os.environ,
+                    "PYTHONUNBUFFERED": "1",
+                    "ROS_HOME": str(self.ros_home),
+                },
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

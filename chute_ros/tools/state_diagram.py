@@ -86,7 +86,7 @@ def main() -> None:
             path.write_text(text)
 
 
-def _mermaid(transitions: Mapping[tuple[enum.Enum, enum.Enum], enum.Enum], first: str = "") -> str:
+def _mermaid(transitions: Mapping[tuple[_State, _Stimulus], _State], first: str = "") -> str:
     lines = ["```mermaid", "stateDiagram-v2"]
     lines += [f"    [*] --> {first}"] if first else []
     lines += [

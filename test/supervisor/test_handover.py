@@ -10,7 +10,7 @@ from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import handover
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import step_down, take_over, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.state import State
@@ -29,6 +29,10 @@ def handed(story: Story, to: State | None = None) -> State:
     """The follower's state after the leader's newest claim."""
     now = START + story.t
     return handover.followed(to or follower(), handover.told(story.state, now), now + AHEAD)
+
+
+def take_over(state: State, t: float) -> tuple[State, tuple[i.Output, ...]]:
+    return update(CONFIG, state, (i.TakeOver(8),), START + AHEAD + t)
 
 
 def decided(outputs: tuple[i.Output, ...], action: Action) -> list[i.Decide]:
@@ -84,14 +88,14 @@ def test_one_that_follows_decides_and_answers_nothing() -> None:
     )
     assert outputs == ()
     # Who takes over within the time that the wish lasts follows it.
-    state, outputs = take_over(CONFIG, state, 8, START + AHEAD + 2.5)
+    state, outputs = take_over(state, 2.5)
     assert decided(outputs, K)
 
 
 def test_a_deploy_that_waits_for_its_kill_goes_on_at_its_time() -> None:
     story = falling()
     state = handed(story)
-    state, outputs = take_over(CONFIG, state, 8, START + AHEAD + 1.3)
+    state, outputs = take_over(state, 1.3)
     # The kill was not reported as begun: it leaves again, under the new number.
     (kill,) = decided(outputs, K)
     assert kill.decision.epoch == 8
@@ -107,7 +111,7 @@ def test_a_shot_that_a_device_has_begun_is_not_shot_again(outcome: Outcome) -> N
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     story.at(1.2, story.heartbeat(), story.report(D, outcome))
     number = story.newest(D)
-    state, outputs = take_over(CONFIG, handed(story), 8, START + AHEAD + 1.3)
+    state, outputs = take_over(handed(story), 1.3)
     assert decided(outputs, D) == []
     confirmed = i.ActionReport(number.epoch, number.id, LINK, Outcome.CONFIRMED, "out")
     state, _ = update(CONFIG, state, (confirmed,), START + AHEAD + 1.4)
@@ -117,7 +121,7 @@ def test_a_shot_that_a_device_has_begun_is_not_shot_again(outcome: Outcome) -> N
 def test_a_shot_that_nobody_has_begun_is_not_lost() -> None:
     story = falling()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
-    _, outputs = take_over(CONFIG, handed(story), 8, START + AHEAD + 1.3)
+    _, outputs = take_over(handed(story), 1.3)
     (deploy,) = decided(outputs, D)
     assert deploy.decision.epoch == 8
 
@@ -126,14 +130,14 @@ def test_a_parachute_that_is_out_stays_out_for_the_next_leader() -> None:
     story = falling()
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     story.at(1.2, parachute(deployed=True))
-    state, outputs = take_over(CONFIG, handed(story), 8, START + AHEAD + 9.0)
+    state, outputs = take_over(handed(story), 9.0)
     assert state.stage is Stage.DEPLOYED
     assert decided(outputs, K) == decided(outputs, D) == []
 
 
 def test_whoever_waits_at_one_that_steps_down_is_told() -> None:
     story = falling()
-    state, outputs = step_down(CONFIG, story.state, "it was stopped", START + 1.1)
+    state, outputs = update(CONFIG, story.state, (i.StepDown("it was stopped"),), START + 1.1)
     (answer,) = (o for o in outputs if isinstance(o, i.Finish))
     assert answer.token == 5
     assert "another supervisor decides now: it was stopped" in answer.message

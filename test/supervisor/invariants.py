@@ -1,0 +1,173 @@
+"""What must hold whatever the configuration and the inputs; each update is watched for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from story import LINK, START
+
+from chute_ros.model import Action, Armed, LandedState, Outcome, VehicleState
+from chute_ros.supervisor import flight
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.rules import BelowMinimum
+from chute_ros.supervisor.state import State
+
+K, D = Action.KILL, Action.DEPLOY
+#: A reason that begins so tells only of silence, or of how far the deploy has got.
+_SILENCE = ("link ", "autopilot link", "counter ", "kill ", "step ")
+#: What a moving vehicle told may be believed for so long, s: the age of a sample and its way.
+_MOVED_LATELY = 1.2
+
+
+class Watch:
+    """Feeds a core and raises where something that must hold does not."""
+
+    def __init__(self, config: SupervisorConfig, state: State | None = None) -> None:
+        self.config = config
+        self.state = state or State(epoch=7, started_at=START)
+        self.now = START
+        self.outputs: tuple[i.Output, ...] = ()
+        self.moved_at = -math.inf
+        self.killed_at = math.nan
+        self.forced = False
+
+    def copy(self) -> Watch:
+        """One that goes on from here another way."""
+        other = Watch(self.config, self.state)
+        other.__dict__.update(self.__dict__)
+        return other
+
+    def wait(self, seconds: float) -> None:
+        """Time passes; the core is woken at each deadline, as its node does."""
+        end = self.now + seconds
+        while (wake := next_deadline(self.config, self.state, self.now)) < end:
+            self.now = wake
+            self.feed()
+        self.now = end
+
+    def restart(self) -> None:
+        """The supervisor begins anew with nothing but a higher epoch."""
+        self.state = State(epoch=self.state.epoch + 4, started_at=self.now, mode=self.state.mode)
+        self.killed_at = math.nan
+        self.forced = False
+
+    def feed(self, *inputs: i.Input) -> tuple[i.Output, ...]:
+        """One update, watched."""
+        before = self.state
+        for one in inputs:
+            if isinstance(one, i.VehicleReport):
+                self._note(one.state)
+            if isinstance(one, i.DeployRequest):
+                self.forced |= one.force
+        self.state, self.outputs = update(self.config, before, inputs, self.now)
+        new = [
+            output.decision
+            for output in self.outputs
+            if isinstance(output, i.Decide) and not output.decision.shadow
+        ]
+        done = [decision.action for decision in new]
+        if before.mode is not i.Mode.ACTIVE and self.state.mode is not i.Mode.ACTIVE:
+            assert not {K, D} & set(done), "in another mode nothing is sent"
+        going_on = before.stage in (Stage.KILLING, Stage.DEPLOYING)
+        if K in done and (math.isnan(self.killed_at) or not going_on):
+            self.killed_at = self.now
+        self._kill_first(done)
+        self._confirmed_is_not_told_again(before, inputs, done)
+        self._released_stays_released(before, inputs, done)
+        self._no_delay(before, inputs, done)
+        ordered = self.state.deploy_rule and not before.deploy_rule
+        if ordered and self.state.deploy_rule != "operator":
+            self._rule_may_deploy(before)
+        return self.outputs
+
+    def _note(self, told: VehicleState) -> None:
+        fast = abs(told.vertical_speed) > self.config.profile.moving_speed
+        if fast or told.acceleration < flight.FREE_FALL:
+            self.moved_at = self.now
+
+    def _kill_first(self, done: list[Action]) -> None:
+        """Every deploy is preceded by a kill, and waits for its confirmation or the delay."""
+        if D in done:
+            assert not math.isnan(self.killed_at), "a deploy without a kill before it"
+            if K in done:
+                assert done.index(K) < done.index(D)
+            kill = self.state.kill
+            assert kill is not None
+            waited = self.now - self.killed_at + 1e-9
+            assert kill.confirmed or waited >= self.config.kill_to_deploy_delay
+
+    def _confirmed_is_not_told_again(
+        self, before: State, inputs: Sequence[i.Input], done: list[Action]
+    ) -> None:
+        """The same deploy is never sent twice to a device that confirmed."""
+        if any(isinstance(one, (i.ResetRequest, i.ModeRequest)) for one in inputs):
+            return
+        # A report is judged before what follows it; what confirmed is out from then on.
+        confirmed = any(deploy.confirmed for deploy in before.deploys)
+        assert not (confirmed and D in done), "told again although one has confirmed"
+        after = any(deploy.confirmed for deploy in self.state.deploys)
+        assert not (after and D in done), "told in the update that heard the confirmation"
+
+    def _released_stays_released(
+        self, before: State, inputs: Sequence[i.Input], done: list[Action]
+    ) -> None:
+        """Only a reset leads back from a released parachute, whoever restarts."""
+        if before.stage is Stage.DEPLOYED:
+            assert D not in done or any(isinstance(one, i.ResetRequest) for one in inputs)
+            if not any(isinstance(one, i.ResetRequest) for one in inputs):
+                assert self.state.stage is Stage.DEPLOYED
+
+    def _no_delay(self, before: State, inputs: Sequence[i.Input], done: list[Action]) -> None:
+        """What is fulfilled in flight kills within this update; what is due leaves within it."""
+        after = self.state
+        if after.mode is not i.Mode.ACTIVE or not after.leading:
+            return
+        if after.stage is Stage.KILLING and after.deploy_rule and after.kill is not None:
+            assert not after.kill.confirmed, "confirmed, and the deploy has not left"
+            assert self.now < after.deploy_due, "due, and the deploy has not left"
+        changed = any(isinstance(one, i.ModeRequest) for one in inputs)
+        for rule in self.config.profile.rules:
+            evidence = after.rule(rule.name)
+            if rule.action < K or after.stage not in rule.states:
+                continue
+            if after.stage is Stage.IN_FLIGHT and evidence.fulfilled(rule) and not changed:
+                assert evidence.latched or evidence.denied, "fulfilled, and nothing follows"
+            newly = evidence.latched and not before.rule(rule.name).latched
+            if newly and before.stage is Stage.IN_FLIGHT:
+                assert K in done, "acted on, and no kill has left"
+
+    def _rule_may_deploy(self, before: State) -> None:
+        """Not on silence alone, not on the ground, not disarmed, not too low."""
+        state, now = self.state, self.now
+        told = state.deploy_reasons
+        assert any(not reason.startswith(_SILENCE) for reason in told), "silence alone deploys"
+        profile = self.config.profile
+        height = flight.measured(self.config, state, "height", now)
+        if profile.below_minimum is not BelowMinimum.DEPLOY:
+            assert not height < profile.minimum_height, "below the minimum height"
+        assert before.airborne or state.airborne, "a rule deploys what is not in flight"
+        if before.stage is Stage.KILLING and before.killed_in_flight:
+            return  # our own kill has switched the motors off
+        if self.now - self.moved_at <= _MOVED_LATELY:
+            return  # what says otherwise is contradicted
+        vehicle = state.vehicle
+        silence = now - state.vehicle_received
+        limit = self.config.vehicle_state_age - 1e-9
+        landed_is_fresh = max(vehicle.landed_state_age, 0.0) + silence < limit
+        if landed_is_fresh:
+            assert vehicle.landed_state is not LandedState.ON_GROUND, "deployed on the ground"
+        if max(vehicle.armed_age, 0.0) + silence < limit and not state.rebooted:
+            assert vehicle.armed is not Armed.DISARMED, "deployed although disarmed"
+
+
+def reports_of(watch: Watch, action: Action, outcome: Outcome, link: str = LINK) -> list[i.Input]:
+    """What a node reports on the newest decision of this action, if there is one."""
+    pending = watch.state.kill if action is K else watch.state.deploy
+    if pending is None:
+        return []
+    number = pending.decision.epoch, pending.decision.id
+    return [i.ActionReport(*number, link, outcome, outcome.name, number[0], number[1])]

@@ -1,0 +1,310 @@
+"""What the field has lived through, told once more: each of these has cost a vehicle, or more."""
+
+import math
+from typing import Any
+
+import pytest
+from story import DOWN, LINK, STANDING, START, Story, falling, parachute, shipped
+
+from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import Rung
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.state import State
+
+K, D = Action.KILL, Action.DEPLOY
+GROUND = LandedState.ON_GROUND
+UPF = "upf_can"
+EACH = pytest.mark.parametrize("name", ["multirotor", "fixed_wing", "rocket"])
+
+
+def aloft(name: str = "multirotor", **settings: Any) -> Story:
+    """In flight for a second."""
+    return Story(shipped(name, **settings)).ready().fly(1.0)
+
+
+# -- ground deployment at start-up from barometer drift ------------------------------------------
+
+
+@EACH
+@pytest.mark.parametrize("armed", [Armed.DISARMED, Armed.ARMED])
+def test_a_barometer_that_drifts_at_start_up_deploys_nothing_on_the_ground(
+    name: str, armed: Armed
+) -> None:
+    story = Story(shipped(name))
+    height = 0.0
+    for n in range(400):
+        # It warms up: the height runs away and back, as fast as anything that falls.
+        speed = -35.0 * math.sin(n / 20.0)
+        height += speed * 0.05
+        told = {"height": height, "vertical_speed": speed}
+        story.fly(story.t + 0.05, armed=armed, landed_state=GROUND, **told)
+    assert story.fired() == []
+    assert story.state.stage is Stage.READY
+
+
+def test_a_land_detector_that_believes_the_drift_deploys_nothing_while_disarmed() -> None:
+    story = Story(shipped("multirotor"))
+    story.fly(20.0, armed=Armed.DISARMED, vertical_speed=-20.0, height=200.0)
+    assert story.state.stage is Stage.READY
+    assert story.fired() == []
+
+
+def test_a_barometer_that_jumps_in_flight_is_not_a_fall() -> None:
+    story = aloft()
+    for n in range(40):
+        # A gust on the static port: single samples far off, and back.
+        story.fly(story.t + 0.05, vertical_speed=-60.0 if n % 3 == 0 else 0.0)
+    assert story.fired() == []
+
+
+# -- deployment missed because a counter was reset -----------------------------------------------
+
+
+def test_a_tumbling_vehicle_whose_attitude_swings_through_the_upright_is_deployed() -> None:
+    story = aloft()
+    start = story.t
+    for n in range(60):
+        # It tumbles: three samples out of four are beyond the limit, never six in a row.
+        tilt = 20.0 if n % 4 == 3 else 120.0
+        story.fly(story.t + 0.05, tilt=tilt)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.when(K) - start < 1.0
+
+
+def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> None:
+    story = aloft()
+    start = story.t
+    for n in range(80):
+        story.fly(story.t + 0.05, vertical_speed=-11.0 if n % 5 == 4 else -14.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.when(K) - start < 2.5
+
+
+def test_dropped_messages_do_not_reset_the_count() -> None:
+    story = aloft()
+    start = story.t
+    for n in range(40):
+        # Two samples out of three never arrive.
+        story.at(start + 0.15 * (n + 1), story.heartbeat(), story.told(vertical_speed=-14.0))
+        if story.fired():
+            break
+    assert story.when(K) - start < 1.3
+
+
+# -- kill vetoed by "landed" while falling -------------------------------------------------------
+
+
+@pytest.mark.parametrize("armed", [Armed.ARMED, Armed.DISARMED])
+def test_a_fall_that_the_autopilot_takes_for_a_landing_is_killed_and_deployed(
+    armed: Armed,
+) -> None:
+    story = aloft()
+    story.fall(3.5, landed_state=GROUND, armed=armed)
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_steady_fall_at_one_g_that_is_taken_for_standing_is_deployed() -> None:
+    story = aloft()
+    # It has reached its final speed: the accelerometer feels what it feels on the ground.
+    lie = {"landed_state": GROUND, "armed": Armed.DISARMED}
+    story.fly(3.5, vertical_speed=-14.0, acceleration=9.8, **lie)
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_landing_in_earnest_deploys_nothing() -> None:
+    story = aloft()
+    story.fly(5.0, vertical_speed=-1.5, height=2.0)
+    story.fly(5.1, vertical_speed=0.0, acceleration=25.0, height=0.0)
+    story.fly(9.0, vertical_speed=0.0, height=0.0, **DOWN)
+    assert story.fired() == []
+    assert story.state.stage is Stage.READY
+
+
+def test_carried_about_after_its_landing_it_deploys_nothing() -> None:
+    story = aloft()
+    story.fly(4.0, vertical_speed=0.0, height=0.0, **DOWN)
+    assert story.state.stage is Stage.READY
+    story.fly(10.0, tilt=120.0, vertical_speed=-3.0, acceleration=3.0, **DOWN)
+    assert story.fired() == []
+
+
+# -- the parachute that fails to pull out --------------------------------------------------------
+
+LADDER = {
+    "deploy_links": (LINK, UPF),
+    "deploy_ladder": (Rung(LINK), Rung(UPF), Rung(UPF, "trigger")),
+}
+
+
+def test_a_parachute_that_does_not_come_out_is_followed_by_the_next_down_to_the_triggers() -> None:
+    story = aloft(**LADDER)
+    for n in range(1, 161):
+        beats = [story.heartbeat(), story.heartbeat(UPF)]
+        told = story.told(**falling(n * 0.05, 300.0), armed=Armed.ARMED)
+        story.at(1.0 + n * 0.05, *beats, told)
+        for decision in story.decisions(D)[-1:]:
+            # Each node has sent it and its device has acknowledged; no canopy comes.
+            link = decision.targets[0]
+            story.at(
+                story.t,
+                story.report(D, Outcome.SENT, link),
+                story.report(D, Outcome.ACCEPTED, link),
+            )
+    steps = [(d.targets[0], d.device) for d in story.decisions(D)]
+    assert steps == [(LINK, ""), (UPF, ""), (UPF, "trigger")]
+    assert story.decisions(K)[0].id < story.decisions(D)[0].id
+    story.at(9.1, story.report(D, Outcome.CONFIRMED, UPF))
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_when_none_comes_out_the_alarm_does_not_stop() -> None:
+    story = aloft(**LADDER).fall(2.0, 2000.0)
+    story.at(60.0)
+    assert story.state.stage is Stage.FAULT
+    said = [t for t, o in story.outputs if isinstance(o, i.Say) and "no parachute" in o.text]
+    assert said[-1] > 58.0
+    assert len(story.decisions(D)) == 3
+
+
+# -- a late ACK taken for a confirmation ---------------------------------------------------------
+
+
+def test_an_ack_however_late_is_no_confirmation() -> None:
+    story = aloft(**LADDER).fall(2.0, 2000.0)
+    first = story.newest(D)
+    late = i.ActionReport(first.epoch, first.id, LINK, Outcome.ACCEPTED, "ACK", first.epoch)
+    story.at(2.5, story.heartbeat(UPF), late)
+    story.at(5.0, story.heartbeat(UPF), late)
+    assert story.state.stage is Stage.DEPLOYING
+    story.at(60.0)
+    assert story.state.stage is Stage.FAULT
+
+
+def test_a_confirmation_of_the_last_flight_is_none_of_this_one() -> None:
+    story = aloft().fall(3.0)
+    old = story.newest(D)
+    story.at(3.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
+    story.fly(5.0, vertical_speed=0.0, **DOWN)
+    story.at(5.0, parachute(deployed=False), i.ResetRequest(1))
+    assert story.answer(1).success
+    story.fly(6.0, **DOWN).fly(7.0).fall(9.0)
+    again = i.ActionReport(old.epoch, old.id, LINK, Outcome.CONFIRMED, "out", old.epoch, old.id)
+    story.at(9.0, again)
+    assert story.state.stage is Stage.DEPLOYING
+    assert story.fired() == ["KILL", "DEPLOY", "KILL", "DEPLOY"]
+
+
+def test_a_confirmed_kill_is_no_confirmed_deploy() -> None:
+    story = aloft().fall(2.0)
+    story.at(2.0, story.report(K, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.DEPLOYING
+
+
+# -- the autopilot that starts anew at height ----------------------------------------------------
+
+ANEW = {"reboot_count": 1, "rebooted_in_flight": True, "height": 0.0}
+
+
+@pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
+def test_an_autopilot_that_starts_anew_at_height_and_falls_is_deployed(name: str) -> None:
+    story = aloft(name)
+    # All that it says of itself is as on the ground: disarmed, landed, at height 0.
+    for n in range(1, 50):
+        told = {**falling(n * 0.05), **ANEW, **DOWN}
+        story.fly(story.t + 0.05, **told)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert "autopilot rebooted" in story.newest(D).rule or "free fall" in story.newest(D).rule
+
+
+def test_an_autopilot_that_starts_anew_and_flies_on_is_not_deployed() -> None:
+    story = aloft().fly(20.0, **ANEW)
+    assert story.fired() == []
+    assert story.alarms() == ["the autopilot started anew in flight"]
+
+
+def test_its_height_that_starts_at_zero_does_not_hold_the_deploy_back() -> None:
+    story = aloft().fly(1.5, **ANEW)
+    story.fly(3.2, **{**ANEW, "vertical_speed": -14.0})
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_battery_that_is_changed_on_the_ground_deploys_nothing() -> None:
+    story = aloft()
+    story.fly(4.0, vertical_speed=0.0, height=0.0, **DOWN)
+    story.fly(20.0, **{**ANEW, **DOWN, "tilt": 90.0})
+    assert story.fired() == []
+
+
+# -- the link that flaps at its limit ------------------------------------------------------------
+
+
+@EACH
+@pytest.mark.parametrize("gap", [0.49, 0.51, 0.99, 1.01, 2.0])
+def test_a_link_that_flaps_at_its_limit_fires_nothing(name: str, gap: float) -> None:
+    story = aloft(name)
+    for n in range(1, 150):
+        beat = [story.heartbeat()] if (n * 0.1) % gap < 0.1 else []
+        story.at(1.0 + n * 0.1, *beat, story.told())
+    assert story.fired() == []
+    assert story.state.stage is Stage.IN_FLIGHT
+
+
+def test_a_deploy_over_a_link_that_flaps_reaches_the_device_and_ends_with_it() -> None:
+    story = aloft()
+    for n in range(1, 60):
+        beat = [story.heartbeat()] if n % 24 == 0 else []  # every 1.2 s: lost each time
+        story.at(1.0 + n * 0.05, *beat, story.told(**falling(n * 0.05)))
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+    assert any(isinstance(o, i.Decide) and o.again for _, o in story.outputs)
+    story.at(story.t + 0.1, story.report(D, Outcome.CONFIRMED))
+    count = len(story.decisions(D))
+    for _ in range(40):
+        story.at(story.t + 1.2, story.heartbeat())
+    assert len(story.decisions(D)) == count, "a device that confirmed is not told again"
+
+
+# -- a restart under the canopy ------------------------------------------------------------------
+
+
+def test_a_supervisor_that_restarts_under_the_canopy_does_not_deploy_again() -> None:
+    story = aloft().fall(3.0)
+    story.at(3.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    story.state = State(epoch=11, started_at=START + 3.0)
+    story.at(3.1, story.heartbeat(), parachute(deployed=True))
+    fired = len(story.decisions(D))
+    story.fly(8.0, vertical_speed=-5.0, tilt=80.0)
+    assert story.state.stage is Stage.DEPLOYED
+    assert len(story.decisions(D)) == fired
+
+
+def test_a_device_node_that_restarts_after_the_release_takes_nothing_back() -> None:
+    story = aloft().fall(3.0)
+    story.at(3.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
+    story.seq = -1
+    story.at(3.1, story.heartbeat(), parachute(deployed=False, alive=False))
+    story.at(3.2, parachute(deployed=False))
+    story.fly(6.0, vertical_speed=-5.0)
+    assert story.state.stage is Stage.DEPLOYED
+    assert len(story.decisions(D)) == 1
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_a_supervisor_that_starts_in_mid_air_protects_at_once() -> None:
+    story = Story(shipped("multirotor"))
+    story.fly(0.5).fall(2.5)
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_supervisor_that_starts_on_the_ground_with_the_parachute_out_fires_nothing() -> None:
+    story = Story(shipped("multirotor"))
+    for _ in range(30):
+        story.at(
+            story.t + 0.1,
+            story.heartbeat(healthy=False),
+            i.VehicleReport(STANDING),
+            parachute(deployed=True),
+        )
+    assert story.fired() == []
+    assert story.decisions()[-1].action is Action.FLIGHT_BLOCK
