@@ -11,6 +11,8 @@ DEMO_ARGS ?=
 # The vehicle of the demo: drone or rocket; and what a drone carries: mavlink, upf or both.
 VEHICLE ?= drone
 PARACHUTE ?= mavlink
+# Steps of each story that make explore tries.
+DEPTH ?= 2
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -21,7 +23,7 @@ OVERLAY := $(SET_UP) && . "$$venv/env.sh"
 # A simulation must not reach other machines, nor a vehicle on them.
 LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test bench build lint docs lock clean distclean
+.PHONY: help demo test bench build lint docs explore lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -45,6 +47,10 @@ lint: ## ruff, mypy and the import rule
 docs: build ## write README.md's tables, config/ and docs/states.* anew
 	@$(OVERLAY) && export PYTHONPATH="$$PWD:$$PYTHONPATH" \
 	    && python3 -m chute_ros.tools.parameter_docs && python3 -m chute_ros.tools.state_diagram
+
+explore: build ## try every story of DEPTH steps on the supervisor's core, write docs/exploration.md
+	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m chute_ros.tools.explore \
+	    --depth $(DEPTH)
 
 lock: ## refresh requirements/*.lock
 	@$(UNDERLAY) && exec scripts/lock.sh

@@ -270,6 +270,7 @@ class SafetySupervisorNode(Node):
         message.header.stamp = self.wall.now().to_msg()
         self._heartbeat_publisher.publish(message)
         self.lease.tell(now)
+        self.services_offered.tidy()
 
     def _changed(self) -> bool:
         before, now = self._published, self.state

@@ -32,9 +32,12 @@ class SupervisorServices:
         # A service that awaits its outcome must not keep the decision loop from running.
         self._group = ReentrantCallbackGroup()
         self._services: list[Service] = []
+        self._calls = 0
+        self._closing = False
 
     def open(self) -> None:
         """Offer them."""
+        self._closing = False
         if self._services:
             return
         for kind, name, callback in (
@@ -44,15 +47,31 @@ class SupervisorServices:
             (Trigger, "safety/reset", self._reset),
             (SetMode, "safety/set_mode", self._set_mode),
         ):
+            served = self._counted(callback)
             self._services.append(
-                self._node.create_service(kind, name, callback, callback_group=self._group)
+                self._node.create_service(kind, name, served, callback_group=self._group)
             )
 
     def close(self) -> None:
-        """Another decides now."""
-        for service in self._services:
-            self._node.destroy_service(service)
-        self._services.clear()
+        """Another decides now. Whoever waits still gets an answer: tidy ends them."""
+        self._closing = True
+
+    def tidy(self) -> None:
+        """Called often: take the services away once nobody waits at them any more."""
+        if self._closing and not self._calls:
+            for service in self._services:
+                self._node.destroy_service(service)
+            self._services.clear()
+
+    def _counted(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        async def served(request: Any, response: Any) -> Any:
+            self._calls += 1
+            try:
+                return await callback(request, response)
+            finally:
+                self._calls -= 1
+
+        return served
 
     def finished(self, output: inputs.Finish) -> None:
         """The core has answered."""

@@ -40,7 +40,7 @@ class Codec:
         """What to_json was given; RecordError says what does not fit."""
         try:
             return self.value(json.loads(text), object)
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise RecordError(f"cannot be read: {error} in {text[:80]!r}") from error
 
     def plain(self, value: object, whole: bool = False) -> Any:
@@ -66,6 +66,8 @@ class Codec:
         """The value of this type that plain stands for."""
         if isinstance(plain, dict):
             return self._object(plain)
+        if dataclasses.is_dataclass(kind):
+            raise RecordError(f"{plain!r} is no {getattr(kind, '__name__', kind)}")
         origin = typing.get_origin(kind)
         arguments = typing.get_args(kind)
         if origin in (types.UnionType, typing.Union):

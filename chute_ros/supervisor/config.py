@@ -13,6 +13,10 @@ from chute_ros.supervisor.rules import DEVICE_RULES, Profile
 _NO_LIMITS: MappingProxyType[str, LinkLimits] = MappingProxyType({})
 
 
+#: As the device of a step: the triggers of a UPF parachute, past its controller.
+TRIGGER = "trigger"
+
+
 @dataclass(frozen=True)
 class Rung:
     """One step of the deploy ladder. device: "" for the one that the node chooses, "1/162" for a

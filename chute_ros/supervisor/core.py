@@ -70,6 +70,8 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     if state.deploy is not None:
         deadlines.append(step_deadline(config, state, state.deploy))
     deadlines.append(state.alarm_at)
+    if state.stage is Stage.FAULT:
+        deadlines.append(state.stage_since + config.deploy_timeout)
     deadlines += [ask.at + ASK_LASTS for ask in state.asks.values()]
     if state.airborne:
         deadlines.append(flight.landed_at(config, state))
@@ -134,7 +136,7 @@ class _Update(Deploying):
         elif isinstance(one, i.TakeOver):
             self._take_over(one)
         elif isinstance(one, i.StepDown):
-            self.give_up_waiting(f"another supervisor decides now: {one.why}")
+            self.answer_all(f"another supervisor decides now: {one.why}")
             self.state = replace(self.state, leading=False)
         else:
             self.mode_request(one)
@@ -156,6 +158,7 @@ class _Update(Deploying):
             self.look_at_rules()
             return
         self._look_at_vehicle()
+        self._note_height()
         self.look_at_parachutes()
         self.look_at_rules()
         # After the rules, of which one may block flight.
@@ -169,18 +172,26 @@ class _Update(Deploying):
         self._note_down()
         in_air = flight.in_air(self.config, self.state, self.now)
         stage = self.state.stage
-        if in_air and listed(stage, Stimulus.TAKEN_OFF):
-            if stage in (Stage.STARTUP, Stage.BLOCKED):
+        if in_air and listed(stage, Stimulus.TAKEN_OFF) and self._may_take_off():
+            if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
                 self.alarm(f"in the air although {stage.name}")
             self.move(Stimulus.TAKEN_OFF)
             self._took_off(anew=stage is not Stage.LANDED)
         elif in_air is False and listed(stage, Stimulus.LANDED):
             self.move(Stimulus.LANDED)
-            self.state = replace(self.state, airborne=False, rebooted=False)
+            self.state = replace(self.state, airborne=False, rebooted=False, landed_at=self.now)
         if self.state.stage is Stage.LANDED and flight.disarmed(self.config, self.state, self.now):
             self.move(Stimulus.SECURED)
         if in_air is False and not self.state.flown and self.state.stage in ON_GROUND:
             self.note_released()
+
+    def _may_take_off(self) -> bool:
+        """From KILLING only one that was killed on the ground and has armed again."""
+        state = self.state
+        if state.stage is not Stage.KILLING:
+            return True
+        again = state.kill is not None and self.armed_since(state.kill)
+        return not state.killed_in_flight and not state.deploy_rule and again
 
     def _note_down(self) -> None:
         """Since when it says that it stands, and nothing contradicts it."""
@@ -188,6 +199,15 @@ class _Update(Deploying):
             self.state = replace(self.state, down_since=math.nan)
         elif math.isnan(self.state.down_since):
             self.state = replace(self.state, down_since=self.now)
+
+    def _note_height(self) -> None:
+        """Since when a deploy is worth it; without any height, some time after the take-off."""
+        if self.state.airborne and not self.state.was_high:
+            height = flight.measured(self.config, self.state, "height", self.now)
+            high = height >= self.config.profile.minimum_height
+            if math.isnan(height):
+                high = self.now >= self.state.airborne_since + flight.HIGH_AFTER
+            self.state = replace(self.state, was_high=high)
 
     def _took_off(self, anew: bool) -> None:
         """anew: it stood disarmed before; otherwise it bounced, or was not down at all."""
@@ -202,6 +222,9 @@ class _Update(Deploying):
             self.state,
             flown=True,
             airborne=True,
+            airborne_since=self.now,
+            was_high=False,
+            killed_in_flight=False,
             home=home,
             measurements=MappingProxyType(measurements),
         )
@@ -223,7 +246,9 @@ class _Update(Deploying):
         if self.state.stage in (Stage.READY, Stage.ARMED):
             action = Action.FLIGHT_BLOCK_RELEASE
             reasons: tuple[str, ...] = ("every required link is healthy",)
-        elif self.state.stage in (Stage.STARTUP, Stage.BLOCKED, Stage.DEPLOYED, Stage.FAULT):
+        elif self.state.stage in (Stage.STARTUP, Stage.BLOCKED, Stage.DEPLOYED, Stage.FAULT) or (
+            self._killed_on_ground()
+        ):
             action = Action.FLIGHT_BLOCK
             reasons = block_reasons(self.config, self.state, self.now) or ("starting",)
         elif self.state.stage is Stage.IN_FLIGHT:
@@ -238,6 +263,13 @@ class _Update(Deploying):
             block = None
         if block is None or block.decision.action is not action:
             self.decide("block", action, "links", reasons, self.config.links)
+
+    def _killed_on_ground(self) -> bool:
+        """The kill has ended, so that a block does not overtake it, and nothing follows it."""
+        state = self.state
+        ended = state.kill is not None and (state.kill.confirmed or self.kill_failed(state.kill))
+        on_ground = not state.killed_in_flight and not state.deploy_rule
+        return state.stage is Stage.KILLING and ended and on_ground
 
     def _send_again(self) -> None:
         for slot in self.slots:

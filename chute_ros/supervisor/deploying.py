@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from chute_ros.model import Action, Outcome
+from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
@@ -14,7 +15,7 @@ from chute_ros.supervisor.state import Pending, State
 
 def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> float:
     """When the newest step of the ladder is given up, monotonic s."""
-    if len(state.deploys) >= len(config.ladder):
+    if len(state.deploys) >= len(state.deploy_ladder or config.ladder):
         return step.decided_at + config.deploy_timeout
     return step.decided_at + config.ladder_step_timeout
 
@@ -55,16 +56,29 @@ class Deploying(Policy):
             self.move(Stimulus.PARACHUTE_OPEN, self.deploy_details())
         elif self.state.stage is Stage.DEPLOYING and self.state.deploys:
             self._climb()
+        elif self.state.stage is Stage.FAULT:
+            self._try_again()
         self._answer()
         self._alarm_again()
 
+    def _try_again(self) -> None:
+        """As long as it is in the air, whoever could not be reached may be now. A device that has
+        confirmed is not among them."""
+        over = self.now >= self.state.stage_since + self.config.deploy_timeout
+        in_air = flight.in_air(self.config, self.state, self.now)
+        if over and in_air and self.state.deploys and self.state.mode is i.Mode.ACTIVE:
+            rule = self.state.deploys[0].decision.rule
+            waited = self.now - self.state.stage_since
+            why = f"tried again {waited:.1f} s after the ladder's end: it is still in the air"
+            self.order_deploy(rule, (why,))
+
     def _climb(self) -> None:
         """Step by step, each with its limit. One whose node is silent is sent, not awaited."""
-        for _ in self.config.ladder:
+        for _ in self.ladder:
             step = self.state.deploys[-1]
             text = step.newest_details() or "no device node reported"
             waited = self.now - step.decided_at
-            last = len(self.state.deploys) >= len(self.config.ladder)
+            last = len(self.state.deploys) >= len(self.ladder)
             link = step.targets[0]
             silent = self.evidence(link).silent(self.config.limits(link).lost_after, self.now)
             over = step.all_failed() or self.now >= step_deadline(self.config, self.state, step)
@@ -78,11 +92,9 @@ class Deploying(Policy):
                 self.state = replace(self.state, alarm_at=alarm_at)
                 return
             number = len(self.state.deploys)
-            rung = self.config.ladder[number - 1]
+            rung = self.ladder[number - 1]
             why = "its node is silent" if silent and not over else f"not confirmed: {text}"
-            self._fire(
-                f"step {number} of {len(self.config.ladder)}, {rung}: {why} ({waited:.2f} s)"
-            )
+            self._fire(f"step {number} of {len(self.ladder)}, {rung}: {why} ({waited:.2f} s)")
 
     def _fire(self, why: str) -> None:
         self.fire(Action.DEPLOY, self.state.deploy_rule, (*self.state.deploy_reasons, why))

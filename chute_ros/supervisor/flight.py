@@ -7,6 +7,7 @@ of an autopilot takes a steady fall for standing still, and must not veto the pa
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
@@ -16,6 +17,10 @@ from chute_ros.supervisor.state import State
 FREE_FALL = 4.9
 #: An autopilot that started anew in flight must say for so long that it stands, s.
 _LANDED_HOLD_AFTER_REBOOT = 10.0
+#: For so long after a landing a vehicle may turn out not to have landed, s.
+_FLIGHT_JUST_BEFORE = 60.0
+#: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
+HIGH_AFTER = 5.0
 
 
 def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
@@ -24,6 +29,15 @@ def measured(config: SupervisorConfig, state: State, name: str, now: float) -> f
     if name == "height" and state.rebooted:
         return math.nan  # it counts from where the autopilot started anew
     return state.measured(name).usable(limits, now)
+
+
+def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
+    """The height, m, also one that does not change any more: it may be that low. NaN: absent."""
+    height = measured(config, state, "height", now)
+    if math.isnan(height) and not state.rebooted:
+        never_stuck = replace(config.profile.limits["height"], stuck_after=0.0)
+        return state.measured("height").usable(never_stuck, now)
+    return height
 
 
 def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> str:
@@ -84,14 +98,30 @@ def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
             return True
         return None if now < landed_at(config, state) else False
     if down is not None:
+        off = armed(config, state, now) is Armed.DISARMED
         # One that has not flown and whose motors are off does not fly, whatever drifts.
-        if not down and armed(config, state, now) is Armed.DISARMED:
-            return False
-        return not down
+        return (not down and not off) or _falls_against_its_word(config, state, down and off, now)
     height = measured(config, state, "height", now)
     if armed(config, state, now) is Armed.ARMED and not math.isnan(height):
         return height - state.armed_height > config.takeoff_height
     return None
+
+
+def _falls_against_its_word(
+    config: SupervisorConfig, state: State, stands_off: bool, now: float
+) -> bool:
+    """A vehicle that says that it stands, or that is disarmed, falls all the same: a land detector
+    was wrong before the fall, or the supervisor came in the middle of it. stands_off: it says
+    both. A barometer that drifts, or a handful of wrong samples, must not look like it: it needs
+    the accelerometer and another sign, where it says both all of them, and a flight just before.
+    """
+    falls = measured(config, state, "acceleration", now) < FREE_FALL
+    sinks = measured(config, state, "vertical_speed", now) < -config.profile.moving_speed
+    height = measured(config, state, "height", now) - state.armed_height
+    high = height > max(config.takeoff_height, config.profile.minimum_height)
+    if stands_off:
+        return falls and sinks and high and now < state.landed_at + _FLIGHT_JUST_BEFORE
+    return falls and (sinks or high)
 
 
 def landed_at(config: SupervisorConfig, state: State) -> float:

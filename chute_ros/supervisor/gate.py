@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.conditions import Finding
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import BelowMinimum, Rule, is_silence
 from chute_ros.supervisor.state import State
@@ -23,7 +23,11 @@ _IN_FLIGHT = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
 def against_person(config: SupervisorConfig, state: State, force: bool, now: float) -> str:
     """Why a person's deploy is refused; empty: it is not."""
     if state.stage is Stage.DEPLOYED:
-        return "a parachute is out already"
+        if not force:
+            return "a parachute is out already; force releases the next of the ladder"
+        if all(out_already(state, rung) for rung in config.ladder):
+            return "every parachute of the ladder is out already"
+        return ""
     if state.stage in _IN_FLIGHT or force:
         return ""
     unknown = ""
@@ -56,14 +60,29 @@ def against_rule(
     return ""
 
 
+def out_already(state: State, rung: Rung) -> bool:
+    """The parachutes that this step of the ladder can release all say that they are released, or
+    its node has reported that it is."""
+    step = ((rung.link,), rung.device)
+    if any(d.confirmed and (d.decision.targets, d.decision.device) == step for d in state.deploys):
+        return True
+    devices = state.evidence(rung.link).devices
+    meant = [s for name, s in devices.items() if rung.device in ("", TRIGGER, name)]
+    return bool(meant) and all(status.deployed for status in meant)
+
+
 def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     """That the vehicle is below the minimum height, in words; empty: it is not, or nobody knows
     (a height that cannot be used is absent, not zero)."""
     profile = config.profile
-    height = flight.measured(config, state, "height", now)
-    if profile.below_minimum is BelowMinimum.DEPLOY or not height < profile.minimum_height:
+    if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
-    return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"
+    height = flight.lowest_height(config, state, now)
+    if height < profile.minimum_height:
+        return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"
+    if profile.minimum_height > 0.0 and not state.was_high:
+        return f"it was never seen at the minimum height, {profile.minimum_height:g} m"
+    return ""
 
 
 def _killed(state: State) -> bool:

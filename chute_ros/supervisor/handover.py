@@ -32,10 +32,14 @@ def told(state: State, now: float) -> str:
         deploys=state.deploys,
         deploy_rule=state.deploy_rule,
         deploy_reasons=state.deploy_reasons,
+        deploy_ladder=state.deploy_ladder,
         deploy_due=state.deploy_due,
         flown=state.flown,
         airborne=state.airborne,
         killed_in_flight=state.killed_in_flight,
+        landed_at=state.landed_at,
+        was_high=state.was_high,
+        airborne_since=state.airborne_since,
         down_since=state.down_since,
         rebooted=state.rebooted,
         reboots_before=state.reboots_before,
@@ -56,7 +60,11 @@ def followed(state: State, text: str, now: float) -> State:
     leader = _CODEC.from_json(text)
     if not isinstance(leader, State):
         raise RecordError(f"not a state: {text[:80]!r}")
-    leader = _moved(leader, now)
+    try:
+        leader = _moved(leader, now)
+    except (TypeError, AttributeError, ValueError) as error:
+        # Another version, or nobody of ours, wrote it.
+        raise RecordError(f"a state that does not fit: {error}") from error
     return replace(
         leader,
         leading=False,
@@ -83,6 +91,8 @@ def _moved(state: State, by: float) -> State:
         ),
         deploy_due=state.deploy_due + by,
         down_since=state.down_since + by,
+        landed_at=state.landed_at + by,
+        airborne_since=state.airborne_since + by,
         alarm_at=state.alarm_at + by,
     )
 

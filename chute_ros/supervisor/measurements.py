@@ -126,8 +126,13 @@ class Measured:
         """After one sample; the same one told again changes nothing."""
         if math.isnan(sample.measured_at):
             return self
-        for known in (self.measured_at, self.candidate_at):
-            if abs(sample.measured_at - known) < _SAME_SAMPLE:
+        for value, at in (
+            (self.value, self.measured_at),
+            (self.candidate, self.candidate_at),
+        ):
+            # Told again by another message, its date varies as the way does; its value does not.
+            same_for = _JITTER if sample.value == value else _SAME_SAMPLE
+            if abs(sample.measured_at - at) < same_for:
                 return self
         wrong = self._impossible(sample, limits)
         if wrong:

@@ -7,7 +7,9 @@ from dataclasses import replace
 from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.gate import out_already
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.state import Pending
 from chute_ros.supervisor.steps import Steps
 
 ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
@@ -26,7 +28,8 @@ class Orders(Steps):
         self.end_kill()
         if token:
             self.state = replace(self.state, kill_tokens=(*self.state.kill_tokens, token))
-        self._to_killing("; ".join(reasons))
+        if self.state.stage is not Stage.DEPLOYED:
+            self._to_killing("; ".join(reasons))
         if not self._kill_joined(token):
             self.fire(Action.KILL, rule, reasons)
 
@@ -36,27 +39,39 @@ class Orders(Steps):
             for action in (Action.KILL, Action.DEPLOY):
                 self.fire(action, rule, reasons)
             return
-        if self.state.deploy_rule or self.deploy_reached(Outcome.CONFIRMED):
+        again = self.state.stage is Stage.DEPLOYED  # a person insists: another parachute
+        if self.state.deploy_rule or (self.deploy_reached(Outcome.CONFIRMED) and not again):
             return  # under way, or out already, which is said at the end of this update
-        if self.state.stage in ON_GROUND:
+        if self.state.stage in ON_GROUND or again:
             self.note_released()
         self.end_kill()
         kill, since = self.state.kill, self.now
         if self.state.stage is Stage.KILLING and self._kill_under_way():
             assert kill is not None
             since = kill.decided_at
-        elif self.state.stage is not Stage.KILLING or kill is None or not kill.confirmed:
+        elif (
+            self.state.stage is not Stage.KILLING
+            or kill is None
+            or not kill.confirmed
+            or self.armed_since(kill)
+        ):
             self._to_killing("; ".join(reasons))
             self.fire(Action.KILL, rule, reasons)
-        due = since + self.config.kill_to_deploy_delay
+        still_in = tuple(r for r in self.config.ladder if not out_already(self.state, r))
         self.state = replace(
-            self.state, deploy_rule=rule, deploy_reasons=reasons, deploy_due=due, deploys=()
+            self.state,
+            deploy_rule=rule,
+            deploy_reasons=reasons,
+            deploy_due=since + self.config.kill_to_deploy_delay,
+            # Where all are out as far as is known, none of them is trusted to be.
+            deploy_ladder=still_in,
+            deploys=(),
         )
 
     def _to_killing(self, why: str) -> None:
         if listed(self.state.stage, Stimulus.KILL):
             if self.state.stage is not Stage.KILLING:
-                flying = self.state.stage in (Stage.IN_FLIGHT, Stage.FAULT)
+                flying = self.state.stage in (Stage.IN_FLIGHT, Stage.FAULT, Stage.DEPLOYED)
                 self.state = replace(self.state, killed_in_flight=flying and self.state.airborne)
             self.move(Stimulus.KILL, why)
 
@@ -74,13 +89,13 @@ class Orders(Steps):
         kill = self.state.kill
         if token or kill is None or self._kill_under_way():
             return self._kill_under_way()
-        if kill.confirmed and self._armed_since(kill.decided_at + _KILL_SETTLES):
+        if kill.confirmed and self.armed_since(kill):
             return False
         wait = self.config.kill_timeout if kill.confirmed else self.config.resend_interval
         return self.now < kill.decided_at + wait
 
-    def _armed_since(self, when: float) -> bool:
-        """The vehicle says, and said after when, that its motors are armed (again)."""
+    def armed_since(self, kill: Pending) -> bool:
+        """The vehicle says, and said after this kill had its time, that it is armed (again)."""
         said_at = self.state.vehicle_received - self.state.vehicle.armed_age
         said = flight.armed(self.config, self.state, self.now)
-        return said is Armed.ARMED and said_at > when
+        return said is Armed.ARMED and said_at > kill.decided_at + _KILL_SETTLES

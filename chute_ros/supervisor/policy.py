@@ -43,14 +43,17 @@ class Judged:
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     findings = tuple(find(config, state, condition, now) for condition in rule.conditions)
-    weight = sum(
-        condition.weight
-        for condition, finding in zip(rule.conditions, findings, strict=True)
-        if finding.holds
-    )
+    pairs = list(zip(rule.conditions, findings, strict=True))
+    weight = sum(condition.weight for condition, one in pairs if one.holds)
+    possible = weight + sum(condition.weight for condition, one in pairs if one.holds is None)
+    holds: bool | None = False
+    if weight >= rule.needed - 1e-9:
+        holds = True
+    elif possible >= rule.needed - 1e-9:
+        holds = None
     told = [finding.samples for finding in findings if finding.samples >= 0]
     seen = sum(told) if told else -1
-    evidence = state.rule(rule.name).seeing(weight >= rule.needed - 1e-9, seen)
+    evidence = state.rule(rule.name).seeing(holds, seen)
     return Judged(rule, evidence, findings)
 
 

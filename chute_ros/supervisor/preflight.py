@@ -76,7 +76,7 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     ]
     if config.require_vehicle_state and (text := _vehicle_problem(config, state, now)):
         reasons.append(text)
-    if state.stage in (Stage.DEPLOYED, Stage.FAULT):
+    if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):
         reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
     return tuple(reasons)
 

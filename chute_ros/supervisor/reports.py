@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from types import MappingProxyType
 
-from chute_ros.model import Armed, LinkState, Outcome
+from chute_ros.model import Armed, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
@@ -59,16 +59,22 @@ class Reports(Requests):
             vehicle_received=self.now,
             measurements=MappingProxyType({**state.measurements, **measurements}),
         )
-        if not state.airborne:
-            self.state = replace(self.state, reboots_before=new.reboot_count)
-        elif new.rebooted_in_flight and new.reboot_count > state.reboots_before:
-            if not state.rebooted:
-                text = "the autopilot started anew in flight"
-                self.outputs.append(i.Say(text, alarm=True))
-            self.state = replace(self.state, rebooted=True)
+        self._note_reboots(new)
         if was_disarmed and new.armed is Armed.ARMED:
             height = flight.measured(self.config, self.state, "height", self.now)
             self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
+
+    def _note_reboots(self, new: VehicleState) -> None:
+        """Restarts on the ground do not count; a node that counts from 0 again has restarted."""
+        state = self.state
+        before = min(state.reboots_before, new.reboot_count)
+        if not state.airborne and not flight.in_air(self.config, state, self.now):
+            before = new.reboot_count
+        again = new.rebooted_in_flight and new.reboot_count > before
+        if again and state.airborne and not state.rebooted:
+            self.outputs.append(i.Say("the autopilot started anew in flight", alarm=True))
+        rebooted = state.rebooted or (again and state.airborne)
+        self.state = replace(state, reboots_before=before, rebooted=rebooted)
 
     def action_report(self, one: i.ActionReport) -> None:
         """How far a node got with a decision, and which is the newest that it knows."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from chute_ros.model import Action, Decision, Outcome, VehicleState
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
@@ -122,6 +122,8 @@ class State:
     #: Rule and reasons of the deploy that follows the kill; empty: none does.
     deploy_rule: str = ""
     deploy_reasons: tuple[str, ...] = ()
+    #: The steps that it has; empty: those of the configuration.
+    deploy_ladder: tuple[Rung, ...] = ()
     #: When it leaves at the latest. A kill that is decided again does not put it off.
     deploy_due: float = math.nan
     #: It was in the air since the start or the reset.
@@ -132,6 +134,12 @@ class State:
     killed_in_flight: bool = False
     #: Since when the vehicle says that it stands and nothing contradicts it.
     down_since: float = math.nan
+    #: When it last landed.
+    landed_at: float = math.nan
+    #: It was seen high enough for a deploy since the take-off.
+    was_high: bool = False
+    #: When it took off.
+    airborne_since: float = math.nan
     #: The autopilot started anew since the take-off.
     rebooted: bool = False
     #: Restarts of the autopilot that had been counted on the ground.

@@ -8,7 +8,7 @@ from typing import Literal
 
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage, Stimulus, next_stage
 from chute_ros.supervisor.state import Pending, State
@@ -35,6 +35,11 @@ class Steps:
         self.outputs.append(i.Say(f"{text} ({why})" if why else text))
 
     @property
+    def ladder(self) -> tuple[Rung, ...]:
+        """The steps of a deploy, without those whose parachutes were out when it was ordered."""
+        return self.state.deploy_ladder or self.config.ladder
+
+    @property
     def slots(self) -> tuple[Slot, ...]:
         """Every decision that may be on its way."""
         return ("block", "kill", *range(len(self.state.deploys)))
@@ -50,8 +55,8 @@ class Steps:
             self.decide("kill", action, rule, reasons, self.config.kill_links)
         elif state.stage is Stage.DEPLOYING and state.kill is not None:
             step = len(state.deploys)
-            if step < len(self.config.ladder) and not any(d.confirmed for d in state.deploys):
-                rung = self.config.ladder[step]
+            if step < len(self.ladder) and not any(d.confirmed for d in state.deploys):
+                rung = self.ladder[step]
                 self.decide(step, action, rule, reasons, (rung.link,), rung.device)
 
     def only_say(self, action: Action, rule: str, reasons: tuple[str, ...]) -> None:
@@ -101,7 +106,10 @@ class Steps:
         """
         stage = self.state.stage
         if slot == "block":
-            return stage not in (Stage.KILLING, Stage.DEPLOYING)
+            under_way = stage is Stage.KILLING and (
+                self.state.killed_in_flight or bool(self.state.deploy_rule)
+            )
+            return stage is not Stage.DEPLOYING and not under_way
         if slot == "kill":
             return stage in (Stage.KILLING, Stage.DEPLOYING, Stage.DEPLOYED)
         return stage is Stage.DEPLOYING
@@ -218,6 +226,12 @@ class Steps:
         for token in self.state.deploy_tokens:
             self.finish(token, success, accepted, message)
         self.state = replace(self.state, deploy_tokens=(), deploy_rule="", deploy_reasons=())
+
+    def answer_all(self, why: str) -> None:
+        """Nobody waits any more; what was ordered goes on, here or elsewhere."""
+        for token in (*self.state.kill_tokens, *self.state.deploy_tokens):
+            self.finish(token, False, False, why)
+        self.state = replace(self.state, kill_tokens=(), deploy_tokens=())
 
     def give_up_waiting(self, why: str) -> None:
         """What was asked for is not pursued any more."""

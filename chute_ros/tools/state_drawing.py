@@ -45,7 +45,7 @@ _CORNERS: dict[tuple[Stage, Stage], tuple[Point, ...]] = {
 #: Where an arrow leaves the frame, and its corner.
 _EXITS: dict[Stage, tuple[Point, Point]] = {
     Stage.IN_FLIGHT: ((870, 85), (1080, 85)),
-    Stage.KILLING: ((870, 335), (1055, 335)),
+    Stage.KILLING: ((870, 335), (1045, 335)),
 }
 #: Two arrows between the same boxes run this far apart.
 _APART = 24.0

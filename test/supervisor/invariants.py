@@ -116,10 +116,11 @@ class Watch:
         self, before: State, inputs: Sequence[i.Input], done: list[Action]
     ) -> None:
         """Only a reset leads back from a released parachute, whoever restarts."""
-        if before.stage is Stage.DEPLOYED:
-            assert D not in done or any(isinstance(one, i.ResetRequest) for one in inputs)
-            if not any(isinstance(one, i.ResetRequest) for one in inputs):
-                assert self.state.stage is Stage.DEPLOYED
+        insists = any(isinstance(one, i.DeployRequest) and one.force for one in inputs)
+        reset = any(isinstance(one, i.ResetRequest) for one in inputs)
+        if before.stage is Stage.DEPLOYED and not reset and not insists:
+            assert D not in done
+            assert self.state.stage is Stage.DEPLOYED
 
     def _no_delay(self, before: State, inputs: Sequence[i.Input], done: list[Action]) -> None:
         """What is fulfilled in flight kills within this update; what is due leaves within it."""

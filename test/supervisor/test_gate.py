@@ -1,5 +1,6 @@
 """The one gate before a deploy: every reason against it is stated, and nothing else refuses."""
 
+import math
 from typing import Any
 
 import pytest
@@ -79,7 +80,10 @@ def test_after_a_parachute_is_out_nobody_deploys_again() -> None:
     asked(story)
     story.at(0.1, story.report(K, Outcome.CONFIRMED))
     story.at(0.2, story.report(D, Outcome.CONFIRMED))
-    assert asked(story, force=True, token=6) == "refused: a parachute is out already"
+    assert (
+        asked(story, force=True, token=6)
+        == "refused: every parachute of the ladder is out already"
+    )
     assert story.fired() == ["KILL", "DEPLOY"]
 
 
@@ -261,9 +265,18 @@ def test_below_the_minimum_height_only_what_the_profile_allows(
 @pytest.mark.parametrize("allowed", BelowMinimum)
 def test_at_the_minimum_height_and_where_it_is_not_known_it_deploys(allowed: BelowMinimum) -> None:
     profile = {"minimum_height": 10.0, "below_minimum": allowed}
-    for height in (10.0, float("nan")):
-        story = wants(profile=profile).flying().fly(1.0, vertical_speed=-14.0, height=height)
-        assert story.fired() == ["KILL", "DEPLOY"]
+    story = wants(profile=profile).flying().fly(1.0, vertical_speed=-14.0, height=10.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    # Without any height it is taken to be high enough some time after the take-off.
+    story = wants(profile=profile).flying().fly(5.2, height=math.nan)
+    assert story.fly(6.2, vertical_speed=-14.0, height=math.nan).fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_vehicle_that_tips_over_before_it_was_ever_high_is_only_killed() -> None:
+    profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.KILL}
+    story = wants(profile=profile).flying().fly(1.0, vertical_speed=-14.0, height=math.nan)
+    assert story.fired() == ["KILL"]
+    assert "never seen at the minimum height, 10 m" in "; ".join(story.newest(K).reasons)
 
 
 def test_a_denial_is_said_once_not_at_each_update_and_again_when_its_reason_changes() -> None:

@@ -61,7 +61,14 @@ def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: A
 DEPLOYS = [
     Case("multirotor", "excess tilt", {"tilt": 60.1}, {"tilt": 59.9}, 0.3),
     Case("multirotor", "critical sink", {"vertical_speed": -12.1}, {"vertical_speed": -12.0}, 1.0),
-    Case("multirotor", "free fall", {"acceleration": 1.9}, {"acceleration": 2.0}, 0.3),
+    *falls(
+        "multirotor",
+        "free fall",
+        0.3,
+        {"acceleration": 1.9},
+        vertical_speed=(-2.1, -1.9),
+        tilt=(45.1, 44.9),
+    ),
     *falls(
         "multirotor",
         "autopilot lost and falling",
@@ -118,7 +125,14 @@ DEPLOYS = [
         1.0,
         before={"vertical_speed": -5.0},
     ),
-    Case("fixed_wing", "free fall", {"acceleration": 1.9}, {"acceleration": 2.0}, 1.0),
+    *falls(
+        "fixed_wing",
+        "free fall",
+        1.0,
+        {"acceleration": 1.9},
+        vertical_speed=(-2.1, -1.9),
+        tilt=(70.1, 69.9),
+    ),
     *falls(
         "fixed_wing",
         "autopilot lost and falling",

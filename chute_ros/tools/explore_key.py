@@ -1,0 +1,168 @@
+"""Which states of the core are the same to the exploration.
+
+Times are taken relative to now, to a millisecond, and as "long ago" where every limit on them has
+passed; numbers of decisions by their order. Left out is what only becomes text, what only times
+the repetition of a decision that has been made, and the rules that only raise an alarm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+
+from chute_ros.model import Action
+from chute_ros.supervisor import flight
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.counter import UNKNOWN_STANDS
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.rules import MeasurementCondition, Rule
+from chute_ros.supervisor.state import ASK_LASTS, Pending, State
+
+#: Fields that do not decide: texts, counts for people, what only times a repetition, and what is
+#: always the same here.
+LEFT_OUT = frozenset(
+    {
+        "late_count",
+        "updated_at",  # always now
+        "next_id",
+        "epoch",
+        "deploy_reasons",
+        "block_refused",
+        "leading",
+        "denied",
+        "seq",  # of which every heartbeat here brings the next, or begins anew
+        "lost_count",
+        "clock_difference",
+        "same_since",  # no value here stays the same
+        "sent_at",
+        "details",
+        "earlier",
+        "home",  # from it only the fence is measured, whose rule raises an alarm
+    }
+)
+_MEASURED = ("height", "vertical_speed", "tilt_deg", "acceleration", "battery_remaining")
+_LONG_AGO = 1e9
+
+
+def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
+    """Equal for two states that decide the same from now on."""
+    slots = (state.block, state.kill, *state.deploys)
+    grace = max(config.limits(link).startup_grace for link in config.links)
+    return (
+        state.stage,
+        state.mode,
+        _since(state.started_at, now, grace) if state.stage is Stage.STARTUP else 0.0,
+        _stage_since(config, state, now),
+        tuple(_link(config, state, link, now) for link in config.links),
+        _vehicle(config, state, now),
+        tuple(_measured(config, state, name, now) for name in _MEASURED),
+        tuple(
+            _rule(state, rule) for rule in config.profile.rules if rule.action is not Action.NONE
+        ),
+        tuple((who, _since(ask.at, now, ASK_LASTS)) for who, ask in sorted(state.asks.items())),
+        tuple(_pending(config, state, pending, now) for pending in slots),
+        # Which was decided after which.
+        tuple(sorted(range(len(slots)), key=lambda n: _number(slots[n]))),
+        bool(state.deploy_rule),
+        round(state.deploy_due - now, 3) if state.deploy_due > now else 0.0,
+        tuple((rung.link, rung.device) for rung in state.deploy_ladder),
+        (state.flown, state.airborne, state.killed_in_flight, state.rebooted),
+        state.was_high or _since(state.airborne_since, now, flight.HIGH_AFTER),
+        # No story here lasts as long as a landing counts.
+        math.isnan(state.landed_at),
+        state.reboots_before,
+        _since(state.down_since, now, 10.0 if state.rebooted else config.profile.landed_hold),
+        round(state.armed_height, 3),
+        tuple(sorted(state.released_before)),
+        tuple(sorted(state.device_blocks)),
+        (len(state.kill_tokens) > 0, len(state.deploy_tokens) > 0),
+        (bool(state.alarms), math.isnan(state.alarm_at)),
+    )
+
+
+def _since(when: float, now: float, limit: float) -> float:
+    """Age in s; -1: it has not happened; _LONG_AGO: the limit has passed."""
+    if math.isnan(when):
+        return -1.0
+    age = round(now - when, 3)
+    return age if age <= limit else _LONG_AGO
+
+
+def _stage_since(config: SupervisorConfig, state: State, now: float) -> float:
+    if state.stage is Stage.FAULT:
+        return _since(state.stage_since, now, config.deploy_timeout)
+    waited_for = state.stage is Stage.DEPLOYED and state.deploy_tokens
+    return _since(state.stage_since, now, config.report_wait) if waited_for else 0.0
+
+
+def _link(config: SupervisorConfig, state: State, link: str, now: float) -> Hashable:
+    evidence, limits = state.evidence(link), config.limits(link)
+    devices = sorted(evidence.devices.items())
+    return (
+        _since(evidence.heard, now, limits.lost_after),
+        evidence.reported,
+        evidence.device_healthy,
+        _since(evidence.regained_at, now, limits.regain_after),
+        _since(evidence.released_at, now, limits.lost_after),
+        tuple((name, status.link_state, status.deployed) for name, status in devices),
+    )
+
+
+def _vehicle(config: SupervisorConfig, state: State, now: float) -> Hashable:
+    vehicle = state.vehicle
+    return (
+        _since(state.vehicle_received, now, config.vehicle_state_age),
+        vehicle.armed,
+        vehicle.landed_state,
+        vehicle.link_state,
+        vehicle.system_status,
+        vehicle.reboot_count,
+    )
+
+
+def _measured(config: SupervisorConfig, state: State, name: str, now: float) -> Hashable:
+    measured, limits = state.measured(name), config.profile.limits[name]
+    return (
+        round(measured.value, 3) if not math.isnan(measured.value) else None,
+        _since(measured.measured_at, now, limits.max_age),
+        bool(measured.rejected),
+        round(measured.candidate, 3) if measured.candidates else None,
+        _since(measured.candidate_at, now, limits.max_age),
+        measured.candidates,
+    )
+
+
+def _rule(state: State, rule: Rule) -> Hashable:
+    evidence = state.rule(rule.name)
+    come = sum(
+        state.measured(condition.measurement).count
+        for condition in rule.conditions
+        if isinstance(condition, MeasurementCondition)
+    )
+    samples = min(evidence.samples, rule.samples)
+    level = round(evidence.level, 3)
+    unknown = min(round(evidence.unknown, 3), UNKNOWN_STANDS)
+    return evidence.holds, level, samples, evidence.latched, evidence.seen == come, unknown
+
+
+def _number(pending: Pending | None) -> tuple[int, int]:
+    return pending.number if pending is not None else (0, 0)
+
+
+def _pending(
+    config: SupervisorConfig, state: State, pending: Pending | None, now: float
+) -> Hashable:
+    if pending is None:
+        return None
+    blocks = pending.decision.action not in (Action.KILL, Action.DEPLOY)
+    longest = max(config.kill_timeout, config.deploy_timeout)
+    return (
+        pending.decision.action,
+        pending.decision.shadow,
+        pending.decision.epoch == state.epoch,
+        pending.decision.targets,
+        pending.targets,
+        0.0 if blocks else _since(pending.decided_at, now, longest),
+        tuple((link, tuple(sorted(told))) for link, told in sorted(pending.outcomes.items())),
+        pending.given_up,
+    )

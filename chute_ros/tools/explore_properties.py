@@ -1,0 +1,267 @@
+"""What must hold at every update of the supervisor's core, whatever came before.
+
+The checks look at what the vehicle was told to be, at what was reported and at what came out; of
+the core's own state they use the stage and little else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
+
+from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.state import State
+
+_EPSILON = 1e-6
+#: By name: what must hold.
+PROPERTIES = {
+    "raises": "an update never raises",
+    "kill first": "a deploy leaves only after a kill that was decided since the start, the reset "
+    "or the take-off",
+    "delay": "the first step of a deploy leaves only once that kill is confirmed, or "
+    "kill_to_deploy_delay after it",
+    "ground": "no rule deploys from a stage on the ground, nor a vehicle that says undisputedly "
+    "that it stands or is disarmed, unless a kill in flight stopped its motors or the autopilot "
+    "started anew in flight and says disarmed",
+    "silence": "no rule deploys unless a sign of a fall came within the last second: silence and "
+    "lost links alone never do",
+    "at once": "a rule that is fulfilled in flight and not denied kills in the same update, and "
+    "it is denied only where the vehicle stands, is disarmed or is too low",
+    "confirmed": "no deploy leaves after one was confirmed, until a person forces another",
+    "deployed": "only a reset, or a deploy that a person forces, leaves DEPLOYED",
+    "stays out": "in DEPLOYED no deploy leaves, and flight is released only by leaving ACTIVE",
+    "shadow": "in SHADOW nothing leaves but what is marked shadow, and the taking back of a "
+    "flight block",
+    "inhibited": "in INHIBITED nothing leaves but the taking back of a flight block",
+    "one answer": "a request is answered at most once, and only if it was asked",
+    "numbers": "the numbers of decisions rise",
+}
+
+
+class ViolationError(Exception):
+    """A property does not hold."""
+
+    def __init__(self, name: str, what: str) -> None:
+        super().__init__(f"{PROPERTIES[name]}: {what}")
+        self.name = name
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What the properties remember of a story. Times: monotonic s; NaN: has not happened."""
+
+    kill: Decision | None = None
+    killed_at: float = math.nan
+    #: Its numbers, with those under which it was decided again.
+    kill_numbers: frozenset[tuple[int, int]] = frozenset()
+    kill_confirmed: bool = False
+    deploy_numbers: frozenset[tuple[int, int]] = frozenset()
+    deploy_confirmed: bool = False
+    newest: tuple[int, int] = (0, 0)
+
+    def canonical(self, config: SupervisorConfig, now: float) -> Hashable:
+        """Equal for two that judge the same from now on."""
+        waited = min(round(now - self.killed_at, 3), config.kill_to_deploy_delay)
+        since = waited if self.kill is not None else None
+        return since, self.kill_confirmed, self.deploy_confirmed
+
+
+@dataclass
+class Properties:
+    """Checks every update; exercised: how often each property had something to say."""
+
+    config: SupervisorConfig
+    exercised: Counter[str] = field(default_factory=Counter)
+
+    def check(
+        self,
+        memory: Memory,
+        before: State,
+        after: State,
+        inputs: tuple[i.Input, ...],
+        outputs: tuple[i.Output, ...],
+        now: float,
+    ) -> Memory:
+        """The memory after the update; ViolationError: a property does not hold."""
+        self.exercised["raises"] += 1
+        memory = self._reported(memory, inputs)
+        reset = after.started_at != before.started_at
+        took_off = after.stage is Stage.IN_FLIGHT and before.stage is not Stage.IN_FLIGHT
+        if reset or took_off:
+            memory = Memory(newest=memory.newest)
+        forced = any(isinstance(one, i.DeployRequest) and one.force for one in inputs)
+        if forced:
+            memory = replace(memory, deploy_confirmed=False)
+        if before.stage is Stage.DEPLOYED:
+            kept = after.stage is Stage.DEPLOYED or reset or forced
+            self._expect("deployed", kept, f"DEPLOYED became {after.stage.name}")
+        self._answers(before, after, inputs, outputs)
+        self._orders(before, after, outputs, now)
+        if after.stage is Stage.IN_FLIGHT or before.stage is Stage.IN_FLIGHT:
+            self._at_once(before, after, outputs, now)
+        for output in outputs:
+            if isinstance(output, i.Decide):
+                self._mode(before, after, output)
+                memory = self._decision(memory, before, after, output, now)
+        return memory
+
+    def _expect(self, name: str, holds: bool, what: str) -> None:
+        self.exercised[name] += 1
+        if not holds:
+            raise ViolationError(name, what)
+
+    def _reported(self, memory: Memory, inputs: tuple[i.Input, ...]) -> Memory:
+        for one in inputs:
+            if isinstance(one, i.ActionReport) and one.outcome is Outcome.CONFIRMED:
+                number = (one.epoch, one.id)
+                if number in memory.kill_numbers:
+                    memory = replace(memory, kill_confirmed=True)
+                if number in memory.deploy_numbers:
+                    memory = replace(memory, deploy_confirmed=True)
+        return memory
+
+    def _answers(
+        self,
+        before: State,
+        after: State,
+        inputs: tuple[i.Input, ...],
+        outputs: tuple[i.Output, ...],
+    ) -> None:
+        waiting = [*before.kill_tokens, *before.deploy_tokens]
+        waiting += [one.token for one in inputs if getattr(one, "token", 0)]
+        for output in outputs:
+            if isinstance(output, i.Finish):
+                self._expect("one answer", output.token in waiting, f"request {output.token}")
+                waiting.remove(output.token)
+        left = [*after.kill_tokens, *after.deploy_tokens]
+        self._expect("one answer", set(left) <= set(waiting), f"{left} wait of {waiting}")
+
+    def _orders(
+        self, before: State, after: State, outputs: tuple[i.Output, ...], now: float
+    ) -> None:
+        """A rule wants a deploy: it was ordered in this update, or in SHADOW said."""
+        rules = {rule.name for rule in self.config.profile.rules}
+        ordered = after.deploy_rule in rules and before.deploy_rule != after.deploy_rule
+        said = any(
+            output.decision.action is Action.DEPLOY and output.decision.rule in rules
+            for output in outputs
+            if isinstance(output, i.Decide) and output.decision.shadow
+        )
+        killed = after.stage is Stage.KILLING and after.killed_in_flight
+        killed = killed and after.kill is not None and not after.kill.decision.rule == after.deploy_rule
+        stands = self._stands(after, now) and not killed
+        falls = self._sign_of_a_fall(after, now)
+        if ordered or said:
+            told = f"rule {after.deploy_rule!r} from {before.stage.name}"
+            # One that has just taken off is told to be in the air in this very update.
+            ground = before.stage in ON_GROUND and not self._says_in_air(after)
+            self._expect("ground", not ground and not stands, told)
+            self._expect("silence", falls, told)
+        elif stands and falls:
+            self.exercised["ground"] += 1
+        elif before.airborne and not falls and now - after.vehicle_received > 1.0:
+            self.exercised["silence"] += 1
+
+    def _at_once(
+        self, before: State, after: State, outputs: tuple[i.Output, ...], now: float
+    ) -> None:
+        if after.mode is not i.Mode.ACTIVE or before.mode is not i.Mode.ACTIVE:
+            return
+        if before.stage is Stage.IN_FLIGHT and after.stage is Stage.KILLING:
+            actions = [one.decision.action for one in outputs if isinstance(one, i.Decide)]
+            self._expect("at once", Action.KILL in actions, "KILLING without a kill")
+        if after.stage is not Stage.IN_FLIGHT:
+            return
+        for rule in self.config.profile.rules:
+            evidence = after.rule(rule.name)
+            if rule.action is Action.NONE or not evidence.fulfilled(rule):
+                continue
+            if rule.action is Action.KILL and evidence.latched:
+                continue  # it was acted on before the vehicle took off
+            fine = self._stands(after, now) or not self._sign_of_a_fall(after, now)
+            self._expect("at once", fine, f"{rule.name!r} is fulfilled, denied {evidence.denied}")
+
+    def _mode(self, before: State, after: State, output: i.Decide) -> None:
+        takes_back = output.decision.rule == "mode"
+        if before.mode is after.mode is i.Mode.SHADOW:
+            fine = output.decision.shadow or takes_back
+            self._expect("shadow", fine, output.decision.action.name)
+        elif before.mode is after.mode is i.Mode.INHIBITED:
+            self._expect("inhibited", takes_back, output.decision.action.name)
+
+    def _decision(
+        self, memory: Memory, before: State, after: State, output: i.Decide, now: float
+    ) -> Memory:
+        decision = output.decision
+        number = (decision.epoch, decision.id)
+        if not output.again:
+            self._expect("numbers", number > memory.newest, f"{number}, {memory.newest}")
+            memory = replace(memory, newest=number)
+        if before.stage is after.stage is Stage.DEPLOYED:
+            released = decision.action is Action.FLIGHT_BLOCK_RELEASE and decision.rule != "mode"
+            wrong = released or decision.action is Action.DEPLOY
+            self._expect("stays out", not wrong or decision.shadow, decision.action.name)
+        if decision.shadow:
+            return memory
+        if decision.action is Action.KILL and not output.again:
+            return self._killed(memory, before, decision, now)
+        if decision.action is Action.DEPLOY:
+            self._expect("kill first", memory.kill is not None, decision.rule)
+            if not memory.deploy_numbers:
+                waited = now - memory.killed_at + _EPSILON
+                fine = memory.kill_confirmed or waited >= self.config.kill_to_deploy_delay
+                self._expect("delay", fine, f"{waited:.2f} s after the kill")
+            self._expect("confirmed", not memory.deploy_confirmed, str(decision.targets))
+            numbers = memory.deploy_numbers | {number}
+            return replace(memory, deploy_numbers=numbers)
+        return memory
+
+    def _killed(self, memory: Memory, before: State, decision: Decision, now: float) -> Memory:
+        number, known = (decision.epoch, decision.id), memory.kill
+        again = (
+            known is not None
+            and decision.rule == known.rule
+            and decision.reasons[: len(known.reasons)] == known.reasons
+        )
+        if again or before.deploy_rule:
+            # The delay goes on counting from the first.
+            return replace(memory, kill_numbers=memory.kill_numbers | {number})
+        return Memory(
+            decision,
+            now,
+            frozenset({number}),
+            deploy_confirmed=memory.deploy_confirmed,
+            newest=memory.newest,
+        )
+
+    def _stands(self, state: State, now: float) -> bool:
+        """What was told last says that it stands or is disarmed, and no number contradicts."""
+        told = state.vehicle
+        if not now - state.vehicle_received <= self.config.vehicle_state_age:
+            return False
+        moves = abs(told.vertical_speed) > self.config.profile.moving_speed
+        moves = moves or told.acceleration < 4.9
+        # An autopilot that started anew in the air says disarmed, whatever the motors do.
+        off = told.armed is Armed.DISARMED and not (state.airborne and state.rebooted)
+        down = told.landed_state is LandedState.ON_GROUND or off
+        return down and not moves
+
+    def _says_in_air(self, state: State) -> bool:
+        return state.vehicle.landed_state is LandedState.IN_AIR
+
+    def _sign_of_a_fall(self, state: State, now: float) -> bool:
+        told = state.vehicle
+        if not now - state.vehicle_received <= 1.0 + _EPSILON:
+            return False
+        signs = (
+            told.tilt > math.radians(45.0),
+            told.vertical_speed < -5.0,
+            told.acceleration < 4.0,
+        )
+        return any(signs)

@@ -1,0 +1,200 @@
+"""Accidents that begin with something that was wrong before: a word, a restart, a gap."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from story import LINK, START, Story, falling, parachute, rule, shipped, vehicle, with_rules
+
+from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.core import update
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.rules import MeasurementCondition
+
+K, D = Action.KILL, Action.DEPLOY
+TILT = rule(MeasurementCondition("tilt_deg", above=60.0), hold=0.3, samples=3)
+GROUND = LandedState.ON_GROUND
+
+
+def given(story: Story, one: i.Input) -> None:
+    """An input that the node makes of its lease, not of a message."""
+    story.state, outputs = update(story.config, story.state, (one,), START + story.t)
+    story.outputs += [(story.t, output) for output in outputs]
+
+
+def test_one_that_steps_down_with_a_deploy_ordered_fires_it_when_it_leads_again() -> None:
+    story = Story(with_rules(TILT, standby=True)).flying().fly(1.0).fly(1.5, tilt=90.0)
+    assert story.fired() == ["KILL"]
+    given(story, i.StepDown("overslept"))
+    story.fly(2.0, tilt=90.0)
+    assert story.fired() == ["KILL"], "nobody else is there, and this one only looks on"
+    given(story, i.TakeOver(11))
+    story.fly(3.0, tilt=90.0)
+    assert "DEPLOY" in story.fired()
+
+
+def test_a_landed_state_that_was_wrong_in_a_hover_does_not_veto_the_fall_after_it() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    story.fly(4.0, landed_state=GROUND)
+    assert story.state.stage is Stage.LANDED
+    story.fall(6.0, landed_state=GROUND, tilt=90.0)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+def test_nor_one_after_which_the_autopilot_disarmed_by_itself() -> None:
+    off: dict[str, Any] = {"landed_state": GROUND, "armed": Armed.DISARMED}
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    story.fly(4.0, landed_state=GROUND).fly(4.2, **off)
+    assert story.state.stage is Stage.READY
+    story.fall(6.5, **off)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"landed_state": GROUND},
+        {"landed_state": LandedState.IN_AIR, "armed": Armed.DISARMED},
+    ],
+)
+def test_a_supervisor_that_starts_in_the_middle_of_a_fall_sees_it(said: dict[str, Any]) -> None:
+    story = Story(shipped("multirotor"))
+    story.fall(3.0, tilt=90.0, **said)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"vertical_speed": -12.0}, {"height": 40.0}, {"acceleration": 0.0}]
+)
+@pytest.mark.parametrize("armed", [Armed.DISARMED, Armed.ARMED])
+def test_one_wrong_sensor_on_the_ground_is_no_flight(
+    wrong: dict[str, float], armed: Armed
+) -> None:
+    story = Story(shipped("multirotor")).ready()
+    stands = {"height": 0.1, "vertical_speed": 0.0, "acceleration": 9.8, "tilt": 1.0}
+    story.fly(5.0, **{**stands, **wrong}, landed_state=GROUND, armed=armed)
+    assert story.state.stage is not Stage.IN_FLIGHT
+    assert story.fired() == []
+
+
+def test_after_a_kill_on_the_ground_flight_is_blocked_and_one_that_flies_is_watched() -> None:
+    story = Story(shipped("multirotor")).ready()
+    story.at(0.1, story.heartbeat(), i.KillRequest(0, "mavlink_parachute 1/161", "test"))
+    story.at(0.15, story.report(K, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.KILLING
+    assert story.newest(Action.FLIGHT_BLOCK).reasons[-1].startswith("the vehicle is KILLING")
+    story.fly(10.0)
+    assert story.state.stage is Stage.IN_FLIGHT
+    assert "in the air although KILLING" in story.alarms()
+    story.fall(12.0, tilt=90.0)
+    assert story.fired() == ["KILL", "KILL", "DEPLOY"]
+
+
+def test_a_person_who_insists_releases_another_parachute_than_the_one_that_is_out() -> None:
+    config = with_rules(TILT, deploy_links=(LINK, "upf_can"))
+    story = Story(config).flying().fly(2.0)
+    story.at(2.0, parachute(deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(3.0, i.DeployRequest(8, False, "it did not open"))
+    assert "force releases the next of the ladder" in story.answer(8).message
+    story.at(3.1, story.heartbeat("upf_can"), i.DeployRequest(9, True, "it did not open"))
+    story.at(3.7, story.heartbeat("upf_can"))
+    assert story.newest(D).targets == ("upf_can",)
+    story.at(3.8, parachute("upf_can", "33", deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(4.5)
+    assert story.answer(9).success
+
+
+def test_a_deploy_after_the_motors_were_armed_again_is_preceded_by_another_kill() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    story.at(2.0, i.KillRequest(5, "operator", "x"))
+    story.at(2.05, story.report(K, Outcome.CONFIRMED))
+    story.fly(10.0)
+    story.at(10.0, i.DeployRequest(6, False, "help"))
+    story.fly(10.7)
+    assert story.fired() == ["KILL", "KILL", "DEPLOY"]
+
+
+def test_as_long_as_it_falls_a_link_that_comes_back_is_told_again() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    start = story.t
+    for step in range(1, 400):
+        t = start + step * 0.05
+        told = story.told(**falling(step * 0.05, 2000.0))
+        story.at(t, told, *([story.heartbeat()] if t < 2.3 or t > 12.5 else []))
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+    assert story.fired()[2:4] == ["KILL", "DEPLOY"]
+    assert any("still in the air" in why for d in story.decisions(D) for why in d.reasons)
+
+
+def test_one_wrong_sample_that_other_messages_tell_again_stays_one() -> None:
+    chance = random.Random(1)
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    bad = story.t + 0.05
+    story.at(bad, story.heartbeat(), story.told(tilt=170.0))
+    for number in range(1, 11):
+        sent, way = bad + number * 0.05, chance.uniform(0.0, 0.012) * number / 3
+        told = replace(story.told().state, tilt=math.radians(170.0), attitude_age=sent - bad)
+        story.at(sent + way, story.heartbeat(), i.VehicleReport(told))
+    story.fly(4.0)
+    assert story.fired() == []
+
+
+def test_an_accelerometer_that_reads_nothing_in_a_hover_deploys_nothing() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    story.fly(4.0, acceleration=0.0)
+    assert story.fired() == []
+
+
+def test_a_node_that_counts_restarts_from_0_again_hides_none() -> None:
+    story = Story(shipped("multirotor"))
+    down = {"armed": Armed.DISARMED, "landed_state": GROUND}
+    story.at(0.0, story.heartbeat(), story.told(reboot_count=2, **down))
+    story.fly(2.0, reboot_count=2).fly(4.0, reboot_count=0)
+    for step in range(1, 40):
+        told = {**falling(step * 0.05, 0.0), **down}
+        again = story.told(reboot_count=1, rebooted_in_flight=True, **told)
+        story.at(4.0 + step * 0.05, story.heartbeat(), again)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
+def test_every_second_message_without_a_value_hides_no_fall(name: str) -> None:
+    story = Story(shipped(name)).flying().fly(2.0)
+    for step in range(1, 160):
+        told = {**falling(step * 0.05, 400.0), "tilt": 90.0}
+        if step % 2:
+            told |= dict.fromkeys(("vertical_speed", "acceleration", "tilt"), math.nan)
+        story.at(2.0 + step * 0.05, story.heartbeat(), story.told(**told))
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+def test_gaps_in_the_messages_do_not_undo_what_was_counted() -> None:
+    story = Story(with_rules(TILT)).flying().fly(2.0)
+    for burst in range(5):
+        for part in (0.0, 0.1):
+            t = 2.05 + burst * 1.2 + part
+            story.at(t, story.heartbeat(), story.told(tilt=90.0 + t * 1e-3))
+    assert story.when(K) < 4.0
+
+
+def test_a_height_that_does_not_change_holds_a_deploy_back_at_a_tip_over() -> None:
+    story, t = Story(shipped("multirotor")), 0.0
+    while t < 10.0:
+        t += 0.1
+        up = t > 8.0
+        told = {
+            "height": 0.0,
+            "vertical_speed": 0.0,
+            "landed_state": LandedState.TAKING_OFF if up else GROUND,
+            "tilt": (90.0 if up else 1.0) + t * 1e-3,
+            "acceleration": 9.8 + t * 1e-6,
+        }
+        story.at(t, story.heartbeat(), vehicle(**told))
+    assert story.fired() == ["KILL"]

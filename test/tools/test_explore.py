@@ -1,0 +1,96 @@
+"""The exploration of the core finds what is broken, and leaves out nothing that decides."""
+
+import dataclasses
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from chute_ros.model import Action
+from chute_ros.supervisor import core, deploying, policy
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.counter import RuleEvidence
+from chute_ros.supervisor.link_evidence import LinkEvidence
+from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.state import Pending, State
+from chute_ros.tools import explore_key
+from chute_ros.tools.explore import BEGINNINGS, Explorer, Found, page
+from chute_ros.tools.explore_properties import PROPERTIES
+
+ROOT = Path(__file__).parents[2]
+
+
+def found_from(*beginnings: str) -> Found:
+    explorer = Explorer(ROOT)
+    return explorer.explore(1, {name: BEGINNINGS[name] for name in beginnings})
+
+
+def test_one_step_from_every_beginning_holds_and_exercises_every_property() -> None:
+    explorer = Explorer(ROOT)
+    found = explorer.explore(1)
+    assert found.violation is None, found.story
+    assert [name for name in PROPERTIES if not explorer.properties.exercised[name]] == []
+    text = page(found, explorer.properties, 1, len(explorer.steps))
+    assert f"| distinct states | {found.states} |" in text
+
+
+def test_a_gate_that_lets_everything_through_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(policy, "against_rule", lambda *_: "")
+    found = found_from("in flight")
+    assert found.violation is not None
+    assert found.violation.name == "ground"
+    assert found.story[:-1] == list(BEGINNINGS["in flight"]), "a shortest story"
+
+
+def test_a_gate_that_lets_nothing_through_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(policy, "against_rule", lambda *_: "no")
+    found = found_from("in flight")
+    assert found.violation is not None
+    assert found.violation.name == "at once"
+
+
+def test_a_deploy_that_does_not_wait_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    ordered = deploying.Deploying.order_deploy
+
+    def at_once(turn: deploying.Deploying, rule: str, reasons: tuple[str, ...]) -> None:
+        ordered(turn, rule, reasons)
+        turn.state = replace(turn.state, deploy_due=turn.now)
+
+    monkeypatch.setattr(deploying.Deploying, "order_deploy", at_once)
+    found = found_from("in flight")
+    assert found.violation is not None
+    assert found.violation.name == "delay"
+
+
+def test_what_raises_and_what_leaves_in_shadow_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    update = core.update
+
+    def shown(*given: object) -> tuple[State, tuple[i.Output, ...]]:
+        state, outputs = update(*given)
+        told = [
+            replace(one, decision=replace(one.decision, shadow=False))
+            if isinstance(one, i.Decide) and one.decision.action is Action.KILL
+            else one
+            for one in outputs
+        ]
+        return state, tuple(told)
+
+    monkeypatch.setattr(core, "update", shown)
+    found = found_from("in flight in SHADOW")
+    assert found.violation is not None
+    assert found.violation.name == "shadow"
+    monkeypatch.setattr(core, "update", lambda *_: 1 / 0)
+    found = found_from("the start")
+    assert found.violation is not None
+    assert found.violation.name == "raises"
+    assert len(found.story) == 1
+
+
+def test_every_field_of_a_state_decides_or_is_named_as_one_that_does_not() -> None:
+    text = Path(explore_key.__file__).read_text()
+    kinds = (State, Pending, RuleEvidence, LinkEvidence, Measured)
+    names = [field.name for kind in kinds for field in dataclasses.fields(kind)]
+    used = {name for name in names if f".{name}" in text}
+    used |= {"measurements"} if ".measured(" in text else set()
+    assert [name for name in names if name not in used | explore_key.LEFT_OUT] == []
+    assert used & explore_key.LEFT_OUT <= {"epoch"}, "compared, but not counted"
