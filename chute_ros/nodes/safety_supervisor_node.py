@@ -37,7 +37,12 @@ from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
-from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from, lease_from
+from chute_ros.nodes.supervisor_parameters import (
+    PARAMETERS,
+    blind_rules,
+    config_from,
+    lease_from,
+)
 from chute_ros.nodes.supervisor_services import SupervisorServices
 from chute_ros.nodes.vehicle_sources import VehicleSources
 from chute_ros.supervisor import inputs
@@ -102,6 +107,11 @@ class SafetySupervisorNode(Node):
                 kind, topic, callback, profile, event_callbacks=self._health.watch(topic)
             )
         self._vehicle_sources = VehicleSources(self, self.values, self._vehicle)
+        for rule in blind_rules(self.config, self.values["vehicle_sources"]):
+            self.get_logger().warning(
+                f"rule '{rule}' can never be fulfilled: the autopilot is the only source of "
+                "measurements; add imu or odometry to vehicle_sources"
+            )
         if self.lease.leading:
             self.services_offered.open()
         self.create_timer(1.0, self._diagnose, clock=self._steady)

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros import model
 from chute_ros.nodes import diagnostics
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.flight import unusable
+from chute_ros.supervisor.flight import measured, unusable
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons
@@ -86,7 +86,7 @@ def decisions_task(
         latched = ", acted on" if counted.latched else ""
         values[f"rule {rule.name}"] = f"{counted.level:.2f} s of {rule.hold:g} s{latched}"
     for measurement in config.profile.limits:
-        value = state.measured(measurement).value
+        value = measured(config, state, measurement, now)
         why = unusable(config, state, measurement, now)
         values[measurement] = f"{value:.2f}" if not why else f"unusable: {why}"
     return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")

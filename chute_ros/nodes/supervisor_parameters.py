@@ -10,12 +10,14 @@ from typing import Any
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.nodes.profile_files import load_profile
+from chute_ros.nodes.vehicle_merge import MAVROS, VEHICLE_STATE
 from chute_ros.nodes.vehicle_sources import VEHICLE_PARAMETERS
 from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.lease import LeaseConfig
 from chute_ros.supervisor.link_evidence import LinkLimits
+from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, is_silence
 
 PARAMETERS = (
     Parameter(
@@ -217,6 +219,20 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         ),
         profile=load_profile(values["profile"], config.links),
     )
+
+
+def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
+    """The rules that can never be fulfilled: they rest on measurements while the autopilot is
+    silent, and it is the only source of measurements."""
+    if set(sources) - {VEHICLE_STATE, MAVROS}:
+        return []
+    lost = AutopilotCondition(AutopilotFact.LOST)
+    return [
+        rule.name
+        for rule in config.profile.rules
+        if any(replace(one, weight=1.0) == lost for one in rule.conditions)
+        and sum(one.weight for one in rule.conditions if is_silence(one)) < rule.needed
+    ]
 
 
 def lease_from(values: Mapping[str, Any], name: str) -> LeaseConfig:

@@ -227,6 +227,9 @@ class _Update(Deploying):
             killed_in_flight=False,
             home=home,
             measurements=MappingProxyType(measurements),
+            # What was acted on in an earlier flight says nothing about this one.
+            rules=MappingProxyType({}) if anew else self.state.rules,
+            asks=MappingProxyType({}) if anew else self.state.asks,
         )
 
     def _look_at_links(self) -> None:

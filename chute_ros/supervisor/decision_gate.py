@@ -6,7 +6,7 @@ import enum
 from collections import deque
 from dataclasses import dataclass, field
 
-from chute_ros.model import Decision
+from chute_ros.model import Action, Decision
 
 
 class Verdict(enum.Enum):
@@ -31,6 +31,7 @@ class DecisionGate:
     max_decision_age: float
     newest_epoch: int = 0
     newest_id: int = 0
+    newest_action: Action = Action.NONE
     #: The newest that were acted on. One that comes again after a newer one is a repetition, not
     #: a refusal: its outcome is what the supervisor has not heard.
     acted: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=50))
@@ -45,10 +46,19 @@ class DecisionGate:
         newest = (self.newest_epoch, self.newest_id)
         if order in self.acted:
             return Verdict.REPEATED
-        if order <= newest:
+        if order <= newest and not self._missed_kill(decision):
             return Verdict.OLDER
         if not -self.max_decision_age <= age <= self.max_decision_age:
             return Verdict.TOO_LATE
-        self.newest_epoch, self.newest_id = order
+        if order > newest:
+            self.newest_epoch, self.newest_id = order
+            self.newest_action = decision.action
         self.acted.append(order)
         return Verdict.ACT
+
+    def _missed_kill(self, decision: Decision) -> bool:
+        """The kill that belongs before a deploy, and was lost on its way: turning motors tear an
+        open canopy, so that it is better late than never."""
+        same_term = decision.epoch == self.newest_epoch
+        kill = decision.action is Action.KILL
+        return kill and same_term and self.newest_action is Action.DEPLOY

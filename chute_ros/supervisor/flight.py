@@ -19,6 +19,8 @@ FREE_FALL = 4.9
 _LANDED_HOLD_AFTER_REBOOT = 10.0
 #: For so long after a landing a vehicle may turn out not to have landed, s.
 _FLIGHT_JUST_BEFORE = 60.0
+#: A climb rate needs heights this far apart at least, s.
+_CLIMB_OVER = 0.4
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
 
@@ -28,7 +30,23 @@ def measured(config: SupervisorConfig, state: State, name: str, now: float) -> f
     limits = config.profile.limits[name]
     if name == "height" and state.rebooted:
         return math.nan  # it counts from where the autopilot started anew
-    return state.measured(name).usable(limits, now)
+    value = state.measured(name).usable(limits, now)
+    if name == "vertical_speed" and math.isnan(value):
+        return climb_rate(config, state, now)
+    return value
+
+
+def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
+    """Vertical speed from the heights of the last second, m/s, for sources that tell none (a
+    receiver without a fix, a barometer alone). NaN: not known."""
+    heights, limits = state.heights, config.profile.limits["height"]
+    height = state.measured("height")
+    if not heights or height.unusable(limits, now) or state.rebooted:
+        return math.nan
+    passed = height.measured_at - heights[0][0]
+    if passed < _CLIMB_OVER:
+        return math.nan
+    return (height.value - heights[0][1]) / passed
 
 
 def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
@@ -44,6 +62,8 @@ def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> s
     """Why a measurement cannot be used; empty: it can."""
     if name == "height" and state.rebooted:
         return "the autopilot started anew in flight, and its height with it"
+    if name == "vertical_speed" and not math.isnan(measured(config, state, name, now)):
+        return ""
     return state.measured(name).unusable(config.profile.limits[name], now)
 
 

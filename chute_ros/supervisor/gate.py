@@ -78,7 +78,8 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
     height = flight.lowest_height(config, state, now)
-    if height < profile.minimum_height:
+    # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
+    if -profile.minimum_height <= height < profile.minimum_height:
         return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"
     if profile.minimum_height > 0.0 and not state.was_high:
         return f"it was never seen at the minimum height, {profile.minimum_height:g} m"
@@ -86,5 +87,6 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
 
 
 def _killed(state: State) -> bool:
-    """Our own kill was decided in flight: motors that are off are its effect."""
-    return state.killed_in_flight and state.stage is Stage.KILLING
+    """Our own kill was decided in flight: motors that are off since then are its effect."""
+    in_flight = state.killed_in_flight and not state.killed_standing
+    return in_flight and state.stage is Stage.KILLING

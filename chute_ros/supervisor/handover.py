@@ -37,6 +37,7 @@ def told(state: State, now: float) -> str:
         flown=state.flown,
         airborne=state.airborne,
         killed_in_flight=state.killed_in_flight,
+        killed_standing=state.killed_standing,
         landed_at=state.landed_at,
         was_high=state.was_high,
         airborne_since=state.airborne_since,

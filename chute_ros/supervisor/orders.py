@@ -72,7 +72,14 @@ class Orders(Steps):
         if listed(self.state.stage, Stimulus.KILL):
             if self.state.stage is not Stage.KILLING:
                 flying = self.state.stage in (Stage.IN_FLIGHT, Stage.FAULT, Stage.DEPLOYED)
-                self.state = replace(self.state, killed_in_flight=flying and self.state.airborne)
+                stood = flight.down_undisputed(
+                    self.config, self.state, self.now
+                ) or flight.disarmed(self.config, self.state, self.now)
+                self.state = replace(
+                    self.state,
+                    killed_in_flight=flying and self.state.airborne,
+                    killed_standing=stood,
+                )
             self.move(Stimulus.KILL, why)
 
     def _kill_under_way(self) -> bool:

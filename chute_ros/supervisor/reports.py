@@ -25,6 +25,10 @@ class Reports(Requests):
         known = not math.isnan(before.heard)
         silent = before.silent(limits.lost_after, self.now)
         self.set_evidence(one.link, before.with_heartbeat(one, limits, self.now))
+        if abs(one.clock_difference) > self.config.preflight.max_clock_difference:
+            text = f"{one.link}: its wall clock differs; it may refuse decisions as too old"
+            if text not in self.state.alarms:
+                self.alarm(text)
         if known and (silent or one.seq <= before.seq):
             # It may know of no decision; what still holds for it is decided anew.
             why = f"{one.link} {'is back' if silent else 'restarted'}"
@@ -59,10 +63,22 @@ class Reports(Requests):
             vehicle_received=self.now,
             measurements=MappingProxyType({**state.measurements, **measurements}),
         )
+        self._note_height_told()
         self._note_reboots(new)
         if was_disarmed and new.armed is Armed.ARMED:
             height = flight.measured(self.config, self.state, "height", self.now)
             self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
+
+    def _note_height_told(self) -> None:
+        """Keep the heights of the last second, at most ten of them."""
+        height = self.state.measured("height")
+        kept = tuple(
+            one for one in self.state.heights if 0.0 <= height.measured_at - one[0] <= 1.0
+        )
+        if not kept or height.measured_at - kept[-1][0] >= 0.1:
+            kept = (*kept, (height.measured_at, height.value))
+        if not math.isnan(height.measured_at):
+            self.state = replace(self.state, heights=kept)
 
     def _note_reboots(self, new: VehicleState) -> None:
         """Restarts on the ground do not count; a node that counts from 0 again has restarted."""

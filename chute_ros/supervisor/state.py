@@ -112,6 +112,8 @@ class State:
     vehicle: VehicleState = field(default=VehicleState())
     vehicle_received: float = math.nan
     measurements: Mapping[str, Measured] = field(default_factory=lambda: MappingProxyType({}))
+    #: (monotonic s, m) of the heights of the last second, the oldest first.
+    heights: tuple[tuple[float, float], ...] = ()
     rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
     #: "link device" -> its newest wish for a kill.
     asks: Mapping[str, Ask] = field(default_factory=lambda: MappingProxyType({}))
@@ -134,6 +136,8 @@ class State:
     killed_in_flight: bool = False
     #: Since when the vehicle says that it stands and nothing contradicts it.
     down_since: float = math.nan
+    #: It said before that kill that it stands, or is disarmed: that is not the kill's effect.
+    killed_standing: bool = False
     #: When it last landed.
     landed_at: float = math.nan
     #: It was seen high enough for a deploy since the take-off.

@@ -17,6 +17,10 @@ from chute_ros.supervisor.state import Pending, State
 Slot = Literal["block", "kill"] | int
 
 
+#: Alarms that are remembered: a device that repeats itself must not grow us.
+_MOST_ALARMS = 16
+
+
 class Steps:
     """Works on state step by step and collects what is to be done."""
 
@@ -188,7 +192,7 @@ class Steps:
     def alarm(self, text: str) -> None:
         """Something that stays until a reset."""
         if text not in self.state.alarms:
-            self.state = replace(self.state, alarms=(*self.state.alarms, text))
+            self.state = replace(self.state, alarms=(*self.state.alarms, text)[-_MOST_ALARMS:])
         self.outputs.append(i.Say(text, alarm=True))
 
     def finish(self, token: int, success: bool, accepted: bool, message: str) -> None:

@@ -37,6 +37,7 @@ LEFT_OUT = frozenset(
         "sent_at",
         "details",
         "earlier",
+        "heights",  # only where no speed is told, which is told here with every height
         "home",  # from it only the fence is measured, whose rule raises an alarm
     }
 )
@@ -71,6 +72,7 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         # No story here lasts as long as a landing counts.
         math.isnan(state.landed_at),
         state.reboots_before,
+        state.killed_standing,
         _since(state.down_since, now, 10.0 if state.rebooted else config.profile.landed_hold),
         round(state.armed_height, 3),
         tuple(sorted(state.released_before)),

@@ -27,8 +27,8 @@ PROPERTIES = {
     "delay": "the first step of a deploy leaves only once that kill is confirmed, or "
     "kill_to_deploy_delay after it",
     "ground": "no rule deploys from a stage on the ground, nor a vehicle that says undisputedly "
-    "that it stands or is disarmed, unless a kill in flight stopped its motors or the autopilot "
-    "started anew in flight and says disarmed",
+    "that it stands or is disarmed, unless it does so since a kill in flight, or says disarmed "
+    "since its autopilot started anew in flight",
     "silence": "no rule deploys unless a sign of a fall came within the last second: silence and "
     "lost links alone never do",
     "at once": "a rule that is fulfilled in flight and not denied kills in the same update, and "
@@ -61,6 +61,8 @@ class Memory:
     #: Its numbers, with those under which it was decided again.
     kill_numbers: frozenset[tuple[int, int]] = frozenset()
     kill_confirmed: bool = False
+    #: It was decided of a vehicle that stood, or was disarmed, already.
+    kill_standing: bool = False
     deploy_numbers: frozenset[tuple[int, int]] = frozenset()
     deploy_confirmed: bool = False
     newest: tuple[int, int] = (0, 0)
@@ -69,7 +71,7 @@ class Memory:
         """Equal for two that judge the same from now on."""
         waited = min(round(now - self.killed_at, 3), config.kill_to_deploy_delay)
         since = waited if self.kill is not None else None
-        return since, self.kill_confirmed, self.deploy_confirmed
+        return since, self.kill_confirmed, self.kill_standing, self.deploy_confirmed
 
 
 @dataclass
@@ -102,7 +104,7 @@ class Properties:
             kept = after.stage is Stage.DEPLOYED or reset or forced
             self._expect("deployed", kept, f"DEPLOYED became {after.stage.name}")
         self._answers(before, after, inputs, outputs)
-        self._orders(before, after, outputs, now)
+        self._orders(memory, before, after, outputs, now)
         if after.stage is Stage.IN_FLIGHT or before.stage is Stage.IN_FLIGHT:
             self._at_once(before, after, outputs, now)
         for output in outputs:
@@ -143,7 +145,12 @@ class Properties:
         self._expect("one answer", set(left) <= set(waiting), f"{left} wait of {waiting}")
 
     def _orders(
-        self, before: State, after: State, outputs: tuple[i.Output, ...], now: float
+        self,
+        memory: Memory,
+        before: State,
+        after: State,
+        outputs: tuple[i.Output, ...],
+        now: float,
     ) -> None:
         """A rule wants a deploy: it was ordered in this update, or in SHADOW said."""
         rules = {rule.name for rule in self.config.profile.rules}
@@ -153,8 +160,9 @@ class Properties:
             for output in outputs
             if isinstance(output, i.Decide) and output.decision.shadow
         )
-        killed = after.stage is Stage.KILLING and after.killed_in_flight
-        killed = killed and after.kill is not None and not after.kill.decision.rule == after.deploy_rule
+        # Motors that were off before the kill are not its effect.
+        killed = before.stage is Stage.KILLING and before.killed_in_flight
+        killed = killed and not memory.kill_standing
         stands = self._stands(after, now) and not killed
         falls = self._sign_of_a_fall(after, now)
         if ordered or said:
@@ -210,7 +218,7 @@ class Properties:
         if decision.shadow:
             return memory
         if decision.action is Action.KILL and not output.again:
-            return self._killed(memory, before, decision, now)
+            return self._killed(memory, before, after, decision, now)
         if decision.action is Action.DEPLOY:
             self._expect("kill first", memory.kill is not None, decision.rule)
             if not memory.deploy_numbers:
@@ -222,7 +230,9 @@ class Properties:
             return replace(memory, deploy_numbers=numbers)
         return memory
 
-    def _killed(self, memory: Memory, before: State, decision: Decision, now: float) -> Memory:
+    def _killed(
+        self, memory: Memory, before: State, after: State, decision: Decision, now: float
+    ) -> Memory:
         number, known = (decision.epoch, decision.id), memory.kill
         again = (
             known is not None
@@ -236,6 +246,7 @@ class Properties:
             decision,
             now,
             frozenset({number}),
+            kill_standing=self._stands(after, now) and before.stage is not Stage.KILLING,
             deploy_confirmed=memory.deploy_confirmed,
             newest=memory.newest,
         )

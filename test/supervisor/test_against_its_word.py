@@ -198,3 +198,78 @@ def test_a_height_that_does_not_change_holds_a_deploy_back_at_a_tip_over() -> No
         }
         story.at(t, story.heartbeat(), vehicle(**told))
     assert story.fired() == ["KILL"]
+
+
+def test_what_it_said_before_a_persons_kill_is_not_the_effect_of_it() -> None:
+    lies: dict[str, Any] = {"armed": Armed.DISARMED, "vertical_speed": 0.0, "acceleration": 9.8}
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    story.fly(2.4, tilt=70.0, landed_state=GROUND, **lies)
+    story.at(2.4, i.KillRequest(5, "operator", "it lies on its side"))
+    story.at(2.45, story.report(K, Outcome.CONFIRMED))
+    story.fly(6.0, tilt=70.0, landed_state=GROUND, **lies)
+    assert story.fired() == ["KILL"]
+
+
+def test_but_one_that_falls_after_it_is_not_left_alone() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0).fly(2.4, landed_state=GROUND)
+    story.at(2.4, i.KillRequest(5, "operator", "wrong button"))
+    story.at(2.45, story.report(K, Outcome.CONFIRMED))
+    story.fall(5.0, landed_state=GROUND, armed=Armed.DISARMED)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize(("height", "last"), [(-5.0, "KILL"), (-60.0, "DEPLOY")])
+def test_far_below_the_take_off_nobody_knows_the_height_above_the_ground(
+    height: float, last: str
+) -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0).fly(3.0, height=20.0)
+    for step in range(20):
+        story.fly(story.t + 0.1, height=20.0 + (height - 20.0) * (step + 1) / 20)
+    story.fly(story.t + 2.0, height=height, tilt=90.0)
+    assert story.fired()[-1] == last
+
+
+def test_without_a_vertical_speed_the_heights_tell_the_sink() -> None:
+    story = Story(shipped("rocket")).flying().fly(2.0, height=1000.0, vertical_speed=math.nan)
+    for step in range(1, 100):
+        told = {"height": 1000.0 - 80.0 * step * 0.05, "vertical_speed": math.nan}
+        story.at(2.0 + step * 0.05, story.heartbeat(), story.told(tilt=170.0, **told))
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+    assert "vertical_speed -80.00 (below -30)" in story.newest(K).reasons
+
+
+def test_what_goes_wrong_again_and_again_does_not_grow_it() -> None:
+    story, t = Story(shipped("multirotor")).flying().fly(1.0), 1.0
+    for _ in range(100):
+        t += 0.25
+        story.at(t, story.heartbeat(), i.KillRequest(0, "mavlink_parachute 1/161", "x"))
+        story.at(t + 0.01, story.report(K, Outcome.FAILED, detail=f"no answer for {t:.2f} s"))
+    assert len(story.state.alarms) <= 16
+
+
+def test_what_was_said_in_one_flight_is_said_in_the_next_as_well() -> None:
+    down = {"landed_state": GROUND, "height": 0.0}
+    story = Story(shipped("multirotor")).flying().fly(13.0, battery_remaining=0.01)
+    story.fly(15.0, **down).fly(16.0, armed=Armed.DISARMED, **down)
+    assert story.state.stage is Stage.READY
+    story.fly(40.0, battery_remaining=0.01)
+    assert len([text for text in story.alarms() if "battery" in text]) == 2
+
+
+def test_a_clock_that_is_set_in_flight_is_an_alarm_before_a_decision_is_refused() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    for number in range(5):
+        beat = replace(story.heartbeat(), clock_difference=0.6)
+        story.at(1.1 + number * 0.1, beat)
+    assert len([text for text in story.alarms() if "wall clock differs" in text]) == 1
+
+
+@pytest.mark.parametrize("turns", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
+def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turns: float) -> None:
+    story = Story(shipped(name)).flying().fly(2.0)
+    for step in range(1, 60):
+        angle = 360.0 * turns * step * 0.1 % 360.0
+        told = story.told(tilt=min(angle, 360.0 - angle) + step * 1e-3)
+        story.at(2.0 + step * 0.1, story.heartbeat(), told)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]

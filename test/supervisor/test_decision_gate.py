@@ -99,3 +99,19 @@ def test_no_decision_is_ever_acted_on_twice_nor_out_of_order(
             assert abs(age) <= 0.5
             acted.append((epoch, number))
     assert acted == sorted(set(acted))
+
+
+def test_a_kill_that_was_overtaken_by_its_deploy_is_carried_out_all_the_same() -> None:
+    gate = DecisionGate(LINK, 0.5)
+    kill = Decision(7, 2, Action.KILL, "r", (), (LINK,))
+    deploy = Decision(7, 3, Action.DEPLOY, "r", (), (LINK,))
+    assert gate.judge(deploy, 0.0) is Verdict.ACT
+    assert gate.judge(kill, 0.6) is Verdict.TOO_LATE
+    assert gate.judge(kill, 0.1) is Verdict.ACT
+    assert gate.judge(kill, 0.1) is Verdict.REPEATED
+    assert gate.judge(deploy, 0.1) is Verdict.REPEATED
+    assert (gate.newest_epoch, gate.newest_id) == (7, 3)
+    block = Decision(7, 1, Action.FLIGHT_BLOCK, "r", (), (LINK,))
+    assert gate.judge(block, 0.0) is Verdict.OLDER
+    other_term = Decision(6, 9, Action.KILL, "r", (), (LINK,))
+    assert gate.judge(other_term, 0.0) is Verdict.OLDER

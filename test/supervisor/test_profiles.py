@@ -60,7 +60,21 @@ def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: A
 
 DEPLOYS = [
     Case("multirotor", "excess tilt", {"tilt": 60.1}, {"tilt": 59.9}, 0.3),
-    Case("multirotor", "critical sink", {"vertical_speed": -12.1}, {"vertical_speed": -12.0}, 1.0),
+    Case("multirotor", "critical sink", {"vertical_speed": -12.1}, {"vertical_speed": -12.0}, 0.5),
+    Case(
+        "multirotor",
+        "falling",
+        {"acceleration": 3.9, "vertical_speed": -5.1},
+        {"acceleration": 3.9, "vertical_speed": -4.9},
+        0.2,
+    ),
+    Case(
+        "multirotor",
+        "falling",
+        {"acceleration": 3.9, "vertical_speed": -5.1},
+        {"acceleration": 4.1, "vertical_speed": -5.1},
+        0.2,
+    ),
     *falls(
         "multirotor",
         "free fall",
@@ -116,7 +130,7 @@ DEPLOYS = [
         0.5,
         before={"battery_remaining": 0.1},
     ),
-    Case("fixed_wing", "excess tilt", {"tilt": 80.1}, {"tilt": 79.9}, 1.0),
+    Case("fixed_wing", "excess tilt", {"tilt": 80.1}, {"tilt": 79.9}, 0.7),
     Case(
         "fixed_wing",
         "critical sink",
@@ -125,13 +139,19 @@ DEPLOYS = [
         1.0,
         before={"vertical_speed": -5.0},
     ),
-    *falls(
+    Case(
         "fixed_wing",
         "free fall",
-        1.0,
-        {"acceleration": 1.9},
-        vertical_speed=(-2.1, -1.9),
-        tilt=(70.1, 69.9),
+        {"acceleration": 2.9, "vertical_speed": -4.1},
+        {"acceleration": 2.9, "vertical_speed": -3.9},
+        0.6,
+    ),
+    Case(
+        "fixed_wing",
+        "free fall",
+        {"acceleration": 2.9, "vertical_speed": -4.1},
+        {"acceleration": 3.1, "vertical_speed": -4.1},
+        0.6,
     ),
     *falls(
         "fixed_wing",

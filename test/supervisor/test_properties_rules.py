@@ -184,7 +184,7 @@ def begun(config: SupervisorConfig, flying: bool) -> Watch:
     return watch
 
 
-@settings(max_examples=400)
+@settings(max_examples=300)
 @given(CONFIGS, st.booleans(), st.lists(GOES, max_size=14))
 def test_what_must_always_hold_does(
     config: SupervisorConfig, flying: bool, goes: list[Any]
@@ -256,7 +256,7 @@ def test_a_lost_heartbeat_alone_never_deploys_whatever_the_profile(
         assert watch.state.deploys == ()
 
 
-@settings(max_examples=50)
+@settings(max_examples=30)
 @given(
     st.lists(st.one_of(OTHER, WAITS), max_size=6),
     st.sampled_from([{"vertical_speed": -14.0}, {"tilt": 80.0}, {"acceleration": 1.0}]),

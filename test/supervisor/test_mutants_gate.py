@@ -1,0 +1,188 @@
+"""The gate word for word and at its limits: what mutants showed that no story looked at."""
+
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+from story import LINK, SINKS, Story, parachute, rule, with_rules
+
+from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome
+from chute_ros.supervisor import gate
+from chute_ros.supervisor.conditions import Finding
+from chute_ros.supervisor.config import Rung, SupervisorConfig
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, BelowMinimum
+from chute_ros.supervisor.state import Pending, State
+
+HOLDS = Finding(True, "it sinks")
+RULE = rule(SINKS, name="sinks")
+
+
+def flying(**told: Any) -> Story:
+    """In flight; the vehicle says this last."""
+    story = Story(with_rules(profile={"landed_hold": 5.0})).fly(0.5)
+    assert story.state.stage is Stage.IN_FLIGHT
+    story.at(0.6, story.heartbeat(), story.told(**told))
+    return story
+
+
+def against(story: Story) -> str:
+    now = story.state.updated_at
+    return gate.against_rule(story.config, story.state, RULE, (HOLDS,), now)
+
+
+# -- every word ----------------------------------------------------------------------------------
+
+
+def test_a_person_hears_why_once_a_parachute_is_out() -> None:
+    story = flying()
+    story.at(0.7, parachute(deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    now = story.state.updated_at
+    assert gate.against_person(story.config, story.state, False, now) == (
+        "a parachute is out already; force releases the next of the ladder"
+    )
+    assert gate.against_person(story.config, story.state, True, now) == (
+        "every parachute of the ladder is out already"
+    )
+    two = SupervisorConfig(deploy_links=(LINK, "upf_can"))
+    assert gate.against_person(two, story.state, True, now) == "", "the second is not"
+
+
+def test_a_person_hears_that_nothing_says_where_it_is() -> None:
+    config, state = SupervisorConfig(), State(epoch=7, started_at=0.0)
+    assert gate.against_person(config, state, False, 1.0) == (
+        "the vehicle is STARTUP, not in flight (nothing fresh says whether it is in the air); "
+        "force deploys all the same"
+    )
+
+
+@pytest.mark.parametrize(
+    ("told", "why"),
+    [
+        ({}, ""),
+        (
+            {"landed_state": LandedState.ON_GROUND},
+            "the vehicle says that it stands, and nothing contradicts it",
+        ),
+        ({"armed": Armed.DISARMED}, "the motors are disarmed, and nothing says that it falls"),
+    ],
+)
+def test_a_rule_hears_why(told: dict[str, Any], why: str) -> None:
+    assert against(flying(**told)) == why
+
+
+def test_a_rule_hears_that_it_has_come_down() -> None:
+    story = flying()
+    story.at(0.65, story.heartbeat())
+    state = replace(story.state, stage=Stage.KILLING, killed_in_flight=True)
+    now = story.state.updated_at
+    assert gate.against_rule(story.config, state, RULE, (HOLDS,), now) == ""
+    down = flying(landed_state=LandedState.ON_GROUND).state
+    down = replace(down, stage=Stage.KILLING, killed_in_flight=True, down_since=900.0)
+    assert gate.against_rule(story.config, down, RULE, (HOLDS,), down.updated_at) == (
+        "the vehicle has come down"
+    )
+
+
+def test_a_rule_hears_that_silence_is_not_enough() -> None:
+    story = flying()
+    silent = rule(AutopilotCondition(AutopilotFact.LOST), name="lost")
+    why = gate.against_rule(story.config, story.state, silent, (HOLDS,), story.state.updated_at)
+    assert why == "only silence speaks for it, and silence alone never deploys"
+
+
+def test_findings_that_do_not_belong_to_the_rule_are_an_error() -> None:
+    story = flying()
+    with pytest.raises(ValueError):
+        gate.against_rule(story.config, story.state, RULE, (HOLDS, HOLDS), story.state.updated_at)
+
+
+def test_a_kill_of_one_that_stood_or_of_another_stage_excuses_nothing() -> None:
+    state = flying(armed=Armed.DISARMED).state
+    config, now = with_rules(), state.updated_at
+    killed = replace(state, stage=Stage.KILLING, killed_in_flight=True)
+    assert gate.against_rule(config, killed, RULE, (HOLDS,), now) == ""
+    standing = replace(killed, killed_standing=True)
+    earlier = replace(killed, stage=Stage.IN_FLIGHT)
+    for one in (standing, earlier):
+        assert gate.against_rule(config, one, RULE, (HOLDS,), now) == (
+            "the motors are disarmed, and nothing says that it falls"
+        )
+
+
+# -- which parachutes are out --------------------------------------------------------------------
+
+
+def seen(**deployed: bool) -> State:
+    """On the second link these devices (d1 is "1") say that they are released, or not."""
+    story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can")))
+    reports = [parachute("upf_can", name[1:], out) for name, out in deployed.items()]
+    story.at(0.1, *reports)
+    return story.state
+
+
+@pytest.mark.parametrize(
+    ("deployed", "device", "out"),
+    [
+        ({}, "", False),
+        ({"d1": True}, "", True),
+        ({"d1": True, "d2": False}, "", False),
+        ({"d1": True, "d2": True}, "", True),
+        ({"d1": True, "d2": False}, "1", True),
+        ({"d1": True, "d2": False}, "2", False),
+        ({"d1": True, "d2": False}, "3", False),
+        ({"d1": True}, "trigger", True),
+        ({"d1": False}, "trigger", False),
+    ],
+)
+def test_a_step_is_out_if_all_that_it_means_are(
+    deployed: dict[str, bool], device: str, out: bool
+) -> None:
+    state = seen(**deployed)
+    assert gate.out_already(state, Rung("upf_can", device)) is out
+    assert not gate.out_already(state, Rung(LINK, device)), "the other link has said nothing"
+
+
+def test_a_step_whose_node_confirmed_is_out_and_no_other() -> None:
+    decision = Decision(7, 1, Action.DEPLOY, "r", (), ("upf_can",), device="2")
+    sent = Pending(decision, ("upf_can",), 0.0, 0.0)
+    told = MappingProxyType({"upf_can": frozenset({Outcome.CONFIRMED})})
+    confirmed = replace(sent, outcomes=told)
+    state = State(epoch=7, started_at=0.0)
+    assert not gate.out_already(replace(state, deploys=(sent,)), Rung("upf_can", "2"))
+    state = replace(state, deploys=(confirmed,))
+    assert gate.out_already(state, Rung("upf_can", "2"))
+    assert not gate.out_already(state, Rung("upf_can", "1"))
+    assert not gate.out_already(state, Rung(LINK, "2"))
+
+
+# -- the minimum height --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("height", "minimum", "was_high", "why"),
+    [
+        (10.0, 10.0, True, ""),
+        (9.9, 10.0, True, "height 9.9 m is below the minimum 10 m"),
+        (-10.0, 10.0, True, "height -10.0 m is below the minimum 10 m"),
+        (-10.1, 10.0, True, ""),
+        (20.0, 10.0, False, "it was never seen at the minimum height, 10 m"),
+        (20.0, 0.5, False, "it was never seen at the minimum height, 0.5 m"),
+        (20.0, 0.0, False, ""),
+    ],
+)
+def test_too_low_to_the_last_bit(height: float, minimum: float, was_high: bool, why: str) -> None:
+    story = Story(with_rules())
+    story.noise = -1  # none
+    story.at(0.1, story.told(height=height, link_state=LinkState.OK))
+    profile = replace(
+        story.config.profile, minimum_height=minimum, below_minimum=BelowMinimum.KILL
+    )
+    config = replace(story.config, profile=profile)
+    state = replace(story.state, was_high=was_high)
+    assert state.measured("height").value == height
+    assert gate.too_low(config, state, state.updated_at) == why
+    anywhere = replace(profile, below_minimum=BelowMinimum.DEPLOY)
+    assert gate.too_low(replace(config, profile=anywhere), state, state.updated_at) == ""
