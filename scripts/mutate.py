@@ -4,7 +4,7 @@ A mutant that no test notices is a survivor. Each must be explained in docs/muta
 stands as "`the line` becomes `the changed line`"; the run fails on one that does not. It works in
 a copy, first with the tests of the module, then what survives with all but the random ones.
 
-    python3 scripts/mutate.py [MODULE...]      with mutmut installed beside pytest
+    python3 scripts/mutate.py [--quick] [MODULE...]      with mutmut installed beside pytest
 """
 
 from __future__ import annotations
@@ -28,8 +28,17 @@ TESTS = {
     "conditions": ("conditions",),
     "flight": ("flight_picture", "against_its_word", "gate"),
     "policy": ("policy", "conditions", "gate"),
-    "orders": ("core_requests", "core_deploy", "gate"),
-    "deploying": ("ladder", "core_deploy", "core_lost"),
+    "orders": (
+        "core_requests",
+        "core_device_blocks",
+        "core_deploy",
+        "gate",
+        "ladder",
+        "against_its_word",
+        "last_defences",
+        "core_lost",
+    ),
+    "deploying": ("ladder", "core_deploy", "core_lost", "against_its_word", "last_defences"),
 }
 #: The random ones take longer than all others together.
 SLOW = ("properties", "properties_loop", "properties_rules", "properties_time", "exhaustive_small")
@@ -52,12 +61,14 @@ def main() -> None:
     """Run, print every survivor, and fail on one that is not explained."""
     options = argparse.ArgumentParser("mutate", description=__doc__)
     options.add_argument("modules", nargs="*", default=list(TESTS), metavar="MODULE")
+    options.add_argument("--quick", action="store_true", help="only the tests of the module")
+    given = options.parse_args()
     page, unexplained = PAGE.read_text(), 0
-    for module in options.parse_args().modules:
+    for module in given.modules:
         with tempfile.TemporaryDirectory(prefix="mutate_") as folder:
             copied = pathlib.Path(folder)
             copy_tree(copied)
-            counts, survivors = run(copied, module)
+            counts, survivors = run(copied, module, given.quick)
         print(f"{module}: {', '.join(f'{n} {verdict}' for verdict, n in counts.items())}")
         for line, before, after in survivors:
             known = f"`{before}` becomes `{after}`" in page
@@ -76,7 +87,9 @@ def copy_tree(folder: pathlib.Path) -> None:
         shutil.copy(ROOT / name, folder / name)
 
 
-def run(folder: pathlib.Path, module: str) -> tuple[dict[str, int], list[tuple[int, str, str]]]:
+def run(
+    folder: pathlib.Path, module: str, quick: bool
+) -> tuple[dict[str, int], list[tuple[int, str, str]]]:
     """How many mutants there were of each verdict, and the survivors: line, before, after."""
     found = folder / "test" / "supervisor"
     own = [f"test/supervisor/test_{name}.py" for name in (*TESTS[module], f"mutants_{module}")]
@@ -87,7 +100,8 @@ def run(folder: pathlib.Path, module: str) -> tuple[dict[str, int], list[tuple[i
         if path.stem.removeprefix("test_") not in SLOW
     ]
     verdicts = mutated(folder, module, own, [])
-    if left := [name for name, verdict in verdicts.items() if verdict != "killed"]:
+    left = [name for name, verdict in verdicts.items() if verdict != "killed"]
+    if left and not quick:
         verdicts |= mutated(folder, module, every, left)
     left = [name for name, verdict in verdicts.items() if verdict != "killed"]
     source = (folder / "chute_ros" / "supervisor" / f"{module}.py").read_text().splitlines()

@@ -204,7 +204,8 @@ class _Update(Deploying):
         """Since when a deploy is worth it; without any height, some time after the take-off."""
         if self.state.airborne and not self.state.was_high:
             height = flight.measured(self.config, self.state, "height", self.now)
-            high = height >= self.config.profile.minimum_height
+            # Far below the take-off nobody knows the height above the ground.
+            high = abs(height) >= self.config.profile.minimum_height
             if math.isnan(height):
                 high = self.now >= self.state.airborne_since + flight.HIGH_AFTER
             self.state = replace(self.state, was_high=high)

@@ -8,6 +8,7 @@ from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.gate import OPERATOR, too_low
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.policy import Policy
 from chute_ros.supervisor.state import Pending, State
@@ -39,6 +40,12 @@ class Deploying(Policy):
         if self.state.stage is not Stage.KILLING or not self.state.deploy_rule:
             return
         if kill.confirmed or self.now >= self.state.deploy_due:
+            low = too_low(self.config, self.state, self.now)
+            if low and self.state.deploy_rule != OPERATOR:
+                # It was high enough when the kill left; a canopy needs the height now.
+                self.alarm(f"no deploy by rule '{self.state.deploy_rule}' after the kill: {low}")
+                self.finish_deploy(False, False, low)
+                return
             if kill.unreported():
                 # A node that misses the kill must not see the deploy first: it would refuse the
                 # kill as older from then on.
@@ -64,7 +71,9 @@ class Deploying(Policy):
     def _try_again(self) -> None:
         """As long as it is in the air, whoever could not be reached may be now. A device that has
         confirmed is not among them."""
-        over = self.now >= self.state.stage_since + self.config.deploy_timeout
+        since = self.state.stage_since
+        back = any(self.evidence(rung.link).regained_at > since for rung in self.ladder)
+        over = back or self.now >= since + self.config.deploy_timeout
         in_air = flight.in_air(self.config, self.state, self.now)
         if over and in_air and self.state.deploys and self.state.mode is i.Mode.ACTIVE:
             rule = self.state.deploys[0].decision.rule
@@ -103,7 +112,9 @@ class Deploying(Policy):
         accepted, text = self.deploy_reached(Outcome.ACCEPTED), self.deploy_details()
         if self.state.stage is Stage.FAULT:
             self.finish_deploy(False, accepted, text or "no device node reported")
-        elif self.state.stage is Stage.DEPLOYED and self.state.deploy_tokens:
+        elif self.state.stage is Stage.DEPLOYED and not self.state.deploy_tokens:
+            self.finish_deploy(True, accepted, text)
+        elif self.state.stage is Stage.DEPLOYED:
             reported = not self.state.deploys or self.deploy_reached(Outcome.CONFIRMED)
             if reported or self.now >= self.state.stage_since + self.config.report_wait:
                 self.finish_deploy(True, accepted, text or "its own status says deployed")

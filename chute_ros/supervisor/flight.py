@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
+from statistics import median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
@@ -43,10 +45,13 @@ def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
     height = state.measured("height")
     if not heights or height.unusable(limits, now) or state.rebooted:
         return math.nan
-    passed = height.measured_at - heights[0][0]
-    if passed < _CLIMB_OVER:
+    if height.measured_at - heights[0][0] < _CLIMB_OVER:
         return math.nan
-    return (height.value - heights[0][1]) / passed
+    # The middle one of the single rates: one step of a height, however high, is no climb.
+    rates = [
+        (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)
+    ]
+    return median(rates)
 
 
 def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:

@@ -16,6 +16,8 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import BelowMinimum, Rule, is_silence
 from chute_ros.supervisor.state import State
 
+#: In place of a rule's name: a person ordered it.
+OPERATOR = "operator"
 #: Where a person may deploy without force.
 _IN_FLIGHT = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
 

@@ -150,6 +150,9 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
             reader.wrong(entries["needed"].line, f"{text} {weights:g}")
     rule = Rule(name, tuple(conditions), action, tuple(states), needed)
     rule = _timing(reader, what, entries, rule)
+    if rule.samples > 1 and rule.hold <= 0.0 and "samples" in entries:
+        text = f"{what} needs {rule.samples} samples at once: add `for`, in which they may come"
+        reader.wrong(entries["samples"].line, text)
     if action is Action.DEPLOY and conditions:
         _check_deploy(reader, what, where.line, rule)
     return rule

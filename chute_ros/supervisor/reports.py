@@ -31,10 +31,15 @@ class Reports(Requests):
                 self.alarm(text)
         if known and (silent or one.seq <= before.seq):
             # It may know of no decision; what still holds for it is decided anew.
-            why = f"{one.link} {'is back' if silent else 'restarted'}"
+            restarted = one.seq <= before.seq
+            why = f"{one.link} {'restarted' if restarted else 'is back'}"
             for slot in self.slots:
                 pending = self.pending(slot)
-                if pending is not None and one.link in pending.targets:
+                if pending is None or one.link not in pending.targets:
+                    continue
+                # One that goes on counting goes on with what it has begun: no second shot.
+                begun = not restarted and one.link not in pending.not_begun()
+                if slot == "block" or not begun:
                     self.renew(slot, why)
 
     def parachute(self, one: i.ParachuteReport) -> None:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from chute_ros.model import Action
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.gate import against_person
+from chute_ros.supervisor.gate import OPERATOR, against_person
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.orders import ON_GROUND, Orders
 from chute_ros.supervisor.preflight import arm_reasons
@@ -93,12 +93,12 @@ class Requests(Orders):
         if wrong:
             self.finish(one.token, False, False, "refused: " + wrong)
         elif self.state.mode is not i.Mode.ACTIVE:
-            self.order_deploy("operator", (reason,))
+            self.order_deploy(OPERATOR, (reason,))
             self._nothing_sent(one.token)
         else:
             tokens = (*self.state.deploy_tokens, one.token)
             self.state = replace(self.state, deploy_tokens=tokens)
-            self.order_deploy("operator", (reason,))
+            self.order_deploy(OPERATOR, (reason,))
 
     def reset_request(self, one: i.ResetRequest) -> None:
         """Back to the start, on the ground only."""

@@ -136,7 +136,7 @@ class Properties:
         outputs: tuple[i.Output, ...],
     ) -> None:
         waiting = [*before.kill_tokens, *before.deploy_tokens]
-        waiting += [one.token for one in inputs if getattr(one, "token", 0)]
+        waiting += [token for one in inputs if (token := getattr(one, "token", 0))]
         for output in outputs:
             if isinstance(output, i.Finish):
                 self._expect("one answer", output.token in waiting, f"request {output.token}")

