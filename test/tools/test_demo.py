@@ -85,7 +85,7 @@ def test_its_summary_has_the_kill_before_the_release(runs):
 
 
 def test_it_keeps_the_logs_where_it_is_told_to(runs):
-    logs = {file.name: file.read_text() for file in runs["good"][3].iterdir()}
+    logs = {file.name: file.read_text() for file in runs["good"][3].glob("*.log")}
     assert set(logs) == {f"{n}.log" for n in ("supervisor", "mavlink", "autopilot", "parachute")}
     assert "RELEASED by" in logs["parachute.log"]
     assert "FLIGHT TERMINATION" in logs["autopilot.log"]
@@ -157,6 +157,19 @@ def test_a_rocket_that_takes_no_command_does_not_fly(runs):
     assert "DEMO FAILED: wiping: " in err
     assert "LAUNCH\n" not in out
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("name", ["good", "upf", "both", "rocket"])
+def test_its_recording_decides_the_same_once_more(runs, name):
+    recordings = [str(file) for file in (runs[name][3] / "ros_home").rglob("*.mcap")]
+    assert recordings
+    done = subprocess.run(
+        [sys.executable, "-m", "chute_ros.tools.replay", *recordings],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_where_a_step_cannot_happen_it_fails_loudly(runs):
