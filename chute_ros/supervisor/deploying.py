@@ -77,6 +77,8 @@ class Deploying(Policy):
         in_air = flight.in_air(self.config, self.state, self.now)
         if over and in_air and self.state.deploys and self.state.mode is i.Mode.ACTIVE:
             rule = self.state.deploys[0].decision.rule
+            if rule != OPERATOR and too_low(self.config, self.state, self.now):
+                return
             waited = self.now - self.state.stage_since
             why = f"tried again {waited:.1f} s after the ladder's end: it is still in the air"
             self.order_deploy(rule, (why,))

@@ -99,7 +99,8 @@ NODES = {
         UmbilicalNode,
         {"connection": "serial:/nowhere/ttyACM0", "publish_vehicle_state": True},
     ),
-    "safety_supervisor": (SafetySupervisorNode, {}),
+    # The black box listens to more, only to keep it.
+    "safety_supervisor": (SafetySupervisorNode, {"black_box": False}),
 }
 
 
