@@ -220,7 +220,8 @@ class DeviceSuite:
         decision = self.decide(Action.DEPLOY)
         self.await_report(Outcome.CONFIRMED, decision)
         assert device.deployed
-        outcomes = [report.outcome for report in self.reports]
+        # On a machine that stands still for a moment it is sent again: the same step once more.
+        outcomes = list(dict.fromkeys(report.outcome for report in self.reports))
         accepted = [Outcome.ACCEPTED] if self.acknowledges else []
         assert outcomes == [Outcome.SENT, *accepted, Outcome.CONFIRMED]
         assert {report.link for report in self.reports} == {self.name}
