@@ -187,7 +187,8 @@ class FullDisk:
 def test_a_full_disk_is_told_and_a_new_file_follows_once_it_has_room(
     tmp_path, monkeypatch, await_until
 ):
-    monkeypatch.setattr(black_box, "RETRY_INTERVAL", 0.05)
+    # Long enough that the room comes between two tries, not in the middle of one.
+    monkeypatch.setattr(black_box, "RETRY_INTERVAL", 0.5)
     disk = FullDisk(monkeypatch)
     recorder = Recorder(tmp_path)
     recorder.turn(10)
