@@ -183,10 +183,10 @@ PARAMETERS = (
 def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
     """The settings of the core; ParameterError where two parameters contradict each other,
     ProfileError with every mistake of the profile."""
-    liveness_from(values, "heartbeat")  # says it in the parameters' names
+    heartbeat = liveness_from(values, "heartbeat")
     standard = LinkLimits(
-        values["heartbeat_stale_after"],
-        values["heartbeat_lost_after"],
+        heartbeat.stale_after,
+        heartbeat.lost_after,
         values["heartbeat_regain_after"],
         values["startup_grace"],
     )

@@ -34,13 +34,12 @@ from chute_ros.protocol.upf.errands import ErrandDone
 from chute_ros.protocol.upf.events import ErrandFinished, TriggerChanged
 from chute_ros.protocol.upf.link import UpfLink
 from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
+from chute_ros.supervisor.config import TRIGGER
 from chute_ros.transport.can_address import parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
 from chute_ros.transport.data_types import load_data_types
 from chute_ros.transport.loop import WireLoop
 
-#: As the device of a decision to deploy: the triggers, past the controller.
-TRIGGER = "trigger"
 _TRIGGER_STATES = {
     "NOT_READY": TriggerStatus.NOT_READY,
     "READY": TriggerStatus.READY,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
+from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.rules import (
     ALL,
     ANY,
@@ -54,10 +54,9 @@ def _measurement(
     limits += [f"below {below:g}"] if not math.isnan(below) else []
     limit = " and ".join(limits)
     samples = state.measured(name).count
-    why = flight.unusable(config, state, name, now)
+    value, why = flight.reading(config, state, name, now)
     if why:
         return Finding(None, f"{name} cannot be used: {why} (asked for: {limit})", samples)
-    value = flight.measured(config, state, name, now)
     if value != state.measured(name).value:
         samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
@@ -70,7 +69,7 @@ def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now:
     wanted = " or ".join(judgement.name for judgement in condition.judged)
     told, so = [], []
     for name in names:
-        evidence, limits = state.links.get(name, LinkEvidence()), config.limits(name)
+        evidence, limits = state.evidence(name), config.limits(name)
         judged = evidence.judged(limits, now)
         if judged is LinkJudgement.NEVER_SEEN and now < state.started_at + limits.startup_grace:
             told.append(f"{name} is still starting")
@@ -125,7 +124,7 @@ def _device(
     wrong = [
         f"{name} {device} is ABNORMAL ({'; '.join(status.faults) or 'no reason given'})"
         for name in names
-        for device, status in state.links.get(name, LinkEvidence()).devices.items()
+        for device, status in state.evidence(name).devices.items()
         if status.state is ParachuteState.ABNORMAL
         and state.links[name].is_heard(config.limits(name), now)
     ]

@@ -145,10 +145,7 @@ class _Update(Deploying):
         """What has not been begun is decided anew, so that no shot is lost; what a device has
         begun goes on there, so that there is no second one."""
         self.state = replace(self.state, leading=True, epoch=one.epoch)
-        for slot in self.slots:
-            pending = self.pending(slot)
-            if pending is not None and (slot == "block" or pending.not_begun()):
-                self.renew(slot, "another supervisor took over")
+        self.renew_not_begun("another supervisor took over")
 
     def look(self) -> None:
         """What follows from all that is known now. One that follows only counts: what it was

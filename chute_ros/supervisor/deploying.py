@@ -16,7 +16,7 @@ from chute_ros.supervisor.state import Pending, State
 
 def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> float:
     """When the newest step of the ladder is given up, monotonic s."""
-    if len(state.deploys) >= len(state.deploy_ladder or config.ladder):
+    if len(state.deploys) >= len(state.ladder(config)):
         return step.decided_at + config.deploy_timeout
     return step.decided_at + config.ladder_step_timeout
 

@@ -27,15 +27,20 @@ _CLIMB_OVER = 0.4
 HIGH_AFTER = 5.0
 
 
+def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    """A measurement and "", or NaN and why it cannot be used."""
+    if name == "height" and state.rebooted:
+        return math.nan, "the autopilot started anew in flight, and its height with it"
+    why = state.measured(name).unusable(config.profile.limits[name], now)
+    if why and name == "vertical_speed":
+        rate = climb_rate(config, state, now)
+        return rate, why if math.isnan(rate) else ""
+    return (math.nan if why else state.measured(name).value), why
+
+
 def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
     """A measurement, or NaN where it cannot be used."""
-    limits = config.profile.limits[name]
-    if name == "height" and state.rebooted:
-        return math.nan  # it counts from where the autopilot started anew
-    value = state.measured(name).usable(limits, now)
-    if name == "vertical_speed" and math.isnan(value):
-        return climb_rate(config, state, now)
-    return value
+    return reading(config, state, name, now)[0]
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
@@ -65,11 +70,7 @@ def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
 
 def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> str:
     """Why a measurement cannot be used; empty: it can."""
-    if name == "height" and state.rebooted:
-        return "the autopilot started anew in flight, and its height with it"
-    if name == "vertical_speed" and not math.isnan(measured(config, state, name, now)):
-        return ""
-    return state.measured(name).unusable(config.profile.limits[name], now)
+    return reading(config, state, name, now)[1]
 
 
 def moving(config: SupervisorConfig, state: State, now: float) -> str:

@@ -85,11 +85,9 @@ def _moved(state: State, by: float) -> State:
         started_at=state.started_at + by,
         stage_since=state.stage_since + by,
         asks=MappingProxyType({w: replace(a, at=a.at + by) for w, a in state.asks.items()}),
-        block=_moved_pending(state.block, by),
-        kill=_moved_pending(state.kill, by),
-        deploys=tuple(
-            replace(d, decided_at=d.decided_at + by, sent_at=d.sent_at + by) for d in state.deploys
-        ),
+        block=state.block and _moved_pending(state.block, by),
+        kill=state.kill and _moved_pending(state.kill, by),
+        deploys=tuple(_moved_pending(deploy, by) for deploy in state.deploys),
         deploy_due=state.deploy_due + by,
         down_since=state.down_since + by,
         landed_at=state.landed_at + by,
@@ -98,7 +96,5 @@ def _moved(state: State, by: float) -> State:
     )
 
 
-def _moved_pending(pending: Pending | None, by: float) -> Pending | None:
-    if pending is None:
-        return None
+def _moved_pending(pending: Pending, by: float) -> Pending:
     return replace(pending, decided_at=pending.decided_at + by, sent_at=pending.sent_at + by)

@@ -91,17 +91,18 @@ class Policy(Reports):
     def look_at_rules(self) -> None:
         """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
         fulfilled: list[Judged] = []
-        stage = self.state.stage
+        stage, rules = self.state.stage, dict(self.state.rules)
         for rule in self.config.profile.rules:
             if stage not in rule.states:
                 # What was counted in another state says nothing about the next time.
                 latched = self.state.rule(rule.name).latched and rule.clears is Clears.NEVER
-                self._remember(rule, RuleEvidence(latched=latched))
+                rules[rule.name] = RuleEvidence(latched=latched)
                 continue
             judged = judge(self.config, self.state, rule, self.now)
-            self._remember(rule, self._cleared(rule, judged.evidence))
-            if judged.evidence.fulfilled(rule) and not self.state.rule(rule.name).latched:
+            rules[rule.name] = self._cleared(rule, judged.evidence)
+            if judged.evidence.fulfilled(rule) and not rules[rule.name].latched:
                 fulfilled.append(judged)
+        self.state = replace(self.state, rules=MappingProxyType(rules))
         # A stable sort: of two that want the same, the one that the profile names first.
         for judged in sorted(fulfilled, key=lambda one: -one.rule.action):
             self._act(judged)

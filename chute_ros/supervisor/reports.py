@@ -161,8 +161,4 @@ class Reports(Requests):
         text = f"{one.link} has seen epoch {one.newest_epoch}: going on as {epoch}"
         self.outputs.append(i.Say(text))
         self.state = replace(self.state, epoch=epoch)
-        for slot in self.slots:
-            pending = self.pending(slot)
-            # What every target has begun with goes on there; a second order would start it again.
-            if pending is not None and (slot == "block" or pending.not_begun()):
-                self.renew(slot, f"{one.link} knows a newer epoch")
+        self.renew_not_begun(f"{one.link} knows a newer epoch")

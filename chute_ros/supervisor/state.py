@@ -170,6 +170,10 @@ class State:
         """The newest step of the ladder."""
         return self.deploys[-1] if self.deploys else None
 
+    def ladder(self, config: SupervisorConfig) -> tuple[Rung, ...]:
+        """The steps of the deploy, without those whose parachutes were out when it was ordered."""
+        return self.deploy_ladder or config.ladder
+
     def measured(self, name: str) -> Measured:
         """What is known of a measurement."""
         return self.measurements.get(name, _NEVER_MEASURED)

@@ -40,8 +40,8 @@ class Steps:
 
     @property
     def ladder(self) -> tuple[Rung, ...]:
-        """The steps of a deploy, without those whose parachutes were out when it was ordered."""
-        return self.state.deploy_ladder or self.config.ladder
+        """The steps of the deploy."""
+        return self.state.ladder(self.config)
 
     @property
     def slots(self) -> tuple[Slot, ...]:
@@ -129,6 +129,14 @@ class Steps:
         # The time since the first decision goes on counting towards its limits.
         new = replace(new, decided_at=pending.decided_at, given_up=pending.given_up)
         self.put(slot, new)
+
+    def renew_not_begun(self, why: str) -> None:
+        """Decide again what not every target has begun with: it goes on where it was begun, and a
+        second order would start it again."""
+        for slot in self.slots:
+            pending = self.pending(slot)
+            if pending is not None and (slot == "block" or pending.not_begun()):
+                self.renew(slot, why)
 
     def renew_missing(self, slot: Slot, why: str) -> None:
         """The same under a new number, to those that have not reported; what is known stays."""
