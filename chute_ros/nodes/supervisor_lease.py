@@ -109,6 +109,10 @@ class LeaseKeeper:
         if message.leader == self.config.name and len(self._followers) < RANKS:
             self._followers[message.name] = now
         other = Claim(message.name, message.rank, message.epoch, message.leading, message.empty)
+        # Whoever it is: its number must not leave us without one that device nodes obey.
+        if wrong := other.implausible(self.config.rank):
+            self._complain(f"{message.name} claims {wrong}: not listened to")
+            return
         self.lease, event = self.lease.heard(self.config, self._own(), other, now)
         if event is not None:
             self._happened(event)

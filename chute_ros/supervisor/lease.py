@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 
 from chute_ros.errors import ParameterError, TransitionError
-from chute_ros.supervisor.epochs import RANKS, epoch_above
+from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 
 #: One whose decisions a device refused as older does not lead for so long, s.
 _STAND_BACK = 5.0
@@ -80,6 +80,16 @@ class Claim:
     leading: bool
     #: It leads since its start without having taken anything over, and has seen no flight.
     empty: bool
+
+    def implausible(self, rank: int) -> str:
+        """Why no supervisor says this, in words; empty: one may. rank: of the one that hears it."""
+        if not 0 <= self.rank < RANKS:
+            return f"rank {self.rank} (0 to {RANKS - 1})"
+        if self.leading and self.epoch % RANKS != self.rank:
+            return f"epoch {self.epoch}, which is none of rank {self.rank}"
+        if epoch_above(self.epoch, rank) > LARGEST_EPOCH:
+            return f"epoch {self.epoch}, above which there is none"
+        return ""
 
     @property
     def strength(self) -> tuple[bool, int]:

@@ -151,12 +151,12 @@ class Reports(Requests):
     def _overtake(self, one: i.ActionReport) -> None:
         """A node refuses what is older than it has seen: go on above that, unless it is another
         supervisor's."""
-        if self.config.standby and one.newest_epoch % RANKS != self.config.rank:
-            self.outputs.append(i.Refused(one.newest_epoch))
-            return
         epoch = epoch_above(one.newest_epoch, self.config.rank)
         if epoch > LARGEST_EPOCH:
             self.alarm(f"{one.link} has seen epoch {one.newest_epoch}, the largest: restart it")
+            return
+        if self.config.standby and one.newest_epoch % RANKS != self.config.rank:
+            self.outputs.append(i.Refused(one.newest_epoch))
             return
         text = f"{one.link} has seen epoch {one.newest_epoch}: going on as {epoch}"
         self.outputs.append(i.Say(text))

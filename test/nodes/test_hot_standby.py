@@ -29,7 +29,7 @@ class Pair:
     def __init__(self, bench):
         self.bench = bench
         self.processes = Processes(bench.folder)
-        self.claims = {}
+        self.claims, self.started = {}, []
         self.states = bench.follow(SafetyState, "safety/state", qos.LATCHED)
         self.decisions = bench.follow(SafetyDecision, "safety/decision", qos.DECISION)
         bench.client.create_subscription(
@@ -42,6 +42,7 @@ class Pair:
         self.link.offer_arming()
 
     def start(self, name, rank, **parameters):
+        self.started.append(name)
         told = [
             part
             for key, value in (QUICK | {"rank": rank} | parameters).items()
@@ -98,7 +99,7 @@ def pair(bench):
     pair = Pair(bench)
     yield pair
     pair.processes.end()
-    for name in ("a", "b"):
+    for name in pair.started:
         print(pair.processes.tail(name, 40))
 
 
@@ -177,3 +178,15 @@ def test_two_that_set_no_standby_do_not_both_decide(pair):
         lambda: {"a", "b"} <= set(pair.claims) and pair.leads("a") != pair.leads("b"),
         "one of them yields",
     )
+
+
+def test_a_claim_with_a_number_that_leaves_none_is_not_listened_to(pair):
+    liar = SupervisorLease(name="liar", rank=3, epoch=2**32 - 1, leading=True)
+    pair.start("a", 0)
+    pair.bench.until(lambda: "a" in pair.claims, "a is heard")
+    pair.bench.publish(liar, "safety/lease")
+    pair.await_leader("a")
+    assert 0 < pair.epoch("a") < 2**32 - 4
+    pair.await_stage(SafetyState.READY)
+    answer = pair.bench.call(Kill, "safety/kill", reason="stop")
+    assert answer.success, answer.message

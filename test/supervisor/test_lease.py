@@ -202,3 +202,32 @@ def test_each_rank_has_its_own_epochs_each_above_the_last(seen: int, rank: int) 
 def test_a_wrong_setting_says_what_is_allowed(settings: dict[str, float], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         replace(FIRST, **settings)
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        (claim("x", 9, 4), "rank 9 (0 to 3)"),
+        (claim("x", 1, 4), "epoch 4, which is none of rank 1"),
+        (claim("x", 3, LARGEST_EPOCH), "above which there is none"),
+        (claim("x", 3, LARGEST_EPOCH, leading=False), "above which there is none"),
+        (claim("x", 3, LARGEST_EPOCH - RANKS), ""),
+        (claim("x", 1, 5), ""),
+        (claim("x", 1, 4, leading=False), ""),
+    ],
+)
+def test_a_claim_that_no_supervisor_makes_is_known_for_it(other: Claim, words: str) -> None:
+    wrong = other.implausible(0)
+    assert words in wrong
+    assert bool(wrong) == bool(words)
+
+
+@given(st.integers(0, RANKS - 1), st.integers(0, LARGEST_EPOCH), st.integers(0, RANKS - 1))
+def test_whom_one_listens_to_leaves_a_number_for_the_takeover(
+    rank: int, epoch: int, other_rank: int
+) -> None:
+    config = LeaseConfig("a", rank, standby=True)
+    other = claim("x", other_rank, epoch, leading=False)
+    if not other.implausible(rank):
+        lease, _ = following(config).heard(config, claim("a", rank, 0, leading=False), other, T)
+        assert lease.next_epoch(config, 0) <= LARGEST_EPOCH
