@@ -13,6 +13,8 @@ VEHICLE ?= drone
 PARACHUTE ?= mavlink
 # Steps of each story that make explore tries.
 DEPTH ?= 2
+# Modules of the supervisor that make mutate changes; empty: all.
+MODULES ?=
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -23,7 +25,7 @@ OVERLAY := $(SET_UP) && . "$$venv/env.sh"
 # A simulation must not reach other machines, nor a vehicle on them.
 LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test bench build lint docs explore lock clean distclean
+.PHONY: help demo test bench build lint docs explore mutate lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -51,6 +53,14 @@ docs: build ## write README.md's tables, config/ and docs/states.* anew
 explore: build ## try every story of DEPTH steps on the supervisor's core, write docs/exploration.md
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m chute_ros.tools.explore \
 	    --depth $(DEPTH)
+
+mutate: .venv-mutate/done ## change the supervisor a little, many times; its tests must notice (MODULES=...)
+	@exec .venv-mutate/bin/python scripts/mutate.py $(MODULES)
+
+.venv-mutate/done: requirements/mutate.lock
+	@rm -rf .venv-mutate && "$(PYTHON)" -m venv .venv-mutate \
+	    && .venv-mutate/bin/pip install --quiet --disable-pip-version-check --require-hashes \
+	        -r requirements/mutate.lock && touch $@
 
 lock: ## refresh requirements/*.lock
 	@$(UNDERLAY) && exec scripts/lock.sh

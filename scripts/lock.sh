@@ -21,3 +21,4 @@ pin_distro jazzy kilted
 pin_distro kilted jazzy
 pin sourced.lock runtime.in dev.in
 pin installer.lock installer.in
+pin mutate.lock mutate.in

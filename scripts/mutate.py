@@ -4,13 +4,14 @@ A mutant that no test notices is a survivor. Each must be explained in docs/muta
 stands as "`the line` becomes `the changed line`"; the run fails on one that does not. It works in
 a copy, first with the tests of the module, then what survives with all but the random ones.
 
-    python3 scripts/mutate.py [--quick] [MODULE...]      with mutmut installed beside pytest
+    make mutate [MODULES="gate counter"]
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
+import os
 import pathlib
 import shutil
 import subprocess
@@ -39,6 +40,24 @@ TESTS = {
         "core_lost",
     ),
     "deploying": ("ladder", "core_deploy", "core_lost", "against_its_word", "last_defences"),
+    "steps": ("ladder", "core_deploy", "core_requests", "core_lost", "gate", "last_defences"),
+    "requests": ("core_requests", "core_device_blocks", "gate", "against_its_word"),
+    "reports": ("core_links", "core_deploy", "core_lost", "field_failures", "against_its_word"),
+    "core": ("core_links", "core_deploy", "core_requests", "core_lost", "against_its_word"),
+    "state": ("core_deploy", "core_requests", "core_lost", "ladder"),
+    "config": ("config",),
+    "decision_gate": ("decision_gate",),
+    "epochs": ("lease",),
+    "handover": ("handover",),
+    "link_evidence": ("link_evidence",),
+    "measurements": ("measurements",),
+    "preflight": ("preflight",),
+    "profile_reader": ("profile_reader",),
+    "yaml_lines": ("profile_reader",),
+    "rules": ("profile_reader", "profiles", "conditions"),
+    "codec": ("codec",),
+    "record": ("record_replay",),
+    "inputs": ("codec",),
 }
 #: The random ones take longer than all others together.
 SLOW = ("properties", "properties_loop", "properties_rules", "properties_time", "exhaustive_small")
@@ -61,6 +80,7 @@ def main() -> None:
     """Run, print every survivor, and fail on one that is not explained."""
     options = argparse.ArgumentParser("mutate", description=__doc__)
     options.add_argument("modules", nargs="*", default=list(TESTS), metavar="MODULE")
+    options.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants at once")
     options.add_argument("--quick", action="store_true", help="only the tests of the module")
     given = options.parse_args()
     page, unexplained = PAGE.read_text(), 0
@@ -68,7 +88,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory(prefix="mutate_") as folder:
             copied = pathlib.Path(folder)
             copy_tree(copied)
-            counts, survivors = run(copied, module, given.quick)
+            counts, survivors = run(copied, module, given.quick, given.jobs)
         print(f"{module}: {', '.join(f'{n} {verdict}' for verdict, n in counts.items())}")
         for line, before, after in survivors:
             known = f"`{before}` becomes `{after}`" in page
@@ -88,7 +108,7 @@ def copy_tree(folder: pathlib.Path) -> None:
 
 
 def run(
-    folder: pathlib.Path, module: str, quick: bool
+    folder: pathlib.Path, module: str, quick: bool, jobs: int
 ) -> tuple[dict[str, int], list[tuple[int, str, str]]]:
     """How many mutants there were of each verdict, and the survivors: line, before, after."""
     found = folder / "test" / "supervisor"
@@ -99,22 +119,22 @@ def run(
         for path in sorted(found.glob("test_*.py"))
         if path.stem.removeprefix("test_") not in SLOW
     ]
-    verdicts = mutated(folder, module, own, [])
+    verdicts = mutated(folder, module, own, [], jobs)
     left = [name for name, verdict in verdicts.items() if verdict != "killed"]
     if left and not quick:
-        verdicts |= mutated(folder, module, every, left)
+        verdicts |= mutated(folder, module, every, left, jobs)
     left = [name for name, verdict in verdicts.items() if verdict != "killed"]
     source = (folder / "chute_ros" / "supervisor" / f"{module}.py").read_text().splitlines()
     return collections.Counter(verdicts.values()), [changed(folder, source, one) for one in left]
 
 
 def mutated(
-    folder: pathlib.Path, module: str, tests: list[str], names: list[str]
+    folder: pathlib.Path, module: str, tests: list[str], names: list[str], jobs: int
 ) -> dict[str, str]:
     """Mutant -> what became of it with these tests; names: only of these, if any."""
     settings = _SETTINGS.format(module=module, tests="\n    ".join(tests))
     (folder / "setup.cfg").write_text(settings)
-    mutmut("run", "--max-children", "2", *names, folder=folder)
+    mutmut("run", "--max-children", str(jobs), *names, folder=folder)
     lines = mutmut("results", "--all", "true", folder=folder).splitlines()
     told = dict(line.strip().split(": ") for line in lines if ": " in line)
     return {name: verdict for name, verdict in told.items() if not names or name in names}

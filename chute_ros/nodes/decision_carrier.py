@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from builtin_interfaces.msg import Time
 from chute_msgs.msg import ActionReport, SafetyDecision
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -17,15 +18,19 @@ MOST_REPORTS = 50
 
 
 class DecisionCarrier:
-    """Lets decisions through the one gate to carry_out, and reports how far they got."""
+    """Lets decisions through the one gate to carry_out, and reports how far they got. age_of:
+    how old what has this stamp is, s."""
 
     def __init__(
-        self, node: Node, max_decision_age: float, carry_out: Callable[[model.Decision], None]
+        self,
+        node: Node,
+        max_decision_age: float,
+        age_of: Callable[[Time], float],
+        carry_out: Callable[[model.Decision], None],
     ) -> None:
         self._node = node
         self._gate = DecisionGate(node.get_name(), max_decision_age)
-        self._carry_out = carry_out
-        # The age of a decision goes by the wall clock, whatever use_sim_time says.
+        self._age_of, self._carry_out = age_of, carry_out
         self._wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         #: The newest report on each of the newest decisions.
         self._reports: dict[tuple[int, int], ActionReport] = {}
@@ -64,8 +69,7 @@ class DecisionCarrier:
 
     def _decision(self, message: SafetyDecision) -> None:
         decision, log = messages.decision_from(message), self._node.get_logger()
-        sent = messages.seconds(message.header.stamp)
-        age = messages.seconds(self._wall.now().to_msg()) - sent
+        age = self._age_of(message.header.stamp)
         verdict = self._gate.judge(decision, age)
         self._verdicts[verdict] += 1
         if verdict is Verdict.ACT:

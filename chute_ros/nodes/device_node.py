@@ -102,7 +102,9 @@ class DeviceNode(Node, ABC):
         self.add_on_set_parameters_callback(self._parameters_set)
         # The wall clock stamps, whatever use_sim_time says; decisions are as old as it tells.
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
-        self.decisions = DecisionCarrier(self, self.values["max_decision_age"], self.carry_out)
+        limit = self.values["max_decision_age"]
+        self._supervisor = SupervisorWatch(limit, self.values["supervisor_lost_after"], self.wall)
+        self.decisions = DecisionCarrier(self, limit, self._supervisor.age, self.carry_out)
         self.wire_text = "not opened yet"
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
         self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
@@ -120,9 +122,6 @@ class DeviceNode(Node, ABC):
         self._seq = count()
         self._loop_faults = 0
         self._summary: Summary | None = None
-        self._supervisor = SupervisorWatch(
-            self.values["max_decision_age"], self.values["supervisor_lost_after"], self.wall
-        )
         self._status_publisher = self.create_publisher(
             ParachuteStatus, "parachute/status", qos.STATUS
         )

@@ -1,4 +1,4 @@
-"""What a device node knows of the supervisor: is it there, and do the clocks agree?
+"""What a device node knows of the supervisor: is it there, and how old is what it says?
 
 A supervisor that was heard and falls silent is lost: then the node does what its parameter
 on_supervisor_lost says. Of several supervisors one leads, and only that one counts.
@@ -10,12 +10,15 @@ import math
 import time
 from collections.abc import Mapping
 
+from builtin_interfaces.msg import Time
 from chute_msgs.msg import LinkHeartbeat
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock
 
 from chute_ros.nodes import diagnostics, messages
 from chute_ros.nodes.parameters import Parameter
+from chute_ros.supervisor.clock_steps import ClockSteps
+from chute_ros.supervisor.epochs import RANKS
 
 HOLD, BLOCK_FLIGHT = "hold", "block_flight"
 WATCH_PARAMETERS = (
@@ -45,13 +48,29 @@ class SupervisorWatch:
         self._delay = math.nan
         self._lost = False
         self._times_lost = 0
+        #: Of each supervisor, also of one that only looks on: it may lead next.
+        self._clocks: dict[str, ClockSteps] = {}
+        self._clock = ClockSteps(limit / 2)
 
     def heartbeat(self, message: LinkHeartbeat) -> None:
         """Anybody's heartbeat came. A supervisor that only looks on does not say healthy."""
-        if message.supervisor and message.device_healthy:
-            self._heard = time.monotonic()
-            sent = messages.seconds(message.header.stamp)
-            self._delay = messages.seconds(self._wall.now().to_msg()) - sent
+        if not message.supervisor:
+            return
+        now, difference = time.monotonic(), self._difference(message.header.stamp)
+        if message.link not in self._clocks and len(self._clocks) >= RANKS:
+            return
+        clock = self._clocks.setdefault(message.link, ClockSteps(self._limit / 2))
+        clock.heard(difference, now)
+        if message.device_healthy:
+            self._heard, self._clock, self._delay = now, clock, clock.age(difference)
+
+    def age(self, stamp: Time) -> float:
+        """How old a decision with this stamp is, s. That a wall clock was set, here or there, made
+        it no older."""
+        return self._clock.age(self._difference(stamp))
+
+    def _difference(self, stamp: Time) -> float:
+        return messages.seconds(self._wall.now().to_msg()) - messages.seconds(stamp)
 
     def look(self) -> bool | None:
         """True: it has just been lost; False: it is back; None: nothing has changed."""
@@ -73,5 +92,13 @@ class SupervisorWatch:
         elif abs(self._delay) > self._limit / 2:
             level = diagnostics.ERROR
             text = f"clocks differ: its heartbeat seems {self._delay:.3f} s old"
-        every = {"heartbeat age (s)": age, "times lost": self._times_lost, **values}
+        elif self._clock.offset:
+            level = diagnostics.WARN
+            text = f"heard; a wall clock was set by {self._clock.offset:.3f} s meanwhile"
+        every = {
+            "heartbeat age (s)": age,
+            "times lost": self._times_lost,
+            "clock set by (s)": self._clock.offset,
+            **values,
+        }
         return diagnostics.status(name, "supervisor", level, text, every, "")

@@ -82,7 +82,7 @@ class Claim:
     empty: bool
 
     def implausible(self, rank: int) -> str:
-        """Why no supervisor says this, in words; empty: one may. rank: of the one that hears it."""
+        """Why no supervisor says this; empty: one may. rank: of the one that hears it."""
         if not 0 <= self.rank < RANKS:
             return f"rank {self.rank} (0 to {RANKS - 1})"
         if self.leading and self.epoch % RANKS != self.rank:

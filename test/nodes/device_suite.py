@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision
 from chute_msgs.srv import Arm, Deploy
+from diagnostic_msgs.msg import DiagnosticArray
 from node_bench import Bench, stamped
 from simulated_device import SimulatedDevice
 
@@ -76,6 +77,12 @@ class DeviceSuite:
         stamped(self.bench.client, message, age)
         self.bench.publish(message, "safety/decision", qos.DECISION)
         return message
+
+    def beat(self, age: float) -> None:
+        """Publish a heartbeat as the supervisor would."""
+        message = LinkHeartbeat(link="safety_supervisor", supervisor=True, device_healthy=True)
+        stamped(self.bench.client, message, age)
+        self.bench.publish(message, "safety/heartbeat")
 
     def await_report(self, outcome: Outcome, decision: SafetyDecision) -> ActionReport:
         order = (decision.epoch, decision.id)
@@ -248,6 +255,33 @@ class DeviceSuite:
         self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE))
         assert not device.deployed
         assert device.commands_to_deploy() == 0
+
+    @pytest.mark.parametrize("step", [3600.0, -3600.0], ids=["forward", "back"])
+    def test_a_wall_clock_that_is_set_makes_no_decision_older(
+        self, device: SimulatedDevice, step: float
+    ) -> None:
+        self.ready_to_deploy(device)
+        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
+
+        def await_told(key: str, value: float) -> None:
+            def told() -> bool:
+                every = [status for array in diagnostics for status in array.status]
+                values = [p.value for s in every for p in s.values if p.key == key]
+                return bool(values) and abs(float(values[-1]) - value) < 0.5
+
+            self.bench.until(told, f"diagnostics tell {key!r}: {value}")
+
+        ages = [0.0]
+        self.beat(ages[0])
+        self.bench.client.create_timer(0.1, lambda: self.beat(ages[0]))
+        await_told("heartbeat age (s)", 0.0)
+        self.decide(Action.DEPLOY, age=step)
+        await_told("decisions: came too late", 1)
+        await_told("clock set by (s)", 0.0)
+        ages[0] = step
+        await_told("clock set by (s)", step)
+        self.await_report(Outcome.CONFIRMED, self.decide(Action.DEPLOY, age=step))
+        assert device.commands_to_deploy() == 1
 
     def test_a_repeated_decision_is_reported_again_and_not_fired_twice(
         self, device: SimulatedDevice

@@ -1,0 +1,38 @@
+"""Was one of two hosts' wall clocks set? Told from the heartbeats that one sends to the other.
+
+A message's way can become slower by no more than the time that has passed, and faster by no more
+than it took before. A difference between stamp and arrival that changes by more is a clock that
+was set, which makes no message older than it is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass
+class ClockSteps:
+    """margin: what is never taken for a step, s. All times are s."""
+
+    margin: float
+    #: How much of the difference between the two clocks is due to steps: ours less theirs.
+    offset: float = 0.0
+    _heard: float = math.nan
+    _difference: float = math.nan
+
+    def heard(self, difference: float, now: float) -> float:
+        """A heartbeat came. difference: the wall clock here less its stamp; now: monotonic.
+        Returns the step that this shows; 0: none."""
+        change, passed = difference - self._difference, now - self._heard
+        took = max(0.0, self.age(self._difference))
+        self._heard, self._difference = now, difference
+        # NaN, for the first, is within no bounds and beyond none.
+        if change > passed + self.margin or change < -took - self.margin:
+            self.offset += change
+            return change
+        return 0.0
+
+    def age(self, difference: float) -> float:
+        """How old a message is whose stamp differs so much from the wall clock here."""
+        return difference - self.offset

@@ -1,0 +1,118 @@
+"""A wall clock that is set makes no decision older; a decision that comes late stays late."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chute_ros.supervisor.clock_steps import ClockSteps
+
+MARGIN = 0.25
+BEAT = 0.1  # s, the supervisor's heartbeats
+
+
+def heard_so_far(difference: float = 0.002, beats: int = 5) -> tuple[ClockSteps, float]:
+    """Clocks that differ by so much, heartbeats as they come; and when the last came."""
+    clocks, now = ClockSteps(MARGIN), 1000.0
+    for _ in range(beats):
+        now += BEAT
+        assert clocks.heard(difference, now) == 0.0
+    return clocks, now
+
+
+@pytest.mark.parametrize("step", [3600.0, -3600.0, 0.5, -0.5])
+def test_a_clock_that_is_set_shows_with_the_next_heartbeat(step: float) -> None:
+    clocks, now = heard_so_far()
+    assert clocks.heard(0.002 + step, now + BEAT) == pytest.approx(step)
+    assert clocks.offset == pytest.approx(step)
+    assert clocks.age(0.003 + step) == pytest.approx(0.003), "a decision sent now is young"
+    assert clocks.age(0.703 + step) == pytest.approx(0.703), "one that comes late is late"
+
+
+def test_one_that_is_set_back_again_is_as_before() -> None:
+    clocks, now = heard_so_far()
+    clocks.heard(3600.002, now + BEAT)
+    clocks.heard(0.002, now + 2 * BEAT)
+    assert clocks.age(0.002) == pytest.approx(0.002)
+
+
+def test_it_is_seen_after_a_gap_as_well() -> None:
+    clocks, now = heard_so_far()
+    assert clocks.heard(3600.0, now + 5.0) == pytest.approx(3599.998)
+
+
+def test_clocks_that_differ_from_the_start_are_no_step() -> None:
+    clocks, _ = heard_so_far(difference=7.0)
+    assert clocks.offset == 0.0
+    assert clocks.age(7.0) == 7.0, "decisions are refused, and pre-flight says why"
+
+
+def test_before_the_first_heartbeat_the_wall_clock_counts() -> None:
+    assert ClockSteps(MARGIN).age(0.4) == 0.4
+    assert ClockSteps(MARGIN).heard(3600.0, 1.0) == 0.0
+
+
+def test_a_node_that_hung_hears_old_heartbeats_and_old_decisions() -> None:
+    """Stopped for 9 s; what came meanwhile is read within a millisecond."""
+    clocks, now = heard_so_far()
+    now += 9.0
+    for late in (9.0, 8.9, 8.8, 0.1):
+        now += 0.0001
+        assert clocks.heard(late, now) == 0.0
+    assert clocks.age(9.0) == 9.0
+
+
+def test_an_answer_to_nonsense_is_a_number_again() -> None:
+    clocks, now = heard_so_far()
+    assert clocks.heard(math.nan, now + BEAT) == 0.0
+    assert clocks.heard(0.002, now + 2 * BEAT) == 0.0
+    assert clocks.age(0.002) == 0.002
+
+
+@pytest.mark.parametrize(
+    ("change", "passed", "seen"),
+    [
+        # Slower by what has passed and the margin is a way that got slower.
+        (0.35, 0.1, False),
+        (0.36, 0.1, True),
+        (5.25, 5.0, False),
+        (5.26, 5.0, True),
+        # Faster by what it took (0.125 s) and the margin.
+        (-0.375, 0.1, False),
+        (-0.38, 0.1, True),
+    ],
+)
+def test_the_bounds_of_a_step(change: float, passed: float, seen: bool) -> None:
+    clocks = ClockSteps(MARGIN)
+    clocks.heard(0.125, 16.0)
+    assert bool(clocks.heard(0.125 + change, 16.0 + passed)) is seen
+
+
+DELAYS = st.lists(st.floats(0.0, 20.0), min_size=2, max_size=40)
+
+
+@given(DELAYS, st.floats(-0.2, 0.2))
+def test_delays_alone_are_never_a_step(delays: list[float], difference: float) -> None:
+    """However slow or jerky the way is, as long as it keeps the order."""
+    clocks, arrived = ClockSteps(MARGIN), 0.0
+    for number, delay in enumerate(delays):
+        arrived = max(arrived, BEAT * number + delay)
+        clocks.heard(arrived - BEAT * number + difference, arrived)
+    assert clocks.offset == 0.0
+
+
+@given(DELAYS, st.floats(30.0, 1e6), st.booleans(), st.integers(1, 39))
+def test_after_a_step_no_age_is_off_by_more_than_the_way_takes(
+    delays: list[float], step: float, back: bool, at: int
+) -> None:
+    clocks, arrived, set_by = ClockSteps(MARGIN), 0.0, 0.0
+    for number, delay in enumerate(delays):
+        if number == min(at, len(delays) - 1):
+            set_by = -step if back else step
+        arrived = max(arrived, BEAT * number + min(delay, 5.0))
+        took = arrived - BEAT * number
+        clocks.heard(took + set_by, arrived)
+    assert abs(clocks.age(took + set_by) - took) <= 5.0 + MARGIN
