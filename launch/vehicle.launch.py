@@ -12,6 +12,10 @@ from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
 
+#: A node that dies is started again: a supervisor goes on where it stopped, and sends a device
+#: node that starts anew what still holds.
+LIVES_ON = {"respawn": True, "respawn_delay": 0.5}
+
 
 def _nodes(context: LaunchContext) -> list:
     """The nodes with one parameter file; a connection that is given overrides the file's."""
@@ -36,6 +40,7 @@ def _nodes(context: LaunchContext) -> list:
             namespace=namespace,
             parameters=[config, *([{"connection": wire}] if wire else [])],
             output="screen",
+            **LIVES_ON,
         )
         for link, wire in links.items()
     ]
@@ -45,6 +50,7 @@ def _nodes(context: LaunchContext) -> list:
         namespace=namespace,
         parameters=[config],
         output="screen",
+        **LIVES_ON,
     )
     return [*nodes, supervisor]
 

@@ -36,6 +36,7 @@ from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
+from chute_ros.nodes.supervisor_memory import MEMORY_PARAMETERS, Memory
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import (
     PARAMETERS,
@@ -62,7 +63,7 @@ class SafetySupervisorNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("safety_supervisor", **options)
-        self.values = declare(self, (*PARAMETERS, *BLACK_BOX_PARAMETERS))
+        self.values = declare(self, (*PARAMETERS, *MEMORY_PARAMETERS, *BLACK_BOX_PARAMETERS))
         self.config = config_from(self.values)
         lease = lease_from(self.values, self.get_name())
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
@@ -75,6 +76,12 @@ class SafetySupervisorNode(Node):
         self.state = State(
             epoch, now, mode=inputs.Mode[self.values["mode"]], leading=not lease.standby
         )
+        first: tuple[inputs.Input, ...] = ()
+        self._memory = Memory(self, self.values, self.config)
+        if (before := self._memory.recall()) is not None:
+            self.state = before
+            if not lease.standby:
+                first = (inputs.TakeOver(epoch_above(max(epoch, before.epoch), lease.rank)),)
         self._misasked: set[str] = set()
         self._recorder = FlightRecorder(self, self.values)
         self._health = Health()
@@ -116,7 +123,7 @@ class SafetySupervisorNode(Node):
             self.services_offered.open()
         self.create_timer(1.0, self._diagnose, clock=self._steady)
         self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self._steady)
-        self._turn()
+        self._turn(*first)
 
     # -- the loop -------------------------------------------------------------------------------
 
@@ -161,6 +168,7 @@ class SafetySupervisorNode(Node):
     def _carry_out(self, outputs: tuple[inputs.Output, ...], now: float) -> None:
         if any(isinstance(output, inputs.Decide) for output in outputs):
             self.lease.tell(now)
+            self._memory.keep(self.state)
         for output in outputs:
             self._do(output, now)
 
@@ -289,6 +297,7 @@ class SafetySupervisorNode(Node):
 
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL
+        self._memory.keep(self.state)
         stamp = self.wall.now().to_msg()
         message = state_message(self.config, self.state, now, stamp)
         self._state_publisher.publish(message)
@@ -299,11 +308,13 @@ class SafetySupervisorNode(Node):
         tasks = [
             decisions_task(name, self.config, self.state, now),
             self._health.task(name, self.state, self.lease, now),
+            self._memory.task(name),
             *self._recorder.tasks(),
         ]
         self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), tasks))
 
     def destroy_node(self) -> None:
-        """The black box ends its file."""
+        """The black box ends its file, the memory is written."""
+        self._memory.close()
         self._recorder.close()
         super().destroy_node()

@@ -10,6 +10,7 @@ from chute_ros.model import Armed, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
+from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import samples_of
 from chute_ros.supervisor.requests import Requests
 
@@ -47,10 +48,15 @@ class Reports(Requests):
         if one.link not in self.config.links:
             return
         status, alive = one.status, one.status.link_state is LinkState.OK
+        was_out = status.device in self.evidence(one.link).deployed
         self.set_evidence(one.link, self.evidence(one.link).with_status(status, self.now))
         if alive and not status.deployed:
             before = self.state.released_before - {(one.link, status.device)}
             self.state = replace(self.state, released_before=before)
+            aloft = flight.in_air(self.config, self.state, self.now) is not False
+            if was_out and aloft and self.state.stage is Stage.DEPLOYED:
+                text = "says no more that it is deployed; a forced deploy goes on with the next"
+                self.alarm(f"{one.link} {status.device} {text}")
 
     def vehicle(self, one: i.VehicleReport) -> None:
         """What the vehicle is told to be, and each measurement in it as evidence."""

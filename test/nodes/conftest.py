@@ -1,4 +1,4 @@
-"""A bench for each test of the nodes."""
+"""A bench for each test of the nodes, and supervisors that are processes of their own."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from node_bench import Bench
+from supervisor_processes import Pair
 
 
 @pytest.fixture
@@ -14,3 +15,13 @@ def bench(namespace: str) -> Iterator[Bench]:
     one = Bench(namespace)
     yield one
     one.close()
+
+
+@pytest.fixture
+def pair(bench: Bench) -> Iterator[Pair]:
+    """Supervisors to start; what they wrote is shown when the test fails."""
+    pair = Pair(bench)
+    yield pair
+    pair.processes.end()
+    for name in pair.started:
+        print(pair.processes.tail(name, 40))

@@ -172,6 +172,9 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     nodes, simulators = STARTED[parachute]
     vehicle = file.name.startswith("vehicle")
     assert names - {None} == ({*nodes, "safety_supervisor"} if vehicle else simulators)
+    if vehicle:
+        started = [one for one in Recorded.made if "executable" in one.options]
+        assert all(one.options["respawn"] for one in started), "what dies is started again"
 
 
 @EVERY

@@ -290,7 +290,19 @@ def test_a_device_node_that_restarts_after_the_release_takes_nothing_back() -> N
     story.fly(6.0, vertical_speed=-5.0)
     assert story.state.stage is Stage.DEPLOYED
     assert len(story.decisions(D)) == 1
-    assert story.state.stage is Stage.DEPLOYED
+    assert story.alarms()[-1] == (
+        "mavlink_parachute 1/161 says no more that it is deployed; a forced deploy goes on with "
+        "the next"
+    )
+
+
+def test_a_parachute_that_is_exchanged_on_the_ground_is_no_alarm() -> None:
+    story = aloft().fall(3.0)
+    story.at(3.0, story.report(D, Outcome.CONFIRMED), parachute(deployed=True))
+    story.fly(8.0, vertical_speed=0.0, height=0.0, **DOWN)
+    alarms = story.alarms()
+    story.at(story.t, parachute(deployed=False))
+    assert story.alarms() == alarms
 
 
 def test_a_supervisor_that_starts_in_mid_air_protects_at_once() -> None:

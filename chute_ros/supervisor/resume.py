@@ -1,0 +1,54 @@
+"""What a supervisor leaves for its next start, so that what is under way goes on.
+
+A restart is to the core an update that comes late: silence meanwhile does not count, measurements
+have aged, and what no device has begun is decided anew under the next epoch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from chute_ros.errors import RecordError
+from chute_ros.supervisor.codec import Codec
+from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.state import State
+
+
+@dataclass(frozen=True)
+class Left:
+    """What was left. boot: names the start of the host, with which its monotonic time began;
+    settings: names the configuration."""
+
+    boot: str
+    settings: str
+    state: State
+
+
+_CODEC = Codec(Left)
+
+
+def worth_leaving(state: State) -> bool:
+    """On the ground with nothing under way a start anew is as good, and clears alarms."""
+    return state.airborne or state.stage not in ON_GROUND
+
+
+def written(left: Left) -> str:
+    """As JSON text."""
+    return _CODEC.to_json(left, whole=True)
+
+
+def resumed(text: str, boot: str, settings: str, within: float, now: float) -> State:
+    """The state to go on with: of one that looks on until it takes over. now: monotonic s, within:
+    so old it may be, s. RecordError: it is not to be gone on with, and why."""
+    left = _CODEC.from_json(text)
+    if not isinstance(left, Left) or not isinstance(left.state, State):
+        raise RecordError(f"nothing that was left: {text[:80]!r}")
+    if left.boot != boot:
+        raise RecordError("the computer has started anew since")
+    if left.settings != settings:
+        raise RecordError("the parameters or the profile have changed since")
+    age = now - left.state.updated_at
+    if not 0.0 <= age <= within:
+        raise RecordError(f"it is {age:.1f} s old (limit {within:g} s)")
+    # Who waited for an outcome waits no more.
+    return replace(left.state, leading=False, kill_tokens=(), deploy_tokens=())

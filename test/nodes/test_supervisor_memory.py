@@ -1,0 +1,113 @@
+"""A supervisor without a standby is killed in flight and started again; what it left in a file."""
+
+import json
+import signal
+import stat
+
+import pytest
+from chute_msgs.msg import SafetyState
+from chute_msgs.srv import Deploy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from supervisor_bench import Scene
+
+from chute_ros.model import Action, Outcome
+
+ALONE = {"hot_standby": False, "kill_to_deploy_delay": 3.0}
+
+
+def flying(pair, **parameters):
+    pair.start("a", 0, **(ALONE | parameters))
+    pair.await_stage(SafetyState.READY)
+    pair.link.flying = True
+    pair.await_stage(SafetyState.IN_FLIGHT)
+    return pair
+
+
+def kill_and_start_again(pair, **parameters):
+    epoch = pair.epoch("a")
+    pair.send_signal("a", signal.SIGKILL)
+    pair.processes.end()
+    pair.start("a", 0, **(ALONE | parameters))
+    pair.bench.until(lambda: pair.epoch("a") > epoch, "it is back")
+
+
+def the_file(pair):
+    folder = pair.processes.ros_home / "chute_ros" / "resume"
+    return pair.bench.until(lambda: list(folder.glob("*.json")), "something is kept")[0]
+
+
+def killed_motors(pair):
+    """A deploy was asked for; the kill is out and not confirmed, the deploy not due yet."""
+    pair.link.outcomes = [Outcome.SENT]
+    pair.bench.ask(Deploy, "safety/deploy", reason="it falls")
+    pair.bench.until(lambda: pair.acted(Action.KILL), "the kill leaves")
+    # Without motors it says that it stands, which no supervisor that starts now doubts.
+    pair.link.flying = False
+    pair.bench.until(
+        lambda: json.loads(the_file(pair).read_text())["state"]["kill"], "the kill is remembered"
+    )
+
+
+def test_the_deploy_that_follows_the_kill_is_not_lost(pair):
+    flying(pair)
+    killed_motors(pair)
+    kill_and_start_again(pair)
+    pair.bench.until(lambda: pair.acted(Action.DEPLOY), "the deploy leaves")
+    assert pair.acted(Action.DEPLOY) == [(pair.epoch("a"), pair.acted(Action.DEPLOY)[0][1])]
+    assert "goes on where it stopped in flight: KILLING" in pair.processes.tail("a", 40)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"resume_within": 0.0}, ""),
+        ({"deploy_timeout": 19.0}, "the parameters or the profile have changed since"),
+    ],
+)
+def test_one_that_was_set_otherwise_starts_anew(pair, changed, words):
+    flying(pair)
+    killed_motors(pair)
+    kill_and_start_again(pair, **changed)
+    pair.await_stage(SafetyState.READY)
+    assert pair.acted(Action.DEPLOY) == []
+    assert words in pair.processes.tail("a", 40)
+
+
+def test_a_damaged_file_is_said_and_the_flight_goes_on(pair):
+    flying(pair)
+    path = the_file(pair)
+    # It hangs, and writes nothing meanwhile.
+    pair.send_signal("a", signal.SIGSTOP)
+    path.write_bytes(path.read_bytes()[:100])
+    kill_and_start_again(pair)
+    pair.await_stage(SafetyState.IN_FLIGHT)
+    assert "starts anew" in pair.processes.tail("a", 60)
+
+
+def test_the_file_is_ours_alone_and_goes_with_the_landing(pair):
+    flying(pair)
+    path = the_file(pair)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+    pair.link.flying = False
+    pair.await_stage(SafetyState.READY)
+    pair.bench.until(lambda: not path.exists(), "there is nothing to go on with")
+
+
+def test_where_nothing_can_be_written_diagnostics_say_so(bench, monkeypatch):
+    nowhere = bench.folder / "a_file"
+    nowhere.write_text("no folder")
+    monkeypatch.setenv("ROS_HOME", str(nowhere))
+    scene = Scene(bench, profile="by_hand", black_box=False)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    scene.await_stage(SafetyState.READY)
+    scene.link.flying = True
+    scene.await_stage(SafetyState.IN_FLIGHT)
+
+    def warned():
+        every = (status for array in diagnostics for status in array.status)
+        mine = [s for s in every if s.name.endswith("safety_supervisor: memory")]
+        return [s for s in mine if s.level == DiagnosticStatus.WARN]
+
+    task = bench.until(warned, "it is told")[-1]
+    assert task.message.startswith("a start anew in flight would forget it: [Errno 20]")
