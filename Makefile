@@ -25,7 +25,7 @@ OVERLAY := $(SET_UP) && . "$$venv/env.sh"
 # A simulation must not reach other machines, nor a vehicle on them.
 LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test bench build lint docs explore mutate lock clean distclean
+.PHONY: help demo test bench hosts build lint docs explore mutate lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -39,6 +39,9 @@ test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kil
 
 bench: build ## measure against bare scripts, write docs/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
+
+hosts: build ## two supervisors and a vehicle on three hosts, spoil the network, write docs/hosts.md
+	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults
 
 build: ## build both packages
 	@$(UNDERLAY) && exec scripts/build.sh

@@ -19,6 +19,7 @@ setup(
         ("share/" + NAME, ["package.xml"]),
         ("share/" + NAME + "/launch", glob("launch/*.py")),
         ("share/" + NAME + "/config", glob("config/*.yaml")),
+        ("share/" + NAME + "/config", glob("config/*.xml")),
         ("share/" + NAME + "/config/profiles", glob("config/profiles/*.yaml")),
     ],
     zip_safe=False,

@@ -40,7 +40,7 @@ class DecisionCarrier:
     def begin(self) -> None:
         """Listen to the supervisor from now on."""
         self._node.create_subscription(
-            SafetyDecision, "safety/decision", self._decision, qos.DECISION
+            SafetyDecision, "safety/decision", self._decision, qos.newest(qos.DECISION)
         )
 
     def report(self, decision: model.Decision, outcome: model.Outcome, detail: str) -> None:

@@ -140,7 +140,7 @@ class DeviceNode(Node, ABC):
         assert self.loop is not None
         self.decisions.begin()
         self.create_subscription(
-            LinkHeartbeat, "safety/heartbeat", self._supervisor.heartbeat, qos.STATUS
+            LinkHeartbeat, "safety/heartbeat", self._supervisor.heartbeat, qos.newest(qos.STATUS)
         )
         self.serve(Arm, "~/arm", self._arm)
         self.serve(Deploy, "~/deploy", self._deploy)

@@ -8,6 +8,7 @@ import signal
 import sys
 
 from chute_ros.errors import ChuteError
+from chute_ros.nodes.middleware import set_up_middleware
 
 _NOT_BUILT = (
     "chute_msgs cannot be imported: build both packages and source the result:\n"
@@ -32,6 +33,7 @@ def run(name: str, class_name: str) -> None:
                 "`pip install -r requirements/runtime.in` bring all that is needed"
             )
         raise
+    set_up_middleware()
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 

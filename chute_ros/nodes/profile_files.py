@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.errors import ParameterError, ProfileError
+from chute_ros.nodes.config_folder import config_folder
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import Profile
-
-#: Beside the package in the repository, and in its share folder once installed.
-_BESIDE = Path(__file__).resolve().parents[2] / "config" / "profiles"
 
 
 def load_profile(named: str, links: Sequence[str]) -> Profile:
@@ -35,8 +33,4 @@ def load_profile(named: str, links: Sequence[str]) -> Profile:
 
 
 def _folder() -> Path:
-    if _BESIDE.is_dir():
-        return _BESIDE
-    from ament_index_python.packages import get_package_share_directory
-
-    return Path(get_package_share_directory("chute_ros")) / "config" / "profiles"
+    return config_folder() / "profiles"

@@ -20,3 +20,14 @@ LATCHED = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
+
+
+def newest(profile: QoSProfile) -> QoSProfile:
+    """How our nodes listen to what is said again soon anyway: pictures, heartbeats, decisions that
+    nobody has reported on. A reliable subscription holds everything back that follows a lost
+    message until that one was sent again, and it is too old by then."""
+    return QoSProfile(
+        depth=profile.depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.VOLATILE,
+    )

@@ -65,7 +65,7 @@ class SafetySupervisorNode(Node):
         super().__init__("safety_supervisor", **options)
         self.values = declare(self, (*PARAMETERS, *MEMORY_PARAMETERS, *BLACK_BOX_PARAMETERS))
         self.config = config_from(self.values)
-        lease = lease_from(self.values, self.get_name())
+        lease = lease_from(self.values, self.config, self.get_name())
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
         self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
@@ -102,11 +102,17 @@ class SafetySupervisorNode(Node):
             DiagnosticArray, "/diagnostics", qos.STATUS
         )
         self.lease = LeaseKeeper(
-            self, lease, self.wall, lambda: self.state, self._lease_event, self._follow
+            self,
+            lease,
+            self.wall,
+            lambda: self.state,
+            lambda now: self.state.links_heard(self.config, now),
+            self._lease_event,
+            self._follow,
         )
         for kind, topic, callback, profile in (
-            (LinkHeartbeat, "safety/heartbeat", self._heartbeat, qos.STATUS),
-            (ParachuteStatus, "parachute/status", self._parachute, qos.STATUS),
+            (LinkHeartbeat, "safety/heartbeat", self._heartbeat, qos.newest(qos.STATUS)),
+            (ParachuteStatus, "parachute/status", self._parachute, qos.newest(qos.STATUS)),
             (ActionReport, "safety/action", self._action, qos.DECISION),
             (SafetyRequest, "safety/request", self._device_request, qos.STATUS),
         ):
@@ -145,7 +151,7 @@ class SafetySupervisorNode(Node):
         if self.lease.leading and (self._changed() or now >= self._state_at):
             self._publish_state(now)
         deadline = next_deadline(self.config, self.state, now)
-        self._sleep(min(deadline, self.lease.deadline(), self._beat_at))
+        self._sleep(min(deadline, self.lease.deadline(now), self._beat_at))
 
     def _update(
         self, new: tuple[inputs.Input, ...], now: float

@@ -28,6 +28,7 @@ class Health:
         self._lost: dict[str, int] = {}
         self._seen = (0, 0, 0)
         self._shown = 0
+        self._own_fault = False
 
     def watch(self, topic: str) -> SubscriptionEventCallbacks:
         """For the subscription of an input: counts the messages that its queue lost."""
@@ -49,12 +50,15 @@ class Health:
         lost = sum(self._lost.values())
         seen = (self._failures, lost, state.late_count)
         self._shown = _SHOWN_FOR if seen != self._seen else max(0, self._shown - 1)
+        own_fault = (seen[0], seen[2]) != (self._seen[0], self._seen[2])
+        self._own_fault = bool(self._shown) and (self._own_fault or own_fault)
         self._seen = seen
         level, text = diagnostics.OK, "leads" if lease.leading else "looks on"
         if lease.trouble():
             level, text = diagnostics.ERROR, lease.trouble()
         elif self._shown:
-            level = diagnostics.ERROR
+            # What a network loses is said again soon; what the loop did not do is not.
+            level = diagnostics.ERROR if self._own_fault else diagnostics.WARN
             text = f"mistakes inside {seen[0]}, messages lost {seen[1]}, updates late {seen[2]}"
         elif not lease.leading and math.isnan(lease.lease.leader_heard):
             level, text = diagnostics.WARN, "looks on, and hears no leader"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -19,8 +20,8 @@ from chute_ros.supervisor.state import State
 
 
 class LeaseKeeper:
-    """state: gives the supervisor's; happened: told of each event; follow: given the state that
-    the leader told. All in the decision loop's thread."""
+    """state: gives the supervisor's; links_heard: how many, now; happened: told of each event;
+    follow: given the state that the leader told. All in the decision loop's thread."""
 
     def __init__(
         self,
@@ -28,13 +29,15 @@ class LeaseKeeper:
         config: LeaseConfig,
         wall: Clock,
         state: Callable[[], State],
+        links_heard: Callable[[float], int],
         happened: Callable[[Event], None],
         follow: Callable[[State], None],
     ) -> None:
         self.config = config
         self.lease = Lease.begin(config, time.monotonic())
         self._node, self._wall = node, wall
-        self._state, self._happened, self._follow = state, happened, follow
+        self._state, self._links_heard = state, links_heard
+        self._happened, self._follow = happened, follow
         #: It has taken over from another, or followed one.
         self._experienced = False
         #: Whose state it has.
@@ -43,20 +46,25 @@ class LeaseKeeper:
         self._followers: dict[str, float] = {}
         self._complained: set[str] = set()
         self._publisher = node.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
-        node.create_subscription(SupervisorLease, "safety/lease", self._claim, qos.STATUS)
+        node.create_subscription(
+            SupervisorLease, "safety/lease", self._claim, qos.newest(qos.STATUS)
+        )
 
     @property
     def leading(self) -> bool:
         """What it decides is sent."""
         return self.lease.role is Role.LEADING
 
-    def deadline(self) -> float:
-        """When look has something to do, monotonic s; infinity: never."""
-        return self.lease.deadline(self.config)
+    def deadline(self, now: float) -> float:
+        """When look has something to do, monotonic s, after now; infinity: not before it hears
+        more."""
+        deadline = self.lease.deadline(self.config)
+        return deadline if deadline > now else math.inf
 
     def look(self, now: float) -> None:
         """Before each turn: does it still lead, must it take over?"""
-        self.lease, event = self.lease.looked(self.config, now)
+        link_heard = self._state().newest_heartbeat()
+        self.lease, event = self.lease.looked(self.config, now, link_heard)
         if event is not None:
             self._happened(event)
 
@@ -72,13 +80,14 @@ class LeaseKeeper:
 
     def tell(self, now: float) -> None:
         """Renew the lease; before a decision leaves, so that whoever takes over knows of it."""
-        claim, state = self._own(), self._state()
+        claim, state = self._own(now), self._state()
         message = SupervisorLease(
             name=claim.name,
             rank=claim.rank,
             epoch=claim.epoch,
             leading=claim.leading,
             empty=claim.empty,
+            links_heard=claim.links_heard,
             leader="" if claim.leading else self._followed,
             state=handover.told(state, now) if claim.leading and self.config.standby else "",
         )
@@ -97,10 +106,11 @@ class LeaseKeeper:
             return f"{name} has rank {rank} as well: give each supervisor its own"
         return ""
 
-    def _own(self) -> Claim:
+    def _own(self, now: float) -> Claim:
         state = self._state()
         empty = not self._experienced and not state.flown and state.stage in ON_GROUND
-        return Claim(self.config.name, self.config.rank, state.epoch, self.leading, empty)
+        name, rank = self.config.name, self.config.rank
+        return Claim(name, rank, state.epoch, self.leading, empty, self._links_heard(now))
 
     def _claim(self, message: SupervisorLease) -> None:
         if message.name == self.config.name:
@@ -108,12 +118,19 @@ class LeaseKeeper:
         now = time.monotonic()
         if message.leader == self.config.name and len(self._followers) < RANKS:
             self._followers[message.name] = now
-        other = Claim(message.name, message.rank, message.epoch, message.leading, message.empty)
+        other = Claim(
+            message.name,
+            message.rank,
+            message.epoch,
+            message.leading,
+            message.empty,
+            message.links_heard,
+        )
         # Whoever it is: its number must not leave us without one that device nodes obey.
         if wrong := other.implausible(self.config.rank):
             self._complain(f"{message.name} claims {wrong}: not listened to")
             return
-        self.lease, event = self.lease.heard(self.config, self._own(), other, now)
+        self.lease, event = self.lease.heard(self.config, self._own(now), other, now)
         if event is not None:
             self._happened(event)
         if message.leading and not self.leading and message.state:

@@ -235,7 +235,7 @@ def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
     ]
 
 
-def lease_from(values: Mapping[str, Any], name: str) -> LeaseConfig:
+def lease_from(values: Mapping[str, Any], config: SupervisorConfig, name: str) -> LeaseConfig:
     """Which part this supervisor has among several. name: of its node."""
     return LeaseConfig(
         name,
@@ -243,6 +243,7 @@ def lease_from(values: Mapping[str, Any], name: str) -> LeaseConfig:
         values["hot_standby"],
         values["lease_timeout"],
         values["lease_listen"],
+        max(config.limits(link).lost_after for link in config.links),
     )
 
 

@@ -74,7 +74,9 @@ class UpfCanNode(DeviceNode):
         self._trigger_publisher = self.create_publisher(
             TriggerStatus, "upf/trigger_status", qos.STATUS
         )
-        self.create_subscription(VehicleState, "vehicle/state", self._vehicle, qos.STATUS)
+        self.create_subscription(
+            VehicleState, "vehicle/state", self._vehicle, qos.newest(qos.STATUS)
+        )
         self.create_subscription(ActionReport, "safety/action", self._action, qos.DECISION)
         self.create_subscription(SafetyState, "safety/state", self._safety, qos.LATCHED)
         UpfServices(self)

@@ -105,7 +105,7 @@ class VehicleSources:
         self._timer.cancel()
         if VEHICLE_STATE in sources:
             callback = self._pass_on if sources == [VEHICLE_STATE] else self._vehicle_state
-            node.create_subscription(VehicleState, VEHICLE_STATE, callback, qos.STATUS)
+            node.create_subscription(VehicleState, VEHICLE_STATE, callback, qos.newest(qos.STATUS))
         for source, kinds in inputs.items():
             for kind, parameter, read in kinds:
                 self._subscribe(kind, parameter, partial(self._heard, source, parameter, read))

@@ -1,5 +1,5 @@
-"""Which of several supervisors leads: one holds a lease and renews it; when it falls silent the
-next takes over; when two lead after a split, one yields.
+"""Which of several supervisors leads: one holds a lease and renews it; when it falls silent, or
+hears fewer links than another, that one takes over; when two lead after a split, one yields.
 
 The table is the whole truth: a pair that it does not list raises.
 """
@@ -28,6 +28,7 @@ class Event(enum.Enum):
     """What can happen to the lease."""
 
     SILENCE = "no leader was heard for the lease's time"
+    HEARS_MORE = "the leader hears fewer links than this one"
     OUTRANKED = "another leads with the better claim"
     OVERSLEPT = "this one did not look for longer than the lease's time"
     REFUSED = "a device has seen a newer leader"
@@ -36,6 +37,7 @@ class Event(enum.Enum):
 
 TRANSITIONS: dict[tuple[Role, Event], Role] = {
     (Role.FOLLOWING, Event.SILENCE): Role.LEADING,
+    (Role.FOLLOWING, Event.HEARS_MORE): Role.LEADING,
     (Role.LEADING, Event.OUTRANKED): Role.FOLLOWING,
     (Role.LEADING, Event.OVERSLEPT): Role.FOLLOWING,
     (Role.LEADING, Event.REFUSED): Role.FOLLOWING,
@@ -55,13 +57,15 @@ def next_role(role: Role, event: Event) -> Role:
 class LeaseConfig:
     """name: of the node; rank: 0 for the first choice; standby: others may run; timeout: a leader
     that is silent for so long has lost the lease, s; listen: how long one that starts looks for a
-    leader before it leads, s (finding each other on the network takes its time)."""
+    leader before it leads, s (finding each other on the network takes its time); deaf_after: one
+    that has heard no link for so long hears nothing, s."""
 
     name: str
     rank: int = 0
     standby: bool = False
     timeout: float = 0.5
     listen: float = 4.0
+    deaf_after: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.rank < RANKS:
@@ -80,6 +84,8 @@ class Claim:
     leading: bool
     #: It leads since its start without having taken anything over, and has seen no flight.
     empty: bool
+    #: Links whose nodes it hears: one that hears none decides nothing, however well it is heard.
+    links_heard: int = 0
 
     def implausible(self, rank: int) -> str:
         """Why no supervisor says this; empty: one may. rank: of the one that hears it."""
@@ -107,6 +113,8 @@ class Lease:
     looked_at: float = math.nan
     leader: str = ""
     leader_heard: float = math.nan
+    #: Since when the leader hears fewer links than this one.
+    hears_more_since: float = math.nan
     #: The highest epoch of any claim.
     highest: int = 0
     stand_back_until: float = -math.inf
@@ -120,30 +128,45 @@ class Lease:
         return cls(role, now + config.listen if config.standby else now)
 
     def deadline(self, config: LeaseConfig) -> float:
-        """When a follower takes over if no leader is heard, monotonic s; infinity: it leads."""
+        """When a follower takes over if all stays as it is, monotonic s; infinity: it leads."""
         if self.role is Role.LEADING:
             return math.inf
-        # Of several followers the first in rank takes over first.
-        wait = config.timeout * (1 + config.rank)
-        unheard = math.isnan(self.leader_heard)
-        since = self.waiting_since if unheard else self.leader_heard
-        return max(since + wait, self.stand_back_until)
+        if not math.isnan(self.hears_more_since):
+            return max(self.hears_more_since + self._wait(config), self.stand_back_until)
+        return max(self._silent_since() + self._wait(config), self.stand_back_until)
 
-    def looked(self, config: LeaseConfig, now: float) -> tuple[Lease, Event | None]:
-        """Look at the clock; what happened, if anything."""
+    def looked(
+        self, config: LeaseConfig, now: float, link_heard: float = math.nan
+    ) -> tuple[Lease, Event | None]:
+        """Look at the clock; what happened, if anything. link_heard: when any link was last
+        heard, monotonic s; NaN: never, which says nothing."""
         overslept = now - self.looked_at > config.timeout
         lease = replace(self, looked_at=now)
         if self.role is Role.LEADING:
             if config.standby and overslept:
                 return lease._moved(Event.OVERSLEPT, now), Event.OVERSLEPT
             return lease, None
-        if overslept:
+        if overslept or now - link_heard > config.deaf_after:
             # What a leader said meanwhile is still to be read: it was not silent, we were deaf.
             waiting = max(self.waiting_since, now)
-            return replace(lease, waiting_since=waiting, leader_heard=math.nan), None
-        if now >= self.deadline(config):
-            return lease._moved(Event.SILENCE, now), Event.SILENCE
-        return lease, None
+            lease = replace(lease, waiting_since=waiting, leader_heard=math.nan)
+            return replace(lease, hears_more_since=math.nan), None
+        if now < self.deadline(config):
+            return lease, None
+        if not math.isnan(self.hears_more_since):
+            return lease._moved(Event.HEARS_MORE, now), Event.HEARS_MORE
+        # Where nobody else was heard since, the network is gone, not the leader.
+        if link_heard < self._silent_since() + self._wait(config) / 2:
+            return lease, None
+        return lease._moved(Event.SILENCE, now), Event.SILENCE
+
+    def _wait(self, config: LeaseConfig) -> float:
+        """Of several followers the first in rank takes over first."""
+        return config.timeout * (1 + config.rank)
+
+    def _silent_since(self) -> float:
+        """Since when no leader is heard."""
+        return self.waiting_since if math.isnan(self.leader_heard) else self.leader_heard
 
     def heard(
         self, config: LeaseConfig, own: Claim, other: Claim, now: float
@@ -154,7 +177,11 @@ class Lease:
         if not other.leading:
             return lease, None
         if self.role is Role.FOLLOWING:
-            return replace(lease, leader=other.name, leader_heard=now), None
+            since = math.nan
+            if own.links_heard > other.links_heard:
+                since = now if math.isnan(self.hears_more_since) else self.hears_more_since
+            lease = replace(lease, leader=other.name, leader_heard=now, hears_more_since=since)
+            return lease, None
         if other.strength > own.strength:
             lease = replace(lease._moved(Event.OUTRANKED, now), leader=other.name)
             return replace(lease, leader_heard=now), Event.OUTRANKED
@@ -175,4 +202,5 @@ class Lease:
 
     def _moved(self, event: Event, now: float) -> Lease:
         role = next_role(self.role, event)
-        return replace(self, role=role, waiting_since=now, leader="", leader_heard=math.nan)
+        lease = replace(self, role=role, waiting_since=now, leader="", leader_heard=math.nan)
+        return replace(lease, hears_more_since=math.nan)

@@ -182,6 +182,18 @@ class State:
         """What is known of a link."""
         return self.links.get(link, _NEVER_HEARD)
 
+    def links_heard(self, config: SupervisorConfig, now: float) -> int:
+        """How many links have a node that is not silent."""
+        return sum(
+            not self.evidence(link).silent(config.limits(link).lost_after, now)
+            for link in config.links
+        )
+
+    def newest_heartbeat(self) -> float:
+        """When any link was last heard, monotonic s; NaN: none ever was."""
+        heard = (one.heard for one in self.links.values())
+        return max((one for one in heard if not math.isnan(one)), default=math.nan)
+
     def rule(self, name: str) -> RuleEvidence:
         """What is known of a rule."""
         return self.rules.get(name, _NEVER_COUNTED)

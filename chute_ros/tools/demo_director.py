@@ -15,6 +15,7 @@ from rclpy.node import Node
 from chute_ros import model
 from chute_ros.errors import ChuteError
 from chute_ros.nodes import qos
+from chute_ros.nodes.middleware import set_up_middleware
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.processes import Processes
 
@@ -40,6 +41,7 @@ class Director:
         self.decisions: list[tuple[float, SafetyDecision]] = []
         self.reports: list[tuple[float, ActionReport]] = []
         self.track: list[tuple[float, float]] = []
+        set_up_middleware()
         rclpy.init(args=[])
         self.node = Node("director", namespace=namespace)
         self._executor = SingleThreadedExecutor()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chute_ros.tools.isolation import free_udp_ports
@@ -53,20 +54,28 @@ class Rig:
         """The parachute's own algorithm fires, not the operator."""
         return self.kind == "upf"
 
-    def start_vehicle(self) -> None:
-        """Everything but the parachute."""
-        node = ("--ros-args", "-r", f"__ns:={self.namespace}")
+    @property
+    def _node(self) -> tuple[str, ...]:
+        return ("--ros-args", "-r", f"__ns:={self.namespace}")
+
+    def start_supervisor(self, name: str, *more: str, on: Sequence[str] = ()) -> None:
+        """One supervisor. more: of its command line; on: the host, as for Processes.start."""
         links = ", ".join(dict.fromkeys((MAVLINK, *self.links)))
-        start = self.processes.start
-        start(
-            "supervisor",
+        self.processes.start(
+            name,
             "chute_ros.nodes.safety_supervisor",
-            *node,
+            *self._node,
             *_parameter("required_links", f"[{links}]"),
             *_parameter("deploy_links", f"[{', '.join(self.links)}]"),
             # Where the parachute decides by itself, nothing else shall.
             *_parameter("profile", "by_hand" if self.automatic else "multirotor"),
+            *more,
+            on=on,
         )
+
+    def start_vehicle(self) -> None:
+        """The vehicle with the nodes of its links, but for the parachute."""
+        node, start = self._node, self.processes.start
         start(
             "mavlink",
             "chute_ros.nodes.mavlink_parachute",

@@ -20,6 +20,7 @@ CANOPY_SINK = -6.5
 def fly(rig: Rig, director: Director, pilot: Pilot) -> None:
     """All of it; StepFailedError where a step does not happen in its time."""
     director.say("demo", f"real nodes over real wires, in {rig.namespace}, on this host only")
+    rig.start_supervisor("supervisor")
     rig.start_vehicle()
     _preflight(director, pilot, rig)
     _climb(director, pilot)

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
@@ -26,11 +27,12 @@ class Processes:
         self.ros_home = folder / "ros_home"
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, name: str, module: str, *arguments: str) -> None:
-        """Run module as name; what it writes goes to name.log."""
+    def start(self, name: str, module: str, *arguments: str, on: Sequence[str] = ()) -> None:
+        """Run module as name; what it writes goes to name.log. on: what the command begins with,
+        where it is to run elsewhere than here."""
         with self.log(name).open("wb") as log:
             self._running[name] = subprocess.Popen(
-                [sys.executable, "-m", module, *arguments],
+                [*on, sys.executable, "-m", module, *arguments],
                 # Buffered, the last words of one that crashes would come before what led to them.
                 env={
                     **os.environ,

@@ -104,6 +104,10 @@ NODES = {
 }
 
 
+#: What one that was lost must not hold back.
+SAID_AGAIN = ("safety/heartbeat", "safety/decision", "parachute/status", "vehicle/state")
+
+
 @pytest.fixture(params=["/", "/drone1", "/fleet/drone1"])
 def bench(request, ros):
     one = Bench(request.param)
@@ -140,6 +144,10 @@ def test_names_types_and_qualities_are_the_contracts_and_nothing_is_missing(benc
         assert ends(found) == expected
     ours = [p for p in node.publishers if p.topic_name not in ROS_TOPICS]
     assert {p.qos_profile.reliability for p in ours} == {ReliabilityPolicy.RELIABLE}
+    again = {absolute(bench, topic) for topic in SAID_AGAIN}
+    for end in node.subscriptions:
+        if end.topic_name in again:
+            assert end.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT, end.topic_name
     offered = {
         service: kind
         for service, (kind,) in bench.client.get_service_names_and_types_by_node(

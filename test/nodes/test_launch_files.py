@@ -72,7 +72,8 @@ def test_every_argument_that_it_uses_is_declared_and_described(file):
 
 def test_the_files_that_they_name_are_installed():
     setup = (ROOT / "setup.py").read_text()
-    for folder, pattern in (("launch", "launch/*.py"), ("config", "config/*.yaml")):
+    for pattern in ("launch/*.py", "config/*.yaml", "config/*.xml"):
+        folder = pattern.partition("/")[0]
         assert f'"/{folder}", glob("{pattern}")' in setup
     for file in FILES:
         for node in ast.walk(ast.parse(file.read_text())):

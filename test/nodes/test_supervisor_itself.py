@@ -101,8 +101,12 @@ def test_messages_that_a_queue_lost_are_counted_by_topic(bench):
     health.watch("safety/action").message_lost(Lost())
     scene = Watched(bench)
     task = health.task("x", scene.supervisor.state, scene.supervisor.lease, time.monotonic())
-    assert task.level == DiagnosticStatus.ERROR
+    assert task.level == DiagnosticStatus.WARN
     assert {p.key: p.value for p in task.values}["messages lost on safety/action"] == "6"
+    health.failed(ValueError("no number"), ())
+    for _ in range(60):
+        task = health.task("x", scene.supervisor.state, scene.supervisor.lease, time.monotonic())
+        assert task.level == DiagnosticStatus.ERROR, "a mistake inside is worse"
 
 
 class Overseen:

@@ -177,6 +177,103 @@ def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -
     assert lease.next_epoch(FIRST, 8) == 12
 
 
+def hears(name: str, rank: int, links_heard: int, leading: bool = True) -> Claim:
+    epoch = epoch_above(7, rank)
+    return Claim(name, rank, epoch, leading, empty=False, links_heard=links_heard)
+
+
+def claims(lease: Lease, leader: int, own: int, tenths: range) -> tuple[Lease, Event | None]:
+    """The leader, a, claims ten times a second to hear so many links; b, that follows, so many."""
+    event = None
+    for tenth in tenths:
+        now = T + tenth * 0.1
+        mine = hears("b", 1, own, leading=False)
+        lease, event = lease.heard(SECOND, mine, hears("a", 0, leader), now)
+        assert event is None
+        lease, event = lease.looked(SECOND, now)
+        if event is not None:
+            break
+    return lease, event
+
+
+def test_a_leader_that_hears_less_than_a_follower_loses_the_lease() -> None:
+    # Its messages go out and none comes in: it renews its lease, and sees no vehicle fall.
+    lease, event = claims(following(SECOND), 0, 2, range(1, 11))
+    assert event is None
+    lease, event = claims(lease, 0, 2, range(11, 20))
+    assert (lease.role, event) == (Role.LEADING, Event.HEARS_MORE)
+    assert lease.looked_at == pytest.approx(T + 1.1), "the lease's time for the second in rank"
+    # The deaf one, when it hears again, yields to the higher epoch.
+    later = replace(hears("b", 1, 2), epoch=lease.next_epoch(SECOND, 8))
+    first, event = leading(FIRST).heard(FIRST, hears("a", 0, 0), later, T + 9.0)
+    assert (first.role, event) == (Role.FOLLOWING, Event.OUTRANKED)
+
+
+@pytest.mark.parametrize(("leader", "own"), [(2, 2), (2, 1), (0, 0)])
+def test_a_leader_that_hears_as_much_keeps_it(leader: int, own: int) -> None:
+    lease, event = claims(following(SECOND), leader, own, range(1, 50))
+    assert (lease.role, event) == (Role.FOLLOWING, None)
+
+
+def test_a_leader_that_misses_a_link_for_a_moment_keeps_it() -> None:
+    lease, _ = claims(following(SECOND), 1, 2, range(1, 10))
+    lease, _ = claims(lease, 2, 2, range(10, 11))
+    lease, event = claims(lease, 1, 2, range(11, 20))
+    assert (lease.role, event) == (Role.FOLLOWING, None)
+
+
+def test_a_follower_that_slept_counts_from_its_waking() -> None:
+    lease, _ = claims(following(SECOND), 1, 2, range(1, 5))
+    lease, event = lease.looked(SECOND, T + 3.0)
+    assert event is None
+    lease, event = claims(lease, 1, 2, range(31, 40))
+    assert (lease.role, event) == (Role.FOLLOWING, None)
+
+
+def looks(
+    lease: Lease, tenths: range, link_heard: float | None = None
+) -> tuple[Lease, Event | None]:
+    """b looks ten times a second and hears no leader; links are heard always, or last then."""
+    event = None
+    for tenth in tenths:
+        now = T + tenth * 0.1
+        lease, event = lease.looked(SECOND, now, now if link_heard is None else link_heard)
+        if event is not None:
+            break
+    return lease, event
+
+
+def test_a_follower_whose_network_is_gone_does_not_take_over() -> None:
+    # The last heartbeat of a link came with the leader's last claim, or a little later.
+    lease, event = looks(following(SECOND), range(1, 100), link_heard=T + 0.45)
+    assert (lease.role, event) == (Role.FOLLOWING, None)
+    # It is back: the leader has its time to be heard before anybody takes over.
+    lease, event = looks(lease, range(100, 109))
+    assert event is None
+    lease, event = lease.heard(SECOND, hears("b", 1, 1, leading=False), hears("a", 0, 1), T + 10.9)
+    lease, event = looks(lease, range(110, 119))
+    assert (lease.role, event) == (Role.FOLLOWING, None)
+    lease, event = looks(lease, range(119, 130))
+    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+
+
+def test_a_leader_is_dead_where_links_are_heard_after_it() -> None:
+    lease, event = looks(following(SECOND), range(1, 10), link_heard=T + 0.5)
+    assert event is None
+    lease, event = looks(lease, range(10, 11), link_heard=T + 0.5)
+    assert (lease.role, event) == (Role.LEADING, Event.SILENCE)
+
+
+def test_where_links_are_rarely_heard_the_next_heartbeat_decides() -> None:
+    slow = replace(SECOND, deaf_after=6.0)
+    lease = following(slow)
+    for tenth in range(1, 30):
+        lease, event = lease.looked(slow, T + tenth * 0.1, T - 0.1)
+        assert event is None
+    lease, event = lease.looked(slow, T + 3.0, T + 3.0)
+    assert event is Event.SILENCE
+
+
 def test_two_of_one_rank_are_noticed() -> None:
     lease, _ = leading(FIRST).heard(FIRST, claim("a", 0, 8), claim("c", 0, 4), T)
     assert lease.same_rank == "c"
