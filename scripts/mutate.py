@@ -55,6 +55,7 @@ TESTS = {
     "profile_reader": ("profile_reader",),
     "yaml_lines": ("profile_reader",),
     "rules": ("profile_reader", "profiles", "conditions"),
+    "clock_steps": ("clock_steps",),
     "codec": ("codec",),
     "record": ("record_replay",),
     "inputs": ("codec",),

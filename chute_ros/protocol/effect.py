@@ -241,9 +241,8 @@ class EffectLoop(Generic[CommandT]):
             return
         if self.phase is Phase.WAIT_EFFECT:
             self._take(Happening.EFFECT_LATE)
-        if self.phase is Phase.WAIT_RETRY:
-            self._take(Happening.RETRY_DUE)
-            self._send()
+        self._take(Happening.RETRY_DUE)
+        self._send()
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""

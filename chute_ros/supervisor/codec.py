@@ -43,7 +43,7 @@ class Codec:
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise RecordError(f"cannot be read: {error} in {text[:80]!r}") from error
 
-    def plain(self, value: object, whole: bool = False) -> Any:
+    def plain(self, value: object, whole: bool) -> Any:
         """value in terms of JSON."""
         if isinstance(value, enum.Enum):
             return value.value
@@ -66,8 +66,8 @@ class Codec:
         """The value of this type that plain stands for."""
         if isinstance(plain, dict):
             return self._object(plain)
-        if dataclasses.is_dataclass(kind):
-            raise RecordError(f"{plain!r} is no {getattr(kind, '__name__', kind)}")
+        if isinstance(kind, type) and dataclasses.is_dataclass(kind):
+            raise RecordError(f"{plain!r} is no {kind.__name__}")
         origin = typing.get_origin(kind)
         arguments = typing.get_args(kind)
         if origin in (types.UnionType, typing.Union):
@@ -117,13 +117,11 @@ def _hints(kind: type) -> dict[str, Any]:
 
 
 def _is_default(field: dataclasses.Field[Any], value: object) -> bool:
-    """Exactly: 0 and 0.0 and -0.0 and False are equal, and differ."""
+    """Exactly, and all that it holds: 0 and 0.0 and -0.0 and False are equal, and differ."""
     if field.default is not dataclasses.MISSING:
         default = field.default
     elif field.default_factory is not dataclasses.MISSING:
         default = field.default_factory()
     else:
         return False
-    if isinstance(value, float) or isinstance(default, float):
-        return type(value) is type(default) and repr(value) == repr(default)
-    return type(value) is type(default) and value == default
+    return type(value) is type(default) and repr(value) == repr(default)

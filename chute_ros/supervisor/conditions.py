@@ -71,12 +71,11 @@ def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now:
     for name in names:
         evidence, limits = state.evidence(name), config.limits(name)
         judged = evidence.judged(limits, now)
-        if judged is LinkJudgement.NEVER_SEEN and now < state.started_at + limits.startup_grace:
-            told.append(f"{name} is still starting")
-            so.append(False)
-            continue
-        told.append(f"{name} is {judged.name}, heard {now - evidence.heard:.2f} s ago")
-        so.append(judged in condition.judged)
+        in_grace = now < state.started_at + limits.startup_grace
+        starting = judged is LinkJudgement.NEVER_SEEN and in_grace
+        heard = f"{judged.name}, heard {now - evidence.heard:.2f} s ago"
+        told.append(f"{name} is {'still starting' if starting else heard}")
+        so.append(judged in condition.judged and not starting)
     holds = all(so) if condition.link == ALL else any(so)
     return Finding(holds, f"link {', '.join(told)} (asked for: {wanted})")
 

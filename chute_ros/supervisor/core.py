@@ -34,8 +34,8 @@ def update(
     config: SupervisorConfig, state: State, inputs: tuple[i.Input, ...], now: float
 ) -> tuple[State, tuple[i.Output, ...]]:
     """Take in what came since the last call, look at the clock, and decide."""
-    # Time does not run backwards; a clock that says so is not followed.
-    now = max(now, state.updated_at) if not math.isnan(state.updated_at) else now
+    # Time does not run backwards; a clock that says so is not followed. (NaN is never the larger.)
+    now = max(now, state.updated_at)
     turn = _Update(config, state, now)
     turn.begin()
     for one in inputs:
@@ -222,7 +222,6 @@ class _Update(Deploying):
             airborne=True,
             airborne_since=self.now,
             was_high=False,
-            killed_in_flight=False,
             home=home,
             measurements=MappingProxyType(measurements),
             # What was acted on in an earlier flight says nothing about this one.
@@ -251,7 +250,7 @@ class _Update(Deploying):
             self._killed_on_ground()
         ):
             action = Action.FLIGHT_BLOCK
-            reasons = block_reasons(self.config, self.state, self.now) or ("starting",)
+            reasons = block_reasons(self.config, self.state, self.now)
         elif self.state.stage is Stage.IN_FLIGHT:
             action, reasons = Action.FLIGHT_BLOCK_RELEASE, ("in the air",)
         else:

@@ -43,14 +43,14 @@ class DecisionGate:
         if decision.shadow:
             return Verdict.SHADOW
         order = (decision.epoch, decision.id)
-        newest = (self.newest_epoch, self.newest_id)
+        newer = order > (self.newest_epoch, self.newest_id)
         if order in self.acted:
             return Verdict.REPEATED
-        if order <= newest and not self._missed_kill(decision):
+        if not newer and not self._missed_kill(decision):
             return Verdict.OLDER
         if not -self.max_decision_age <= age <= self.max_decision_age:
             return Verdict.TOO_LATE
-        if order > newest:
+        if newer:
             self.newest_epoch, self.newest_id = order
             self.newest_action = decision.action
         self.acted.append(order)

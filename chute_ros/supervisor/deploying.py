@@ -44,7 +44,8 @@ class Deploying(Policy):
             if low and self.state.deploy_rule != OPERATOR:
                 # It was high enough when the kill left; a canopy needs the height now.
                 self.alarm(f"no deploy by rule '{self.state.deploy_rule}' after the kill: {low}")
-                self.finish_deploy(False, False, low)
+                # Nobody waits for it: a person's is held back by no height.
+                self.state = replace(self.state, deploy_rule="", deploy_reasons=())
                 return
             if kill.unreported():
                 # A node that misses the kill must not see the deploy first: it would refuse the
@@ -59,7 +60,8 @@ class Deploying(Policy):
     def look_at_deploy(self) -> None:
         """Confirmed, one step further, or at the end of the ladder."""
         confirmed = self.deploy_reached(Outcome.CONFIRMED)
-        if confirmed and self.state.stage in (Stage.DEPLOYING, Stage.FAULT):
+        # Also while somebody kills once more after the ladder's end.
+        if confirmed and self.state.stage in (Stage.KILLING, Stage.DEPLOYING, Stage.FAULT):
             self.move(Stimulus.PARACHUTE_OPEN, self.deploy_details())
         elif self.state.stage is Stage.DEPLOYING and self.state.deploys:
             self._climb()
@@ -114,11 +116,10 @@ class Deploying(Policy):
         accepted, text = self.deploy_reached(Outcome.ACCEPTED), self.deploy_details()
         if self.state.stage is Stage.FAULT:
             self.finish_deploy(False, accepted, text or "no device node reported")
-        elif self.state.stage is Stage.DEPLOYED and not self.state.deploy_tokens:
-            self.finish_deploy(True, accepted, text)
         elif self.state.stage is Stage.DEPLOYED:
             reported = not self.state.deploys or self.deploy_reached(Outcome.CONFIRMED)
-            if reported or self.now >= self.state.stage_since + self.config.report_wait:
+            waited = self.now >= self.state.stage_since + self.config.report_wait
+            if reported or waited or not self.state.deploy_tokens:
                 self.finish_deploy(True, accepted, text or "its own status says deployed")
 
     def _alarm_again(self) -> None:

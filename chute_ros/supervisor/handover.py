@@ -75,6 +75,7 @@ def followed(state: State, text: str, now: float) -> State:
         vehicle=state.vehicle,
         vehicle_received=state.vehicle_received,
         measurements=state.measurements,
+        heights=state.heights,
     )
 
 

@@ -124,7 +124,7 @@ class Measured:
 
     def with_sample(self, sample: Sample, limits: Limits) -> Measured:
         """After one sample; the same one told again changes nothing."""
-        if math.isnan(sample.measured_at):
+        if not math.isfinite(sample.measured_at):
             return self
         for value, at in (
             (self.value, self.measured_at),
@@ -136,14 +136,10 @@ class Measured:
                 return self
         wrong = self._impossible(sample, limits)
         if wrong:
-            return replace(
-                self, rejected=wrong, candidate=math.nan, candidate_at=math.nan, candidates=0
-            )
+            return Measured(self.value, self.measured_at, self.same_since, self.count, wrong)
         doubtful = self._doubtful(sample, limits)
         if doubtful:
-            agrees = self.candidates > 0 and not _jumps(
-                self.candidate, self.candidate_at, sample, limits
-            )
+            agrees = not _jumps(self.candidate, self.candidate_at, sample, limits)
             candidates = self.candidates + 1 if agrees else 1
             if candidates < CONFIRMING_SAMPLES:
                 return replace(
@@ -193,9 +189,6 @@ def samples_of(
     vehicle: VehicleState, received: float, home: tuple[float, float] | None
 ) -> Mapping[str, Sample]:
     """Every measurement in a VehicleState. received: monotonic s; home: degrees."""
-    distance = math.nan
-    if home is not None:
-        distance = distance_between(home, (vehicle.latitude, vehicle.longitude))
     told = {
         "height": (vehicle.height, vehicle.height_age),
         "vertical_speed": (vehicle.vertical_speed, vehicle.vertical_speed_age),
@@ -205,7 +198,8 @@ def samples_of(
         "battery_remaining": (vehicle.battery_remaining, vehicle.battery_age),
     }
     if home is not None:
-        told["distance_from_home"] = (distance, vehicle.position_age)
+        here = (vehicle.latitude, vehicle.longitude)
+        told["distance_from_home"] = (distance_between(home, here), vehicle.position_age)
     return {name: Sample(value, received - age) for name, (value, age) in told.items()}
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.gate import out_already
+from chute_ros.supervisor.gate import OPERATOR, out_already
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.state import Pending
 from chute_ros.supervisor.steps import Steps
@@ -40,8 +40,11 @@ class Orders(Steps):
                 self.fire(action, rule, reasons)
             return
         again = self.state.stage is Stage.DEPLOYED  # a person insists: another parachute
-        if self.state.deploy_rule or (self.deploy_reached(Outcome.CONFIRMED) and not again):
-            return  # under way, or out already, which is said at the end of this update
+        if self.state.deploy_rule:
+            self._join_deploy(rule, reasons)
+            return
+        if self.deploy_reached(Outcome.CONFIRMED) and not again:
+            return  # out already, which is said at the end of this update
         if self.state.stage in ON_GROUND or again:
             self.note_released()
         self.end_kill()
@@ -68,16 +71,21 @@ class Orders(Steps):
             deploys=(),
         )
 
+    def _join_deploy(self, rule: str, reasons: tuple[str, ...]) -> None:
+        """A rule's deploy that a person wants as well is theirs: no height holds it back."""
+        if rule == OPERATOR and self.state.deploy_rule != OPERATOR:
+            both = (*self.state.deploy_reasons, *reasons)
+            self.state = replace(self.state, deploy_rule=rule, deploy_reasons=both)
+
     def _to_killing(self, why: str) -> None:
         if listed(self.state.stage, Stimulus.KILL):
             if self.state.stage is not Stage.KILLING:
-                flying = self.state.stage in (Stage.IN_FLIGHT, Stage.FAULT, Stage.DEPLOYED)
                 stood = flight.down_undisputed(
                     self.config, self.state, self.now
                 ) or flight.disarmed(self.config, self.state, self.now)
                 self.state = replace(
                     self.state,
-                    killed_in_flight=flying and self.state.airborne,
+                    killed_in_flight=self.state.airborne,
                     killed_standing=stood,
                 )
             self.move(Stimulus.KILL, why)

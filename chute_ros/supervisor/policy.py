@@ -42,10 +42,10 @@ class Judged:
 
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
-    findings = tuple(find(config, state, condition, now) for condition in rule.conditions)
-    pairs = list(zip(rule.conditions, findings, strict=True))
-    weight = sum(condition.weight for condition, one in pairs if one.holds)
-    possible = weight + sum(condition.weight for condition, one in pairs if one.holds is None)
+    found = [(condition, find(config, state, condition, now)) for condition in rule.conditions]
+    findings = tuple(finding for _, finding in found)
+    weight = sum(condition.weight for condition, one in found if one.holds)
+    possible = weight + sum(condition.weight for condition, one in found if one.holds is None)
     holds: bool | None = False
     if weight >= rule.needed - 1e-9:
         holds = True
@@ -116,7 +116,7 @@ class Policy(Reports):
         )
         if by_itself or disarmed:
             self.outputs.append(i.Say(f"rule '{rule.name}' has cleared"))
-            return replace(evidence, latched=False, denied="")
+            return replace(evidence, latched=False)
         return evidence
 
     def _act(self, judged: Judged) -> None:
@@ -125,12 +125,12 @@ class Policy(Reports):
             return
         if self.state.stage not in rule.states:
             return  # a graver one has just moved it on
-        action, lowered = rule.action, ""
+        action = rule.action
         if action is Action.DEPLOY:
             denied = against_rule(self.config, self.state, rule, judged.findings, self.now)
-            lowered = too_low(self.config, self.state, self.now) if not denied else ""
-            if lowered and self.config.profile.below_minimum is BelowMinimum.NOTHING:
-                denied = lowered
+            lowered = too_low(self.config, self.state, self.now)
+            if self.config.profile.below_minimum is BelowMinimum.NOTHING:
+                denied = denied or lowered
             if denied:
                 self._deny(rule, denied, reasons)
                 return
@@ -148,14 +148,17 @@ class Policy(Reports):
 
     def _deny(self, rule: Rule, why: str, reasons: tuple[str, ...]) -> None:
         evidence = self.state.rule(rule.name)
-        # The reason without its figures, which change all the time: it is said once.
-        kind = why.partition(" is below")[0].rstrip("0123456789.- m")
-        if evidence.denied != kind:
+        if _kind(evidence.denied) != _kind(why):
             self.outputs.append(
                 i.Say(f"rule '{rule.name}' wants a deploy ({'; '.join(reasons)}): denied, {why}")
             )
-            self._remember(rule, replace(evidence, denied=kind))
+        self._remember(rule, replace(evidence, denied=why))
 
     def _remember(self, rule: Rule, evidence: RuleEvidence) -> None:
         rules = {**self.state.rules, rule.name: evidence}
         self.state = replace(self.state, rules=MappingProxyType(rules))
+
+
+def _kind(why: str) -> str:
+    """A reason without the height in it, which changes all the time: it is said once."""
+    return why.rpartition(" is below")[2]

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 from chute_ros.errors import ParameterError, ProfileError
 from chute_ros.model import Action
+from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
@@ -125,6 +126,10 @@ def _limits(reader: _ProfileLines, where: Where) -> MappingProxyType[str, Limits
 def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
     what = f"rule '{name}'"
     entries = reader.mapping(where, _RULE_KEYS, what)
+    if name == OPERATOR:
+        reader.wrong(
+            where.line, f"{what} has a person's name, whom no height holds back: rename it"
+        )
     for key in ("conditions", "action", "states"):
         if key not in entries and where.is_mapping:
             reader.wrong(where.line, f"{what} has no {key}: add it")
@@ -150,7 +155,7 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
             reader.wrong(entries["needed"].line, f"{text} {weights:g}")
     rule = Rule(name, tuple(conditions), action, tuple(states), needed)
     rule = _timing(reader, what, entries, rule)
-    if rule.samples > 1 and rule.hold <= 0.0 and "samples" in entries:
+    if rule.samples > 1 and rule.hold <= 0.0:
         text = f"{what} needs {rule.samples} samples at once: add `for`, in which they may come"
         reader.wrong(entries["samples"].line, text)
     if action is Action.DEPLOY and conditions:

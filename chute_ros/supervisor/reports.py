@@ -138,7 +138,7 @@ class Reports(Requests):
             ):
                 # Refused as older, not tried: those that have not begun get a new number.
                 self.renew_missing(slot, f"{one.link} saw a newer decision first")
-                continue
+                return
             reached = pending.of(one.link) | {one.outcome}
             outcomes = MappingProxyType({**pending.outcomes, one.link: reached})
             details, text = pending.details, f"{one.link}: {one.detail}"

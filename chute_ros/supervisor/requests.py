@@ -26,13 +26,11 @@ class Requests(Orders):
     def arm_request(self, one: i.ArmRequest) -> None:
         """Arming needs every pre-flight check; disarming only the ground."""
         if one.arm:
-            wrong = arm_reasons(self.config, self.state, one.day, self.now)
-        elif self.state.stage in ON_GROUND or self._down():
-            wrong = ()
+            wrong = "; ".join(arm_reasons(self.config, self.state, one.day, self.now))
         else:
-            wrong = (f"the vehicle is {self.state.stage.name}: not disarmed in flight",)
+            wrong = self._against_disarming()
         if wrong:
-            self.finish(one.token, False, False, "refused: " + "; ".join(wrong))
+            self.finish(one.token, False, False, "refused: " + wrong)
         else:
             links = self.config.deploy_links
             self.outputs.append(i.ArmDevices(one.token, one.arm, one.triggers, links))
@@ -165,11 +163,13 @@ class Requests(Orders):
         self.state = replace(self.state, mode=one.mode, rules=MappingProxyType({}))
         self.finish(one.token, True, True, f"mode {one.mode.name}")
 
-    def _down(self) -> bool:
-        """Known to be on the ground, and no deploy on its way."""
-        if self.state.deploy_rule:
-            return False
-        return flight.in_air(self.config, self.state, self.now) is False
+    def _against_disarming(self) -> str:
+        """Why the parachute is not disarmed; empty: it is on the ground, no deploy on its way."""
+        stage = self.state.stage
+        down = flight.in_air(self.config, self.state, self.now) is False
+        if stage in ON_GROUND or (down and not self.state.deploy_rule):
+            return ""
+        return f"the vehicle is {stage.name}: not disarmed in flight"
 
     def _nothing_sent(self, token: int) -> None:
         text = f"refused: mode is {self.state.mode.name}; nothing is sent"

@@ -77,7 +77,7 @@ class Steps:
         rule: str,
         reasons: tuple[str, ...],
         targets: tuple[str, ...],
-        device: str = "",
+        device: str,
     ) -> Decision:
         """A new decision under the next number, in SHADOW only as what would have been done."""
         state = self.state

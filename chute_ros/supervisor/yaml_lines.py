@@ -46,7 +46,7 @@ class LineReader:
         for key_node, node in where.node.value:
             key, line = str(key_node.value), key_node.start_mark.line + 1
             if allowed and key not in allowed:
-                near = difflib.get_close_matches(key, allowed, 1)
+                near = difflib.get_close_matches(key, allowed)
                 fix = f"did you mean {near[0]}? " if near else ""
                 self.wrong(line, f"{what} has no {key!r}: {fix}it may have {', '.join(allowed)}")
             elif key in entries:
@@ -74,18 +74,18 @@ class LineReader:
         choices = tuple(choices)
         if where.value in choices:
             return str(where.value)
-        near = difflib.get_close_matches(str(where.value), choices, 1)
+        near = difflib.get_close_matches(str(where.value), choices)
         fix = f" (did you mean {near[0]}?)" if near else ""
         self.wrong(where.line, f"{what} is {where.value!r}: need {' or '.join(choices)}{fix}")
         return choices[0]
 
     def text(self, where: Where, what: str) -> str:
         """Words."""
-        words = where.value if isinstance(where.node, yaml.ScalarNode) else None
-        if not isinstance(words, str) or not words.strip():
+        said = isinstance(where.node, yaml.ScalarNode) and isinstance(where.value, str)
+        words = where.value.split() if said else []
+        if not words:
             self.wrong(where.line, f"{what} is {where.value!r}: need words")
-            return ""
-        return " ".join(words.split())
+        return " ".join(words)
 
     def many(self, where: Where, what: str) -> list[Where]:
         """The entries of a list; one alone may stand without brackets."""
@@ -100,24 +100,20 @@ def compose(text: str, name: str) -> Where:
     """The root of a YAML text; ProfileError if it is none. name: of the file."""
     try:
         return where_of(yaml.compose(text, Loader=yaml.SafeLoader))
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        line = mark.line + 1 if mark is not None else 1
-        raise ProfileError(f"{name}, line {line}: not YAML: {error.problem}") from None
-    except (yaml.YAMLError, ValueError) as error:
-        raise ProfileError(f"{name}, line 1: not YAML: {error}") from None
+    except (yaml.YAMLError, ValueError) as error:  # most say where, and what in short
+        mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", error)
+        line = 1 if mark is None else mark.line + 1
+        raise ProfileError(f"{name}, line {line}: not YAML: {problem}") from None
 
 
 def where_of(node: yaml.Node | None) -> Where:
     """A node of the file."""
     if node is None:
         return Where(None, None, 1)
-    value = node.value
+    value = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
     if isinstance(node, yaml.ScalarNode):
         try:
             value = yaml.safe_load(node.value) if node.style is None else node.value
         except (yaml.YAMLError, ValueError):  # as of 2024-13-45, a date that is none
             value = node.value
-    else:
-        value = "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
     return Where(node, value, node.start_mark.line + 1)

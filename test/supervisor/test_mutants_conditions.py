@@ -80,6 +80,12 @@ def test_what_the_autopilot_says_of_itself_counts_up_to_its_age(
         assert found.text == "autopilot's own state is old"
 
 
+def test_one_that_is_being_switched_off_is_no_emergency() -> None:
+    known = state(vehicle=VehicleState(system_status=7), vehicle_received=NOW)
+    found = find(CONFIG, known, AutopilotCondition(AutopilotFact.EMERGENCY), NOW)
+    assert found == Finding(False, "autopilot's own state is 7 (6 or 8)")
+
+
 def test_a_wish_for_a_kill_ends_at_its_time_and_all_are_told() -> None:
     asks = {"a 1": Ask(NOW, "a", "fire"), "b 2": Ask(NOW, "b", "smoke")}
     known, wants = state(asks=MappingProxyType(asks)), DeviceCondition(DeviceFact.ASKS_FOR_KILL)

@@ -55,6 +55,7 @@ def test_the_rounding_itself_is_full_and_empty() -> None:
     shortest = rule(SINKS, hold=1e-6, samples=0)
     assert RuleEvidence(level=0.0, holds=True).fulfilled(shortest)
     assert RuleEvidence(level=1e-6).cleared()
+    assert not RuleEvidence(level=2e-6).cleared()
 
 
 @pytest.mark.parametrize(("unknown", "stands"), [(1.0, 2.0), (4.0, 0.0)])

@@ -6,12 +6,13 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
+from story import Story, with_rules
 
 from chute_ros.model import Armed, LandedState, VehicleState
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, gate
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.rules import Profile
+from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.supervisor.state import State
 
 CONFIG = SupervisorConfig(profile=Profile("tested", (), minimum_height=10.0))
@@ -78,3 +79,60 @@ def test_one_that_also_says_disarmed_needs_all_signs_and_a_flight_just_before(
 ) -> None:
     told = known(armed=Armed.DISARMED, acceleration=1.0, vertical_speed=-9.0, height=height)
     assert flight.in_air(CONFIG, replace(told, landed_at=landed_at), NOW) is in_air
+
+
+def told_by_heights(*heights: tuple[float, float]) -> State:
+    """The last of these heights is the newest that was measured."""
+    height = Measured(heights[-1][1], heights[-1][0], heights[-1][0], len(heights))
+    known = MappingProxyType({"height": height})
+    return State(epoch=7, started_at=0.0, measurements=known, heights=heights)
+
+
+def test_a_climb_rate_needs_heights_just_so_far_apart() -> None:
+    far = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
+    assert flight.climb_rate(CONFIG, far, 0.4) == pytest.approx(-15.0)
+    near = told_by_heights((0.1, 50.0), (0.2, 47.0), (0.4, 44.0))
+    assert math.isnan(flight.climb_rate(CONFIG, near, 0.4))
+
+
+def test_a_climb_rate_is_not_known_where_the_height_is_not() -> None:
+    falls = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
+    assert math.isnan(flight.climb_rate(CONFIG, falls, 9.0)), "the newest is old"
+    assert math.isnan(flight.climb_rate(CONFIG, replace(falls, rebooted=True), 0.4))
+    assert math.isnan(flight.climb_rate(CONFIG, replace(falls, heights=()), 0.4))
+
+
+@pytest.mark.parametrize(("height", "in_air"), [(40.0, False), (40.1, True)])
+def test_how_high_one_falls_counts_from_where_it_was_armed(height: float, in_air: bool) -> None:
+    state = replace(known(acceleration=1.0, height=height), armed_height=30.0)
+    assert flight.in_air(CONFIG, state, NOW) is in_air
+
+
+@pytest.mark.parametrize(("height", "in_air"), [(32.0, False), (32.1, True)])
+def test_without_a_landed_state_it_flies_above_the_height_of_a_take_off(
+    height: float, in_air: bool
+) -> None:
+    state = replace(known(LandedState.UNKNOWN, height=height), armed_height=30.0)
+    assert flight.in_air(CONFIG, state, NOW) is in_air
+
+
+@pytest.mark.parametrize(
+    ("rebooted", "hold", "believed_after"),
+    [(False, 1.0, 1.0), (True, 1.0, 10.0), (True, 15.0, 15.0)],
+)
+def test_how_long_one_must_say_that_it_stands(
+    rebooted: bool, hold: float, believed_after: float
+) -> None:
+    config = SupervisorConfig(profile=Profile("tested", (), landed_hold=hold))
+    state = replace(known(), down_since=NOW, rebooted=rebooted)
+    assert flight.landed_at(config, state) == NOW + believed_after
+
+
+def test_one_without_a_height_is_taken_to_be_high_enough_just_so_long_after_its_take_off() -> None:
+    profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.KILL}
+    story = Story(with_rules(profile=profile)).flying()
+    story.fly(4.95, height=math.nan)
+    why = gate.too_low(story.config, story.state, story.state.updated_at)
+    assert why == "it was never seen at the minimum height, 10 m"
+    story.fly(5.05, height=math.nan)
+    assert gate.too_low(story.config, story.state, story.state.updated_at) == ""

@@ -58,6 +58,14 @@ def test_a_person_hears_that_nothing_says_where_it_is() -> None:
     )
 
 
+@pytest.mark.parametrize("stage", [one for one in Stage if one is not Stage.DEPLOYED])
+def test_a_person_needs_no_force_in_flight_and_everywhere_else(stage: Stage) -> None:
+    config, state = SupervisorConfig(), State(epoch=7, started_at=0.0, stage=stage)
+    flies = stage in (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
+    assert (gate.against_person(config, state, False, 1.0) == "") is flies
+    assert gate.against_person(config, state, True, 1.0) == ""
+
+
 @pytest.mark.parametrize(
     ("told", "why"),
     [

@@ -271,3 +271,12 @@ def test_each_shipped_profile_has_no_mistake_and_says_what_and_wherefrom(name: s
     for rule in profile.rules:
         assert rule.says
         assert rule.source
+
+
+def test_no_rule_has_a_persons_name() -> None:
+    """What a person orders passes below the minimum height."""
+    (told,) = mistakes(WHOLE.replace("  falls:", "  operator:"))
+    assert told == (
+        "mine.yaml, line 9: rule 'operator' has a person's name, whom no height holds back: "
+        "rename it"
+    )

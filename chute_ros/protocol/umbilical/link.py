@@ -279,10 +279,8 @@ class UmbilicalLink:
         self.orders.judge_again(now)
 
     def _tell_picture(self, now: float) -> None:
-        if self.computer.liveness.state is not LinkState.NEVER_SEEN:
-            status = self.computer.status(now, self.pause)
-            self._events.append(ParachuteChanged(status))
-            self._events.append(VehicleChanged(self.computer.vehicle_state(now)))
+        self._events.append(ParachuteChanged(self.computer.status(now, self.pause)))
+        self._events.append(VehicleChanged(self.computer.vehicle_state(now)))
 
     def _changed(self, changes: list[LinkChange]) -> None:
         self._events += [DeviceLinkChanged(DEVICE.replace("_", " "), one) for one in changes]

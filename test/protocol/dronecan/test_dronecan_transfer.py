@@ -180,6 +180,15 @@ def test_a_device_that_restarted_and_counts_from_0_again_is_heard():
     assert ear.counts == {}
 
 
+def test_a_device_that_restarts_at_once_with_the_same_id_is_heard_if_it_says_something_new():
+    ear = Ear()
+    before, frames = single(payload=b"before!")
+    after, again = single(payload=b"anew...")
+    assert ear.hear(frames, 0.0) == [before]
+    assert ear.hear([*again, *again], 0.1) == [after]
+    assert ear.counts == {"transfers that came twice": 1}
+
+
 def test_a_lost_frame_loses_its_transfer_and_not_the_next():
     for lost in range(8):
         ear = Ear()

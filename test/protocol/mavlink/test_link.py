@@ -1,12 +1,17 @@
 """Stories of a whole link over bytes: who is heard, who is not, and the flight block."""
 
+import importlib.util
 import math
+import sys
 
 import pytest
 from link_bench import START, Bench, ack, copter, heartbeat, landed, status
 
+from chute_ros.errors import NotBuiltError, ParameterError
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.protocol.events import DeviceLinkChanged, ParachuteChanged
+from chute_ros.protocol.mavlink import dialect as dialect_module
+from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.flight_block import DISARM_INTERVAL
 from chute_ros.protocol.mavlink.frames import FrameEncoder
@@ -48,6 +53,29 @@ def test_without_a_name_the_first_parachute_that_is_not_lost_is_meant():
     assert bench.link.chosen_parachute().device == "1/162"
     bench.at(12.0)
     assert bench.link.chosen_parachute().device == "1/161"  # both are lost
+
+
+def test_a_deploy_need_not_wait_once_a_parachute_was_heard():
+    bench = Bench()
+    assert not bench.link.has_parachute()
+    bench.hear(PILOT, copter())
+    assert not bench.link.has_parachute(), "an autopilot is none"
+    bench.hear(CHUTE, heartbeat()).at(60.0)
+    assert bench.link.has_parachute(), "one that is lost is told all the same"
+
+
+@pytest.mark.parametrize("interval", [0.0, -1.0, math.inf, math.nan])
+def test_a_heartbeat_needs_a_time_between_two(interval):
+    with pytest.raises(ParameterError) as raised:
+        MavlinkConfig(heartbeat_interval=interval)
+    assert str(raised.value) == f"heartbeat_interval is {interval}: need a time above 0 s"
+
+
+def test_without_its_dialect_it_says_what_to_build(monkeypatch):
+    monkeypatch.setitem(sys.modules, "chute_msgs.mavlink", None)
+    spec = importlib.util.spec_from_file_location("not_built", dialect_module.__file__)
+    with pytest.raises(NotBuiltError, match=r"colcon build .* then source install"):
+        spec.loader.exec_module(importlib.util.module_from_spec(spec))
 
 
 def test_other_vehicles_and_ground_stations_do_not_confuse_it():

@@ -113,6 +113,14 @@ def test_connection_COMPONENT_INFORMATION_BASIC_field_by_field():  # noqa: N802
     }
 
 
+def test_connection_COMPONENT_INFORMATION_BASIC_without_a_date():  # noqa: N802
+    message = d.MAVLink_component_information_basic_message(
+        1500, 3, 0, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
+    )
+    information = ready().hear(PARACHUTE, message).link.chosen_parachute().information
+    assert information.manufacture_date == "", "0 is not known, and no day of 1970"
+
+
 # -- "MAV_CMD_SET_PARACHUTE_ARM", "Parachute Triggering Sources" ------------------------------
 
 

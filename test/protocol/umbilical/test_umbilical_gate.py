@@ -247,6 +247,19 @@ def test_launch_is_refused_while_flight_is_blocked():
     assert bench.notices() == ["flight blocked: parachute lost", "flight block released"]
 
 
+def test_the_main_valve_is_not_opened_while_flight_is_blocked_unless_forced():
+    bench = ready()
+    bench.link.flight_block("parachute lost", bench.now)
+    number = bench.order("open_mav")
+    assert bench.end(number).message == (
+        "open_mav refused: flight is blocked (parachute lost); force sends it"
+    )
+    assert bench.tokens == []
+    forced = bench.order("open_mav", force=True)
+    assert bench.ends(forced) == []
+    assert len(bench.tokens) == 1
+
+
 def test_a_flight_block_takes_back_a_launch_that_waits():
     bench = ready()
     bench.order("payload_n1")

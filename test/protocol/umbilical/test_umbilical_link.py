@@ -17,10 +17,12 @@ from chute_ros.model import LinkState, ParachuteState
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
     ParachuteChanged,
+    Severity,
     VehicleChanged,
 )
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.protocol.umbilical.events import TelemetryReceived
+from chute_ros.protocol.umbilical.sayings import LogLine
 
 BEGIN, END = "--- BEGIN FLASH CSV DUMP ---", "--- END FLASH CSV DUMP ---"
 
@@ -265,3 +267,18 @@ def test_a_clock_that_stands_still_is_a_fault():
     assert "its clock stands still" in bench.of(ParachuteChanged)[-1].status.faults
     number = bench.order("launch", force=True)
     assert "no fresh telemetry" in bench.end(number).message
+
+
+# -- more than a person can read ----------------------------------------------------------------
+
+
+def test_of_lines_for_the_log_fifty_a_second_are_told_and_no_error_is_left_out():
+    bench = ready().silent().after(1.1)
+    bench.hear(*[f"[ERROR] sensor {number}" for number in range(60)])
+    assert [one.text for one in bench.of(LogLine)] == [f"sensor {n}" for n in range(50)]
+    assert bench.link.counts["lines for the log beyond fifty a second"] == 10
+    bench.after(0.5).restarts().after(0.3).hear("[INFO] hello")
+    assert "flight computer restarted" in bench.notices(), "an error of ours is always told"
+    assert len(bench.of(LogLine)) == 50
+    bench.after(0.3).hear("[INFO] hello again")
+    assert bench.of(LogLine)[50:] == [LogLine(Severity.INFO, "hello again")]

@@ -3,7 +3,7 @@
 import pytest
 from umbilical_link_bench import ASCENT, STANDBY, STARTUP, Bench, ready
 
-from chute_ros.errors import TransitionError
+from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.protocol.umbilical.config import MemoryLimits
 from chute_ros.protocol.umbilical.events import DumpData, DumpFinished, DumpStarted, Progress
 from chute_ros.protocol.umbilical.memory import STEPS, Sign, Step, next_step
@@ -155,6 +155,17 @@ def test_a_dump_that_nobody_asked_for_is_followed():
     assert bench.tokens == []
 
 
+def test_dumps_that_nobody_asked_for_are_not_followed_without_end():
+    """It may be noise on the wire; a while later it is looked at again."""
+    bench = ready().silent()
+    for kind in ("csv", "csv"):
+        bench.hear(BEGIN[kind]).hear_bytes(CSV).hear(END[kind])
+    assert len(bench.of(DumpStarted)) == len(bench.of(DumpFinished)) == 1
+    assert dumped(bench) == CSV
+    bench.after(60.0).hear(BEGIN["csv"]).hear_bytes(CSV).hear(END["csv"])
+    assert len(bench.of(DumpFinished)) == 2
+
+
 # -- FRAM dump ----------------------------------------------------------------------------------
 
 SNAP = ["SNAP seq=1 mode=2", "Snapshot: alt=3", "FRAM end"]
@@ -229,6 +240,23 @@ def test_a_wipe_that_falls_silent_is_given_up():
     bench.after(59.0).hear("Wipe progress: 1/2 sectors").after(59.0)
     assert bench.ends(number) == []
     assert bench.after(1.1).end(number).message == "wipe flash failed: silent for 60 s"
+
+
+@pytest.mark.parametrize("said", ["Flash wiped successfully.", "ERASE FAILED!"])
+def test_the_end_of_a_wipe_of_which_nothing_is_known_is_told(said):
+    assert ready().hear(said).notices() == [f"flight computer: {said}"]
+    bench, number = dumping()
+    bench.hear(END["csv"], said)
+    assert f"flight computer: {said}" in bench.notices()
+    assert bench.end(number).success
+
+
+@pytest.mark.parametrize("name", ["answer_within", "dump_silence", "wipe_silence", "fram_quiet"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("inf"), float("nan")])
+def test_its_limits_are_times(name, value):
+    with pytest.raises(ParameterError) as raised:
+        MemoryLimits(**{name: value})
+    assert str(raised.value) == f"{name} is {value}: need a time above 0 s"
 
 
 def test_a_wipe_by_somebody_else_is_followed():

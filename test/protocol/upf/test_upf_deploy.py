@@ -270,6 +270,26 @@ def test_controller_that_refused_once_and_then_died_is_gone_round(bench):
     assert fired_at(story.at(2.5))
 
 
+def test_controller_that_falls_silent_is_gone_round_for_each_deploy(bench):
+    """The one that it had accepted, and the one that it had not answered."""
+    story = deploy(armed(bench("")), True)
+    story.answer_result(story.requests(SERVICE)[0], "SUCCESS")
+    deploy(story, token=2).at(1.4).trigger_status()
+    text = "the controller does not answer: firing the triggers directly"
+    assert story.notices().count(text) == 1, "of the first its silence says nothing yet"
+    story.at(1.8)
+    assert story.notices().count(text) == 2
+    story.trigger_status("LAUNCHED")
+    assert (story.end(1).success, story.end(2).success) == (True, True)
+
+
+def test_controller_that_restarts_before_its_answer_has_the_time_that_it_had(bench):
+    story = armed(bench("")).node_status(uptime=60)
+    deploy(story).after(0.5).trigger_status().node_status(uptime=0).status("NOT_READY")
+    assert not fired_at(story.at(1.05).trigger_status())
+    assert fired_at(story.at(1.15))
+
+
 def test_controller_that_accepted_and_restarts_is_gone_round_at_once(bench):
     story = armed(bench("")).node_status(uptime=60)
     deploy(story).answer_result(story.requests(SERVICE)[0], "SUCCESS")
@@ -373,6 +393,71 @@ def test_deploy_without_anybody_is_refused(bench):
     story = deploy(bench(""))
     assert story.end(1).message == "no controller was heard on this link (heard: none)"
     assert not fired_at(story)
+
+
+@pytest.mark.parametrize("type_name", ["STATUS", "TRIGGER_STATUS"])
+def test_deploy_need_not_wait_once_a_controller_or_a_trigger_was_heard(bench, type_name):
+    story = bench("")
+    assert not story.link.has_parachute()
+    (story.status("READY") if type_name == "STATUS" else story.trigger_status()).at(60.0)
+    assert story.link.has_parachute()
+
+
+# -- the triggers themselves: the end of a ladder ---------------------------------------------
+
+
+def fire(story, token=1):
+    story.link.fire_triggers(token, story.now)
+    return story.step()
+
+
+def test_triggers_are_fired_past_a_controller_that_is_well(bench):
+    story = fire(bench().in_flight()).after(1.0)
+    assert story.end(1).success
+    assert story.trigger.fired
+    assert story.controller.requests_heard == []
+
+
+def test_triggers_are_fired_at_once_and_again_until_one_says_that_it_has(bench):
+    story = fire(armed(bench("")))
+    assert len(story.requests(TRIGGER, "TYPE_LAUNCH")) == len(story.messages(LAUNCH)) == 1
+    assert story.requests(SERVICE) == []
+    story.at(1.5)
+    assert len(story.messages(LAUNCH)) >= 4
+    assert story.trigger_status("LAUNCHED").end(1).success
+    count = len(story.messages(LAUNCH))
+    assert len(story.at(9.0).messages(LAUNCH)) == count
+
+
+def test_triggers_that_have_fired_are_not_fired_again_at_the_end_of_a_ladder(bench):
+    story = fire(bench("").trigger_status("LAUNCHED").clear())
+    assert story.end(1).success
+    assert not fired_at(story.at(9.0))
+
+
+def test_without_a_trigger_there_is_nothing_to_fire(bench):
+    story = fire(bench("").status("ARMED").clear())
+    assert not story.end(1).success
+    assert story.end(1).message == "no trigger was ever heard; nothing was sent"
+    assert not fired_at(story.at(9.0))
+
+
+def test_what_makes_it_less_ready_gives_way_to_the_triggers(bench):
+    story = armed(bench(""))
+    story.link.service(2, "TYPE_DISARM", 0, story.now)
+    fire(story.step())
+    assert "given up: a release was ordered" in story.end(2).message
+
+
+def test_a_deploy_that_is_overdue_when_the_triggers_are_ordered_goes_on_as_well(bench):
+    """After a stall both are due in the same moment."""
+    story = deploy(armed(bench("")))
+    story.t += 1.2
+    fire(story, token=2)
+    assert "the controller does not answer: firing the triggers directly" in story.notices()
+    assert len(story.messages(LAUNCH)) == 2
+    story.trigger_status("LAUNCHED")
+    assert (story.end(1).success, story.end(2).success) == (True, True)
 
 
 # -- what may not come between ----------------------------------------------------------------

@@ -1,0 +1,83 @@
+"""Settings at their very limits, and what is said past them, in full: what mutants showed."""
+
+from typing import Any
+
+import pytest
+
+from chute_ros.errors import ParameterError
+from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkLimits
+
+TIMES = (
+    "deploy_timeout",
+    "kill_timeout",
+    "resend_interval",
+    "vehicle_state_age",
+    "ladder_step_timeout",
+    "alarm_interval",
+    "late_after",
+)
+
+
+def refusal(**settings: Any) -> str:
+    with pytest.raises(ParameterError) as caught:
+        SupervisorConfig(**settings)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("delay", [0.0, 60.0])
+def test_the_delay_from_the_kill_to_the_deploy_may_reach_its_limits(delay: float) -> None:
+    assert SupervisorConfig(kill_to_deploy_delay=delay).kill_to_deploy_delay == delay
+
+
+@pytest.mark.parametrize("delay", [-0.1, 60.1, float("nan")])
+def test_a_delay_past_its_limits_is_told_in_full(delay: float) -> None:
+    said = f"kill_to_deploy_delay is {delay}: need 0 to 60 s"
+    assert refusal(kill_to_deploy_delay=delay) == said
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_every_time_is_above_0_and_up_to_a_minute(name: str) -> None:
+    for good in (0.001, 60.0):
+        assert getattr(SupervisorConfig(**{name: good}), name) == good
+    for wrong in (0.0, 60.1):
+        said = f"{name} is {wrong}: need above 0, up to 60 s"
+        assert refusal(**{name: wrong}) == said
+
+
+@pytest.mark.parametrize("name", ["required_links", "kill_links", "deploy_links"])
+def test_no_list_of_links_is_empty_or_has_an_empty_name(name: str) -> None:
+    assert refusal(**{name: ()}) == f"{name} is []: need at least one link's name"
+    assert refusal(**{name: ("a", "")}) == f"{name} is ['a', '']: need at least one link's name"
+
+
+def test_a_step_of_the_ladder_on_another_link_is_told_with_those_that_may_be() -> None:
+    said = "deploy_ladder names c:1/162: need a link of deploy_links (a, b)"
+    assert refusal(deploy_links=("a", "b"), deploy_ladder=(Rung("a"), Rung("c", "1/162"))) == said
+
+
+def test_without_a_ladder_every_link_that_deploys_is_a_step() -> None:
+    config = SupervisorConfig(deploy_links=("a", "b"))
+    assert config.ladder == (Rung("a"), Rung("b"))
+    steps = (Rung("b", TRIGGER), Rung("a"))
+    assert SupervisorConfig(deploy_links=("a", "b"), deploy_ladder=steps).ladder == steps
+
+
+def test_a_step_is_written_as_it_is_read() -> None:
+    for text in ("upf_can", "upf_can:trigger", "mavlink_parachute:1/162"):
+        assert str(Rung.parse(text)) == text
+    assert Rung.parse("upf_can:trigger") == Rung("upf_can", TRIGGER)
+    for wrong in ("", ":33", "upf_can:"):
+        with pytest.raises(ParameterError) as caught:
+            Rung.parse(wrong)
+        assert str(caught.value) == (
+            f"parameter deploy_ladder has {wrong!r}: need LINK or LINK:DEVICE, for example "
+            "mavlink_parachute, mavlink_parachute:1/162, upf_can:trigger"
+        )
+
+
+def test_a_link_has_its_own_limits_or_the_standard_ones() -> None:
+    slow = LinkLimits(2.0, 4.0)
+    config = SupervisorConfig(("a", "b"), link_limits={"a": slow})
+    assert config.limits("a") == slow
+    assert config.limits("b") == LinkLimits()

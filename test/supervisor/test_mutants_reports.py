@@ -1,0 +1,513 @@
+"""Reports in every word and at their limits: what mutants showed that no story looked at."""
+
+import math
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import pytest
+from story import FLYING, LINK, STANDING, START, Story, parachute, vehicle, with_rules
+
+from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
+from chute_ros.supervisor.core import update
+from chute_ros.supervisor.link_evidence import LinkLimits
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.state import State
+
+K, D = Action.KILL, Action.DEPLOY
+BLOCK, RELEASE = Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE
+UPF = "upf_can"
+BOTH = SupervisorConfig(kill_links=(LINK, UPF), deploy_links=(LINK, UPF))
+
+# -- heartbeats ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("difference", "differs"),
+    [(0.5, False), (-0.5, False), (0.5625, True), (-0.5625, True), (math.nan, False)],
+)
+def test_a_wall_clock_that_differs_is_an_alarm_once(difference: float, differs: bool) -> None:
+    story = Story(SupervisorConfig(preflight=PreflightLimits(max_clock_difference=0.5)))
+    for tick in range(3):
+        story.at(tick * 0.1, replace(story.heartbeat(), clock_difference=difference))
+    text = "mavlink_parachute: its wall clock differs; it may refuse decisions as too old"
+    assert story.alarms() == [text] * differs
+
+
+@pytest.mark.parametrize(
+    ("before", "seq", "t", "why"),
+    [
+        (5, 6, 0.2, None),
+        (5, 5, 0.2, "mavlink_parachute restarted"),
+        (5, 4, 0.2, "mavlink_parachute restarted"),
+        (5, 6, 0.9, None),
+        (5, 6, 1.0, "mavlink_parachute is back"),
+        (5, 5, 1.0, "mavlink_parachute restarted"),
+    ],
+)
+def test_a_node_that_may_have_restarted_is_told_again_and_why(
+    before: int, seq: int, t: float, why: str | None
+) -> None:
+    story = Story()
+    story.at(0.0, i.LinkHeartbeat(LINK, LinkState.OK, False, before))
+    story.at(0.1, story.report(BLOCK, Outcome.CONFIRMED))
+    story.at(t, i.LinkHeartbeat(LINK, LinkState.OK, False, seq))
+    reasons = story.decisions(BLOCK)[0].reasons
+    anew = [d.reasons for d in story.decisions(BLOCK)[1:]]
+    assert anew == ([(*reasons, why)] if why else [])
+
+
+def test_for_how_long_a_node_may_be_silent_is_its_own_setting() -> None:
+    limits = MappingProxyType({LINK: LinkLimits(lost_after=5.0)})
+    story = Story(SupervisorConfig(link_limits=limits))
+    story.at(0.0, story.heartbeat(healthy=False))
+    story.at(0.1, story.report(BLOCK, Outcome.CONFIRMED))
+    story.at(4.0, story.heartbeat(healthy=False))
+    assert len(story.decisions(BLOCK)) == 1
+
+
+def under_way() -> Story:
+    """Only the second parachute is on the way, and the second node alone was told of the block."""
+    config = SupervisorConfig(
+        deploy_links=(LINK, UPF),
+        deploy_ladder=(Rung(UPF), Rung(LINK)),
+        require_vehicle_state=False,
+    )
+    story = Story(config).flying()
+    beats = story.heartbeat(), i.LinkHeartbeat(UPF, LinkState.OK, True, 900)
+    story.at(0.1, *beats, i.DeployRequest(5, False, "it falls"))
+    story.at(0.2, story.report(K, Outcome.CONFIRMED))
+    assert [d.targets for d in story.decisions(D)] == [(UPF,)]
+    return story
+
+
+def test_a_node_that_restarts_hears_of_what_it_was_told_and_of_nothing_else() -> None:
+    story = under_way()
+    count = len(story.decisions())
+    story.at(0.3, i.LinkHeartbeat(LINK, LinkState.OK, True, 0))
+    assert len(story.decisions()) == count, "the kill is confirmed, and the deploy is not for it"
+    story.at(0.4, i.LinkHeartbeat(UPF, LinkState.OK, True, 0))
+    anew = story.decisions()[count:]
+    assert [(d.action, d.targets) for d in anew] == [(D, (UPF,))], (
+        "although the kill was not for it"
+    )
+    assert anew[0].reasons[-1] == "upf_can restarted"
+
+
+@pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.FAILED])
+def test_of_what_it_has_begun_one_that_was_only_silent_is_not_told_again(outcome: Outcome) -> None:
+    story = Story(BOTH).flying()
+    beats = story.heartbeat(), story.heartbeat(UPF)
+    story.at(0.1, *beats, i.KillRequest(5, "operator", "stop"))
+    story.at(0.2, story.report(K, outcome))
+    story.at(2.0, story.heartbeat())
+    anew = [d.action for d in story.decisions() if d.reasons[-1] == "mavlink_parachute is back"]
+    assert anew == ([] if outcome is Outcome.SENT else [K])
+
+
+# -- parachutes ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("later", "counts"),
+    [
+        ({"deployed": False}, True),
+        ({"deployed": False, "alive": False}, False),
+        ({"deployed": True}, False),
+        ({"deployed": False, "device": "1/162"}, False),
+        ({"deployed": False, "link": UPF}, False),
+    ],
+)
+def test_one_that_was_out_before_counts_only_after_it_says_itself_that_it_is_packed(
+    later: dict[str, Any], counts: bool
+) -> None:
+    story = Story(BOTH).ready()
+    story.at(0.1, parachute(deployed=True), story.heartbeat(), i.VehicleReport(STANDING))
+    story.at(0.2, parachute(**later), i.VehicleReport(FLYING))
+    story.at(0.3, parachute(deployed=True))
+    assert (story.state.stage is Stage.DEPLOYED) is counts
+
+
+def test_a_parachute_that_is_out_counts_although_its_node_was_never_heard() -> None:
+    story = Story(BOTH).flying()
+    story.at(0.1, parachute(UPF, "33", deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+
+
+def test_the_picture_of_one_takes_nothing_of_what_is_known_of_its_link() -> None:
+    story = Story().ready()
+    story.at(0.1, parachute(device="1/161"))
+    story.at(0.2, parachute(device="1/162"))
+    evidence = story.state.evidence(LINK)
+    assert set(evidence.devices) == {"1/161", "1/162"}
+    assert evidence.heard == START
+
+
+BACK = (
+    "mavlink_parachute 1/161 says no more that it is deployed; a forced deploy goes on with the "
+    "next"
+)
+
+
+@pytest.mark.parametrize(
+    ("one", "told", "alarms"),
+    [
+        ({}, FLYING, [BACK]),
+        ({}, VehicleState(), [BACK]),
+        ({}, STANDING, []),
+        ({"alive": False}, FLYING, []),
+        ({"deployed": True}, FLYING, []),
+        ({"device": "1/162"}, FLYING, []),
+        ({"link": "stranger"}, FLYING, []),
+    ],
+)
+def test_a_release_that_is_taken_back_in_the_air_is_an_alarm_in_these_words(
+    one: dict[str, Any], told: VehicleState, alarms: list[str]
+) -> None:
+    story = Story(BOTH).flying()
+    story.at(0.1, parachute(deployed=True), story.report(RELEASE, Outcome.SENT))
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(0.2, i.VehicleReport(told))
+    story.at(0.3, parachute(**one))
+    assert story.alarms() == alarms
+
+
+def test_one_that_is_taken_back_before_a_flight_is_none() -> None:
+    """Although nothing is known of the vehicle."""
+    story = Story()
+    story.at(0.1, parachute(deployed=True))
+    story.at(0.2, parachute(deployed=False))
+    assert story.alarms() == []
+
+
+# -- the vehicle ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "height"),
+    [
+        (Armed.DISARMED, Armed.ARMED, 7.0),
+        (Armed.UNKNOWN, Armed.ARMED, 0.0),
+        (Armed.DISARMED, Armed.UNKNOWN, 0.0),
+        (Armed.ARMED, Armed.ARMED, 0.0),
+    ],
+)
+def test_the_height_at_which_it_was_armed_is_kept(
+    before: Armed, now: Armed, height: float
+) -> None:
+    story = Story()
+    story.at(0.0, vehicle(armed=before))
+    story.at(0.1, vehicle(armed=now, height=7.0))
+    assert story.state.armed_height == height
+
+
+def test_armed_without_a_height_it_is_taken_for_0() -> None:
+    story = Story()
+    story.at(0.0, vehicle(armed=Armed.DISARMED, height=7.0))
+    story.at(0.1, vehicle(armed=Armed.ARMED, height=7.0))
+    assert story.state.armed_height == 7.0
+    story.at(0.2, vehicle(armed=Armed.DISARMED))
+    story.at(9.0, vehicle(armed=Armed.ARMED, height=math.nan))
+    assert story.state.armed_height == 0.0
+
+
+def test_each_measurement_goes_on_from_its_own_past_and_the_distance_from_home() -> None:
+    story = Story(with_rules()).ready().fly(0.2, latitude=48.0, longitude=11.0)
+    story.fly(0.4, latitude=48.5, longitude=11.0)
+    assert story.state.measured("height").count == 8
+    assert story.state.measured("tilt_deg").value == pytest.approx(5.0)
+    assert story.state.measured("distance_from_home").value == pytest.approx(55_600, rel=0.01)
+
+
+def heights(*told: tuple[float, float]) -> list[tuple[float, float]]:
+    """What is kept after these (t, height)."""
+    story = Story()
+    for t, height in told:
+        story.at(t, vehicle(height=height))
+    return [(at - START, height) for at, height in story.state.heights]
+
+
+def test_the_heights_of_the_last_second_are_kept() -> None:
+    told = [(tick / 8, float(tick)) for tick in range(20)]
+    assert heights(*told) == told[-9:], "the oldest is just a second old"
+
+
+def test_of_heights_that_come_fast_ten_a_second_are_kept() -> None:
+    told = [(tick / 64, float(tick)) for tick in range(65)]
+    assert heights(*told) == told[::7]
+
+
+def test_a_height_just_a_tenth_of_a_second_after_the_last_is_kept() -> None:
+    state = State(epoch=7, started_at=0.0)
+    for now in (0.0, 0.1):
+        state, _ = update(SupervisorConfig(), state, (vehicle(height=now),), now)
+    assert state.heights == ((0.0, 0.0), (0.1, 0.1))
+
+
+def test_without_a_height_the_last_ones_are_kept_as_they_are() -> None:
+    told = [(0.125, 1.0), (0.25, 2.0)]
+    assert heights(*told, (0.375, math.nan)) == told
+    assert heights((0.125, math.nan)) == []
+
+
+def test_heights_from_before_a_clock_was_set_back_are_not_kept() -> None:
+    story = Story()
+    for tick in range(8):
+        story.at(tick / 8, vehicle(height=float(tick)))
+    for tick in range(8, 14):
+        story.at(tick / 8, vehicle(height=float(tick), age=30.0))
+    assert all(at < START - 25.0 for at, _ in story.state.heights)
+
+
+def reboots(*told: tuple[dict[str, Any], int, bool]) -> Story:
+    """The vehicle tells this, with so many restarts, the last of them in flight or not."""
+    story = Story(with_rules())
+    for number, (parts, count, in_flight) in enumerate(told):
+        one = vehicle(**parts, reboot_count=count, rebooted_in_flight=in_flight)
+        story.at(number * 0.1, story.heartbeat(), one)
+    return story
+
+
+DOWN: dict[str, Any] = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
+UP: dict[str, Any] = {"armed": Armed.ARMED, "landed_state": LandedState.IN_AIR}
+ANEW = ["the autopilot started anew in flight"]
+
+
+@pytest.mark.parametrize(
+    ("told", "alarms"),
+    [
+        # In flight it counts, once.
+        ([(DOWN, 2, False), (UP, 2, False), (UP, 3, True), (UP, 3, True)], ANEW),
+        ([(DOWN, 2, False), (UP, 2, False), (UP, 3, True), (UP, 4, True)], ANEW),
+        # It does not say that this was in flight, or it is none more than before.
+        ([(DOWN, 2, False), (UP, 2, False), (UP, 3, False)], []),
+        ([(DOWN, 2, False), (UP, 2, False), (UP, 2, True)], []),
+        # On the ground it does not, and is not taken for one in the next flight.
+        ([(DOWN, 2, False), (DOWN, 3, True)], []),
+        ([(DOWN, 2, False), (DOWN, 3, True), (UP, 3, True), (UP, 3, True)], []),
+        # A node that has restarted counts from 0 again.
+        ([(DOWN, 2, False), (UP, 2, False), (UP, 0, False), (UP, 1, True)], ANEW),
+        # The report with which it takes off belongs to the flight.
+        ([(DOWN, 2, False), (UP, 3, True), (UP, 3, True)], ANEW),
+    ],
+)
+def test_a_restart_of_the_autopilot_counts_in_flight(
+    told: list[tuple[dict[str, Any], int, bool]], alarms: list[str]
+) -> None:
+    story = reboots(*told)
+    assert story.alarms() == alarms
+    assert story.state.rebooted is bool(alarms)
+
+
+# -- how decisions fare --------------------------------------------------------------------------
+
+
+def killing(config: SupervisorConfig | None = None) -> Story:
+    """In flight; a person asks for a kill at 0.1."""
+    story = Story(config or SupervisorConfig()).flying()
+    story.at(0.1, i.KillRequest(5, "operator", "stop"))
+    return story
+
+
+def test_the_answer_tells_the_last_two_details_each_with_its_link() -> None:
+    story = killing()
+    for outcome, detail in ((Outcome.SENT, "sent"), (Outcome.ACCEPTED, "taken")):
+        story.at(story.t + 0.1, story.report(K, outcome, detail=detail))
+    story.at(0.5, story.report(K, Outcome.CONFIRMED, detail="off"))
+    text = "mavlink_parachute: taken; mavlink_parachute: off"
+    assert story.answers(5) == [i.Finish(5, True, True, text)]
+
+
+def test_the_newest_details_are_kept_each_once() -> None:
+    story = killing()
+    for number in (*range(10), 5, 9):
+        story.at(story.t + 0.1, story.report(K, Outcome.SENT, detail=f"try {number}"))
+    assert story.state.kill is not None
+    assert story.state.kill.details == tuple(f"{LINK}: try {n}" for n in range(2, 10))
+
+
+def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is_not() -> None:
+    """The block and the kill are not for this link, the first step of the ladder neither."""
+    config = SupervisorConfig(
+        deploy_links=(LINK, UPF),
+        deploy_ladder=(Rung(LINK), Rung(UPF)),
+        require_vehicle_state=False,
+    )
+    story = Story(config).flying()
+    story.at(0.1, story.heartbeat(), story.heartbeat(UPF), i.DeployRequest(5, False, "it falls"))
+    story.at(0.2, story.report(K, Outcome.CONFIRMED))
+    story.at(0.3, story.report(D, Outcome.FAILED))
+    assert story.newest(D).targets == (UPF,)
+    story.at(0.4, story.report(D, Outcome.CONFIRMED, UPF))
+    assert story.state.stage is Stage.DEPLOYED
+    assert story.state.kill is not None
+    assert story.state.kill.of(UPF) == frozenset()
+
+
+def refused(
+    story: Story, action: Action, link: str = LINK, detail: str = "older"
+) -> i.ActionReport:
+    return story.report(action, Outcome.FAILED, link, detail)
+
+
+def test_a_deploy_that_a_later_kill_overtook_leaves_again_under_a_new_number_and_says_why() -> (
+    None
+):
+    story = Story().flying()
+    story.at(0.1, i.DeployRequest(5, False, "it falls"))
+    story.at(0.2, story.report(K, Outcome.CONFIRMED))
+    story.at(0.3, i.KillRequest(6, "operator", "stop"))
+    old = story.newest(D)
+    story.at(0.4, refused(story, D))
+    new = story.newest(D)
+    assert new.id > story.newest(K).id > old.id
+    assert new.reasons == (*old.reasons, "mavlink_parachute saw a newer decision first")
+    assert story.state.deploy is not None
+    assert story.state.deploy.of(LINK) == frozenset(), "it was refused, not tried"
+    story.at(0.5, refused(story, D, detail="broken"))
+    assert story.state.stage is Stage.FAULT, "nothing is newer any more"
+
+
+def test_a_kill_that_its_deploy_overtook_leaves_again_although_a_parachute_is_out() -> None:
+    """Motors that turn tear an open canopy."""
+    story = Story().flying()
+    story.at(0.1, i.DeployRequest(5, False, "it falls"))
+    story.at(0.7, parachute(deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(0.8, refused(story, K))
+    assert len(story.decisions(K)) == 2
+    assert story.newest(K).reasons[-1] == "mavlink_parachute saw a newer decision first"
+
+
+def test_a_kill_that_was_overtaken_is_not_tried_again_once_all_is_given_up() -> None:
+    story = Story(SupervisorConfig(deploy_timeout=1.0)).flying()
+    story.at(0.1, i.DeployRequest(5, False, "it falls"))
+    story.at(2.0)
+    assert story.state.stage is Stage.FAULT
+    story.at(2.1, refused(story, K))
+    assert len(story.decisions(K)) == 1
+
+
+def test_a_kill_that_was_sent_and_failed_then_was_not_overtaken() -> None:
+    story = Story().flying()
+    story.at(0.1, i.DeployRequest(5, False, "it falls"))
+    story.at(0.2, story.report(K, Outcome.SENT))
+    story.at(0.7, refused(story, K, detail="no acknowledgement"))
+    assert story.newest(D).id > story.newest(K).id
+    assert len(story.decisions(K)) == 1
+
+
+def test_a_newer_decision_for_another_link_overtakes_nothing() -> None:
+    config = SupervisorConfig(deploy_links=(UPF,), kill_links=(LINK,))
+    story = Story(config)
+    story.at(0.0, story.heartbeat(UPF))
+    story.flying().at(0.1, i.DeployRequest(5, False, "it falls"))
+    story.at(0.7)
+    assert story.newest(D).id > story.newest(K).id
+    story.at(0.8, refused(story, K))
+    assert len(story.decisions(K)) == 1
+    assert story.state.kill is not None
+    assert story.state.kill.all_failed()
+
+
+def test_an_older_number_that_failed_on_a_link_that_was_asked_again_says_nothing() -> None:
+    story = Story(BOTH).flying()
+    story.at(0.1, story.heartbeat(), story.heartbeat(UPF), i.DeployRequest(5, False, "it falls"))
+    story.at(0.2, story.report(K, Outcome.SENT, UPF))
+    story.at(0.7)
+    first = story.newest(K)
+    story.at(0.8, refused(story, K))
+    second = story.newest(K)
+    assert (second.id > first.id, second.targets) == (True, (LINK,))
+
+    def old(outcome: Outcome, link: str) -> i.ActionReport:
+        return i.ActionReport(first.epoch, first.id, link, outcome, "told", first.epoch)
+
+    assert story.state.kill is not None
+    story.at(0.81, old(Outcome.FAILED, LINK))
+    assert story.state.kill.of(LINK) == frozenset(), "it was asked again since"
+    story.at(0.82, old(Outcome.FAILED, UPF))
+    assert story.state.kill.of(UPF) == {Outcome.SENT, Outcome.FAILED}, "it was not"
+    story.at(0.83, old(Outcome.CONFIRMED, LINK))
+    assert story.state.kill.of(LINK) == {Outcome.CONFIRMED}, "done is done"
+
+
+# -- epochs --------------------------------------------------------------------------------------
+
+
+def seen(epoch: int, number: int = 0, outcome: Outcome = Outcome.FAILED) -> i.ActionReport:
+    """A report on our first decision by a node that has seen this one."""
+    return i.ActionReport(7, 1, LINK, outcome, "older", epoch, number)
+
+
+def test_a_newer_epoch_is_overtaken_in_these_words() -> None:
+    story = Story().ready()
+    old = story.newest(RELEASE)
+    story.at(0.1, seen(900))
+    assert "mavlink_parachute has seen epoch 900: going on as 904" in story.said().splitlines()
+    new = story.newest(RELEASE)
+    assert (new.epoch, story.state.epoch) == (904, 904)
+    assert new.reasons == (*old.reasons, "mavlink_parachute knows a newer epoch")
+    assert story.alarms() == []
+
+
+def test_the_largest_epoch_is_an_alarm_in_these_words() -> None:
+    story = Story().ready()
+    story.at(0.1, seen(2**32 - 1))
+    assert story.alarms() == [
+        "mavlink_parachute has seen epoch 4294967295, the largest: restart it"
+    ]
+
+
+@pytest.mark.parametrize(("link", "outcome"), [("stranger", Outcome.FAILED), (LINK, Outcome.NONE)])
+def test_who_is_not_ours_or_says_nothing_moves_no_epoch(link: str, outcome: Outcome) -> None:
+    story = Story().ready()
+    story.at(0.1, i.ActionReport(7, 1, link, outcome, "older", newest_epoch=900))
+    assert story.state.epoch == 7
+
+
+@pytest.mark.parametrize("rank", [0, 1, 2, 3])
+def test_the_largest_epoch_of_each_rank_can_still_be_used(rank: int) -> None:
+    story = Story(SupervisorConfig(rank=rank)).ready()
+    largest = 2**32 - 4 + rank
+    story.at(0.1, seen(largest - 1))
+    assert story.state.epoch == largest
+    assert story.alarms() == []
+
+
+@pytest.mark.parametrize(("epoch", "number", "foreign"), [(7, 1, False), (7, 2, True)])
+def test_under_our_epoch_a_number_that_we_never_gave_is_anothers(
+    epoch: int, number: int, foreign: bool
+) -> None:
+    story = Story().ready()
+    assert story.state.next_id == 2
+    story.at(0.1, seen(epoch, number, Outcome.CONFIRMED))
+    assert story.state.epoch == (8 if foreign else 7)
+    assert story.state.block is not None
+    assert story.state.block.confirmed is not foreign
+
+
+def test_one_that_follows_leaves_epochs_alone() -> None:
+    story = Story().ready()
+    story.state = replace(story.state, leading=False)
+    story.at(0.1, seen(900))
+    assert story.state.epoch == 7
+
+
+@pytest.mark.parametrize(("epoch", "yields"), [(9, True), (900, False)])
+def test_a_standby_yields_to_another_but_not_to_itself_before_its_restart(
+    epoch: int, yields: bool
+) -> None:
+    story = Story(SupervisorConfig(standby=True)).ready()
+    outputs = story.at(0.1, seen(epoch))
+    assert (i.Refused(epoch) in outputs) is yields
+    assert story.state.epoch == (7 if yields else 904)
+
+
+def test_one_that_is_alone_goes_on_above_whoever_was_there() -> None:
+    story = Story().ready()
+    outputs = story.at(0.1, seen(9))
+    assert i.Refused(9) not in outputs
+    assert story.state.epoch == 12

@@ -1,0 +1,183 @@
+"""What the core remembers: what mutants showed that no story looked at."""
+
+import math
+from dataclasses import replace
+from types import MappingProxyType
+
+import pytest
+from story import LINK, parachute
+
+from chute_ros.model import Action, Decision, LinkState, Outcome
+from chute_ros.supervisor.config import Rung, SupervisorConfig
+from chute_ros.supervisor.counter import RuleEvidence
+from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
+from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.state import Pending, State
+
+UPF = "upf_can"
+BOTH = (LINK, UPF)
+STEPS = (Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED)
+TWO = SupervisorConfig(deploy_links=BOTH, resend_interval=0.25)
+
+
+def pending(action: Action = Action.KILL, **outcomes: set[Outcome]) -> Pending:
+    """Decided at 10.0 for both links; a and b: what each has reported."""
+    decision = Decision(7, 3, action, "r", (), BOTH)
+    links = {"a": LINK, "b": UPF}
+    told = {links[name]: frozenset(one) for name, one in outcomes.items()}
+    return Pending(decision, BOTH, 10.0, 10.0, MappingProxyType(told))
+
+
+# -- a decision on its way -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "reached"),
+    [
+        ({}, []),
+        ({"a": {Outcome.FAILED}}, []),
+        ({"a": {Outcome.SENT}}, [Outcome.SENT]),
+        ({"a": {Outcome.SENT, Outcome.FAILED}}, [Outcome.SENT]),
+        ({"a": {Outcome.FAILED}, "b": {Outcome.ACCEPTED}}, [Outcome.SENT, Outcome.ACCEPTED]),
+        (
+            {"a": {Outcome.CONFIRMED}, "b": {Outcome.FAILED}},
+            [*STEPS],
+        ),
+    ],
+)
+def test_a_decision_has_got_as_far_as_the_best_link(
+    outcomes: dict[str, set[Outcome]], reached: list[Outcome]
+) -> None:
+    one = pending(**outcomes)
+    assert [
+        o for o in (Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED) if one.reached(o)
+    ] == reached
+    assert one.confirmed is (Outcome.CONFIRMED in reached)
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "failed", "unreported", "not_begun"),
+    [
+        ({}, False, BOTH, BOTH),
+        ({"a": {Outcome.FAILED}}, False, (UPF,), BOTH),
+        ({"a": {Outcome.FAILED}, "b": {Outcome.FAILED}}, True, (), BOTH),
+        ({"a": {Outcome.FAILED}, "b": {Outcome.SENT, Outcome.FAILED}}, True, (), (LINK,)),
+        ({"a": {Outcome.SENT}, "b": {Outcome.ACCEPTED}}, False, (), ()),
+        ({"a": {Outcome.CONFIRMED, Outcome.FAILED}, "b": {Outcome.FAILED}}, False, (), (UPF,)),
+    ],
+)
+def test_who_has_failed_or_not_reported_or_not_begun(
+    outcomes: dict[str, set[Outcome]],
+    failed: bool,
+    unreported: tuple[str, ...],
+    not_begun: tuple[str, ...],
+) -> None:
+    one = pending(**outcomes)
+    assert one.all_failed() is failed
+    assert one.unreported() == unreported
+    assert one.not_begun() == not_begun
+
+
+def test_a_kill_and_a_deploy_are_sent_again_steadily_and_a_flight_block_ever_more_rarely() -> None:
+    for action in (Action.KILL, Action.DEPLOY):
+        assert replace(pending(action), sent_at=90.0).resend_at(TWO) == 90.25
+    block = pending(Action.FLIGHT_BLOCK)
+    for sent_at, then in [(10.0, 10.25), (11.0, 11.25), (12.0, 12.5), (14.0, 15.0), (90.0, 91.0)]:
+        assert replace(block, sent_at=sent_at).resend_at(TWO) == then
+
+
+def test_what_was_reported_last_is_told_in_words() -> None:
+    assert pending().newest_details() == ""
+    assert replace(pending(), details=("a: x", "b: y", "a: z")).newest_details() == "b: y; a: z"
+
+
+def test_a_decision_is_known_by_epoch_and_number() -> None:
+    assert pending().number == (7, 3)
+
+
+# -- what is known -------------------------------------------------------------------------------
+
+
+def test_what_was_never_told_is_nothing() -> None:
+    state = State(epoch=7, started_at=0.0)
+    assert repr(state.measured("height")) == repr(Measured())
+    assert repr(state.evidence(LINK)) == repr(LinkEvidence())
+    assert state.rule("tested") == RuleEvidence()
+    assert state.deploy is None
+
+
+def test_what_was_told_is_that() -> None:
+    height, rule = Measured(value=5.0, measured_at=1.0), RuleEvidence(level=1.0)
+    state = State(
+        epoch=7,
+        started_at=0.0,
+        measurements=MappingProxyType({"height": height}),
+        links=MappingProxyType({LINK: LinkEvidence(heard=1.0)}),
+        rules=MappingProxyType({"tested": rule}),
+    )
+    assert state.measured("height") is height
+    assert state.evidence(LINK).heard == 1.0
+    assert state.rule("tested") is rule
+
+
+def test_a_link_is_heard_as_long_as_its_own_limits_say() -> None:
+    limits = MappingProxyType({UPF: LinkLimits(lost_after=4.0)})
+    config = SupervisorConfig(deploy_links=(*BOTH, "umbilical"), link_limits=limits)
+    heard = {LINK: LinkEvidence(heard=10.0), UPF: LinkEvidence(heard=10.0)}
+    state = State(epoch=7, started_at=0.0, links=MappingProxyType(heard))
+    counts = [state.links_heard(config, now) for now in (10.9, 11.0, 13.9, 14.0)]
+    assert counts == [2, 1, 1, 0]
+
+
+def test_the_newest_heartbeat_is_that_of_any_link() -> None:
+    assert math.isnan(State(epoch=7, started_at=0.0).newest_heartbeat())
+    heard = {"a": LinkEvidence(), "b": LinkEvidence(heard=12.0), "c": LinkEvidence(heard=11.0)}
+    state = State(epoch=7, started_at=0.0, links=MappingProxyType(heard))
+    assert state.newest_heartbeat() == 12.0
+
+
+def test_the_newest_step_of_the_ladder_is_the_last() -> None:
+    first, second = pending(Action.DEPLOY), replace(pending(Action.DEPLOY), decided_at=12.0)
+    state = State(epoch=7, started_at=0.0, deploys=(first, second))
+    assert state.deploy is second
+
+
+def test_the_ladder_is_that_of_the_order_and_without_one_that_of_the_settings() -> None:
+    state = State(epoch=7, started_at=0.0)
+    assert state.ladder(TWO) == (Rung(LINK), Rung(UPF))
+    assert replace(state, deploy_ladder=(Rung(UPF),)).ladder(TWO) == (Rung(UPF),)
+
+
+# -- parachutes that are out ---------------------------------------------------------------------
+
+
+def out(heard: float, released_at: float) -> State:
+    """Device 33 of the second link is out; its node was heard, and said so, at these times."""
+    status = parachute(UPF, "33", True).status
+    evidence = LinkEvidence(
+        heard=heard,
+        reported=LinkState.OK,
+        released_at=released_at,
+        devices=MappingProxyType({"33": status}),
+    )
+    return State(epoch=7, started_at=0.0, links=MappingProxyType({UPF: evidence}))
+
+
+@pytest.mark.parametrize(
+    ("heard", "released_at", "counts"),
+    [(9.0, 3.0, True), (5.0, 8.0, True), (5.0, 6.0, False), (5.0, 5.9, False)],
+)
+def test_a_parachute_counts_while_its_node_is_heard_or_has_just_told_it(
+    heard: float, released_at: float, counts: bool
+) -> None:
+    limits = MappingProxyType({UPF: LinkLimits(stale_after=2.0, lost_after=4.0)})
+    config = SupervisorConfig(deploy_links=BOTH, link_limits=limits)
+    state = out(heard, released_at)
+    assert state.released(config) == {(UPF, "33")}
+    assert bool(state.newly_released(config, 10.0)) is counts
+    before = replace(state, released_before=frozenset({(UPF, "33")}))
+    assert not before.newly_released(config, 10.0)
+
+
+def test_a_parachute_of_a_link_that_deploys_nothing_is_not_looked_at() -> None:
+    assert out(9.0, 9.0).released(SupervisorConfig()) == frozenset()
