@@ -7,12 +7,15 @@ of falling vehicles whose attitude swung through the upright.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from chute_ros.supervisor.rules import Rule
 
 #: Two floats that count the same seconds may differ by this, s.
 _ROUNDING = 1e-6
+#: Weights that add up to what is needed may miss it by this.
+_WEIGHTS_ROUNDING = 1e-9
 #: A counter stands still for so long while nothing can be said, s: a gap in the messages of a
 #: vehicle that falls must not undo what was counted.
 UNKNOWN_STANDS = 3.0
@@ -23,14 +26,17 @@ class RuleEvidence:
     """What is known of a rule. level: s, 0 to the rule's hold."""
 
     level: float = 0.0
-    #: The conditions held at the last update; None: it could not be said.
+    #: The conditions held at the last look; None: it could not be said.
     holds: bool | None = False
     #: For how long it has not been possible to say, s.
     unknown: float = 0.0
-    #: Distinct samples that showed it since the counter left 0.
-    samples: int = 0
-    #: Samples that had come at the last update.
-    seen: int = -1
+    #: For each condition the distinct samples that showed it, at most those that the rule needs,
+    #: less what has leaked: one sample that denies it takes the rule's leak away.
+    shown: tuple[float, ...] = ()
+    #: For each condition the samples that had come at the last look; -1: it rests on none.
+    seen: tuple[int, ...] = ()
+    #: Enough conditions held, each of them shown by enough samples.
+    sure: bool = False
     #: It was acted on and is not done with yet.
     latched: bool = False
     #: Why it was fulfilled and not acted on; empty: it was not, or was.
@@ -48,19 +54,38 @@ class RuleEvidence:
             # What cannot be said is no good sample: it leaks only once it has been so for long.
             level -= rule.leak * min(passed, max(0.0, unknown - UNKNOWN_STANDS))
         level = min(max(level, 0.0), rule.hold)
-        stands = self.holds is None and unknown < UNKNOWN_STANDS
-        kept = self.samples if self.holds or level > 0.0 or stands else 0
-        return replace(self, level=level, samples=kept, unknown=unknown)
+        return replace(self, level=level, unknown=unknown)
 
-    def seeing(self, holds: bool | None, seen: int) -> RuleEvidence:
-        """After the conditions were looked at; seen: samples that have come so far."""
-        new = bool(holds) and (seen < 0 or seen != self.seen)
-        return replace(self, holds=holds, seen=seen, samples=self.samples + int(new))
+    def seeing(self, rule: Rule, found: Sequence[tuple[bool | None, int]]) -> RuleEvidence:
+        """After the conditions were looked at. found: for each whether it holds (None: it cannot
+        be said), and how many samples of what it rests on have come so far (-1: none come)."""
+        known = len(self.shown) == len(found)  # otherwise it is another rule of this name
+        before = self.shown if known else (0.0,) * len(found)
+        last = self.seen if known else (-1,) * len(found)
+        shown = []
+        weight = possible = sure = 0.0
+        for condition, (holds, seen), count, old in zip(
+            rule.conditions, found, before, last, strict=True
+        ):
+            if seen != old:
+                change = {True: 1.0, False: -rule.leak, None: 0.0}[holds]
+                count = min(max(0.0, count + change), float(rule.samples))
+            shown.append(count)
+            weight += condition.weight if holds else 0.0
+            possible += condition.weight if holds is not False else 0.0
+            sure += condition.weight if holds and (seen < 0 or count >= rule.samples) else 0.0
+        enough = rule.needed - _WEIGHTS_ROUNDING
+        return replace(
+            self,
+            holds=True if weight >= enough else None if possible >= enough else False,
+            shown=tuple(shown),
+            seen=tuple(seen for _, seen in found),
+            sure=sure >= enough,
+        )
 
     def fulfilled(self, rule: Rule) -> bool:
         """It holds now, has for long enough, and enough samples showed it."""
-        enough = self.samples >= rule.samples or self.seen < 0
-        return bool(self.holds) and enough and self.level >= rule.hold - _ROUNDING
+        return self.sure and self.level >= rule.hold - _ROUNDING
 
     def cleared(self) -> bool:
         """Its counter has leaked to nothing."""

@@ -42,18 +42,9 @@ class Judged:
 
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
-    found = [(condition, find(config, state, condition, now)) for condition in rule.conditions]
-    findings = tuple(finding for _, finding in found)
-    weight = sum(condition.weight for condition, one in found if one.holds)
-    possible = weight + sum(condition.weight for condition, one in found if one.holds is None)
-    holds: bool | None = False
-    if weight >= rule.needed - 1e-9:
-        holds = True
-    elif possible >= rule.needed - 1e-9:
-        holds = None
-    told = [finding.samples for finding in findings if finding.samples >= 0]
-    seen = sum(told) if told else -1
-    evidence = state.rule(rule.name).seeing(holds, seen)
+    findings = tuple(find(config, state, condition, now) for condition in rule.conditions)
+    found = [(finding.holds, finding.samples) for finding in findings]
+    evidence = state.rule(rule.name).seeing(rule, found)
     return Judged(rule, evidence, findings)
 
 

@@ -136,15 +136,18 @@ def _measured(config: SupervisorConfig, state: State, name: str, now: float) -> 
 
 def _rule(state: State, rule: Rule) -> Hashable:
     evidence = state.rule(rule.name)
-    come = sum(
+    come = tuple(
         state.measured(condition.measurement).count
-        for condition in rule.conditions
         if isinstance(condition, MeasurementCondition)
+        else -1
+        for condition in rule.conditions
     )
-    samples = min(evidence.samples, rule.samples)
+    shown = tuple(round(count, 3) for count in evidence.shown)
+    new = tuple(a != b for a, b in zip(evidence.seen, come, strict=False))
     level = round(evidence.level, 3)
     unknown = min(round(evidence.unknown, 3), UNKNOWN_STANDS)
-    return evidence.holds, level, samples, evidence.latched, evidence.seen == come, unknown
+    sure = evidence.holds, evidence.sure
+    return sure, level, shown, evidence.latched, new, unknown
 
 
 def _number(pending: Pending | None) -> tuple[int, int]:

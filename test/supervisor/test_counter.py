@@ -5,10 +5,10 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from story import SINKS, Story, rule, with_rules
+from story import SINKS, Story, rule, shipped, with_rules
 
 from chute_ros.supervisor.counter import RuleEvidence
-from chute_ros.supervisor.rules import Rule
+from chute_ros.supervisor.rules import MeasurementCondition, Rule
 
 #: Full after 1 s, empty again after 2 s, and three samples must have shown it.
 RULE = rule(SINKS, hold=1.0, leak=0.5, samples=3)
@@ -21,7 +21,7 @@ def counted(pattern: str, one: Rule = RULE, every: float = 0.1) -> list[RuleEvid
         evidence = evidence.counted(one, every) if n else evidence
         seen += mark != "-"
         holds = evidence.holds if mark == "-" else mark == "x"
-        evidence = evidence.seeing(holds, seen)
+        evidence = evidence.seeing(one, [(holds, seen)])
         told.append(evidence)
     return told
 
@@ -65,15 +65,61 @@ def test_one_sample_told_for_long_is_not_three() -> None:
     assert fulfilled("x" + "-" * 30 + "x-x") == [33]
 
 
-def test_samples_count_until_the_counter_is_empty_again() -> None:
-    assert counted("xx.")[-1].samples == 2
-    assert counted("xx......")[-1].samples == 0
+def test_a_sample_that_denies_it_takes_the_leak_of_one_away() -> None:
+    assert counted("xx.")[-1].shown == (1.5,)
+    assert counted("xx...")[-1].shown == (0.5,)
+    assert counted("xx......")[-1].shown == (0.0,)
+    assert counted("x" * 9 + ".")[-1].shown == (2.5,), "it holds no more than are needed"
+    assert fulfilled("xxx.xx.xx.xx.xxxx") == [16], "two of three are enough"
+
+
+TILTS = MeasurementCondition("tilt_deg", above=60.0)
+
+
+def test_samples_of_another_condition_do_not_count_for_it() -> None:
+    both = rule(SINKS, TILTS, samples=3)
+    evidence = RuleEvidence()
+    for n in range(10):
+        # One sample says that it sinks, and no more come; tilt comes all the time.
+        evidence = evidence.seeing(both, [(True, 1), (True, n)])
+        assert evidence.holds
+        assert not evidence.fulfilled(both)
+    for n in (2, 3):
+        evidence = evidence.seeing(both, [(True, n), (True, 9)])
+    assert evidence.fulfilled(both)
+
+
+def test_what_was_shown_before_the_rule_held_counts() -> None:
+    """A battery tells once a second; a fall must not wait for three more."""
+    both = rule(SINKS, TILTS, samples=3)
+    evidence = RuleEvidence()
+    for n in range(3):
+        evidence = evidence.seeing(both, [(False, n), (True, n)])
+    assert evidence.holds is False
+    for n in range(3, 6):
+        assert not evidence.fulfilled(both)
+        evidence = evidence.seeing(both, [(True, n), (True, 2)])
+    assert evidence.fulfilled(both)
+
+
+def test_one_wrong_sample_beside_a_battery_that_is_dead_fires_nothing() -> None:
+    story = Story(shipped("multirotor")).ready().fly(2.0, battery_remaining=0.04)
+    story.fly(2.05, battery_remaining=0.04, vertical_speed=-8.0)
+    silent = {"vertical_speed": math.nan, "vertical_speed_age": math.nan}
+    story.fly(3.5, battery_remaining=0.04, **silent)
+    assert story.fired() == []
+
+
+def test_a_rule_of_the_same_name_with_other_conditions_begins_anew() -> None:
+    before = counted("x" * 20)[-1]
+    other = rule(SINKS, TILTS, hold=1.0, samples=3)
+    assert before.seeing(other, [(True, 50), (True, 50)]).shown == (1.0, 1.0)
 
 
 def test_what_rests_on_no_measurement_needs_no_samples() -> None:
     evidence = RuleEvidence()
     for _ in range(12):
-        evidence = evidence.counted(RULE, 0.1).seeing(True, -1)
+        evidence = evidence.counted(RULE, 0.1).seeing(RULE, [(True, -1)])
     assert evidence.fulfilled(RULE)
 
 
@@ -84,7 +130,7 @@ def test_without_a_hold_it_is_fulfilled_at_once() -> None:
 def test_it_has_cleared_once_it_is_empty_and_does_not_hold() -> None:
     evidence = counted("x" * 11)[-1]
     assert not evidence.cleared()
-    assert not evidence.seeing(False, 99).cleared()
+    assert not evidence.seeing(RULE, [(False, 99)]).cleared()
     assert counted("x" * 11 + "." * 22)[-1].cleared()
 
 
@@ -113,7 +159,7 @@ def test_its_level_is_that_of_the_seconds_told_and_stays_between_empty_and_full(
     for seen, (passed, holds) in enumerate(told):
         level += passed if evidence.holds else -leak * passed
         level = min(max(level, 0.0), hold)
-        evidence = evidence.counted(one, passed).seeing(holds, seen)
+        evidence = evidence.counted(one, passed).seeing(one, [(holds, seen)])
         assert evidence.level == pytest.approx(level)
         assert 0.0 <= evidence.level <= hold
         if evidence.fulfilled(one):

@@ -117,7 +117,7 @@ def test_on_the_ground_it_wakes_when_the_vehicle_state_is_just_too_old(stage: St
 
 
 def test_it_wakes_just_after_a_rule_is_fulfilled() -> None:
-    counting = MappingProxyType({"tested": RuleEvidence(0.25, holds=True, samples=9)})
+    counting = MappingProxyType({"tested": RuleEvidence(0.25, holds=True)})
     wakes = next_deadline(SETTINGS, replace(QUIET, rules=counting), NOW)
     assert 100.75 < wakes < 100.75001
 

@@ -1,6 +1,7 @@
 """The counter to the last sample: what mutants showed that no story looked at."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from story import SINKS, rule
@@ -9,51 +10,69 @@ from chute_ros.model import Action
 from chute_ros.supervisor.counter import UNKNOWN_STANDS, RuleEvidence
 
 RULE = rule(SINKS, action=Action.DEPLOY, hold=2.0, leak=0.5, samples=3)
-UNKNOWN = RuleEvidence(level=1.0, holds=None, samples=2, seen=5)
+UNKNOWN = RuleEvidence(level=1.0, holds=None, shown=(2.0,), seen=(5,))
 
 
 def test_how_long_nothing_can_be_said_adds_up_and_ends_with_a_word() -> None:
     once = UNKNOWN.counted(RULE, 1.0)
-    assert (once.unknown, once.level, once.samples) == (1.0, 1.0, 2)
+    assert (once.unknown, once.level, once.shown) == (1.0, 1.0, (2.0,))
     assert once.counted(RULE, 0.5).unknown == 1.5
     for holds in (True, False):
-        assert once.seeing(holds, 6).counted(RULE, 0.5).unknown == 0.0
+        assert once.seeing(RULE, [(holds, 6)]).counted(RULE, 0.5).unknown == 0.0
 
 
 def test_past_its_stand_it_leaks_for_as_long_as_it_is_past() -> None:
-    nearly = RuleEvidence(level=1.0, holds=None, samples=2, unknown=UNKNOWN_STANDS - 0.5)
+    nearly = RuleEvidence(level=1.0, holds=None, unknown=UNKNOWN_STANDS - 0.5)
     assert nearly.counted(RULE, 1.0).level == 0.75
-    past = RuleEvidence(level=1.0, holds=None, samples=2, unknown=UNKNOWN_STANDS + 1.0)
+    past = RuleEvidence(level=1.0, holds=None, unknown=UNKNOWN_STANDS + 1.0)
     assert past.counted(RULE, 1.0).level == 0.5
 
 
-def test_samples_are_forgotten_with_the_stand_and_with_an_empty_counter() -> None:
-    empty = RuleEvidence(level=0.0, holds=None, samples=2, unknown=UNKNOWN_STANDS - 1.0)
-    assert empty.counted(RULE, 0.5).samples == 2
-    assert empty.counted(RULE, 1.0).samples == 0, "at the end of the stand"
-    bad = RuleEvidence(level=1.0, holds=False, samples=2)
-    assert bad.counted(RULE, 1.0).samples == 2, "something is left of it"
-    assert bad.counted(RULE, 2.0).samples == 0
-    assert RuleEvidence(holds=True, samples=2).counted(RULE, 0.0).samples == 2
+def test_what_cannot_be_said_shows_nothing_and_denies_nothing() -> None:
+    assert UNKNOWN.seeing(RULE, [(None, 6)]).shown == (2.0,)
+    assert UNKNOWN.seeing(RULE, [(None, 6)]).holds is None
 
 
 def test_a_sample_counts_once_also_where_none_has_come_so_far() -> None:
-    first = RuleEvidence().seeing(True, 0)
-    assert first.samples == 1
-    assert first.seeing(True, 0).samples == 1
-    told = RuleEvidence().seeing(True, -1)
-    assert told.seeing(True, -1).samples == 2, "what has no samples is looked at each time"
+    first = RuleEvidence().seeing(RULE, [(True, 0)])
+    assert (first.shown, first.seen) == ((1.0,), (0,))
+    assert first.seeing(RULE, [(True, 0)]).shown == (1.0,)
 
 
 @pytest.mark.parametrize(("seen", "enough"), [(-1, True), (0, False), (1, False)])
 def test_only_what_has_no_samples_needs_none(seen: int, enough: bool) -> None:
-    full = RuleEvidence(level=2.0, holds=True, samples=2, seen=seen)
+    full = RuleEvidence(level=2.0, shown=(1.0,), seen=(0,)).seeing(RULE, [(True, seen)])
+    assert full.holds
     assert full.fulfilled(RULE) is enough
+
+
+def test_it_holds_with_enough_weight_and_cannot_be_said_where_the_rest_could_be() -> None:
+    light, heavy = replace(SINKS, weight=1.0), replace(SINKS, weight=2.0)
+    one = rule(light, heavy, needed=2.0)
+    for found, holds in (
+        ([True, False], False),
+        ([False, True], True),
+        ([True, None], None),
+        ([None, False], False),
+        ([None, True], True),
+        ([False, None], None),
+    ):
+        pairs: list[tuple[bool | None, int]] = [(each, -1) for each in found]
+        assert RuleEvidence().seeing(one, pairs).holds is holds
+
+
+def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure() -> None:
+    light, heavy = replace(SINKS, weight=1.0), replace(SINKS, weight=2.0)
+    one = rule(light, heavy, needed=2.0, samples=2)
+    evidence = RuleEvidence().seeing(one, [(True, 1), (True, 1)])
+    assert not evidence.seeing(one, [(True, 2), (True, 1)]).fulfilled(one)
+    assert evidence.seeing(one, [(True, 1), (True, 2)]).fulfilled(one)
+    assert not evidence.seeing(one, [(True, 2), (False, 2)]).fulfilled(one)
 
 
 def test_the_rounding_itself_is_full_and_empty() -> None:
     shortest = rule(SINKS, hold=1e-6, samples=0)
-    assert RuleEvidence(level=0.0, holds=True).fulfilled(shortest)
+    assert RuleEvidence(level=0.0, sure=True).fulfilled(shortest)
     assert RuleEvidence(level=1e-6).cleared()
     assert not RuleEvidence(level=2e-6).cleared()
 

@@ -59,7 +59,7 @@ def leader(clock: float) -> State:
         vehicle_received=clock - 0.25,
         measurements=frozen(height=Measured(30.0, clock, clock, 9)),
         heights=((clock - 0.25, 30.0),),
-        rules=frozen(tested=RuleEvidence(level=0.5, samples=3)),
+        rules=frozen(tested=RuleEvidence(level=0.5, shown=(3.0,))),
         asks=MappingProxyType({"upf_can 33": Ask(clock - 0.5, "upf_can", "launching")}),
         block=pending(Action.FLIGHT_BLOCK, clock),
         kill=pending(Action.KILL, clock),

@@ -137,6 +137,8 @@ def test_samples_are_counted_in_whole_numbers_up_to_a_thousand() -> None:
 
 
 def test_more_than_one_sample_needs_a_time_in_which_they_come() -> None:
+    with pytest.raises(ProfileError, match="rule 'a' needs 2 samples at once"):
+        rule(samples="2")
     said = "rule 'falls' needs 3 samples at once: add `for`, in which they may come"
     assert spoilt("    for: 0.5\n", "") == [f"line 22: {said}"]
     assert spoilt("for: 0.5", "for: 0") == [f"line 23: {said}"]
@@ -192,6 +194,12 @@ def test_every_measurement_may_have_limits_of_its_own(name: str) -> None:
     limits = read(f"profile: p\nrules: {{}}\nmeasurements: {{{name}: {{max_age: 3}}}}").limits
     assert limits[name].max_age == 3.0
     assert {**limits, name: None} == {**STANDARD_LIMITS, name: None}
+
+
+def test_what_is_no_profile_names_its_file_and_what_is_no_rules_says_so() -> None:
+    assert mistakes("profile: [p\n---\n")[0].startswith("mine.yaml, line 2: not YAML: ")
+    need = "need `key: value` lines"
+    assert mistakes("profile: p\nrules: 3\n") == [f"mine.yaml, line 2: rules is 3: {need}"]
 
 
 def test_without_any_link_only_any_can_be_named() -> None:
