@@ -49,6 +49,7 @@ TESTS = {
     "decision_gate": ("decision_gate",),
     "epochs": ("lease",),
     "handover": ("handover",),
+    "resume": ("resume",),
     "link_evidence": ("link_evidence",),
     "measurements": ("measurements",),
     "preflight": ("preflight",),
@@ -90,7 +91,8 @@ def main() -> None:
             copied = pathlib.Path(folder)
             copy_tree(copied)
             counts, survivors = run(copied, module, given.quick, given.jobs)
-        print(f"{module}: {', '.join(f'{n} {verdict}' for verdict, n in counts.items())}")
+        every, killed = sum(counts.values()), counts["killed"]
+        print(f"| {module}.py | {every} | {killed} | {every - killed} |", flush=True)
         for line, before, after in survivors:
             known = f"`{before}` becomes `{after}`" in page
             unexplained += not known
