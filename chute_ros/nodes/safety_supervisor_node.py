@@ -30,13 +30,12 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
-from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
 from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
-from chute_ros.nodes.supervisor_memory import MEMORY_PARAMETERS, Memory
+from chute_ros.nodes.supervisor_memory import Memory
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import (
     PARAMETERS,
@@ -63,7 +62,7 @@ class SafetySupervisorNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("safety_supervisor", **options)
-        self.values = declare(self, (*PARAMETERS, *MEMORY_PARAMETERS, *BLACK_BOX_PARAMETERS))
+        self.values = declare(self, PARAMETERS)
         self.config = config_from(self.values)
         lease = lease_from(self.values, self.config, self.get_name())
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.

@@ -8,8 +8,10 @@ from types import MappingProxyType
 from typing import Any
 
 from chute_ros.errors import ParameterError
+from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
 from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.nodes.profile_files import load_profile
+from chute_ros.nodes.supervisor_memory import MEMORY_PARAMETERS
 from chute_ros.nodes.vehicle_merge import MAVROS, VEHICLE_STATE
 from chute_ros.nodes.vehicle_sources import VEHICLE_PARAMETERS
 from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
@@ -177,6 +179,8 @@ PARAMETERS = (
         60.0,
     ),
     *VEHICLE_PARAMETERS,
+    *MEMORY_PARAMETERS,
+    *BLACK_BOX_PARAMETERS,
 )
 
 

@@ -11,7 +11,6 @@ import sys
 import textwrap
 from pathlib import Path
 
-from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
 from chute_ros.nodes.device_node import COMMON_PARAMETERS
 from chute_ros.nodes.mavlink_parameters import PARAMETERS as MAVLINK_PARAMETERS
 from chute_ros.nodes.parameters import Parameter, Value
@@ -24,7 +23,7 @@ NODES: dict[str, tuple[Parameter, ...]] = {
     "mavlink_parachute": (*MAVLINK_PARAMETERS, *COMMON_PARAMETERS),
     "upf_can": (*UPF_PARAMETERS, *COMMON_PARAMETERS),
     "umbilical": (*UMBILICAL_PARAMETERS, *COMMON_PARAMETERS),
-    "safety_supervisor": (*SUPERVISOR_PARAMETERS, *BLACK_BOX_PARAMETERS),
+    "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
 README = Path("README.md")
 RULES = Path("docs/rules.md")

@@ -11,7 +11,6 @@ from typing import Any
 import yaml
 
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
 from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor.inputs import Mode
@@ -26,7 +25,7 @@ def other_from(path: Path, node: str) -> Other:
     """What the file asks for; ParameterError says what is wrong with it. node: the whole name of
     the node that flew."""
     given = _given(path, node)
-    known = {one.name: one for one in (*PARAMETERS, *BLACK_BOX_PARAMETERS)}
+    known = {one.name: one for one in PARAMETERS}
     for name in given:
         if name.partition(".")[0] not in {*known, *_EVERYWHERE}:
             near = difflib.get_close_matches(name, known, 1)
