@@ -70,6 +70,11 @@ def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure() -> Non
     assert not evidence.seeing(one, [(True, 2), (False, 2)]).fulfilled(one)
 
 
+def test_weights_that_miss_by_the_rounding_are_sure_as_well() -> None:
+    one = rule(SINKS, needed=1.0 + 1e-9)
+    assert RuleEvidence().seeing(one, [(True, -1)]).fulfilled(one)
+
+
 def test_the_rounding_itself_is_full_and_empty() -> None:
     shortest = rule(SINKS, hold=1e-6, samples=0)
     assert RuleEvidence(level=0.0, sure=True).fulfilled(shortest)
