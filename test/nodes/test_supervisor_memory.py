@@ -24,11 +24,12 @@ def flying(pair, **parameters):
 
 
 def kill_and_start_again(pair, **parameters):
-    epoch = pair.epoch("a")
     pair.send_signal("a", signal.SIGKILL)
     pair.processes.end()
+    pair.bench.turns(0.2)  # what it had said is heard
+    pair.claims.clear()
     pair.start("a", 0, **(ALONE | parameters))
-    pair.bench.until(lambda: pair.epoch("a") > epoch, "it is back")
+    pair.bench.until(lambda: "a" in pair.claims, "it is back")
 
 
 def the_file(pair):
@@ -51,7 +52,9 @@ def killed_motors(pair):
 def test_the_deploy_that_follows_the_kill_is_not_lost(pair):
     flying(pair)
     killed_motors(pair)
+    first = pair.epoch("a")
     kill_and_start_again(pair)
+    assert pair.epoch("a") > first
     pair.bench.until(lambda: pair.acted(Action.DEPLOY), "the deploy leaves")
     assert pair.acted(Action.DEPLOY) == [(pair.epoch("a"), pair.acted(Action.DEPLOY)[0][1])]
     assert "goes on where it stopped in flight: KILLING" in pair.processes.tail("a", 40)
