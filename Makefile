@@ -15,6 +15,9 @@ PARACHUTE ?= mavlink
 DEPTH ?= 2
 # Modules of the supervisor that make mutate changes; empty: all.
 MODULES ?=
+# How many flights of the campaign, and the seed of the first.
+FLIGHTS ?= 1000
+SEED ?= 0
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -25,7 +28,7 @@ OVERLAY := $(SET_UP) && . "$$venv/env.sh"
 # A simulation must not reach other machines, nor a vehicle on them.
 LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test bench hosts build lint docs explore mutate lock clean distclean
+.PHONY: help demo test bench campaign hosts build lint docs explore mutate lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -39,6 +42,10 @@ test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kil
 
 bench: build ## measure against bare scripts, write docs/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
+
+campaign: build ## fly FLIGHTS flights in virtual time from SEED on, write docs/campaign.*
+	@$(OVERLAY) && exec python3 -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
+	    --page docs/campaign.md
 
 hosts: build ## two supervisors and a vehicle on three hosts, spoil the network, write docs/hosts.md
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults

@@ -39,6 +39,7 @@ setup(
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",
+            "campaign = chute_ros.tools.campaign:main",
         ],
     },
 )

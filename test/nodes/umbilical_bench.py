@@ -129,6 +129,7 @@ class Cable:
         self.plug()
         self.await_link(LinkState.OK)
         self.bench.until(lambda: self.heartbeats[-1].device_healthy, "it is healthy")
+        self.bench.until(lambda: self.statuses, "its picture is told")
 
     # -- services ------------------------------------------------------------------------------
 

@@ -1,0 +1,35 @@
+"""What a perfect observer knows of a fall."""
+
+from __future__ import annotations
+
+import pytest
+
+from chute_ros.campaign.truth import SOFT, observe, touchdown_speed
+from chute_ros.sim.flight import FlightModel
+
+
+def falling_from(height: float, fall_speed: float = 25.0) -> FlightModel:
+    return FlightModel(height=height, armed=True, motors_failed=True, fall_speed=fall_speed)
+
+
+def test_the_last_moment_is_the_last() -> None:
+    model = falling_from(60.0)
+    truth = observe(model, 100.0)
+    assert truth.falls
+    assert truth.height == 60.0
+    assert truth.leeway == pytest.approx(truth.latest - 100.0)
+    assert touchdown_speed(model, truth.leeway - 0.01) <= SOFT
+    assert touchdown_speed(model, truth.leeway + 0.06) > SOFT
+    assert model.height == 60.0, "the vehicle itself has not moved"
+
+
+def test_the_higher_the_more_time() -> None:
+    leeways = [observe(falling_from(height), 0.0).leeway for height in (10, 20, 40, 80, 120)]
+    assert leeways == sorted(leeways)
+    assert leeways[0] < 1.0 < leeways[1] < 2.0 < leeways[2] < 4.0
+    under_canopy = FlightModel(height=3.0, vertical_speed=-12.0, motors_failed=True)
+    assert observe(under_canopy, 0.0).leeway == -1.0, "too low and too fast for any parachute"
+
+
+def test_without_a_parachute_it_hits_the_ground_hard() -> None:
+    assert touchdown_speed(falling_from(100.0), 1e9) > 20.0
