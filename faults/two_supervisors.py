@@ -90,8 +90,7 @@ class Scene:
 
     def close(self) -> None:
         """Everything ends; the network is whole again."""
-        for host in self.network.hosts:
-            self.network.cable(host, "heal")
+        self.heal()
         self.pilot.close()
         self.director.close()
         self.processes.end()
@@ -144,6 +143,11 @@ class Scene:
         for command in story.spoilt:
             self.network.cable(*command)
 
+    def heal(self) -> None:
+        """Every cable is whole."""
+        for host in self.network.hosts:
+            self.network.cable(host, "heal")
+
     def acted(self) -> list[tuple[int, int, str]]:
         """The kills and deploys that the device node acted on, in their order."""
         text = self.processes.log("mavlink").read_text(errors="replace")
@@ -188,25 +192,20 @@ def _fly(scene: Scene, story: Story, told: Told) -> None:
     if story.healed_after:
         scene.spoil(story)
         _spin(director, story.healed_after)
-        _heal(scene)
+        scene.heal()
     director.until("a kill is on the wire", 10.0, _reported(director, Action.KILL))
     told.killed = director.when(Action.KILL, Outcome.SENT) - failed_at
     if story.at_kill:
         scene.spoil(story)
     director.until("the parachute is out", 15.0, lambda: bool(director.deployed_at))
     told.released = director.deployed_at - failed_at
-    _heal(scene)
+    scene.heal()
     healed_at = time.monotonic()
     director.until("one leads, the other follows", 15.0, scene.one_leads)
     told.healed = since(healed_at)
     director.until("it says deployed", 10.0, director.stage(Stage.DEPLOYED))
     # Whoever would still fire does it within its next turns.
     _spin(director, 2.0)
-
-
-def _heal(scene: Scene) -> None:
-    for host in HOSTS:
-        scene.network.cable(host, "heal")
 
 
 def _reported(director: Director, action: Action) -> Callable[[], bool]:

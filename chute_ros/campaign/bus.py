@@ -5,8 +5,9 @@ from __future__ import annotations
 import random
 from typing import TypeVar
 
-from chute_ros.campaign.channel import Channel, flip_a_byte
+from chute_ros.campaign.channel import Channel
 from chute_ros.campaign.world import World
+from chute_ros.sim.faults import flip_a_byte
 from chute_ros.transport.loop import ProtocolLink
 
 #: A datagram on a companion computer's network, s.

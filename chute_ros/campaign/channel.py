@@ -69,10 +69,3 @@ class Channel(Generic[MessageT]):
             arrives = self._newest = max(arrives, self._newest)
         for _ in range(copies):
             self._world.post(arrives, lambda at, message=message: deliver(message, at))
-
-
-def flip_a_byte(data: bytes, chance: random.Random) -> bytes:
-    """One byte is another."""
-    copy = bytearray(data)
-    copy[chance.randrange(len(copy))] ^= chance.randrange(1, 256)
-    return bytes(copy)

@@ -100,7 +100,8 @@ class DeviceNode(Node, ABC):
         self.loop: WireLoop[Any] | None = None
         self.values = declare(self, (*COMMON_PARAMETERS, *parameters))
         self.add_on_set_parameters_callback(self._parameters_set)
-        # The wall clock stamps, whatever use_sim_time says; decisions are as old as it tells.
+        # The wall clock stamps, whatever use_sim_time says; decisions are as old as the watch of
+        # the supervisor tells.
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         limit = self.values["max_decision_age"]
         self._supervisor = SupervisorWatch(limit, self.values["supervisor_lost_after"], self.wall)

@@ -30,6 +30,13 @@ class FaultKnobs:
             raise ParameterError(f"delay is {self.delay}: need 0 to 60 s")
 
 
+def flip_a_byte(data: bytes, chance: random.Random) -> bytes:
+    """data, 1 byte or more, with one byte that is another."""
+    copy = bytearray(data)
+    copy[chance.randrange(len(copy))] ^= chance.randrange(1, 256)
+    return bytes(copy)
+
+
 class FaultyLink:
     """Stands between a loop and a device's link, and spoils what passes in both directions."""
 
@@ -83,8 +90,8 @@ class FaultyLink:
         copies = 2 if chance() < knobs.duplicate else 1
         spoiled = []
         for _ in range(copies):
-            copy = bytearray(data)
+            copy = data
             if data and chance() < knobs.corrupt:
-                copy[self._random.randrange(len(data))] ^= self._random.randrange(1, 256)
-            spoiled.append((now + chance() * knobs.delay, bytes(copy)))
+                copy = flip_a_byte(data, self._random)
+            spoiled.append((now + chance() * knobs.delay, copy))
         return spoiled

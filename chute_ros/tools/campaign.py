@@ -24,10 +24,10 @@ _TELL_EVERY = 5.0  # s
 def main() -> None:
     """Fly; exit code 1 if a flight was what must not be."""
     options = argparse.ArgumentParser("campaign", description=__doc__)
-    options.add_argument("--flights", type=int, default=1000, help="how many (default: 1000)")
+    options.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
-    options.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
-    options.add_argument("--page", type=Path, help="write the results there, beside a picture")
+    options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
+    options.add_argument("--page", type=writable, help="write the results there, beside a picture")
     options.add_argument("--replay", type=int, metavar="SEED", help="tell one flight")
     # `ros2 run` adds arguments for nodes, which this is none of.
     chosen, _ = options.parse_known_args()
@@ -61,6 +61,22 @@ def main() -> None:
         chosen.page.write_text(page(tally, chosen.seed, drawn.name))
     if tally.wrong:
         sys.exit(1)
+
+
+def positive(text: str) -> int:
+    """1 or more."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text}: need 1 or more")
+    return number
+
+
+def writable(text: str) -> Path:
+    """Said before the flights, not after them."""
+    path = Path(text)
+    if not os.access(path.parent, os.W_OK) or path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text}: no file can be written there")
+    return path
 
 
 def _replay(profiles: Path, seed: int) -> None:

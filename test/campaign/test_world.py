@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.campaign.channel import Channel, Spell, flip_a_byte
+from chute_ros.campaign.channel import Channel, Spell
 from chute_ros.campaign.world import World
+from chute_ros.sim.faults import flip_a_byte
 
 
 class Alarm:
