@@ -191,7 +191,7 @@ def test_a_height_that_does_not_change_holds_a_deploy_back_at_a_tip_over() -> No
         up = t > 8.0
         told = {
             "height": 0.0,
-            "vertical_speed": 0.0,
+            "vertical_speed": (-4.0 if up else 0.0) + t * 1e-6,
             "landed_state": LandedState.TAKING_OFF if up else GROUND,
             "tilt": (90.0 if up else 1.0) + t * 1e-3,
             "acceleration": 9.8 + t * 1e-6,
@@ -225,7 +225,7 @@ def test_far_below_the_take_off_nobody_knows_the_height_above_the_ground(
     story = Story(shipped("multirotor")).flying().fly(2.0).fly(3.0, height=20.0)
     for step in range(20):
         story.fly(story.t + 0.1, height=20.0 + (height - 20.0) * (step + 1) / 20)
-    story.fly(story.t + 2.0, height=height, tilt=90.0)
+    story.fly(story.t + 2.0, height=height, vertical_speed=-4.0, tilt=90.0)
     assert story.fired()[-1] == last
 
 
@@ -270,7 +270,8 @@ def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turn
     story = Story(shipped(name)).flying().fly(2.0)
     for step in range(1, 60):
         angle = 360.0 * turns * step * 0.1 % 360.0
-        told = story.told(tilt=min(angle, 360.0 - angle) + step * 1e-3)
+        tilt = min(angle, 360.0 - angle) + step * 1e-3
+        told = story.told(tilt=tilt, vertical_speed=-6.0 - step * 1e-3)
         story.at(2.0 + step * 0.1, story.heartbeat(), told)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
 
@@ -333,5 +334,5 @@ def test_flying_down_a_valley_from_the_start_is_high_enough() -> None:
     story = Story(shipped("multirotor")).flying()
     for step in range(1, 60):
         story.fly(step * 0.1, height=-0.5 * step)
-    story.fly(8.0, height=-30.0, tilt=90.0)
+    story.fly(8.0, height=-30.0, vertical_speed=-4.0, tilt=90.0)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]

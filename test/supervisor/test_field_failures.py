@@ -67,7 +67,7 @@ def test_a_tumbling_vehicle_whose_attitude_swings_through_the_upright_is_deploye
     for n in range(60):
         # It tumbles: three samples out of four are beyond the limit, never six in a row.
         tilt = 20.0 if n % 4 == 3 else 120.0
-        story.fly(story.t + 0.05, tilt=tilt)
+        story.fly(story.t + 0.05, tilt=tilt, vertical_speed=-3.5)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(K) - start < 1.0
 

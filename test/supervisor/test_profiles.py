@@ -4,6 +4,7 @@ it, or for just too short, it does not."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from random import Random
 from typing import Any
 
 import pytest
@@ -58,8 +59,15 @@ def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: A
     ]
 
 
+def tips(profile: str, hold: float, tilt: float, sink: float) -> list[Case]:
+    """It tips over and sinks; it tips over alone (an attitude sensor that lies), or sinks alone."""
+    both = {"tilt": tilt + 0.1, "vertical_speed": -sink - 0.1}
+    unders = ({"tilt": tilt - 0.1}, {"vertical_speed": -sink + 0.1})
+    return [Case(profile, "excess tilt", both, {**both, **under}, hold) for under in unders]
+
+
 DEPLOYS = [
-    Case("multirotor", "excess tilt", {"tilt": 60.1}, {"tilt": 59.9}, 0.3),
+    *tips("multirotor", hold=0.3, tilt=60.0, sink=3.0),
     Case("multirotor", "critical sink", {"vertical_speed": -12.1}, {"vertical_speed": -12.0}, 0.5),
     Case(
         "multirotor",
@@ -136,7 +144,7 @@ DEPLOYS = [
         0.5,
         before={"battery_remaining": 0.1},
     ),
-    Case("fixed_wing", "excess tilt", {"tilt": 80.1}, {"tilt": 79.9}, 0.7),
+    *tips("fixed_wing", hold=0.7, tilt=80.0, sink=5.0),
     Case(
         "fixed_wing",
         "critical sink",
@@ -302,6 +310,7 @@ def test_every_rule_has_its_story(name: str) -> None:
     told = {case.rule for case in (*DEPLOYS, *ALARMS) if case.profile == name}
     told |= {"device asks for a kill", "parachute open", "link lost"}
     told |= {"flight computer in fault", "flight computer in fault, on its way"}
+    told |= {"tipped over at take-off"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
@@ -313,6 +322,30 @@ def test_a_flight_that_goes_well_fires_and_warns_nothing(name: str) -> None:
     story.fly(22.0, height=20.0, vertical_speed=-4.0)
     assert story.fired() == []
     assert story.alarms() == []
+
+
+@pytest.mark.parametrize(
+    ("height", "tilt", "fired"),
+    [(2.9, 60.1, ["KILL"]), (-2.9, 60.1, ["KILL"]), (3.1, 60.1, []), (2.9, 59.9, [])],
+)
+def test_a_multirotor_that_tips_over_at_the_ground_stops_its_motors(
+    height: float, tilt: float, fired: list[str]
+) -> None:
+    story = Story(shipped("multirotor")).ready().fly(1.0, height=height)
+    story.fly(1.2, height=height, tilt=tilt)
+    assert story.fired() == [], "not by four samples"
+    story.fly(3.0, height=height, tilt=tilt)
+    assert story.fired() == fired
+    assert {kill.rule for kill in story.decisions(K)} <= {"tipped over at take-off"}
+
+
+@pytest.mark.parametrize("name", ["multirotor", "fixed_wing"])
+def test_an_attitude_sensor_that_sends_noise_ends_no_flight(name: str) -> None:
+    noise = Random(1)
+    story = Story(shipped(name)).ready().fly(1.0)
+    for step in range(1, 1200):
+        story.fly(1.0 + step * EVERY, EVERY, tilt=noise.uniform(0.0, 180.0))
+    assert story.fired() == []
 
 
 @EACH

@@ -103,7 +103,7 @@ def test_a_flight_that_ended_under_its_parachute_is_replayed() -> None:
 def test_with_other_settings_the_replay_differs_and_shows_where() -> None:
     story = Story(MULTIROTOR)
     begin = story.state
-    story.ready().fly(1.0).fly(2.0, tilt=70.0)
+    story.ready().fly(1.0).fly(2.0, tilt=70.0, vertical_speed=-4.0)
     again = replay(shipped("fixed_wing"), begin, story.turns)
     differs = [turn.now for turn, _, outputs in again if outputs != turn.outputs]
     assert differs[0] == pytest.approx(START + story.when(Action.KILL), abs=1e-6)
