@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.supervisor import flight
@@ -25,8 +25,7 @@ from chute_ros.supervisor.state import ASK_LASTS, State
 _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """holds None: it cannot be said. samples: so many distinct ones came so far; -1: none do."""
 
     holds: bool | None
@@ -48,20 +47,17 @@ def find(config: SupervisorConfig, state: State, condition: Condition, now: floa
 def _measurement(
     config: SupervisorConfig, state: State, condition: MeasurementCondition, now: float
 ) -> Finding:
-    name = condition.measurement
-    above, below = condition.above, condition.below
-    limits = [f"above {above:g}"] if not math.isnan(above) else []
-    limits += [f"below {below:g}"] if not math.isnan(below) else []
-    limit = " and ".join(limits)
-    samples = state.measured(name).count
+    name, known = condition.measurement, state.measured(condition.measurement)
+    samples = known.count
     value, why = flight.reading(config, state, name, now)
     if why:
-        return Finding(None, f"{name} cannot be used: {why} (asked for: {limit})", samples)
-    if value != state.measured(name).value:
+        asked = f"(asked for: {condition.limits})"
+        return Finding(None, f"{name} cannot be used: {why} {asked}", samples)
+    if value != known.value:
         samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
-    holds = not (value <= above or value >= below)
-    return Finding(holds, f"{name} {value:.2f} ({limit})", samples)
+    holds = not (value <= condition.above or value >= condition.below)
+    return Finding(holds, f"{name} {value:.2f} ({condition.limits})", samples)
 
 
 def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:

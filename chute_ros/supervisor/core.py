@@ -192,10 +192,10 @@ class _Update(Deploying):
 
     def _note_down(self) -> None:
         """Since when it says that it stands, and nothing contradicts it."""
-        if not flight.down_undisputed(self.config, self.state, self.now):
-            self.state = replace(self.state, down_since=math.nan)
-        elif math.isnan(self.state.down_since):
-            self.state = replace(self.state, down_since=self.now)
+        down = flight.down_undisputed(self.config, self.state, self.now)
+        known = not math.isnan(self.state.down_since)
+        if down != known:
+            self.state = replace(self.state, down_since=self.now if down else math.nan)
 
     def _note_height(self) -> None:
         """Since when a deploy is worth it; without any height, some time after the take-off."""
@@ -205,7 +205,8 @@ class _Update(Deploying):
             high = abs(height) >= self.config.profile.minimum_height
             if math.isnan(height):
                 high = self.now >= self.state.airborne_since + flight.HIGH_AFTER
-            self.state = replace(self.state, was_high=high)
+            if high:
+                self.state = replace(self.state, was_high=True)
 
     def _took_off(self, anew: bool) -> None:
         """anew: it stood disarmed before; otherwise it bounced, or was not down at all."""

@@ -54,6 +54,9 @@ class RuleEvidence:
             # What cannot be said is no good sample: it leaks only once it has been so for long.
             level -= rule.leak * min(passed, max(0.0, unknown - UNKNOWN_STANDS))
         level = min(max(level, 0.0), rule.hold)
+        # Most rules stand still at most updates.
+        if level == self.level and unknown == self.unknown:
+            return self
         return replace(self, level=level, unknown=unknown)
 
     def seeing(self, rule: Rule, found: Sequence[tuple[bool | None, int]]) -> RuleEvidence:
@@ -62,26 +65,26 @@ class RuleEvidence:
         known = len(self.shown) == len(found)  # otherwise it is another rule of this name
         before = self.shown if known else (0.0,) * len(found)
         last = self.seen if known else (-1,) * len(found)
-        shown = []
+        shown, now_seen = [], []
         weight = possible = sure = 0.0
         for condition, (holds, seen), count, old in zip(
             rule.conditions, found, before, last, strict=True
         ):
+            now_seen.append(seen)
             if seen != old:
-                change = {True: 1.0, False: -rule.leak, None: 0.0}[holds]
+                change = 1.0 if holds else 0.0 if holds is None else -rule.leak
                 count = min(max(0.0, count + change), float(rule.samples))
             shown.append(count)
             weight += condition.weight if holds else 0.0
             possible += condition.weight if holds is not False else 0.0
             sure += condition.weight if holds and (seen < 0 or count >= rule.samples) else 0.0
         enough = rule.needed - _WEIGHTS_ROUNDING
-        return replace(
-            self,
-            holds=True if weight >= enough else None if possible >= enough else False,
-            shown=tuple(shown),
-            seen=tuple(seen for _, seen in found),
-            sure=sure >= enough,
-        )
+        rule_holds = True if weight >= enough else None if possible >= enough else False
+        found_now = (rule_holds, tuple(shown), tuple(now_seen), sure >= enough)
+        if found_now == (self.holds, self.shown, self.seen, self.sure):
+            return self
+        holds, shown_now, seen_now, is_sure = found_now
+        return replace(self, holds=holds, shown=shown_now, seen=seen_now, sure=is_sure)
 
     def fulfilled(self, rule: Rule) -> bool:
         """It holds now, has for long enough, and enough samples showed it."""

@@ -14,14 +14,10 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.gate import against_rule, too_low
 from chute_ros.supervisor.reports import Reports
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    BelowMinimum,
-    Clears,
-    MeasurementCondition,
-    Rule,
-)
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 from chute_ros.supervisor.state import State
+
+_NOTHING, _LATCHED = RuleEvidence(), RuleEvidence(latched=True)
 
 
 @dataclass(frozen=True)
@@ -52,18 +48,16 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
     """When a rule's counter is full or empty, or what it rests on too old."""
     deadlines = []
     for rule in config.profile.rules:
-        evidence = state.rule(rule.name)
         if state.stage not in rule.states:
             continue
+        evidence = state.rule(rule.name)
         deadlines.append(evidence.deadline(rule, now))
-        if any(isinstance(condition, AutopilotCondition) for condition in rule.conditions):
+        if rule.asks_the_autopilot:
             deadlines.append(state.vehicle_received + config.vehicle_state_age)
         if evidence.holds:
             deadlines += [
-                state.measured(condition.measurement).measured_at
-                + config.profile.limits[condition.measurement].max_age
-                for condition in rule.conditions
-                if isinstance(condition, MeasurementCondition)
+                state.measured(name).measured_at + config.profile.limits[name].max_age
+                for name in rule.measured
             ]
     return deadlines
 
@@ -77,7 +71,7 @@ class Policy(Reports):
             rule.name: self.state.rule(rule.name).counted(rule, passed)
             for rule in self.config.profile.rules
         }
-        self.state = replace(self.state, rules=MappingProxyType(counted))
+        self._keep(counted)
 
     def look_at_rules(self) -> None:
         """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
@@ -87,13 +81,13 @@ class Policy(Reports):
             if stage not in rule.states:
                 # What was counted in another state says nothing about the next time.
                 latched = self.state.rule(rule.name).latched and rule.clears is Clears.NEVER
-                rules[rule.name] = RuleEvidence(latched=latched)
+                rules[rule.name] = _LATCHED if latched else _NOTHING
                 continue
             judged = judge(self.config, self.state, rule, self.now)
             rules[rule.name] = self._cleared(rule, judged.evidence)
             if judged.evidence.fulfilled(rule) and not rules[rule.name].latched:
                 fulfilled.append(judged)
-        self.state = replace(self.state, rules=MappingProxyType(rules))
+        self._keep(rules)
         # A stable sort: of two that want the same, the one that the profile names first.
         for judged in sorted(fulfilled, key=lambda one: -one.rule.action):
             self._act(judged)
@@ -146,8 +140,11 @@ class Policy(Reports):
         self._remember(rule, replace(evidence, denied=why))
 
     def _remember(self, rule: Rule, evidence: RuleEvidence) -> None:
-        rules = {**self.state.rules, rule.name: evidence}
-        self.state = replace(self.state, rules=MappingProxyType(rules))
+        self._keep({**self.state.rules, rule.name: evidence})
+
+    def _keep(self, rules: dict[str, RuleEvidence]) -> None:
+        if rules != self.state.rules:
+            self.state = replace(self.state, rules=MappingProxyType(rules))
 
 
 def _kind(why: str) -> str:

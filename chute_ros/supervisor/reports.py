@@ -88,7 +88,7 @@ class Reports(Requests):
         )
         if not kept or height.measured_at - kept[-1][0] >= 0.1:
             kept = (*kept, (height.measured_at, height.value))
-        if not math.isnan(height.measured_at):
+        if not math.isnan(height.measured_at) and kept != self.state.heights:
             self.state = replace(self.state, heights=kept)
 
     def _note_reboots(self, new: VehicleState) -> None:
@@ -101,7 +101,8 @@ class Reports(Requests):
         if again and state.airborne and not state.rebooted:
             self.outputs.append(i.Say("the autopilot started anew in flight", alarm=True))
         rebooted = state.rebooted or (again and state.airborne)
-        self.state = replace(state, reboots_before=before, rebooted=rebooted)
+        if (before, rebooted) != (state.reboots_before, state.rebooted):
+            self.state = replace(state, reboots_before=before, rebooted=rebooted)
 
     def action_report(self, one: i.ActionReport) -> None:
         """How far a node got with a decision, and which is the newest that it knows."""

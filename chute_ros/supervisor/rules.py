@@ -9,6 +9,7 @@ import enum
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 
 from chute_ros.model import Action
@@ -61,6 +62,13 @@ class MeasurementCondition:
     above: float = math.nan
     below: float = math.nan
     weight: float = 1.0
+
+    @cached_property
+    def limits(self) -> str:
+        """What is asked for, in words; made once, as it is told at every update."""
+        above = [f"above {self.above:g}"] if not math.isnan(self.above) else []
+        below = [f"below {self.below:g}"] if not math.isnan(self.below) else []
+        return " and ".join(above + below)
 
 
 @dataclass(frozen=True)
@@ -119,6 +127,17 @@ class Rule:
     #: What it means, and where its values come from, in words.
     says: str = ""
     source: str = ""
+
+    @cached_property
+    def measured(self) -> tuple[str, ...]:
+        """The measurements that it rests on."""
+        known = (one for one in self.conditions if isinstance(one, MeasurementCondition))
+        return tuple(one.measurement for one in known)
+
+    @cached_property
+    def asks_the_autopilot(self) -> bool:
+        """One of its conditions is what the autopilot says of itself."""
+        return any(isinstance(one, AutopilotCondition) for one in self.conditions)
 
 
 @dataclass(frozen=True)
