@@ -22,3 +22,4 @@ pin_distro kilted jazzy
 pin sourced.lock runtime.in dev.in
 pin installer.lock installer.in
 pin mutate.lock mutate.in
+pin fuzz.lock fuzz.in

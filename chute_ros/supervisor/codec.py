@@ -21,6 +21,15 @@ from chute_ros.errors import RecordError
 
 #: Under this name an object says which class it is.
 CLASS = "is"
+#: What a text raises that stands for nothing; OverflowError: no float holds its whole number.
+_MISFITS = (
+    ValueError,
+    TypeError,
+    KeyError,
+    AttributeError,
+    RecursionError,
+    OverflowError,
+)
 
 
 class Codec:
@@ -36,11 +45,11 @@ class Codec:
         others in another version."""
         return json.dumps(self.plain(value, whole), separators=(",", ":"))
 
-    def from_json(self, text: str) -> Any:
-        """What to_json was given; RecordError says what does not fit."""
+    def from_json(self, text: str, kind: Any = object) -> Any:
+        """What to_json was given; RecordError says what does not fit. kind: what it must be."""
         try:
-            return self.value(json.loads(text), object)
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+            return self.value(json.loads(text), kind)
+        except _MISFITS as error:
             raise RecordError(f"cannot be read: {error} in {text[:80]!r}") from error
 
     def plain(self, value: object, whole: bool) -> Any:
@@ -65,13 +74,16 @@ class Codec:
     def value(self, plain: Any, kind: Any) -> Any:
         """The value of this type that plain stands for."""
         if isinstance(plain, dict):
-            return self._object(plain)
+            made = self._object(plain)
+            # A field of another class would be found out only where it is used.
+            if kind is object or isinstance(made, kind):
+                return made
         if isinstance(kind, type) and dataclasses.is_dataclass(kind):
             raise RecordError(f"{plain!r} is no {kind.__name__}")
         origin = typing.get_origin(kind)
         arguments = typing.get_args(kind)
         if origin in (types.UnionType, typing.Union):
-            if plain is None:
+            if plain is None and type(None) in arguments:
                 return None
             return self.value(plain, next(one for one in arguments if one is not type(None)))
         if origin is tuple:
@@ -84,8 +96,10 @@ class Codec:
             return MappingProxyType(dict(pairs))
         if isinstance(kind, type) and issubclass(kind, enum.Enum):
             return kind(plain)
-        if kind is float:
+        if kind is float and isinstance(plain, (int, float)):
             return float(plain)
+        if kind in (float, int, str, bool) and not isinstance(plain, kind):
+            raise RecordError(f"{plain!r} is no {kind.__name__}")
         return plain
 
     def _object(self, plain: dict[str, Any]) -> Any:

@@ -51,8 +51,10 @@ def _measurement(
     samples = known.count
     value, why = flight.reading(config, state, name, now)
     if why:
-        asked = f"(asked for: {condition.limits})"
-        return Finding(None, f"{name} cannot be used: {why} {asked}", samples)
+        text = f"{name} cannot be used: {why} (asked for: {condition.limits})"
+        if condition.if_unknown:
+            return Finding(True, f"{text}, taken to be so")
+        return Finding(None, text, samples)
     if value != known.value:
         samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.

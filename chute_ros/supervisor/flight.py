@@ -13,6 +13,7 @@ from statistics import median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.measurements import CLIMB_RATE
 from chute_ros.supervisor.state import State
 
 #: Less specific force than this is free fall, m/s^2 (half of what a body at rest feels).
@@ -31,6 +32,9 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     """A measurement and "", or NaN and why it cannot be used."""
     if name == "height" and state.rebooted:
         return math.nan, "the autopilot started anew in flight, and its height with it"
+    if name == CLIMB_RATE:
+        rate = climb_rate(config, state, now)
+        return rate, "too few heights that can be used" if math.isnan(rate) else ""
     why = state.measured(name).unusable(config.profile.limits[name], now)
     if why and name == "vertical_speed":
         rate = climb_rate(config, state, now)

@@ -39,6 +39,7 @@ class Stimulus(enum.Enum):
     KILL = "a kill was decided"
     DEPLOY_DUE = "the kill is confirmed or its time is over, and a deploy follows"
     PARACHUTE_OPEN = "a parachute says that it was released"
+    TAKEN_BACK = "a parachute that nobody ordered to release says no more that it is out"
     DEPLOY_FAILED = "no parachute confirmed in time"
     RESET = "a person asked for the start"
 
@@ -75,6 +76,7 @@ TRANSITIONS: dict[tuple[Stage, Stimulus], Stage] = {
     (_S.DEPLOYING, _E.PARACHUTE_OPEN): _S.DEPLOYED,
     (_S.DEPLOYING, _E.DEPLOY_FAILED): _S.FAULT,
     (_S.DEPLOYED, _E.KILL): _S.KILLING,
+    (_S.DEPLOYED, _E.TAKEN_BACK): _S.IN_FLIGHT,
     (_S.DEPLOYED, _E.RESET): _S.STARTUP,
     (_S.LANDED, _E.LINKS_UNHEALTHY): _S.BLOCKED,
     (_S.LANDED, _E.DISARMED): _S.READY,

@@ -64,6 +64,10 @@ STANDARD_LIMITS: dict[str, Limits] = {
     "battery_remaining": Limits(0.0, 1.0, 0.5, 0.3, 10.0, 0.0),
 }
 
+HEIGHT = "height"
+#: From the heights of the last second; on it conditions can rest as on the measurements.
+CLIMB_RATE = "climb_rate"
+
 
 #: The unit of each, for people.
 UNITS: dict[str, str] = {

@@ -17,7 +17,7 @@ from chute_ros.model import Action
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+from chute_ros.supervisor.measurements import CLIMB_RATE, STANDARD_LIMITS, Limits
 from chute_ros.supervisor.rules import (
     ALL,
     ANY,
@@ -191,7 +191,9 @@ def _member(reader: _ProfileLines, where: Where, what: str, kind: type[_Kind]) -
 
 def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | None:
     entries = reader.mapping(
-        where, (*_CONDITION_KEYS, "above", "below", "is", "weight"), f"a condition of {what}"
+        where,
+        (*_CONDITION_KEYS, "above", "below", "if_unknown", "is", "weight"),
+        f"a condition of {what}",
     )
     kinds = [key for key in _CONDITION_KEYS if key in entries]
     weight = 1.0
@@ -203,7 +205,7 @@ def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | No
         text = f"a condition of {what} needs one of {', '.join(_CONDITION_KEYS)}"
         reader.wrong(where.line, f"{text}; it has {', '.join(kinds) or 'none'}")
         return None
-    for key in ("above", "below"):
+    for key in ("above", "below", "if_unknown"):
         if key in entries:
             reader.wrong(entries[key].line, f"{key} belongs to a measurement: remove it here")
     if "is" in entries and kinds != ["link"]:
@@ -232,7 +234,8 @@ def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | No
 def _measurement(
     reader: _ProfileLines, what: str, where: Where, entries: dict[str, Where], weight: float
 ) -> MeasurementCondition:
-    name = reader.choice(entries["measurement"], f"measurement in {what}", STANDARD_LIMITS)
+    known = (*STANDARD_LIMITS, CLIMB_RATE)
+    name = reader.choice(entries["measurement"], f"measurement in {what}", known)
     if "is" in entries:
         reader.wrong(entries["is"].line, "`is` belongs to a link: use above or below")
     if "above" not in entries and "below" not in entries:
@@ -244,7 +247,10 @@ def _measurement(
     }
     if len(limits) == 2 and not limits["above"] < limits["below"]:
         reader.wrong(where.line, f"{name} in {what} can never be: above must be less than below")
-    return MeasurementCondition(name, weight=weight, **limits)
+    if_unknown = False
+    if "if_unknown" in entries:
+        if_unknown = reader.truth(entries["if_unknown"], f"if_unknown of {name} in {what}")
+    return MeasurementCondition(name, weight=weight, if_unknown=if_unknown, **limits)
 
 
 def _check_deploy(reader: _ProfileLines, what: str, line: int, rule: Rule) -> None:

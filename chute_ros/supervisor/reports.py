@@ -10,7 +10,7 @@ from chute_ros.model import Armed, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
-from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.machine import Stage, Stimulus
 from chute_ros.supervisor.measurements import samples_of
 from chute_ros.supervisor.requests import Requests
 
@@ -55,8 +55,13 @@ class Reports(Requests):
             self.state = replace(self.state, released_before=before)
             aloft = flight.in_air(self.config, self.state, self.now) is not False
             if was_out and aloft and self.state.stage is Stage.DEPLOYED:
-                text = "says no more that it is deployed; a forced deploy goes on with the next"
-                self.alarm(f"{one.link} {status.device} {text}")
+                text = f"{one.link} {status.device} says no more that it is deployed"
+                if self.state.deploys or not self.state.airborne:
+                    self.alarm(f"{text}; a forced deploy goes on with the next")
+                else:
+                    # It may have erred when it said so; with nothing out, the rules must live.
+                    self.alarm(text)
+                    self.move(Stimulus.TAKEN_BACK, text)
 
     def vehicle(self, one: i.VehicleReport) -> None:
         """What the vehicle is told to be, and each measurement in it as evidence."""

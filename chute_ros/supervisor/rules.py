@@ -15,7 +15,7 @@ from types import MappingProxyType
 from chute_ros.model import Action
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+from chute_ros.supervisor.measurements import CLIMB_RATE, HEIGHT, STANDARD_LIMITS, Limits
 
 #: Instead of a link's name: it is enough if one is so, or all must be.
 ANY, ALL = "any", "all"
@@ -56,12 +56,14 @@ class DeviceFact(enum.Enum):
 
 @dataclass(frozen=True)
 class MeasurementCondition:
-    """A usable measurement is above, or below, a limit (NaN: not asked for)."""
+    """A usable measurement, or CLIMB_RATE, is above, or below, a limit (NaN: not asked for)."""
 
     measurement: str
     above: float = math.nan
     below: float = math.nan
     weight: float = 1.0
+    #: Where nothing usable tells, it is taken to hold: a second sign that may be missing.
+    if_unknown: bool = False
 
     @cached_property
     def limits(self) -> str:
@@ -102,7 +104,9 @@ Condition = MeasurementCondition | LinkCondition | AutopilotCondition | DeviceCo
 
 
 def is_silence(condition: Condition) -> bool:
-    """Does it tell only that somebody is not heard?"""
+    """Does it tell only that somebody is not heard, or may it?"""
+    if isinstance(condition, MeasurementCondition):
+        return condition.if_unknown
     if isinstance(condition, AutopilotCondition):
         return condition.fact is AutopilotFact.LOST
     return isinstance(condition, LinkCondition)
@@ -132,7 +136,7 @@ class Rule:
     def measured(self) -> tuple[str, ...]:
         """The measurements that it rests on."""
         known = (one for one in self.conditions if isinstance(one, MeasurementCondition))
-        return tuple(one.measurement for one in known)
+        return tuple(HEIGHT if c.measurement == CLIMB_RATE else c.measurement for c in known)
 
     @cached_property
     def asks_the_autopilot(self) -> bool:
@@ -174,5 +178,6 @@ DEVICE_RULES = (
         Action.KILL,
         (Stage.IN_FLIGHT, Stage.DEPLOYED),
         needed=1.0,
+        clears=Clears.BY_ITSELF,
     ),
 )

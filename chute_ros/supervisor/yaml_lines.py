@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import sys
 from collections.abc import Iterable
 from typing import Any
 
@@ -44,7 +45,12 @@ class LineReader:
         entries: dict[str, Where] = {}
         allowed = tuple(allowed)
         for key_node, node in where.node.value:
-            key, line = str(key_node.value), key_node.start_mark.line + 1
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                # Its text could be as long as its aliases make it.
+                self.wrong(line, f"a key of {what} is no word: need `key: value` lines")
+                continue
+            key = str(key_node.value)
             if allowed and key not in allowed:
                 near = difflib.get_close_matches(key, allowed)
                 fix = f"did you mean {near[0]}? " if near else ""
@@ -55,6 +61,12 @@ class LineReader:
                 # The line of the key: a mapping begins only on the line after it.
                 entries[key] = Where(node, where_of(node).value, line)
         return entries
+
+    def truth(self, where: Where, what: str) -> bool:
+        """True or false."""
+        if not isinstance(where.value, bool):
+            self.wrong(where.line, f"{what} is {where.value!r}: need true or false")
+        return where.value is True
 
     def number(
         self, where: Where, what: str, least: float = -math.inf, most: float = math.inf
@@ -100,6 +112,8 @@ def compose(text: str, name: str) -> Where:
     """The root of a YAML text; ProfileError if it is none. name: of the file."""
     try:
         return where_of(yaml.compose(text, Loader=yaml.SafeLoader))
+    except RecursionError:
+        raise ProfileError(f"{name}, line 1: not YAML: it is nested too deep") from None
     except (yaml.YAMLError, ValueError) as error:  # most say where, and what in short
         mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", error)
         line = 1 if mark is None else mark.line + 1
@@ -116,4 +130,6 @@ def where_of(node: yaml.Node | None) -> Where:
             value = yaml.safe_load(node.value) if node.style is None else node.value
         except (yaml.YAMLError, ValueError):  # as of 2024-13-45, a date that is none
             value = node.value
+        if isinstance(value, int) and abs(value) > sys.float_info.max:
+            value = node.value  # no number that could be reckoned with
     return Where(node, value, node.start_mark.line + 1)

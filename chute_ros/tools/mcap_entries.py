@@ -8,16 +8,22 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, NamedTuple
 
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
-from zstandard import ZstdError
+from zstandard import ZstdDecompressor, ZstdError
 
 from chute_ros.errors import RecordError
 
+#: Longest chunk, bytes: who writes MCAP ends one after four million at the latest.
+_LONGEST_CHUNK = 16 * 1024 * 1024
+#: And how many times as long as in the file: a few bytes must not become hours of reading.
+_MOST_COMPRESSION = 1000
 #: What bytes that are no MCAP make its reader raise.
 _UNREADABLE = (
     McapError,
@@ -68,7 +74,7 @@ class McapEntries:
             inner = [record]
             if isinstance(record, Chunk):
                 try:
-                    inner = breakup_chunk(record, validate_crc=True)
+                    inner = breakup_chunk(_unpacked(record), validate_crc=True)
                 except _UNREADABLE:
                     if self.position < size:
                         damaged += 1
@@ -111,3 +117,20 @@ class McapEntries:
             f"{self.path} ends in the middle ({size} bytes), as after a power cut: read as far as "
             "it goes"
         )
+
+
+def _unpacked(chunk: Chunk) -> Chunk:
+    """The same without compression. ValueError: it is not as long as it says, or too long."""
+    size, packed = chunk.uncompressed_size, chunk.data
+    if chunk.compression not in ("zstd", "lz4"):
+        return chunk
+    if size > min(_LONGEST_CHUNK, _MOST_COMPRESSION * len(packed)):
+        raise ValueError(f"a chunk of {size} bytes in {len(packed)}")
+    # One more than it says: no more is ever unpacked.
+    if chunk.compression == "zstd":
+        data = ZstdDecompressor().stream_reader(packed).read(size + 1)
+    else:
+        data = LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
+    if len(data) != size:
+        raise ValueError(f"a chunk of {len(data)} bytes or more says that it has {size}")
+    return replace(chunk, compression="", data=data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -17,6 +18,8 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.replaying import Other
 
 NODE = "safety_supervisor"
+#: Names of nodes and parts of them in one file, at most.
+_MOST_NAMES = 1000
 #: What ROS gives every node.
 _EVERYWHERE = {"use_sim_time", "start_type_description_service", "qos_overrides"}
 
@@ -48,11 +51,11 @@ def _given(path: Path, node: str) -> dict[str, Any]:
         whole = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror or error}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ParameterError(f"{path} is no YAML: {' '.join(str(error).split())}") from None
     found: dict[str, Any] = {}
     sections = 0
-    for name, section in _sections(whole, ""):
+    for name, section in _sections(path, whole):
         if any(_matches(name, one) for one in (node, f"/{NODE}")):
             sections += 1
             found.update(section)
@@ -64,15 +67,20 @@ def _given(path: Path, node: str) -> dict[str, Any]:
     return found
 
 
-def _sections(part: Any, name: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Name of a node, with wildcards -> its parameters; names may be nested."""
-    if not isinstance(part, dict):
-        return
-    for key, value in part.items():
-        if key == "ros__parameters":
-            yield name, value if isinstance(value, dict) else {}
-        else:
-            yield from _sections(value, f"{name}/{str(key).strip('/')}")
+def _sections(path: Path, whole: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Name of a node, with wildcards -> its parameters; names may be nested. ParameterError: there
+    are so many that the file must hold itself, or multiply by its aliases."""
+    waiting, walked = [("", whole)], 0
+    while waiting:
+        name, part = waiting.pop()
+        walked += 1
+        if walked > _MOST_NAMES:
+            raise ParameterError(f"{path}: more than {_MOST_NAMES} names in it: no parameter file")
+        if name.endswith("/ros__parameters"):
+            yield name.removesuffix("/ros__parameters"), part if isinstance(part, dict) else {}
+        elif isinstance(part, dict):
+            inner = [(f"{name}/{str(key).strip('/')}", one) for key, one in part.items()]
+            waiting += reversed(inner)
 
 
 def _matches(pattern: str, node: str) -> bool:
@@ -99,6 +107,6 @@ def _check(path: Path, parameter: Parameter, value: Any) -> None:
         good = parameter.minimum <= value <= parameter.maximum
     if not good:
         raise ParameterError(
-            f"{path}: parameter {parameter.name} of {NODE} is {value!r}: "
+            f"{path}: parameter {parameter.name} of {NODE} is {reprlib.repr(value)}: "
             f"need {parameter.allowed()} ({parameter.description})"
         )

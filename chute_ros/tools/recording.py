@@ -13,6 +13,7 @@ from rclpy.serialization import deserialize_message
 from chute_ros.errors import RecordError
 from chute_ros.nodes.box_writer import RECORD
 from chute_ros.nodes.message_definitions import type_hash, type_name
+from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC, Turn
 from chute_ros.supervisor.state import State
@@ -95,7 +96,7 @@ class _Reader:
             if name == RECORD:
                 self._into.turns.append(self._turn(entry))
             elif name:
-                message = deserialize_message(entry.data, self._kinds[name])
+                message = self._message(entry, self._kinds[name])
                 self._into.messages.setdefault(name, []).append((entry.time, message))
         self._into.remarks += entries.remarks
 
@@ -116,16 +117,26 @@ class _Reader:
             self._into.remarks.append(f"{text}: left out")
         return ""
 
+    def _message(self, entry: Entry, kind: Any) -> Any:
+        """What was published."""
+        try:
+            return deserialize_message(entry.data, kind)
+        except Exception as error:  # noqa: BLE001
+            # The middleware says what it likes of bytes that are no message, by its own classes.
+            topic = entry.channel.topic
+            told = f"{self._path}: message {entry.number} of {topic} cannot be read"
+            raise RecordError(f"{told}: {error}") from None
+
     def _turn(self, entry: Entry) -> RecordedTurn:
-        message = deserialize_message(entry.data, SupervisorRecord)
+        message = self._message(entry, SupervisorRecord)
         try:
             turn = Turn(
                 message.monotonic,
-                tuple(CODEC.from_json(one) for one in message.inputs),
-                tuple(CODEC.from_json(one) for one in message.outputs),
+                tuple(CODEC.from_json(one, i.Input) for one in message.inputs),
+                tuple(CODEC.from_json(one, i.Output) for one in message.outputs),
             )
-            config = CODEC.from_json(message.config) if message.config else None
-            state = CODEC.from_json(message.state) if message.state else None
+            config = message.config and CODEC.from_json(message.config, SupervisorConfig)
+            state = message.state and CODEC.from_json(message.state, State)
         except RecordError as error:
             raise RecordError(f"{self._path}: turn {entry.number} {error}") from None
-        return RecordedTurn(entry.time, entry.number, turn, config, state)
+        return RecordedTurn(entry.time, entry.number, turn, config or None, state or None)

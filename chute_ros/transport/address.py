@@ -38,8 +38,13 @@ class Address:
     send_port: int = 0
 
 
+def _is_whole(text: str) -> bool:
+    """A number of digits alone; Python reads none of thousands of them."""
+    return text.isascii() and text.isdigit() and len(text) < 10
+
+
 def _port(text: str, whole: str, lowest: int) -> int:
-    if text.isascii() and text.isdigit() and lowest <= int(text) <= 65535:
+    if _is_whole(text) and lowest <= int(text) <= 65535:
         return int(text)
     raise ParameterError(
         f"connection {whole!r}: port {text!r} is no number from {lowest} to 65535: need {FORMS}"
@@ -51,7 +56,7 @@ def parse_address(text: str) -> Address:
     kind, colon, rest = text.partition(":")
     if kind == "serial":
         path, colon_before_baud, baud = rest.rpartition(":")
-        if not colon_before_baud or (baud and not (baud.isascii() and baud.isdigit())):
+        if not colon_before_baud or (baud and not _is_whole(baud)):
             # Names under /dev/serial/by-path hold colons of their own.
             path, baud = rest, str(DEFAULT_BAUD)
         if path and baud and int(baud) > 0:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import gc
 import logging
@@ -165,10 +164,11 @@ class CanBusWire:
         self._failures += 1
         if self._failures > _MOST_FAILURES and self._address.interface not in _DIRECT:
             raise OSError(f"nothing but failures, the last one: {reason(error)}") from None
-        if isinstance(error.__cause__, UnicodeError) and hasattr(self._bus, "flush"):
-            # slcan would keep what it cannot decode, and stumble over it for ever.
-            with contextlib.suppress(Exception):
-                self._bus.flush()
+        undecoded = getattr(self._bus, "_buffer", None)
+        if isinstance(error.__cause__, UnicodeError) and isinstance(undecoded, bytearray):
+            # slcan would keep what it cannot decode, and stumble over it for ever. Its own flush
+            # would throw away the frames that wait behind it as well.
+            undecoded.clear()
         return self._drop(kind)
 
     def _frame(self, message: Any) -> bytes:

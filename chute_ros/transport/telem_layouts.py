@@ -30,6 +30,6 @@ def load_layouts(folder: str, named: str) -> list[Layout]:
 def _load(file: Path) -> Layout:
     try:
         content = yaml.safe_load(file.read_text())
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise ParameterError(f"{file}: cannot be read: {error}") from None
     return layout_from(content, str(file))

@@ -115,10 +115,13 @@ class Watch:
     def _released_stays_released(
         self, before: State, inputs: Sequence[i.Input], done: list[Action]
     ) -> None:
-        """Only a reset leads back from a released parachute, whoever restarts."""
+        """Only a reset leads back from a released parachute, whoever restarts; or its own word,
+        where nobody had ordered it."""
         insists = any(isinstance(one, i.DeployRequest) and one.force for one in inputs)
         reset = any(isinstance(one, i.ResetRequest) for one in inputs)
-        if before.stage is Stage.DEPLOYED and not reset and not insists:
+        told = [one.status for one in inputs if isinstance(one, i.ParachuteReport)]
+        takes_back = not before.deploys and any(not status.deployed for status in told)
+        if before.stage is Stage.DEPLOYED and not (reset or insists or takes_back):
             assert D not in done
             assert self.state.stage is Stage.DEPLOYED
 

@@ -155,6 +155,13 @@ def test_every_output_comes_back() -> None:
         ("", "cannot be read"),
         ("Rung(link='a')", "Rung"),
         ('{"is":"LinkLimits","stale_after":9.0}', "need 0 < stale_after < lost_after"),
+        ('{"is":"VehicleState","height":1%s}' % ("0" * 400), "int too large"),
+        ('{"is":"VehicleState","height":"1.5"}', "'1.5' is no float"),
+        ('{"is":"State","epoch":"1","started_at":0}', "'1' is no int"),
+        ('{"is":"State","epoch":1,"started_at":{"is":"Rung","link":"a"}}', "is no float"),
+        ('{"is":"DeployRequest","token":1,"force":0,"reason":"x"}', "0 is no bool"),
+        ('{"is":"DeployRequest","token":1,"force":false,"reason":null}', "None is no str"),
+        ('{"is":"VehicleReport","state":{"is":"Rung","link":"a"}}', "is no VehicleState"),
     ],
 )
 def test_what_does_not_fit_is_said(text: str, words: str) -> None:
@@ -174,3 +181,13 @@ def test_the_armed_state_of_the_vehicle_is_not_lost_on_the_way() -> None:
         told = there_and_back(VehicleState(armed=armed))
         assert isinstance(told, VehicleState)
         assert told.armed is armed
+
+
+def test_what_must_be_of_one_class_is_of_no_other() -> None:
+    told = CODEC.to_json(i.DeployRequest(1, False, "why"))
+    assert CODEC.from_json(told, i.Input) == i.DeployRequest(1, False, "why")
+    for kind in (State, i.Output):
+        with pytest.raises(RecordError, match="is no "):
+            CODEC.from_json(told, kind)
+    with pytest.raises(RecordError, match="None is no "):
+        CODEC.from_json("null", i.Input)

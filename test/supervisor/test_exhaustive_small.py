@@ -66,7 +66,7 @@ def given(*inputs: i.Input) -> Letter:
 
 
 WELL = {"armed": Armed.ARMED, "landed_state": AIR, "vertical_speed": 0.0, "height": 50.0}
-FALLS = {**WELL, "vertical_speed": -14.0}
+FALLS = {**WELL, "vertical_speed": -14.0, "acceleration": 6.5}
 LETTERS: dict[str, Letter] = {
     "stands": tell(armed=Armed.DISARMED, landed_state=GROUND, vertical_speed=0.0, height=0.0),
     "flies": tell(**WELL),

@@ -76,7 +76,8 @@ def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> No
     story = aloft()
     start = story.t
     for n in range(80):
-        story.fly(story.t + 0.05, vertical_speed=-11.0 if n % 5 == 4 else -14.0)
+        speed = -11.0 if n % 5 == 4 else -14.0
+        story.fly(story.t + 0.05, vertical_speed=speed, acceleration=6.5)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(K) - start < 2.5
 
@@ -86,7 +87,8 @@ def test_dropped_messages_do_not_reset_the_count() -> None:
     start = story.t
     for n in range(40):
         # Two samples out of three never arrive.
-        story.at(start + 0.15 * (n + 1), story.heartbeat(), story.told(vertical_speed=-14.0))
+        told = story.told(vertical_speed=-14.0, acceleration=6.5)
+        story.at(start + 0.15 * (n + 1), story.heartbeat(), told)
         if story.fired():
             break
     assert story.when(K) - start < 1.3
@@ -108,8 +110,23 @@ def test_a_steady_fall_at_one_g_that_is_taken_for_standing_is_deployed() -> None
     story = aloft()
     # It has reached its final speed: the accelerometer feels what it feels on the ground.
     lie = {"landed_state": GROUND, "armed": Armed.DISARMED}
-    story.fly(3.5, vertical_speed=-14.0, acceleration=9.8, **lie)
+    for n in range(40):
+        height = 150.0 - 14.0 * 0.05 * n
+        story.fly(story.t + 0.05, height=height, vertical_speed=-14.0, acceleration=9.8, **lie)
     assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_vertical_speed_that_is_wrong_alone_ends_no_flight() -> None:
+    story = aloft()
+    story.fly(30.0, vertical_speed=-20.0)
+    assert story.fired() == []
+
+
+def test_a_vertical_speed_is_believed_alone_where_no_height_can_be_used() -> None:
+    story = aloft()
+    story.fly(story.t + 2.0, vertical_speed=-14.0, height=math.nan)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert any("taken to be so" in reason for reason in story.newest(K).reasons)
 
 
 def test_a_landing_in_earnest_deploys_nothing() -> None:
@@ -267,6 +284,21 @@ def test_a_deploy_over_a_link_that_flaps_reaches_the_device_and_ends_with_it() -
 
 
 # -- a restart under the canopy ------------------------------------------------------------------
+
+
+def test_a_release_that_nobody_ordered_and_that_is_taken_back_leaves_the_rules_alive() -> None:
+    """One damaged status says that a parachute is out, and the motors are stopped for it."""
+    story = aloft()
+    story.at(story.t + 0.05, story.heartbeat(), parachute(deployed=True))
+    assert story.fired() == ["KILL"]
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(story.t + 0.1, parachute(deployed=False))
+    assert story.state.stage is Stage.IN_FLIGHT
+    assert story.alarms()[-1].endswith("1/161 says no more that it is deployed")
+    story.fall(story.t + 3.0, armed=Armed.DISARMED)
+    assert story.fired()[-1] == "DEPLOY"
+    story.at(story.t + 0.1, story.heartbeat(), parachute(deployed=True))
+    assert story.state.stage is Stage.DEPLOYED
 
 
 def test_a_supervisor_that_restarts_under_the_canopy_does_not_deploy_again() -> None:

@@ -101,7 +101,7 @@ def test_a_part_of_a_record_that_is_of_another_kind_is_said(plain: str) -> None:
 def test_what_a_leader_told_that_does_not_fit_is_said() -> None:
     kill = '{"is":"Ask","at":1,"link":"a","reason":"b"}'
     text = f'{{"is":"State","epoch":1,"started_at":0,"kill":{kill}}}'
-    with pytest.raises(RecordError, match="a state that does not fit"):
+    with pytest.raises(RecordError, match="is no Pending"):
         followed(Story().state, text, START)
 
 

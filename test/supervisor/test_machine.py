@@ -36,9 +36,9 @@ def test_deploying_is_entered_only_from_killing() -> None:
     assert entries == {Stage.KILLING}
 
 
-def test_only_a_reset_or_a_person_who_insists_on_another_parachute_leaves_deployed() -> None:
+def test_only_a_reset_a_person_who_insists_or_a_device_that_erred_leaves_deployed() -> None:
     ways = {stimulus for (before, stimulus) in TRANSITIONS if before is Stage.DEPLOYED}
-    assert ways == {Stimulus.RESET, Stimulus.KILL}
+    assert ways == {Stimulus.RESET, Stimulus.KILL, Stimulus.TAKEN_BACK}
 
 
 def test_nothing_but_a_reset_leads_back_to_the_start() -> None:

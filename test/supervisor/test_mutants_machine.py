@@ -48,6 +48,7 @@ EXPECTED = {
     ),
     "DEPLOYED": (
         "KILL KILLING",
+        "TAKEN_BACK IN_FLIGHT",
         "RESET STARTUP",
     ),
     "LANDED": (

@@ -209,13 +209,13 @@ def test_without_any_link_only_any_can_be_named() -> None:
     assert "mine.yaml, line 19: link in rule 'falls' is 'x': need any" in str(caught.value)
 
 
-MEASUREMENTS = tuple(STANDARD_LIMITS)
+MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate")
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED"
 PROFILE_KEYS = (
     "profile, minimum_height, below_minimum, moving_speed, landed_hold, measurements, rules"
 )
 RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, action, clears"
-CONDITION_KEYS = "measurement, link, autopilot, device, above, below, is, weight"
+CONDITION_KEYS = "measurement, link, autopilot, device, above, below, if_unknown, is, weight"
 LIMIT_KEYS = "minimum, maximum, rate, jump, max_age, stuck_after"
 FLYING = "its states may be IN_FLIGHT and KILLING"
 KINDS = "needs one of measurement, link, autopilot, device; it has"
@@ -237,7 +237,7 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
         (
             "  height: {max",
             "  zzz: {max",
-            f"7: measurements has no 'zzz': it may have {', '.join(MEASUREMENTS)}",
+            f"7: measurements has no 'zzz': it may have {', '.join(STANDARD_LIMITS)}",
         ),
         (
             "maximum: 9000",

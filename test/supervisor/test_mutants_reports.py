@@ -145,10 +145,7 @@ def test_the_picture_of_one_takes_nothing_of_what_is_known_of_its_link() -> None
     assert evidence.heard == START
 
 
-BACK = (
-    "mavlink_parachute 1/161 says no more that it is deployed; a forced deploy goes on with the "
-    "next"
-)
+BACK = "mavlink_parachute 1/161 says no more that it is deployed"
 
 
 @pytest.mark.parametrize(

@@ -225,6 +225,9 @@ def test_every_mistake_is_told_at_once() -> None:
         ("profile: \x00\n", "line 1: not YAML: "),
         ("---\na: 1\n---\nb: 2\n", "line 3: not YAML: but found another document"),
         ("profile: *nobody\n", "line 1: not YAML: found undefined alias"),
+        ("[" * 3000, "line 1: not YAML: it is nested too deep"),
+        ("a: " + "{a: " * 1500, "line 1: not YAML: it is nested too deep"),
+        ("? [a]\n: 1\n", "line 1: a key of a profile is no word"),
     ],
 )
 def test_what_is_no_profile_at_all_says_so(text: str, words: str) -> None:
@@ -280,3 +283,17 @@ def test_no_rule_has_a_persons_name() -> None:
         "mine.yaml, line 9: rule 'operator' has a person's name, whom no height holds back: "
         "rename it"
     )
+
+
+@pytest.mark.parametrize("number", ["1" + "0" * 400, "0x" + "f" * 4000])
+def test_a_number_that_no_float_holds_is_no_number(number: str) -> None:
+    assert any("need a number" in one for one in mistakes(WHOLE.replace("-12.5", number, 1)))
+
+
+def test_a_key_that_aliases_make_endless_is_not_spelt_out() -> None:
+    """Nine times as long with each line: the last one would fill the memory."""
+    lines = ["a: &a [x, x, x, x, x, x, x, x, x]"]
+    for before, name in zip("abcdefghijk", "bcdefghijkl", strict=True):
+        lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
+    (told,) = [one for one in mistakes("\n".join([*lines, "? *l", ": 1"])) if "no word" in one]
+    assert told.startswith("mine.yaml, line 12: a key of a profile is no word")

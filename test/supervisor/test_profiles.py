@@ -59,8 +59,21 @@ def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: A
     ]
 
 
+def sinks(profile: str, hold: float, sink: float, before: float = 0.1) -> list[Case]:
+    """It sinks too fast, and one more sign says so; or only the one sensor."""
+    over, under = {"vertical_speed": -sink - 0.1}, {"vertical_speed": -sink}
+    signs = ({"acceleration": 6.9}, {"acceleration": 7.1}), ({"tilt": 45.1}, {"tilt": 44.9})
+    cases, said = [], {"vertical_speed": before}
+    for more, less in signs:
+        cases += [
+            Case(profile, "critical sink", {**over, **more}, one, hold, before=said)
+            for one in ({**under, **more}, {**over, **less})
+        ]
+    return cases
+
+
 def tips(profile: str, hold: float, tilt: float, sink: float) -> list[Case]:
-    """It tips over and sinks; it tips over alone (an attitude sensor that lies), or sinks alone."""
+    """It tips over and sinks; it tips over alone (its sensor lies), or it sinks alone."""
     both = {"tilt": tilt + 0.1, "vertical_speed": -sink - 0.1}
     unders = ({"tilt": tilt - 0.1}, {"vertical_speed": -sink + 0.1})
     return [Case(profile, "excess tilt", both, {**both, **under}, hold) for under in unders]
@@ -68,7 +81,7 @@ def tips(profile: str, hold: float, tilt: float, sink: float) -> list[Case]:
 
 DEPLOYS = [
     *tips("multirotor", hold=0.3, tilt=60.0, sink=3.0),
-    Case("multirotor", "critical sink", {"vertical_speed": -12.1}, {"vertical_speed": -12.0}, 0.5),
+    *sinks("multirotor", hold=0.5, sink=12.0),
     Case(
         "multirotor",
         "falling",
@@ -145,14 +158,7 @@ DEPLOYS = [
         before={"battery_remaining": 0.1},
     ),
     *tips("fixed_wing", hold=0.7, tilt=80.0, sink=5.0),
-    Case(
-        "fixed_wing",
-        "critical sink",
-        {"vertical_speed": -15.1},
-        {"vertical_speed": -15.0},
-        1.0,
-        before={"vertical_speed": -5.0},
-    ),
+    *sinks("fixed_wing", hold=1.0, sink=15.0, before=-5.0),
     Case(
         "fixed_wing",
         "free fall",

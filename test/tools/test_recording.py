@@ -1,12 +1,14 @@
 """What was recorded is read back, whatever became of the file."""
 
 import random
+import struct
 import zlib
 
 import pytest
 from chute_msgs.msg import SafetyState
 from flight_bench import END, NAMESPACE, START, STEP, WALL, Flight
 from mcap.writer import Writer
+from zstandard import ZstdCompressor
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor import inputs as i
@@ -139,11 +141,39 @@ def forged(path, topic, schema_name, metadata, data):
         writer.finish()
 
 
+def packed(path, size, says):
+    """A file with one chunk of size zeros, which says that it has another size."""
+    packer = ZstdCompressor().compressobj()
+    data = b"".join(packer.compress(bytes(1 << 20)) for _ in range(size >> 20)) + packer.flush()
+    head = struct.pack("<QQQI", 0, 1, says, 0) + b"\4\0\0\0zstd" + struct.pack("<Q", len(data))
+    records = [(0x01, b"\0" * 8), (0x06, head + data), (0x02, b"\0" * 20)]
+    told = [bytes((kind,)) + struct.pack("<Q", len(one)) + one for kind, one in records]
+    path.write_bytes(b"\x89MCAP0\r\n" + b"".join(told) + b"\x89MCAP0\r\n")
+    return path
+
+
+@pytest.mark.parametrize("says", [1 << 28, 1 << 20, 0], ids=["what it has", "less", "nothing"])
+def test_a_few_bytes_do_not_become_hours_of_reading(says, tmp_path):
+    """Each nine zeros read as a record that is none: 30 million of them in 8 kB."""
+    entries = McapEntries(packed(tmp_path / "bomb.mcap", 1 << 28, says))
+    assert list(entries) == []
+    assert entries.path.stat().st_size < 10_000
+    assert "damaged parts are left out (1 chunks)" in entries.remarks[0]
+
+
 def test_a_recording_of_another_version_is_told(tmp_path):
     path = tmp_path / "old.mcap"
     about = {"topic_type_hash": "RIHS01_" + zlib.crc32(b"old").to_bytes(4, "big").hex()}
     forged(path, "/safety/record", "chute_msgs/msg/SupervisorRecord", about, b"")
     with pytest.raises(RecordError, match="another version of chute_msgs"):
+        read([path], {})
+
+
+def test_a_message_that_the_middleware_cannot_read_is_told(tmp_path):
+    path = tmp_path / "spoilt.mcap"
+    spoilt = b"\0\1\0\0" + b"\xff" * 40
+    forged(path, "/safety/record", "chute_msgs/msg/SupervisorRecord", {}, spoilt)
+    with pytest.raises(RecordError, match=r"spoilt\.mcap: message 0 of /safety/record cannot be"):
         read([path], {})
 
 

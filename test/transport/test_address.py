@@ -91,6 +91,8 @@ def test_what_is_no_address_is_named_with_what_would_be(text):
         # Nothing can be sent to port 0.
         ("udpout:127.0.0.1:0", "0"),
         ("tcp:127.0.0.1:0", "0"),
+        # Python reads no number of so many digits.
+        ("tcp:127.0.0.1:" + "1" * 5000, "1" * 5000),
         ("udppair:127.0.0.1:14541:127.0.0.1:0", "0"),
     ],
 )
@@ -100,6 +102,11 @@ def test_a_port_that_is_none_is_named_with_its_connection(text, port):
     assert f"connection {text!r}: port {port!r}" in str(caught.value)
     assert "to 65535" in str(caught.value)
     assert FORMS in str(caught.value)
+
+
+def test_what_is_too_long_for_a_baud_rate_is_part_of_the_path():
+    text = "/dev/ttyUSB0:" + "9" * 5000
+    assert parse_address(f"serial:{text}") == Address("serial", text, 57600)
 
 
 @pytest.mark.parametrize("text", ["serial:/dev/ttyACM0", "usb:c0de:cafe:A1"])

@@ -103,6 +103,14 @@ def test_a_line_that_is_no_frame_is_counted_by_its_kind_and_the_wire_lives(
         assert [change.is_open for change in node.changes] == [True]
 
 
+def test_a_frame_on_the_heels_of_garbage_is_heard(adapter, path, await_until):
+    """In one piece with it, as a serial port delivers what came in one go."""
+    with running_can(f"slcan:{path}") as node:
+        adapter.deliver(b"\xff\xfe\r" + LINES[0])
+        await_until(lambda: node.frames == FRAMES[:1], "it is heard")
+        assert node.wire.counts.total() == 1
+
+
 def test_an_adapter_that_delivers_nothing_but_garbage_is_opened_again(adapter, path, await_until):
     with running_can(f"slcan:{path}") as node:
         adapter.deliver(*[b"T123"] * 150)

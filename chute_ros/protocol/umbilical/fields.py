@@ -16,7 +16,7 @@ _F32_LIMIT = 3.4028235677973366e38
 _F64_LIMIT = 1.7976931348623157e308
 
 _WHOLE = r"(?:0|-?[1-9][0-9]{0,9})"
-_FLOAT = r"(?:-?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]+)?|inf)|NaN)"
+_FLOAT = r"(?:-?(?:0|[1-9][0-9]*)(?:\.[0-9]+)?|-?inf|NaN)"
 #: All that a whole record is written with.
 NUMBERS = re.compile(r"[-0-9.,Nainf]*")
 _NOT_FINITE = ("NaN", "inf", "-inf")
@@ -35,6 +35,17 @@ class FieldType:
     def pattern(self) -> str:
         """A regular expression for what is printed; the range is checked apart."""
         return _WHOLE if self.is_whole else _FLOAT
+
+    @property
+    def sure_pattern(self) -> str:
+        """One for what is printed and so short that it is in range: most of what comes."""
+        digits = len(str(int(self.highest))) - 1
+        if not self.is_whole:
+            return _FLOAT.replace("[0-9]*", f"[0-9]{{0,{digits - 1}}}", 1)
+        if not digits:
+            return f"[0-{self.highest}]"
+        sign = "-?" if self.lowest < 0 else ""
+        return f"(?:0|{sign}[1-9][0-9]{{0,{digits - 1}}})"
 
 
 TYPES: dict[str, FieldType] = {

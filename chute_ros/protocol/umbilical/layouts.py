@@ -6,12 +6,13 @@ Source: Umbilical Reference, section 3; the other layouts were found in the fiel
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.umbilical.fields import TYPES, FieldType, Value, problem_of
+from chute_ros.protocol.umbilical.fields import TYPES, FieldType, Value, convert, problem_of
 
 #: The layout of the reference, which is preferred where a line does not tell.
 REFERENCE_LAYOUT = "telem57_airbrake_state"
@@ -63,9 +64,13 @@ class Layout:
         self.target_floats = target_floats
         self.target_fields = target_fields
         self.index = {field.name: number for number, field in enumerate(fields)}
-        self._pattern = re.compile(",".join(field.kind.pattern for field in fields))
-        self._converters = tuple(int if f.kind.is_whole else float for f in fields)
-        self._limits = tuple((f.kind.lowest, f.kind.highest) for f in fields)
+        self._sure = re.compile(",".join(field.kind.sure_pattern for field in fields))
+        numbers = range(len(fields))
+        whole = [number for number in numbers if fields[number].kind.is_whole]
+        broken = [number for number in numbers if not fields[number].kind.is_whole]
+        # Each kind converted at once and put in its place is quicker than field by field.
+        self._whole, self._broken = _picker(whole), _picker(broken)
+        self._in_order = _picker([(broken + whole).index(number) for number in numbers])
         self._expected = [(i, f.expected) for i, f in enumerate(fields) if f.expected is not None]
 
     @property
@@ -77,11 +82,9 @@ class Layout:
         """The values of a line (without "$TELEM," and its end), or why it is no record."""
         texts = body.split(",")
         # First all at once, which is the usual case; only then field by field for the reason.
-        if self._pattern.fullmatch(body):
-            values = tuple(c(text) for c, text in zip(self._converters, texts, strict=True))
-            limits = zip(values, self._limits, strict=True)
-            if all(low <= value <= high for value, (low, high) in limits):
-                return values
+        if self._sure.fullmatch(body):
+            broken, whole = map(float, self._broken(texts)), map(int, self._whole(texts))
+            return self._in_order((*broken, *whole))
         if len(texts) != self.count:
             text = f"{len(texts)} fields where {self.name} has {self.count}"
             return Problem("field count", text)
@@ -90,7 +93,7 @@ class Layout:
             if reason:
                 shown = text if len(text) <= 50 else f"{text[:47]}..."
                 return Problem(reason, f"{field.name} ({field.kind.name}) is {shown!r}")
-        return tuple(c(text) for c, text in zip(self._converters, texts, strict=True))
+        return tuple(convert(f.kind, text) for f, text in zip(self.fields, texts, strict=True))
 
     def is_as_expected(self, values: tuple[Value, ...]) -> bool:
         """Every field holds what it is meant to: tells layouts of one count apart."""
@@ -121,10 +124,10 @@ def layout_from(content: Mapping[str, Any], where: str) -> Layout:
     try:
         fields = tuple(_field(one) for one in content["fields"])
         layout = Layout(
-            str(content["name"]),
+            _word(content["name"]),
             fields,
             int(content["target_floats"]),
-            tuple(content["target_fields"]),
+            tuple(_word(one) for one in content["target_fields"]),
         )
     except (LookupError, OverflowError, TypeError, ValueError) as error:
         raise ParameterError(f"{where}: no layout of $TELEM: {error!r}") from None
@@ -143,9 +146,24 @@ def layout_from(content: Mapping[str, Any], where: str) -> Layout:
     return layout
 
 
+def _picker(numbers: list[int]) -> Callable[[Sequence[Any]], tuple[Any, ...]]:
+    """Those of a sequence that have these numbers."""
+    if len(numbers) > 1:
+        return itemgetter(*numbers)
+    return lambda sequence: tuple(sequence[number] for number in numbers)
+
+
 def _field(content: Mapping[str, Any]) -> Field:
-    if content["type"] not in TYPES:
+    if _word(content["type"]) not in TYPES:
         raise ValueError(f"type {content['type']}: need one of {', '.join(TYPES)}")
     expected = content.get("expected")
     limits = None if expected is None else (float(expected[0]), float(expected[1]))
-    return Field(str(content["name"]), TYPES[content["type"]], str(content["unit"]), limits)
+    name, unit = _word(content["name"]), _word(content["unit"])
+    return Field(name, TYPES[_word(content["type"])], unit, limits)
+
+
+def _word(content: Any) -> str:
+    """One word or number; not a list, which the file's aliases may make endless."""
+    if not isinstance(content, (str, int, float)):
+        raise TypeError(f"a word is needed, not a {type(content).__name__}")
+    return str(content)

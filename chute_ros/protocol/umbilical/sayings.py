@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from chute_ros.protocol.events import Severity
 from chute_ros.protocol.umbilical.fields import NUMBERS
@@ -18,8 +19,7 @@ from chute_ros.protocol.umbilical.stream import CUT_LINE
 UNKNOWN_LINE = "unknown line"
 
 
-@dataclass(frozen=True)
-class Telemetry:
+class Telemetry(NamedTuple):
     """A $TELEM line: its fields as text, not looked at yet."""
 
     body: str

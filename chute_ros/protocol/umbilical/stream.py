@@ -14,12 +14,14 @@ import re
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 #: Longest line, bytes; of a longer one only the end is looked at.
 MOST_LINE = 8192
 #: Longest $TELEM line that a dump is searched for, bytes.
 _MOST_TELEM = 4096
 _TELEM = b"$TELEM,"
+_MARK = b"--- BEGIN"
 _BEGIN = re.compile(rb"(?:^|(?<!\] ))--- BEGIN FLASH (CSV|BINARY) DUMP ---$")
 _END = re.compile(rb"(?:\[INFO\] )?--- END FLASH (?:CSV|BINARY) DUMP ---")
 _END_LONGEST = len(b"[INFO] --- END FLASH BINARY DUMP ---")
@@ -36,8 +38,7 @@ class DumpFormat(enum.Enum):
     BINARY = "binary"
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """One line, without its end."""
 
     data: bytes
@@ -109,7 +110,7 @@ class StreamReader:
             return False
         self._buffer, self._cut = rest, False
         line = line.removesuffix(b"\r")
-        begin = _BEGIN.search(line)
+        begin = _BEGIN.search(line) if _MARK in line else None
         if begin is None:
             items.append(Line(line))
             return bool(rest)

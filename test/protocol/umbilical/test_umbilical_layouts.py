@@ -283,3 +283,17 @@ def test_the_references_layout_comes_first_and_the_others_by_file(tmp_path):
         (tmp_path / f"{name}.yaml").write_text((FOLDER / f"{name}.yaml").read_text())
     names = [layout.name for layout in load_layouts(str(tmp_path), "layouts")]
     assert names == [STATE, "telem50", "telem54"]
+
+
+@pytest.mark.parametrize("text", ["[" * 3000, "a: 2001-12-14t21:59:43.10-99:99", "a: 0b_"])
+def test_a_file_that_only_the_reader_of_yaml_stumbles_over(tmp_path, text):
+    (tmp_path / "mine.yaml").write_text(text)
+    with pytest.raises(ParameterError, match=r"mine\.yaml: cannot be read"):
+        load_layouts(str(tmp_path), "parameter layouts")
+
+
+@pytest.mark.parametrize("key", ["name", "target_fields"])
+def test_a_list_of_lists_is_no_word(key):
+    content = yaml.safe_load((FOLDER / f"{STATE}.yaml").read_text())
+    with pytest.raises(ParameterError, match="a word is needed, not a list"):
+        layout_from({**content, key: [["x"]]}, "here")

@@ -1,0 +1,78 @@
+"""docs/fuzz.md: what was tried, for how long, and what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from bench.report import machine, table
+from fuzz.run import CORPUS, Outcome
+from fuzz.target import VARIATIONS
+from fuzz.targets import target_of
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "fuzz.md"
+_PAGE = """\
+# Fuzzed
+
+Written by `make fuzz MINUTES={minutes:g}`. The numbers belong to the machine that made them:
+{machine}.
+
+Every reader of foreign bytes, and the links with their transactions, are fed by libFuzzer
+(through atheris) with inputs that it changes until they reach new code. In the targets of links an
+input is a program: time that passes, frames with fuzzed fields, requests. Whatever is fed: nothing
+is raised but the named errors of files and settings; no input takes long; an instance that reads
+{variations} variations of an input holds few objects; what is dropped is counted; every request
+ends once; and nothing leaves that fires and was not ordered. `fuzz/targets/` says it for each.
+
+{table}
+
+Edges and features as libFuzzer counts them; new: inputs that reached more than all before them;
+slowest: time of the processor; held: objects in one instance in the end, at most, where it is
+looked at; memory: of the process at its start and at most.
+
+{found}
+
+{stored} inputs ({size} kB) that together reach all that was ever reached are stored in
+`fuzz/corpus/`; `make test` feeds them again. One file: `python3 -m fuzz --replay TARGET FILE`.
+"""
+
+
+def page(outcomes: Sequence[Outcome], minutes: float) -> str:
+    """The whole page."""
+    rows = [
+        (
+            f"{one.name}: {target_of(one.name).what}",
+            f"{one.seconds:.0f} s",
+            f"{one.inputs:,}",
+            f"{one.edges} / {one.features}",
+            str(one.new),
+            f"{one.slowest:.0f} ms",
+            str(one.largest or ""),
+            f"{one.memory[0]} / {one.memory[1]} MB",
+        )
+        for one in outcomes
+    ]
+    head = ("target", "for", "inputs", "edges / features", "new", "slowest", "held", "memory")
+    inputs = sum(one.inputs for one in outcomes)
+    found = [f"- {line}" for one in outcomes for line in told(one)]
+    text = "\n".join(["Found:", "", *found]) if found else f"Found in {inputs:,} inputs: nothing."
+    files = [one for one in CORPUS.rglob("*") if one.is_file()]
+    return _PAGE.format(
+        minutes=minutes,
+        machine=machine(),
+        variations=VARIATIONS,
+        table=table(head, rows),
+        found=text,
+        stored=len(files),
+        size=round(sum(one.stat().st_size for one in files) / 1000),
+    )
+
+
+def told(outcome: Outcome) -> list[str]:
+    """What was found, one line each, with how to see it again."""
+    root = PAGE.parent.parent
+    lines = []
+    for path in outcome.found:
+        shown = path.relative_to(root) if path.is_relative_to(root) else path
+        lines.append(f"`python3 -m fuzz --replay {outcome.name} {shown}`")
+    return lines + ([f"{outcome.name}: {outcome.died}"] if outcome.died else [])
