@@ -21,6 +21,7 @@ setup(
         ("share/" + NAME + "/config", glob("config/*.yaml")),
         ("share/" + NAME + "/config", glob("config/*.xml")),
         ("share/" + NAME + "/config/profiles", glob("config/profiles/*.yaml")),
+        ("share/" + NAME + "/config/security", glob("config/security/*.xml")),
     ],
     zip_safe=False,
     install_requires=["setuptools"],

@@ -27,6 +27,9 @@ def _nodes(context: LaunchContext) -> list:
     connection = LaunchConfiguration("connection").perform(context)
     bus = LaunchConfiguration("bus").perform(context)
     cable = LaunchConfiguration("cable").perform(context)
+    # An enclave has the name of its node, with the namespace.
+    place = "/".join(["", *filter(None, namespace.split("/"))])
+    secured = LaunchConfiguration("enclaves").perform(context) == "true"
     links = {
         "mavlink": {"mavlink_parachute": connection},
         "upf": {"mavlink_parachute": connection, "upf_can": bus},
@@ -39,6 +42,7 @@ def _nodes(context: LaunchContext) -> list:
             executable=link,
             namespace=namespace,
             parameters=[config, *([{"connection": wire}] if wire else [])],
+            ros_arguments=["--enclave", f"{place}/{link}"] if secured else [],
             output="screen",
             **LIVES_ON,
         )
@@ -49,6 +53,7 @@ def _nodes(context: LaunchContext) -> list:
         executable="safety_supervisor",
         namespace=namespace,
         parameters=[config],
+        ros_arguments=["--enclave", f"{place}/safety_supervisor"] if secured else [],
         output="screen",
         **LIVES_ON,
     )
@@ -85,6 +90,12 @@ def generate_launch_description() -> LaunchDescription:
                 "cable",
                 default_value="",
                 description="serial port of an umbilical; empty: as the parameter file says",
+            ),
+            DeclareLaunchArgument(
+                "enclaves",
+                default_value="false",
+                choices=["true", "false"],
+                description="each node in its own SROS 2 enclave; docs/security.md",
             ),
             OpaqueFunction(function=_nodes),
         ]

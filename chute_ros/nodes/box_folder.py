@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
+from chute_ros.nodes.private_files import make_folder
 from chute_ros.nodes.ros_home import ros_home
 
 
@@ -26,7 +27,7 @@ class BoxFolder:
     def next_path(self, wall: int) -> Path:
         """The name of a new file. wall: the time, Unix ns. What orders them is their number: the
         clock of a computer without a battery begins anew with each start."""
-        self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        make_folder(self.path)
         number = max((number for number, _ in self._numbered()), default=0) + 1
         when = datetime.datetime.fromtimestamp(wall // 10**9, datetime.timezone.utc)
         return self.path / f"{self._name}_{number:06d}_{when:%Y%m%dT%H%M%SZ}.mcap"

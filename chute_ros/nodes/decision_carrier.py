@@ -73,8 +73,9 @@ class DecisionCarrier:
         verdict = self._gate.judge(decision, age)
         self._verdicts[verdict] += 1
         if verdict is Verdict.ACT:
-            log.warning(f"{_name(decision)} ({decision.rule}): {'; '.join(decision.reasons)}")
+            # Told afterwards: the wire comes first.
             self._carry_out(decision)
+            log.warning(f"{_name(decision)} ({decision.rule}): {'; '.join(decision.reasons)}")
         elif verdict is Verdict.REPEATED:
             # The supervisor has not heard our report, perhaps because it was not there yet.
             report = self._reports.get((decision.epoch, decision.id))

@@ -228,7 +228,8 @@ class DeviceNode(Node, ABC):
         self, decision: model.Decision, begin: Callable[[Any, int, float], None]
     ) -> None:
         """Have begin(link, token, now) called for a decision, once a parachute is heard."""
-        self.desk.deploy_for(decision, begin, self.values["give_up_after"])
+        wait = self.values["give_up_after"]
+        self.desk.request_once(decision, begin, lambda link: link.has_parachute(), wait)
 
     def in_link(self, function: Callable[[Any, float], None]) -> None:
         """Have function(link, now) called in the link's thread."""

@@ -7,11 +7,13 @@ come whole.
 from __future__ import annotations
 
 import datetime
+import os
 from dataclasses import dataclass
 from io import BufferedWriter
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
+from chute_ros.nodes.private_files import make_folder, open_new
 from chute_ros.nodes.ros_home import ros_home
 
 PART = ".part"
@@ -43,7 +45,7 @@ class DumpFiles:
     def refusal(self, path: str) -> str:
         """Why a dump cannot go to this path (empty: a new name); empty text: it can."""
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
+            make_folder(self.folder)
             if not path:
                 return ""
             wanted = self.folder / Path(path).expanduser()
@@ -63,8 +65,8 @@ class DumpFiles:
         self._size, self._failure = 0, ""
         try:
             self._final = self.folder / (Path(path).expanduser() if path else name)
-            self._final.parent.mkdir(parents=True, exist_ok=True)
-            self._file = open(f"{self._final}{PART}", "xb")  # noqa: SIM115
+            make_folder(self._final.parent)
+            self._file = os.fdopen(open_new(Path(f"{self._final}{PART}")), "wb")
         except OSError as error:
             self._failure = f"cannot be written: {error}"
         return str(self._final)

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import os
 import signal
 import sys
+from typing import NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.nodes.middleware import set_up_middleware
 
+#: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
+#: executor hand a kill to each other, and Python's own 5 ms would be most of its way.
+_SWITCH_INTERVAL = 0.0002
 _NOT_BUILT = (
     "chute_msgs cannot be imported: build both packages and source the result:\n"
     "  colcon build --base-paths src src/chute_ros/msg_defs   (in your workspace)\n"
@@ -34,6 +39,7 @@ def run(name: str, class_name: str) -> None:
             )
         raise
     set_up_middleware()
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
@@ -41,8 +47,7 @@ def run(name: str, class_name: str) -> None:
         rclpy.init()
     except RuntimeError as error:
         # Arguments and parameter files that cannot be read; ROS names them before its own code.
-        print(f"{name}: {str(error).partition(', at /')[0]}", file=sys.stderr)
-        sys.exit(2)
+        _refused(name, error)
     node = None
     try:
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
@@ -52,7 +57,9 @@ def run(name: str, class_name: str) -> None:
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # the usual ways to end a node
-    except RuntimeError:
+    except RuntimeError as error:
+        if node is None and _security():
+            _refused(name, error)  # the node or one of its topics
         # What a publish raises once a signal has shut ROS down; otherwise a mistake of ours.
         if rclpy.ok():
             raise
@@ -67,3 +74,19 @@ def run(name: str, class_name: str) -> None:
         # The signal's own handler may be shutting down at this very moment.
         with contextlib.suppress(RuntimeError):
             rclpy.try_shutdown()
+
+
+def _security() -> bool:
+    return os.environ.get("ROS_SECURITY_ENABLE") == "true"
+
+
+def _refused(name: str, error: RuntimeError) -> NoReturn:
+    """In one line why ROS did not let it start."""
+    text = " ".join(str(error).partition(", at /")[0].split())
+    if _security():
+        text += (
+            " (ROS_SECURITY_ENABLE is true: docs/security.md says what keystore, enclave and "
+            "middleware it needs)"
+        )
+    print(f"{name}: {text}", file=sys.stderr)
+    sys.exit(2)

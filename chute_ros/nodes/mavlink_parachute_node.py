@@ -24,7 +24,8 @@ from chute_ros.nodes.mavlink_diagnostics import (
     link_task,
     parachute_tasks,
 )
-from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from, signing_from
+from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from
+from chute_ros.nodes.signing_memory import SigningMemory
 from chute_ros.protocol.effect import EffectFinished
 from chute_ros.protocol.events import (
     RequestFinished,
@@ -48,7 +49,9 @@ class MavlinkParachuteNode(DeviceNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("mavlink_parachute", PARAMETERS, **options)
         address = parse_address(self.values["connection"])
-        link = MavlinkLink(config_from(self.values), *signing_from(self.values))
+        config = config_from(self.values)
+        self._signing = SigningMemory(self, self.values)
+        link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
         self.loop = WireLoop(link, make_wire(address), self.deliver)
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
@@ -58,9 +61,15 @@ class MavlinkParachuteNode(DeviceNode):
         self.serve(GetInfo, "~/get_info", self._get_info)
         self.begin()
 
+    def destroy_node(self) -> None:
+        """The link's thread ends first: then the newest times are known, and are written."""
+        super().destroy_node()
+        self._signing.finish()
+
     # -- what DeviceNode asks for ---------------------------------------------------------------
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
+        self._signing.keep(now)
         chosen = link.chosen_parachute()
         details = details_of(link, now)
         if not self.values["expect_parachute"]:
@@ -83,7 +92,12 @@ class MavlinkParachuteNode(DeviceNode):
 
     def carry_out(self, decision: model.Decision) -> None:
         if decision.action is model.Action.KILL:
-            self.desk.request_for(decision, lambda link, token, now: link.kill(token, now))
+            self.desk.request_once(
+                decision,
+                lambda link, token, now: link.kill(token, now),
+                MavlinkLink.has_autopilot,
+                self.values["give_up_after"],
+            )
         elif decision.action is model.Action.DEPLOY:
             force, device = self.values["deploy_arms_trigger"], decision.device
             self.deploy_for(
@@ -118,6 +132,7 @@ class MavlinkParachuteNode(DeviceNode):
             link_task(name, details, traffic, wire),
             *parachute_tasks(name, details, self.values["expect_parachute"]),
             autopilot_task(name, details.vehicle),
+            self._signing.task(name),
         ]
 
     # -- services -------------------------------------------------------------------------------

@@ -11,9 +11,7 @@ from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.mavlink.commands import CommandLimits
 from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
 from chute_ros.protocol.mavlink.parachute import StatusLimits
-from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.transport.address import FORMS
-from chute_ros.transport.signing_key import signing_from_file
 
 PARAMETERS = (
     Parameter(
@@ -136,11 +134,3 @@ def config_from(values: Mapping[str, Any]) -> MavlinkConfig:
         autopilot_message_rate=values["autopilot_message_rate"],
         disarm_when_blocked=values["disarm_when_blocked"],
     )
-
-
-def signing_from(values: Mapping[str, Any]) -> tuple[Signer | None, Verifier | None]:
-    """Signer and verifier for the key file, or neither; SigningKeyError if it cannot be used."""
-    name = values["signing_key_file"]
-    if not name:
-        return None, None
-    return signing_from_file(name, values["signing_link_id"], "parameter signing_key_file")

@@ -16,6 +16,7 @@ from mcap.writer import CompressionType, Writer
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from chute_ros.nodes.message_definitions import definition, type_hash, type_name
+from chute_ros.nodes.private_files import open_new, sync_folder
 
 #: A chunk that is longer (bytes, before compression) is finished before the next flush.
 _CHUNK = 256 * 1024
@@ -47,7 +48,7 @@ class McapFile:
             self._writer.start(profile="ros2", library="chute_ros")
             self._channels = {key: self._channel(topic) for key, topic in topics.items()}
             # The name must be on the disk too, or a power cut takes the file away.
-            _sync_folder(path.parent)
+            sync_folder(path.parent)
         except OSError:
             self._disk.close()
             path.unlink(missing_ok=True)  # or each try on a full disk would leave one behind
@@ -93,8 +94,7 @@ class _Disk:
     system, or raises."""
 
     def __init__(self, path: Path) -> None:
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
-        self._descriptor = os.open(path, flags, 0o600)
+        self._descriptor = open_new(path)
         self.position = 0
 
     def write(self, data: bytes) -> int:
@@ -118,14 +118,6 @@ class _Disk:
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:
             os.close(descriptor)
-
-
-def _sync_folder(path: Path) -> None:
-    folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
 
 
 def _offered(profile: QoSProfile) -> str:

@@ -12,6 +12,8 @@ from rclpy.task import Future
 from chute_ros import model
 
 Begin = Callable[[Any, int, float], None]
+#: Of a link: the device that a request needs was heard.
+Ready = Callable[[Any], bool]
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,8 @@ class RequestDesk:
         self._tokens = count(1)
         self._waiting: dict[int, Future] = {}
         self._decisions: dict[int, model.Decision] = {}
-        #: Deploys that wait for a parachute: (token, begin, until). Of the link's thread.
-        self._held: list[tuple[int, Begin, float]] = []
+        #: Those that wait for their device: (token, begin, ready, until). Of the link's thread.
+        self._held: list[tuple[int, Begin, Ready, float]] = []
 
     def request(self, begin: Begin) -> Future:
         """Have begin(link, token, now) called in the link's thread; the future is its end."""
@@ -52,30 +54,32 @@ class RequestDesk:
         self._decisions[token] = decision
         self._call(token, begin)
 
-    def deploy_for(self, decision: model.Decision, begin: Begin, give_up_after: float) -> None:
-        """The same for a deploy: a node that has just started waits until it has heard a
-        parachute, at most give_up_after s. try_held is called often meanwhile."""
+    def request_once(
+        self, decision: model.Decision, begin: Begin, ready: Ready, give_up_after: float
+    ) -> None:
+        """The same once ready says that there is a device for it: a node that has just started
+        has heard none yet, and waits for it at most give_up_after s. try_held is called often
+        meanwhile."""
         token = next(self._tokens)
         self._decisions[token] = decision
 
         def begin_or_hold(link: Any, now: float) -> None:
-            if link.has_parachute():
+            if ready(link):
                 self._begin(link, token, begin, now)
             else:
-                self._held.append((token, begin, now + give_up_after))
+                self._held.append((token, begin, ready, now + give_up_after))
 
         self._in_link(begin_or_hold)
 
     def try_held(self, link: Any, now: float) -> None:
-        """In the link's thread: begin the deploys that waited for a parachute, or for too long."""
-        ready = link.has_parachute()
+        """In the link's thread: begin those that waited for their device, or for too long."""
         held, self._held = self._held, []
-        for token, begin, until in held:
-            if ready or now >= until:
+        for token, begin, ready, until in held:
+            if ready(link) or now >= until:
                 # A call of its own: a mistake in it must not cost those that follow.
                 self._call(token, begin)
             else:
-                self._held.append((token, begin, until))
+                self._held.append((token, begin, ready, until))
 
     def finished(self, token: int, end: Any) -> None:
         """A request ended: its caller gets end."""

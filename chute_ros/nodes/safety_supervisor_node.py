@@ -163,7 +163,17 @@ class SafetySupervisorNode(Node):
             self._health.failed(error, new)
             self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
             return None
+        decisions = [output for output in outputs if isinstance(output, inputs.Decide)]
+        if decisions and self.lease.config.standby:
+            # Whoever takes over must know of what left.
+            self.lease.tell(now)
+        # Before anything is kept or told of it: a device waits for this.
+        sent = [self._publish_decision(one.decision) for one in decisions]
         self._recorder.turn(now, new, outputs, before, self.state, self.config)
+        for one, message in zip(decisions, sent, strict=True):
+            self._tell_decision(one, message)
+        if decisions:
+            self._memory.keep(self.state)
         return outputs
 
     def _sleep(self, wake: float) -> None:
@@ -171,16 +181,13 @@ class SafetySupervisorNode(Node):
         self._timer.reset()
 
     def _carry_out(self, outputs: tuple[inputs.Output, ...], now: float) -> None:
-        if any(isinstance(output, inputs.Decide) for output in outputs):
-            self.lease.tell(now)
-            self._memory.keep(self.state)
+        """All but the decisions, which have left by now."""
         for output in outputs:
-            self._do(output, now)
+            if not isinstance(output, inputs.Decide):
+                self._do(output, now)
 
     def _do(self, output: inputs.Output, now: float) -> None:
-        if isinstance(output, inputs.Decide):
-            self._publish_decision(output)
-        elif isinstance(output, inputs.Finish):
+        if isinstance(output, inputs.Finish):
             self.services_offered.finished(output)
         elif isinstance(output, inputs.ArmDevices):
             self._arming.begin(output, now)
@@ -190,10 +197,13 @@ class SafetySupervisorNode(Node):
             log = self.get_logger()
             log.error(output.text) if output.alarm else log.info(output.text)
 
-    def _publish_decision(self, output: inputs.Decide) -> None:
-        decision = output.decision
+    def _publish_decision(self, decision: model.Decision) -> SafetyDecision:
         message = messages.decision(decision, self.wall.now().to_msg())
         self._decision_publisher.publish(message)
+        return message
+
+    def _tell_decision(self, output: inputs.Decide, message: SafetyDecision) -> None:
+        decision = output.decision
         self._recorder.message("safety/decision", message)
         if not output.again:
             shadow = " (SHADOW, not sent)" if decision.shadow else ""

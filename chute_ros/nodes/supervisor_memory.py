@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +14,9 @@ from rclpy.node import Node
 
 from chute_ros.errors import RecordError
 from chute_ros.nodes import diagnostics
+from chute_ros.nodes.kept_file import KeptFile
 from chute_ros.nodes.parameters import Parameter
+from chute_ros.nodes.private_files import read_own_text
 from chute_ros.nodes.ros_home import ros_home
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
@@ -38,7 +38,7 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 class Memory:
-    """A thread writes: a slow disk must not be in the decision loop's way."""
+    """In a file of the node's own, where resume_within says that it may be needed."""
 
     def __init__(self, node: Node, values: Mapping[str, Any], config: SupervisorConfig) -> None:
         self._within = values["resume_within"]
@@ -47,30 +47,21 @@ class Memory:
         told = json.dumps(dict(values), sort_keys=True) + CODEC.to_json(config, whole=True)
         self._settings = hashlib.sha256(told.encode()).hexdigest()
         self._boot = _BOOT_ID.read_text().strip() if self._within else ""
-        self._trouble = ""
-        self._times = 0
-        self._newest: State | None = None
-        self._waiting = False
-        self._closed = False
-        self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self._write_all, name="memory", daemon=True)
-        if self._within:
-            self._thread.start()
+        self._file = KeptFile(self._path, self._text, "memory") if self._within else None
 
     def recall(self) -> State | None:
         """The state to go on with, once: should it be what stops us, the next starts anew."""
         try:
-            text = self._path.read_text() if self._within else ""
+            text = read_own_text(self._path) if self._within else ""
             self._path.unlink(missing_ok=True)
-        except (OSError, ValueError):
-            return None
-        try:
             state = (
                 resumed(text, self._boot, self._settings, self._within, time.monotonic())
                 if text
                 else None
             )
-        except RecordError as error:
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, RecordError) as error:
             self._log.warning(f"starts anew, {self._path} is of no use: {error}")
             return None
         if state is not None:
@@ -79,49 +70,25 @@ class Memory:
 
     def keep(self, state: State) -> None:
         """The newest state."""
-        if self._within:
-            with self._changed:
-                self._newest, self._waiting = state, True
-                self._changed.notify()
+        if self._file is not None:
+            self._file.keep(state)
 
     def task(self, name: str) -> DiagnosticStatus:
         """For diagnostics."""
-        level, text = diagnostics.OK, "kept while a flight lasts" if self._within else "off"
-        if self._trouble:
-            level, text = diagnostics.WARN, self._trouble
-        values = {"file": str(self._path), "times written": self._times}
+        level, text = diagnostics.OK, "off"
+        if self._file is not None:
+            text = "kept while a flight lasts"
+            if self._file.trouble:
+                level = diagnostics.WARN
+                text = f"a start anew in flight would forget it: {self._file.trouble}"
+        written_times = 0 if self._file is None else self._file.times_written
+        values = {"file": str(self._path), "times written": written_times}
         return diagnostics.status(name, "memory", level, text, values, "")
 
     def close(self) -> None:
         """Write what waits."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
-        if self._within:
-            self._thread.join(timeout=2.0)
+        if self._file is not None:
+            self._file.close()
 
-    def _write_all(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._waiting or self._closed)
-                state, self._waiting = self._newest if self._waiting else None, False
-            if state is None:
-                return
-            try:
-                self._write(state)
-                self._trouble = ""
-            except OSError as error:
-                self._trouble = f"a start anew in flight would forget it: {error}"
-
-    def _write(self, state: State) -> None:
-        if not worth_leaving(state):
-            self._path.unlink(missing_ok=True)
-            return
-        text = written(Left(self._boot, self._settings, state))
-        self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        new = self._path.with_suffix(".new")
-        # Not flushed to the disk: after a power cut the monotonic time is another anyway.
-        with open(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w") as file:
-            file.write(text)
-        new.replace(self._path)
-        self._times += 1
+    def _text(self, state: State) -> str:
+        return written(Left(self._boot, self._settings, state)) if worth_leaving(state) else ""

@@ -14,6 +14,7 @@ from rclpy.clock import Clock
 from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.task import Future
+from rclpy.type_support import check_for_type_support
 from std_srvs.srv import Trigger
 
 from chute_ros.nodes import messages
@@ -31,34 +32,44 @@ class SupervisorServices:
         self._waiting: dict[int, Future] = {}
         # A service that awaits its outcome must not keep the decision loop from running.
         self._group = ReentrantCallbackGroup()
-        self._services: list[Service] = []
-        self._calls = 0
-        self._closing = False
-
-    def open(self) -> None:
-        """Offer them."""
-        self._closing = False
-        if self._services:
-            return
-        for kind, name, callback in (
+        self._offers = (
             (Arm, "safety/arm", self._arm),
             (Deploy, "safety/deploy", self._deploy),
             (Kill, "safety/kill", self._kill),
             (Trigger, "safety/reset", self._reset),
             (SetMode, "safety/set_mode", self._set_mode),
-        ):
+        )
+        for kind, _, _ in self._offers:
+            # Now, not at a takeover: it opens files.
+            check_for_type_support(kind)
+        self._services: list[Service] = []
+        self._calls = 0
+        self._open = False
+
+    def open(self) -> None:
+        """Offer them. What the system does not allow now is tried again by tidy: the one that
+        leads must decide all the same."""
+        self._open = True
+        for kind, name, callback in self._offers[len(self._services) :]:
             served = self._counted(callback)
-            self._services.append(
-                self._node.create_service(kind, name, served, callback_group=self._group)
-            )
+            try:
+                service = self._node.create_service(kind, name, served, callback_group=self._group)
+            except Exception as error:  # noqa: BLE001 - the middleware names none
+                text = f"cannot offer {name}: {error}; trying again"
+                self._node.get_logger().error(text, throttle_duration_sec=1.0)
+                return
+            self._services.append(service)
 
     def close(self) -> None:
         """Another decides now. Whoever waits still gets an answer: tidy ends them."""
-        self._closing = True
+        self._open = False
 
     def tidy(self) -> None:
-        """Called often: take the services away once nobody waits at them any more."""
-        if self._closing and not self._calls:
+        """Called often: offer what is still missing, or take the services away once nobody waits
+        at them any more."""
+        if self._open:
+            self.open()
+        elif not self._calls:
             for service in self._services:
                 self._node.destroy_service(service)
             self._services.clear()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import glob
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
+from chute_ros.nodes.private_files import read_own_text, replace_text
 from chute_ros.nodes.ros_home import ros_home
 from chute_ros.protocol.dronecan.allocation import HIGHEST, LOWEST, UNIQUE_ID_LENGTH
 
@@ -26,7 +25,7 @@ class AllocationFile:
         """The table; empty if there is no file. ParameterError if it cannot be believed: to begin
         anew could give a node id of one device to another."""
         try:
-            text = self.path.read_text()
+            text = read_own_text(self.path)
         except FileNotFoundError:
             return {}
         except (OSError, UnicodeDecodeError) as error:
@@ -51,28 +50,9 @@ class AllocationFile:
         return table
 
     def save(self, table: Mapping[bytes, int]) -> None:
-        """Write all beside the file, then put it in its place; OSError if that fails."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        for left in self.path.parent.glob(f"{glob.escape(self.path.name)}.*.new"):
-            left.unlink(missing_ok=True)  # of a process that was killed while it wrote
-        beside = self.path.with_name(f"{self.path.name}.{os.getpid()}.new")
+        """It is on the disk before anybody gets the node id; OSError if that fails."""
         text = json.dumps({key.hex(): n for key, n in sorted(table.items())}, indent=1) + "\n"
-        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        try:
-            with os.fdopen(descriptor, "w") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            beside.replace(self.path)
-        except OSError:
-            beside.unlink(missing_ok=True)
-            raise
-        # The new name itself must be on the disk before anybody gets the node id.
-        folder = os.open(self.path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        replace_text(self.path, text, durable=True)
 
     def _unusable(self, why: str) -> ParameterError:
         return ParameterError(

@@ -99,12 +99,13 @@ class UpfCanNode(DeviceNode):
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):
+            # Told afterwards: the supervisor comes first.
+            self.ask_supervisor(int(event.ask), event.device, event.reason)
             text = f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
             if event.ask is Ask.FLIGHT_BLOCK_RELEASE:
                 self.get_logger().info(text)
             else:
                 self.get_logger().warning(text)
-            self.ask_supervisor(int(event.ask), event.device, event.reason)
         elif isinstance(event, ErrandFinished):
             self.desk.finished(event.token, event)
         elif isinstance(event, TriggerChanged):

@@ -148,12 +148,8 @@ STARTED = {
 }
 
 
-@pytest.mark.parametrize("parachute", STARTED)
-@EVERY
-def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
-    file, parachute, monkeypatch
-):
-    """Run for real, with stand-ins where `launch` is not there."""
+def made_by(file, monkeypatch, **arguments):
+    """What the function of a launch file makes: run for real, with stand-ins for `launch`."""
     for name in {"launch", "launch.actions", "launch.substitutions", "launch_ros.actions"} | {
         "launch.launch_description_sources",
         "launch_ros",
@@ -163,19 +159,42 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
         module.__getattr__ = lambda wanted: type(wanted, (Recorded,), {})
         monkeypatch.setitem(sys.modules, name, module)
     Recorded.made.clear()
-    chosen = {"parachute": parachute, "port": "14600", "namespace": "drone1"}
-    monkeypatch.setattr(Recorded, "chosen", chosen)
+    monkeypatch.setattr(Recorded, "chosen", {"port": "14600", **arguments})
     space = {}
     exec(compile(file.read_text(), str(file), "exec"), space)
     function = space.get("_nodes") or space["_vehicle"]
     function(context=None)
-    names = {one.options.get("executable") or one.options.get("name") for one in Recorded.made}
+    return list(Recorded.made)
+
+
+@pytest.mark.parametrize("parachute", STARTED)
+@EVERY
+def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
+    file, parachute, monkeypatch
+):
+    made = made_by(file, monkeypatch, parachute=parachute, namespace="drone1")
+    names = {one.options.get("executable") or one.options.get("name") for one in made}
     nodes, simulators = STARTED[parachute]
     vehicle = file.name.startswith("vehicle")
     assert names - {None} == ({*nodes, "safety_supervisor"} if vehicle else simulators)
     if vehicle:
-        started = [one for one in Recorded.made if "executable" in one.options]
+        started = [one for one in made if "executable" in one.options]
         assert all(one.options["respawn"] for one in started), "what dies is started again"
+
+
+@pytest.mark.parametrize(
+    ("namespace", "place"), [("", ""), ("drone1", "/drone1"), ("/fleet/drone1", "/fleet/drone1")]
+)
+def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(namespace, place, monkeypatch):
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    given = {"parachute": "both", "namespace": namespace}
+    for enclaves in ("true", "false"):
+        made = made_by(vehicle, monkeypatch, **given, enclaves=enclaves)
+        nodes = [one.options for one in made if "executable" in one.options]
+        assert len(nodes) == 3
+        for node in nodes:
+            own = ["--enclave", f"{place}/{node['executable']}"]
+            assert node["ros_arguments"] == (own if enclaves == "true" else [])
 
 
 @EVERY

@@ -113,4 +113,5 @@ def test_where_nothing_can_be_written_diagnostics_say_so(bench, monkeypatch):
         return [s for s in mine if s.level == DiagnosticStatus.WARN]
 
     task = bench.until(warned, "it is told")[-1]
-    assert task.message.startswith("a start anew in flight would forget it: [Errno 20]")
+    assert task.message.startswith("a start anew in flight would forget it: [Errno 17]")
+    assert str(nowhere) in task.message

@@ -186,6 +186,10 @@ class MavlinkLink:
         """A device was heard that can be told to deploy."""
         return self.chosen_parachute() is not None
 
+    def has_autopilot(self) -> bool:
+        """One was heard that can be told to stop the motors."""
+        return self._devices.chosen_autopilot() is not None
+
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Where requests without a device go: the first that is not lost, or the first."""
         return self._devices.chosen_parachute()

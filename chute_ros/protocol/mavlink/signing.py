@@ -2,16 +2,19 @@
 
 Source: MAVLink developer guide, "Message signing": SHA-256 over key, frame and time stamp, cut to
 48 bits; time stamps in units of 10 microseconds since 2015-01-01, rising in each stream (system,
-component, link id); a new stream may lag at most one minute.
+component, link id), and never more than one minute behind our own.
 
 A stream's time stamp is stored only after its signature was found right, so that a forged frame
-with a high time stamp does not shut out the true sender.
+with a high time stamp does not shut out the true sender. What was stored outlives the process
+(Times): otherwise what was recorded before a restart would be believed after it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import hmac
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from chute_ros.errors import SigningKeyError
 
@@ -19,6 +22,7 @@ KEY_BYTES = 32
 #: Unix time (s) of time stamp 0.
 EPOCH_2015 = 1420070400
 UNITS_PER_SECOND = 100_000
+#: So far a time stamp may lag behind our own.
 NEW_STREAM_LAG = 60 * UNITS_PER_SECOND
 
 UNSIGNED = "frame without a signature"
@@ -30,6 +34,19 @@ UNSIGNED_ALLOWED = frozenset({109})
 
 _TIMESTAMP = slice(-12, -6)
 _LINK_ID = -13
+
+
+#: (system id, component id, link id)
+Stream = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Times:
+    """What must outlive a restart: the highest time stamp that was given out or heard, and the
+    newest of each stream that was heard."""
+
+    newest: int = 0
+    streams: Mapping[Stream, int] = field(default_factory=dict)
 
 
 def key_from_text(text: bytes, name: str) -> bytes:
@@ -77,21 +94,25 @@ class Signer:
         self.key = key
         self.link_id = link_id
         self._clock = clock
-        self._last = 0
+        #: The highest that was given out.
+        self.newest = 0
 
     def next_timestamp(self, now: float) -> int:
         """A time stamp higher than any given out before."""
-        self._last = max(self._clock.at(now), self._last + 1)
-        return self._last
+        self.newest = max(self._clock.at(now), self.newest + 1)
+        return self.newest
 
 
 class Verifier:
-    """Checks the frames that we receive against key."""
+    """Checks the frames that we receive against key. streams: heard before a restart."""
 
-    def __init__(self, key: bytes, clock: SigningClock) -> None:
+    def __init__(
+        self, key: bytes, clock: SigningClock, streams: Mapping[Stream, int] | None = None
+    ) -> None:
         self._key = key
         self._clock = clock
-        self._streams: dict[tuple[int, int, int], int] = {}
+        #: The newest time stamp of each.
+        self.streams: dict[Stream, int] = dict(streams or {})
 
     def refusal(self, raw: bytes, signed: bool, message_id: int, now: float) -> str:
         """Why the frame in raw is refused; empty: it is good."""
@@ -102,9 +123,13 @@ class Verifier:
             return WRONG_SIGNATURE
         timestamp = int.from_bytes(raw[_TIMESTAMP], "little")
         stream = (raw[5], raw[6], raw[_LINK_ID])
-        last = self._streams.get(stream, self._clock.at(now) - NEW_STREAM_LAG)
-        if timestamp <= last:
+        if timestamp <= max(self.streams.get(stream, 0), self._clock.at(now) - NEW_STREAM_LAG):
             return REPLAYED
-        self._streams[stream] = timestamp
+        self.streams[stream] = timestamp
         self._clock.heard(timestamp)
         return ""
+
+
+def times_of(signer: Signer, verifier: Verifier) -> Times:
+    """What must outlive a restart, now."""
+    return Times(max([signer.newest, *verifier.streams.values()]), dict(verifier.streams))

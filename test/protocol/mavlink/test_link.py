@@ -64,6 +64,13 @@ def test_a_deploy_need_not_wait_once_a_parachute_was_heard():
     assert bench.link.has_parachute(), "one that is lost is told all the same"
 
 
+def test_a_kill_need_not_wait_once_an_autopilot_was_heard():
+    bench = Bench().hear(CHUTE, heartbeat())
+    assert not bench.link.has_autopilot(), "a parachute is none"
+    bench.hear(PILOT, copter()).at(60.0)
+    assert bench.link.has_autopilot(), "one that is lost is told all the same"
+
+
 @pytest.mark.parametrize("interval", [0.0, -1.0, math.inf, math.nan])
 def test_a_heartbeat_needs_a_time_between_two(interval):
     with pytest.raises(ParameterError) as raised:

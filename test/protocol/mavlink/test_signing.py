@@ -25,6 +25,10 @@ def signed(key=KEY, now=NOW, link=0, ids=(1, 161), signer=None):
     return encoder.encode(d.MAVLink_heartbeat_message(37, 8, 0, 0, 3, 3), now)
 
 
+def signed_time(now):
+    return int.from_bytes(signed(now=now)[-12:-6], "little")
+
+
 def reader():
     return FrameDecoder(Verifier(KEY, clock()))
 
@@ -75,6 +79,38 @@ def test_a_frame_of_a_minute_ago_does_not_open_a_stream():
     decoder = reader()
     assert decoder.feed_datagram(signed(now=NOW - 61.0), NOW) == []
     assert decoder.counts[signing.REPLAYED] == 1
+
+
+def test_a_stream_that_falls_back_by_more_than_a_minute_is_not_heard_any_more():
+    """As one whose frames are recorded, held back, and let through ever later."""
+    decoder = reader()
+    assert len(decoder.feed_datagram(signed(now=NOW), NOW)) == 1
+    assert len(decoder.feed_datagram(signed(now=NOW + 1.0), NOW + 60.0)) == 1
+    assert decoder.feed_datagram(signed(now=NOW + 2.0), NOW + 63.0) == []
+    assert decoder.counts[signing.REPLAYED] == 1
+
+
+def test_what_was_heard_before_a_restart_is_not_heard_after_it():
+    ours = clock()
+    signer, verifier = Signer(KEY, ours), Verifier(KEY, ours)
+    recorded = signed(now=NOW)
+    assert len(FrameDecoder(verifier).feed_datagram(recorded, NOW)) == 1
+    before = signing.times_of(signer, verifier)
+    assert list(before.streams) == [(1, 161, 0)]
+    assert before.newest == before.streams[1, 161, 0], "nothing was sent"
+    again = FrameDecoder(Verifier(KEY, clock(), before.streams))
+    assert again.feed_datagram(recorded, NOW) == []
+    assert again.counts[signing.REPLAYED] == 1
+    assert len(again.feed_datagram(signed(now=NOW + 0.1), NOW + 0.1)) == 1
+    assert (1, 161, 0) in before.streams
+    assert before.streams[1, 161, 0] < signed_time(now=NOW + 0.1), "it is a picture of then"
+
+
+def test_what_we_have_given_out_counts_among_the_newest():
+    ours = clock()
+    signer = Signer(KEY, ours)
+    given = signer.next_timestamp(NOW)
+    assert signing.times_of(signer, Verifier(KEY, ours)) == signing.Times(given, {})
 
 
 def test_one_forged_frame_with_a_high_time_does_not_shut_out_the_true_sender():

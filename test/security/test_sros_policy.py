@@ -1,0 +1,181 @@
+"""The SROS 2 policy allows each node exactly what it does, and nobody else to decide."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+from node_bench import LOCAL
+
+from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.nodes.umbilical_node import UmbilicalNode
+from chute_ros.nodes.upf_can_node import UpfCanNode
+from chute_ros.tools.isolation import free_udp_ports
+
+CONFIG = Path(__file__).parents[2] / "config"
+POLICY = CONFIG / "security" / "policy.xml"
+NODES = {
+    "mavlink_parachute": (MavlinkParachuteNode, lambda: f"udpin:{LOCAL}:0"),
+    "upf_can": (UpfCanNode, lambda: f"mcast:0:{free_udp_ports(1)[0]}"),
+    "umbilical": (UmbilicalNode, lambda: "serial:/nowhere/ttyACM0"),
+    "safety_supervisor": (SafetySupervisorNode, None),
+}
+#: What ROS itself gives every node.
+OF_ROS = ("rcl_interfaces/", "type_description_interfaces/")
+EVERY_NODE = {"/rosout", "/parameter_events"}
+#: What each node of the ros2 command line offers.
+COMMAND_LINE = {
+    f"/_ros2cli_*/{name}"
+    for name in (
+        "describe_parameters",
+        "get_parameter_types",
+        "get_parameters",
+        "get_type_description",
+        "list_parameters",
+        "set_parameters",
+        "set_parameters_atomically",
+    )
+}
+#: (in the policy, in the graph)
+RIGHTS = {
+    "publish": "publisher",
+    "subscribe": "subscriber",
+    "reply": "service",
+    "request": "client",
+}
+
+
+def allowed():
+    """Enclave -> right -> names, relative to the profile's namespace."""
+    found = {}
+    for enclave in ElementTree.parse(POLICY).getroot().iter("enclave"):
+        (profile,) = enclave.iter("profile")
+        assert profile.get("ns") == "/"
+        node = profile.get("node")
+        assert enclave.get("path") == f"/{node}"
+        rights = found[node] = defaultdict(set)
+        for group in profile:
+            ((right, verdict),) = group.items()
+            assert verdict == "ALLOW"
+            for one in group:
+                name = one.text.replace("~", node)
+                assert name not in rights[right], f"{name} is there twice"
+                rights[right].add(name)
+    return found
+
+
+def in_graph(bench, name):
+    """Right -> name -> type of what this node does now, as the policy writes it."""
+    prefix = f"{bench.namespace}/"
+    found = {}
+    for right, what in RIGHTS.items():
+        ask = getattr(bench.client, f"get_{what}_names_and_types_by_node")
+        found[right] = {
+            one.removeprefix(prefix): kinds[0] for one, kinds in ask(name, bench.namespace)
+        }
+    return found
+
+
+def shipped_parameters(name):
+    """Of every parameter file that is shipped with this node in it."""
+    every = (yaml.safe_load(path.read_text()) for path in sorted(CONFIG.glob("*.yaml")))
+    mine = [one[f"/**/{name}"]["ros__parameters"] for one in every if f"/**/{name}" in one]
+    assert mine
+    return mine
+
+
+def does(bench, name):
+    """Right -> name -> type of what the node does with any of its parameter files."""
+    make, connection = NODES[name]
+    total = defaultdict(dict)
+    for parameters in shipped_parameters(name):
+        if connection is not None:
+            parameters["connection"] = connection()
+        node = bench.add(make, **parameters)
+        bench.until(
+            lambda: (
+                set(in_graph(bench, name)["publish"]) >= EVERY_NODE
+                and f"{name}/set_parameters" in in_graph(bench, name)["reply"]
+            ),
+            "it is in the graph",
+        )
+        for right, names in in_graph(bench, name).items():
+            total[right] |= names
+        bench.remove(node)
+        bench.until(lambda: name not in bench.client.get_node_names(), "it is gone from the graph")
+    return total
+
+
+@pytest.fixture
+def everything(bench):
+    """What all nodes do: right -> name -> type."""
+    total = defaultdict(dict)
+    for name in NODES:
+        for right, names in does(bench, name).items():
+            total[right] |= names
+    return total
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_a_node_is_allowed_what_it_does_and_nothing_more(bench, name):
+    rights = allowed()[name]
+    found = does(bench, name)
+    for right in RIGHTS:
+        assert rights[right] == set(found[right]), right
+
+
+def test_a_standby_is_allowed_what_the_first_is_under_its_own_name():
+    first, second = allowed()["safety_supervisor"], allowed()["standby"]
+    assert {
+        right: {one.replace("safety_supervisor/", "standby/") for one in names}
+        for right, names in first.items()
+    } == second
+
+
+def test_a_console_may_ask_for_everything_and_say_nothing(everything):
+    console = allowed()["console"]
+    asked = {name for name, kind in everything["reply"].items() if not kind.startswith(OF_ROS)}
+    assert console["request"] == asked
+    assert console["publish"] == EVERY_NODE
+    assert console["subscribe"] == set(everything["publish"]) - {"/parameter_events"}
+    assert console["reply"] == COMMAND_LINE
+
+
+def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
+    recorder = allowed()["recorder"]
+    assert recorder["subscribe"] == set(everything["publish"]) - {"/parameter_events"}
+    assert recorder["publish"] == EVERY_NODE
+    assert recorder["reply"] == COMMAND_LINE
+    assert recorder["request"] == set()
+
+
+@pytest.mark.parametrize(
+    ("topic", "who"),
+    [
+        ("safety/decision", {"safety_supervisor", "standby"}),
+        ("safety/lease", {"safety_supervisor", "standby"}),
+        ("safety/state", {"safety_supervisor", "standby"}),
+        ("safety/request", {"mavlink_parachute", "upf_can", "umbilical"}),
+        ("safety/action", {"mavlink_parachute", "upf_can", "umbilical"}),
+        ("parachute/status", {"mavlink_parachute", "upf_can", "umbilical"}),
+        ("vehicle/state", {"mavlink_parachute", "umbilical"}),
+    ],
+)
+def test_only_these_may_say_what_decides(topic, who):
+    assert {name for name, rights in allowed().items() if topic in rights["publish"]} == who
+
+
+def test_nobody_may_change_a_nodes_parameters():
+    asked = {name for rights in allowed().values() for name in rights["request"]}
+    assert not any("parameters" in name for name in asked)
+    assert not any("*" in name for name in asked)
+
+
+def test_no_comment_stands_among_the_enclaves():
+    """ros2 security takes one for an enclave without a path, and ends."""
+    text = POLICY.read_text()
+    assert "<!--" not in text[text.index("<enclaves>") :]
