@@ -1,39 +1,74 @@
-"""make hosts: writes docs/hosts.md. As root: python3 -m faults [PART OF A STORY'S NAME ...]"""
+"""make hosts: writes docs/hosts.md. As root: python3 -m faults [PART ...] [--only WORDS ...]
+
+PART: supervisors, ground, discovery, fleet; none: all. --only: the stories whose names contain one
+of these, and nothing is written.
+"""
 
 from __future__ import annotations
 
+import argparse
 import os
+import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
-from bench.report import load, machine
-from faults import two_supervisors
+from faults import ground_station_flight, two_supervisors
+from faults import ground_station_stories as ground
+from faults.fleet_discovery import search_all
+from faults.fleet_discovery import table as discovery_table
+from faults.fleet_stories import fly_all as fly_fleets
+from faults.fleet_stories import table as fleet_table
+from faults.hosts_page import PARTS, with_part
 from faults.network import Network, why_not
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "hosts.md"
-_PAGE = """\
-# Several hosts
+Names = tuple[str, ...]
+#: A part's table, and whether everything in it was as it must be.
+Outcome = tuple[str, bool]
 
-Written by `make hosts`. The numbers belong to the machine that made them:
-{machine}. {load}
 
-Each host is a network namespace of its own; a switch in user space (`faults/switch.py`) joins
-them, whose cables are cut, slowed, made lossy or one-way. All processes are the real ones.
+def _supervisors(names: Names) -> Outcome:
+    with Network(two_supervisors.HOSTS) as network:
+        network.enter(two_supervisors.VEHICLE)
+        every = two_supervisors.fly_all(network, names)
+    return two_supervisors.table(every), not any(told.wrong for told in every)
 
-## Two supervisors
 
-The vehicle, with `mavlink_parachute`, an autopilot and a parachute, is one host; two supervisors
-with `hot_standby` are the two others. In flight a cable is spoilt, then a motor fails. Times: from
-the spoiling to the takeover; from the motor's failure to the kill on the wire and to the
-parachute's own "deployed"; from the healing until one leads and the other follows. In each story:
-one deploy was acted on, after the kill, and none by the order of an older leader.
+def _ground(names: Names) -> Outcome:
+    with Network(ground_station_flight.HOSTS) as network:
+        network.enter(ground_station_flight.VEHICLE)
+        every = ground.fly_all(network, names)
+    return ground.table(every), not any(seen.wrong for _, seen in every)
 
-{supervisors}
-"""
+
+def _discovery(_: Names) -> Outcome:
+    steps = search_all()
+    return discovery_table(steps), not any(step.wrong for step in steps)
+
+
+def _fleet(names: Names) -> Outcome:
+    every = fly_fleets(names)
+    return fleet_table(every), not any(flown.wrong for flown in every)
+
+
+_RUN: dict[str, Callable[[Names], Outcome]] = {
+    "supervisors": _supervisors,
+    "ground": _ground,
+    "discovery": _discovery,
+    "fleet": _fleet,
+}
 
 
 def main() -> None:
-    """Fly them; exit code 1 if something went wrong."""
+    """Run them; exit code 1 if something went wrong."""
+    options = argparse.ArgumentParser("faults")
+    options.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}")
+    options.add_argument("--only", nargs="+", default=(), metavar="WORDS")
+    chosen = options.parse_args()
+    for part in chosen.parts:
+        if part not in PARTS:
+            sys.exit(f"hosts: part {part!r} is not known: need one of {', '.join(PARTS)}")
     if reason := why_not():
         sys.exit(f"hosts: {reason}")
     os.environ |= {
@@ -42,16 +77,20 @@ def main() -> None:
         # Shared memory does not care about a network that is cut.
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     }
-    before = load()
-    with Network(two_supervisors.HOSTS) as network:
-        network.enter(two_supervisors.VEHICLE)
-        every = two_supervisors.fly_all(network, tuple(sys.argv[1:]))
-    text = two_supervisors.table(every)
-    print(text)
-    if not sys.argv[1:]:
-        PAGE.write_text(_PAGE.format(machine=machine(), load=before, supervisors=text))
-    if any(told.wrong for told in every):
-        sys.exit("hosts: not everything went as it must")
+    # Ended from outside it must leave neither hosts nor processes behind.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("hosts: ended from outside"))
+    wrong = []
+    for part in chosen.parts or PARTS:
+        before = os.getloadavg()[0]
+        text, good = _RUN[part](tuple(chosen.only))
+        print(text)
+        if not chosen.only:
+            page = PAGE.read_text() if PAGE.exists() else ""
+            PAGE.write_text(with_part(page, part, text, before))
+        if not good:
+            wrong.append(part)
+    if wrong:
+        sys.exit(f"hosts: not everything went as it must: {', '.join(wrong)}")
 
 
 if __name__ == "__main__":

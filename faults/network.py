@@ -11,6 +11,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 
 #: <linux/ethtool.h>, <linux/sockios.h>: transmit checksums are left to a card that is not there.
@@ -19,7 +20,7 @@ _CLONE_NEWNET = 0x40000000
 
 
 class Network:
-    """Hosts 10.77.0.1, .2, ...; the first is where this process moves to with enter."""
+    """Hosts 10.77.0.1, .2, ...; this process moves to one with enter, and back at the end."""
 
     def __init__(self, hosts: Sequence[str]) -> None:
         self.hosts = tuple(hosts)
@@ -28,6 +29,7 @@ class Network:
         self._switch: subprocess.Popen[str] | None = None
 
     def __enter__(self) -> Network:
+        self._home = os.open("/proc/thread-self/ns/net", os.O_RDONLY)
         try:
             for number, host in enumerate(self.hosts, start=1):
                 self._add(host, number)
@@ -41,6 +43,7 @@ class Network:
             for host in self.hosts:
                 self.cable(host, "heal")
         except BaseException:
+            os.close(self._home)
             self._remove()
             raise
         return self
@@ -51,6 +54,8 @@ class Network:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        _move_to(self._home)
+        os.close(self._home)
         self._remove()
 
     def cable(self, host: str, *command: str) -> None:
@@ -69,8 +74,17 @@ class Network:
     def enter(self, host: str) -> None:
         """This thread, and the processes and threads that it starts from now on, are on host."""
         with open(f"/run/netns/{self._space(host)}") as space:
-            if ctypes.CDLL(None, use_errno=True).setns(space.fileno(), _CLONE_NEWNET):
-                raise OSError(ctypes.get_errno(), "setns")
+            _move_to(space.fileno())
+
+    def address(self, host: str) -> str:
+        """Of a host, on its cable."""
+        return f"10.77.0.{self.hosts.index(host) + 1}"
+
+    def carried(self, host: str) -> tuple[int, int]:
+        """Bytes that have left the host, and that have reached it, since the beginning."""
+        counters = Path("/sys/class/net") / self._near(host) / "statistics"
+        sent, received = (int((counters / f"{way}_bytes").read_text()) for way in ("rx", "tx"))
+        return sent, received
 
     def _space(self, host: str) -> str:
         return f"chute_{self._tag}_{host}"
@@ -88,7 +102,7 @@ class Network:
         _ip("link", "set", near, "up")
         inside = ("-n", space)
         _ip(*inside, "link", "set", far, "name", "eth0")
-        _ip(*inside, "address", "add", f"10.77.0.{number}/24", "dev", "eth0")
+        _ip(*inside, "address", "add", f"{self.address(host)}/24", "dev", "eth0")
         for interface in ("lo", "eth0"):
             _ip(*inside, "link", "set", interface, "up")
         _ip(*inside, "route", "add", "224.0.0.0/4", "dev", "eth0")
@@ -110,6 +124,11 @@ def why_not() -> str:
         return "needs root: network namespaces and raw sockets"
     done = subprocess.run(["ip", "netns", "list"], check=False, capture_output=True, text=True)
     return done.stderr.strip() if done.returncode else ""
+
+
+def _move_to(space: int) -> None:
+    if ctypes.CDLL(None, use_errno=True).setns(space, _CLONE_NEWNET):
+        raise OSError(ctypes.get_errno(), "setns")
 
 
 def _ip(*arguments: str) -> None:

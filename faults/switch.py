@@ -6,6 +6,7 @@ python -m faults.switch PORT=INTERFACE ...    commands on standard input, one a 
     PORT deaf | PORT mute         nothing reaches the host | nothing leaves it
     PORT slow SECONDS             what leaves it or reaches it comes so much later
     PORT lossy FRACTION           of frames is lost, each way
+    PORT unicast                  no IP multicast passes, as on many radio links
 
 Each command is answered with "ok". The interfaces are the near ends of veth pairs.
 """
@@ -23,6 +24,7 @@ from dataclasses import dataclass
 
 _ETH_P_ALL = 3
 _BROADCAST_BIT = 1
+_MULTICAST = bytes.fromhex("01005e")  # how an IP multicast group's address begins on Ethernet
 #: More than this waiting: a slow cable drops, as a router does.
 _MOST_WAITING = 20_000
 
@@ -37,9 +39,20 @@ class Cable:
     receives: bool = True
     delay: float = 0.0
     loss: float = 0.0
+    multicast: bool = True
 
-    def passes(self) -> bool:
+    def set(self, what: str, value: str) -> None:
+        """As a command has it; whatever was before is over."""
+        self.sends = what not in ("cut", "mute")
+        self.receives = what not in ("cut", "deaf")
+        self.delay = float(value) if what == "slow" else 0.0
+        self.loss = float(value) if what == "lossy" else 0.0
+        self.multicast = what != "unicast"
+
+    def passes(self, frame: bytes) -> bool:
         """This frame is not lost."""
+        if not self.multicast and frame[:3] == _MULTICAST:
+            return False
         return random.random() >= self.loss
 
 
@@ -77,11 +90,7 @@ class Switch:
                 self._send(name, frame)
 
     def _command(self, name: str, what: str, value: str = "0") -> None:
-        cable = self.cables[name]
-        cable.sends = what not in ("cut", "mute")
-        cable.receives = what not in ("cut", "deaf")
-        cable.delay = float(value) if what == "slow" else 0.0
-        cable.loss = float(value) if what == "lossy" else 0.0
+        self.cables[name].set(what, value)
 
     def _take(self, source: str) -> None:
         cable = self.cables[source]
@@ -93,7 +102,7 @@ class Switch:
             if address[2] == socket.PACKET_OUTGOING:
                 continue  # what we sent ourselves
             self._where[frame[6:12]] = source
-            if not cable.sends or not cable.passes():
+            if not cable.sends or not cable.passes(frame):
                 continue
             known = None if frame[0] & _BROADCAST_BIT else self._where.get(frame[:6])
             for name in (known,) if known else self.cables:
@@ -109,7 +118,7 @@ class Switch:
 
     def _send(self, name: str, frame: bytes) -> None:
         cable = self.cables[name]
-        if cable.receives and cable.passes():
+        if cable.receives and cable.passes(frame):
             try:
                 cable.wire.send(frame)
             except OSError:

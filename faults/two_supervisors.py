@@ -6,10 +6,8 @@ after the kill, by one order; healed, one of the two must lead.
 
 from __future__ import annotations
 
-import re
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,16 +16,13 @@ from chute_msgs.msg import SupervisorLease
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.demo_director import Director, StepFailedError
-from chute_ros.tools.demo_rig import Rig
-from chute_ros.tools.pilot import Pilot
-from chute_ros.tools.processes import Processes
+from chute_ros.tools.demo_director import StepFailedError
+from faults.flight import Flight, reported
 from faults.network import Network
 
 VEHICLE, FIRST, SECOND = "vehicle", "first", "second"
 HOSTS = (VEHICLE, FIRST, SECOND)
 HEIGHT = 60.0  # m
-_ACTED = re.compile(r"decision (\d+)\.(\d+) (KILL|DEPLOY) \(")
 
 
 @dataclass(frozen=True)
@@ -73,27 +68,16 @@ class Told:
     wrong: str = ""
 
 
-class Scene:
-    """One flight with the hosts of a network; this process is on the vehicle's host."""
+class Scene(Flight):
+    """One flight with two supervisors."""
 
     def __init__(self, network: Network, folder: Path, namespace: str) -> None:
-        self.network = network
-        self.processes = Processes(folder)
-        self.director = Director(namespace, self.processes)
-        self.rig = Rig.on_free_ports("mavlink", "", namespace, self.processes)
-        self.pilot = Pilot(self.rig.pilot, system_id=1)
+        super().__init__(network, folder, namespace)
         #: Name -> what it said last, and when.
         self.claims: dict[str, tuple[SupervisorLease, float]] = {}
         self.director.node.create_subscription(
             SupervisorLease, "safety/lease", self._claim, qos.STATUS
         )
-
-    def close(self) -> None:
-        """Everything ends; the network is whole again."""
-        self.heal()
-        self.pilot.close()
-        self.director.close()
-        self.processes.end()
 
     def take_off(self) -> None:
         """Both supervisors up, the first leads, the vehicle at its height."""
@@ -106,11 +90,7 @@ class Scene:
         director.until("the second follows", 30.0, lambda: self.follows(SECOND))
         director.until("flight is released", 30.0, director.stage(Stage.READY))
         director.until_granted("arming", 10.0, director.ask_arm)
-        self.pilot.arm()
-        director.until("the motors are armed", 10.0, lambda: director.vehicle.armed == 2)
-        self.pilot.take_off(HEIGHT)
-        director.until("it flies", 20.0, director.stage(Stage.IN_FLIGHT))
-        director.until("it is up", 60.0, lambda: director.vehicle.height > HEIGHT - 1.0)
+        self.climb(HEIGHT)
 
     def _start(self, name: str, rank: int) -> None:
         self.rig.start_supervisor(
@@ -142,18 +122,6 @@ class Scene:
         """As the story says."""
         for command in story.spoilt:
             self.network.cable(*command)
-
-    def heal(self) -> None:
-        """Every cable is whole."""
-        for host in self.network.hosts:
-            self.network.cable(host, "heal")
-
-    def acted(self) -> list[tuple[int, int, str]]:
-        """The kills and deploys that the device node acted on, in their order."""
-        text = self.processes.log("mavlink").read_text(errors="replace")
-        lines = (line for line in text.splitlines() if "not acted on" not in line)
-        found = (_ACTED.search(line) for line in lines if "[WARN]" in line)
-        return [(int(one[1]), int(one[2]), one[3]) for one in found if one]
 
     def _claim(self, message: SupervisorLease) -> None:
         self.claims[message.name] = (message, time.monotonic())
@@ -191,9 +159,9 @@ def _fly(scene: Scene, story: Story, told: Told) -> None:
     scene.pilot.fail_motor()
     if story.healed_after:
         scene.spoil(story)
-        _spin(director, story.healed_after)
+        scene.spin(story.healed_after)
         scene.heal()
-    director.until("a kill is on the wire", 10.0, _reported(director, Action.KILL))
+    director.until("a kill is on the wire", 10.0, reported(director, Action.KILL, Outcome.SENT))
     told.killed = director.when(Action.KILL, Outcome.SENT) - failed_at
     if story.at_kill:
         scene.spoil(story)
@@ -205,16 +173,7 @@ def _fly(scene: Scene, story: Story, told: Told) -> None:
     told.healed = since(healed_at)
     director.until("it says deployed", 10.0, director.stage(Stage.DEPLOYED))
     # Whoever would still fire does it within its next turns.
-    _spin(director, 2.0)
-
-
-def _reported(director: Director, action: Action) -> Callable[[], bool]:
-    return lambda: director.outcome(action, Outcome.SENT) is not None
-
-
-def _spin(director: Director, seconds: float) -> None:
-    end = time.monotonic() + seconds
-    director.until("time passes", seconds + 5.0, lambda: time.monotonic() >= end)
+    scene.spin(2.0)
 
 
 def _wrong(scene: Scene) -> str:

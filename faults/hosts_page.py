@@ -1,0 +1,83 @@
+"""docs/hosts.md: each part is written anew by itself, and keeps its place among the others."""
+
+from __future__ import annotations
+
+import re
+
+from bench.report import machine
+
+_HEAD = """\
+# Several hosts
+
+Written by `make hosts`; each part can be written alone (`make hosts PARTS=fleet`). The numbers
+belong to the machine that made them: {machine}.
+
+Each host is a network namespace of its own; a switch in user space (`faults/switch.py`) joins
+them, whose cables are cut, slowed, made lossy, one-way or rid of multicast. All processes are the
+real ones. What follows from it for a user is in [fleet.md](fleet.md).
+"""
+#: Heading and explanation of each part.
+PARTS = {
+    "supervisors": """\
+## Two supervisors
+
+The vehicle, with `mavlink_parachute`, an autopilot and a parachute, is one host; two supervisors
+with `hot_standby` are the two others. In flight a cable is spoilt, then a motor fails. Times: from
+the spoiling to the takeover; from the motor's failure to the kill on the wire and to the
+parachute's own "deployed"; from the healing until one leads and the other follows. In each story:
+one deploy was acted on, after the kill, and none by the order of an older leader.
+""",
+    "ground": """\
+## Vehicle and ground station
+
+The vehicle, with its nodes, autopilot and parachute, is one host; the ground station, a node that
+sees `safety/state`, `parachute/status` and `/diagnostics` and calls the services under `safety/`,
+is the other, and its cable is the one that is spoilt. Times: from the operator's call (where a
+motor fails: from that) to the release or the kill on the wire; from the call to the answer, the
+last one where there are several; from the healing, or from the start of a second ground station,
+until the vehicle's state is seen. In each story: not more than one deploy was acted on, after the
+kill.
+""",
+    "discovery": """\
+## Discovery servers
+
+Two vehicles on a host with a discovery server of its own, and ground stations on another, with
+another; no multicast passes between the two. All have `ROS_DISCOVERY_SERVER` set as
+[fleet.md](fleet.md) says, but where said. Times: from the start of that ground station, from the
+server's death or return, from the motor's failure, from the healing.
+""",
+    "fleet": """\
+## A fleet
+
+Vehicles on hosts of five each, under one ground station on a host of its own; where there are
+discovery servers, no multicast passes. Each vehicle has a `mavlink_parachute` and a
+`safety_supervisor`; one process a host simulates the autopilots and parachutes. "slowed":
+`heartbeat_rate` and `autopilot_message_rate` 2 instead of 10, and limits to fit. While all fly,
+10 s are measured: processor (100 % is one core), memory, what the ground station's cable carries,
+and how often its picture of a vehicle was silent for more than 1.5 s ("gaps"). Then a motor of one
+vehicle fails, and the operator deploys another (of several): no other may kill or deploy, and the
+ground station must see just that. "all seen": from the start of another ground station until it
+has every vehicle's state. "updates late": of all supervisors, since their start, and how many of
+them said so in `/diagnostics`. "busy": 16 processes that only compute run beside the fleet, from
+10 s before the motor's failure to the end.
+""",
+}
+_MARK = "<!-- part {} -->"
+
+
+def with_part(page: str, part: str, table: str, load: float) -> str:
+    """The page with this part written anew; the others as page has them, if it has them."""
+    texts = _parts_of(page)
+    head = PARTS[part]
+    texts[part] = f"{head}\nLoad before the run: {load:.1f} (of the last minute).\n\n{table}\n"
+    every = [f"{_MARK.format(one)}\n{texts[one]}" for one in PARTS if one in texts]
+    return "\n".join([_HEAD.format(machine=machine()), *every])
+
+
+def _parts_of(page: str) -> dict[str, str]:
+    pieces = re.split(r"^<!-- part (\w+) -->\n", page, flags=re.MULTILINE)
+    return {
+        name: text.rstrip("\n") + "\n"
+        for name, text in zip(pieces[1::2], pieces[2::2], strict=True)
+        if name in PARTS
+    }
