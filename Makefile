@@ -15,6 +15,12 @@ PARACHUTE ?= mavlink
 DEPTH ?= 2
 # Modules of the supervisor that make mutate changes; empty: all.
 MODULES ?=
+# Parts of make hosts: supervisors, ground, discovery, fleet; empty: all.
+PARTS ?=
+# Loops of make soak.
+LOOPS ?= 300
+# How long make fuzz may take.
+MINUTES ?= 10
 # How many flights of the campaign, and the seed of the first.
 FLIGHTS ?= 1000
 SEED ?= 0
@@ -28,7 +34,7 @@ OVERLAY := $(SET_UP) && . "$$venv/env.sh"
 # A simulation must not reach other machines, nor a vehicle on them.
 LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
-.PHONY: help demo test bench campaign hosts build lint docs explore mutate lock clean distclean
+.PHONY: help demo test bench campaign hosts soak build lint docs explore mutate fuzz lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -47,8 +53,12 @@ campaign: build ## fly FLIGHTS flights in virtual time from SEED on, write docs/
 	@$(OVERLAY) && exec python3 -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
 	    --page docs/campaign.md
 
-hosts: build ## two supervisors and a vehicle on three hosts, spoil the network, write docs/hosts.md
-	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults
+hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write docs/hosts.md (PARTS=...)
+	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults $(PARTS)
+
+soak: build ## faults on real processes, LOOPS times from SEED on, write docs/soak.* (as root)
+	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults.soak --loops $(LOOPS) \
+	    --seed $(SEED) --page docs/soak.md
 
 build: ## build both packages
 	@$(UNDERLAY) && exec scripts/build.sh
@@ -71,6 +81,17 @@ mutate: .venv-mutate/done ## change the supervisor a little, many times; its tes
 	@rm -rf .venv-mutate && "$(PYTHON)" -m venv .venv-mutate \
 	    && .venv-mutate/bin/pip install --quiet --disable-pip-version-check --require-hashes \
 	        -r requirements/mutate.lock && touch $@
+
+fuzz: build .venv-fuzz/done ## feed the decoders what a fuzzer thinks of for MINUTES, write docs/fuzz.md
+	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PWD/.venv-fuzz:$$PYTHONPATH" \
+	    exec python3 -m fuzz --minutes="$(MINUTES)"
+
+# Beside the environment of the nodes, whose packages it needs as well.
+.venv-fuzz/done: requirements/fuzz.lock
+	@$(OVERLAY) && rm -rf .venv-fuzz && { uv pip install --quiet --target .venv-fuzz \
+	        --only-binary :all: --require-hashes -r requirements/fuzz.lock \
+	    || { echo 'fuzz: atheris has wheels for Linux on x86_64 and Python 3.10 to 3.13 only' >&2; \
+	        exit 1; }; } && touch $@
 
 lock: ## refresh requirements/*.lock
 	@$(UNDERLAY) && exec scripts/lock.sh

@@ -9,16 +9,15 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
 from collections import Counter
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from collections.abc import Iterator
+from typing import Any
 
 from bench.bare_telemetry import Splitter
 from bench.command import at_least, run
+from bench.decoding import Batch, Peer, Times, take_turns, times_table
 from bench.flight_lines import REAL_RATE, FlightLines
-from bench.report import load, summary, table
-from chute_ros.errors import ChuteError
+from bench.report import load
 from chute_ros.protocol.umbilical import sayings
 from chute_ros.protocol.umbilical.config import UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import LINES_TO_RECOGNISE, TelemetryDecoder
@@ -37,24 +36,6 @@ BATCH = 100
 #: More lines than these are not lost where two layouts have one count: those that the other one
 #: needs to be recognised, without the line that does it.
 _MAY_MISS = LINES_TO_RECOGNISE - 1
-
-
-@dataclass
-class Times:
-    """Microseconds a line, of each batch; lines that were not decoded."""
-
-    batches: list[float] = field(default_factory=list)
-    missed: int = 0
-
-
-#: Layout -> peer -> what it took.
-Measured = dict[str, dict[str, Times]]
-
-
-class Peer(Protocol):
-    """What is measured. feed: one read of the port; how many lines were decoded."""
-
-    def feed(self, data: bytes, now: float) -> int: ...
 
 
 class Bare:
@@ -117,7 +98,7 @@ def section(chosen: argparse.Namespace) -> str:
     """Measure; the section without its heading."""
     before = load()
     layouts = load_layouts("", "bench")
-    measured: Measured = {}
+    measured: dict[str, dict[str, Times]] = {}
     for number, layout in enumerate(layouts):
         measured[layout.name] = _measure(layout, layouts, chosen.batches)
         done = f"{number + 1} of {len(layouts)} layouts"
@@ -140,42 +121,19 @@ def _measure(layout: Layout, layouts: list[Layout], batches: int) -> dict[str, T
         line = lines.next(int(now * 1000.0))
         for peer in peers.values():
             peer.feed(line, now)
-    times = {name: Times() for name in peers}
-    for _ in range(batches):
-        clock = [now + n * step for n in range(1, BATCH + 1)]
-        batch = [(at, lines.next(int(at * 1000.0))) for at in clock]
-        now = batch[-1][0]
-        for name, peer in peers.items():
-            decoded = 0
-            start = time.perf_counter_ns()
-            for at, line in batch:
-                decoded += peer.feed(line, at)
-            times[name].batches.append((time.perf_counter_ns() - start) / 1e3 / BATCH)
-            times[name].missed += BATCH - decoded
-            if times[name].missed > _MAY_MISS:
-                raise ChuteError(f"{layout.name}: {name} decoded {decoded} of {BATCH} lines")
-    return times
+
+    def coming() -> Iterator[tuple[Batch, int]]:
+        start = now
+        for _ in range(batches):
+            clock = [start + n * step for n in range(1, BATCH + 1)]
+            yield [(at, lines.next(int(at * 1000.0))) for at in clock], BATCH
+            start = clock[-1]
+
+    return take_turns(layout.name, peers, coming(), _MAY_MISS)
 
 
-def report(measured: Measured, before: str) -> str:
+def report(measured: dict[str, dict[str, Times]], before: str) -> str:
     """The section without its heading. before: the load of the machine when it began."""
-    rows = []
-    for layout, times in measured.items():
-        base = summary(times[BARE].batches)
-        for name, one in times.items():
-            numbers = summary(one.batches)
-            ratios = (f"{number / base[i]:.1f}" for i, number in enumerate(numbers[:2]))
-            values = (*(f"{number:.1f} us" for number in numbers), *ratios, str(one.missed))
-            rows.append((f"{layout}: {name}", *values))
-    head = (
-        "microseconds a line",
-        "median",
-        "99th percentile",
-        "largest",
-        "ratio of medians",
-        "of 99th percentiles",
-        "missed",
-    )
     count = len(next(iter(measured.values()))[BARE].batches)
     return (
         "### Decoding a line\n\n"
@@ -189,7 +147,7 @@ def report(measured: Measured, before: str) -> str:
         "until its air brake opens, what telem57_airbrake_deployment sends fits the reference's\n"
         f"layout as well, and it takes {LINES_TO_RECOGNISE} lines to believe in another.\n"
         f"{count} batches of {BATCH} lines to each, taking turns, in one run.\n\n"
-        + table(head, rows)
+        + times_table("microseconds a line", measured, BARE)
         + "\n"
     )
 

@@ -1,80 +1,141 @@
-"""A MAVLink network: what one says, all others hear, each over its own ways."""
+"""A network, bus or cable: what one says, all others hear, each over its own way."""
 
 from __future__ import annotations
 
 import random
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TypeVar
 
-from chute_ros.campaign.channel import Channel
+from chute_ros.campaign.channel import Channel, Nature, Way
 from chute_ros.campaign.world import World
 from chute_ros.sim.faults import flip_a_byte
 from chute_ros.transport.loop import ProtocolLink
 
-#: A datagram on a companion computer's network, s.
-_WIRE_DELAY = 0.0005
+#: Of a CAN frame as bytes (protocol/dronecan/can_frame.py): where its length and its data stand.
+_CAN_LENGTH, _CAN_DATA = 4, 8
+
+
+def spoil_can(frame: bytes, chance: random.Random) -> bytes:
+    """One byte of its data is another, between an adapter and its host: a frame with another
+    identifier nobody has sent."""
+    length = frame[_CAN_LENGTH]
+    if not length:
+        return frame
+    end = _CAN_DATA + length
+    return frame[:_CAN_DATA] + flip_a_byte(frame[_CAN_DATA:end], chance) + frame[end:]
+
+
+def refuse_can(frame: bytes, chance: random.Random) -> None:
+    """What is damaged on the bus itself every CAN controller refuses by its checksum."""
+
+
+Spoil = Callable[[bytes, random.Random], bytes | None]
+
+
+@dataclass(frozen=True)
+class Medium:
+    """What it is made of."""
+
+    nature: Nature
+    spoil: Spoil
+
+
+#: Half of the way from one to another each: datagrams on a companion computer's network, frames on
+#: a CAN bus, USB packets of a serial cable.
+MAVLINK = Medium(Nature(0.00025, overtaken=0.05), flip_a_byte)
+CAN = Medium(Nature(0.0001, overtaken=0.002), refuse_can)
+SERIAL = Medium(Nature(0.001, in_order=True), flip_a_byte)
 
 
 class Plug:
-    """A protocol or a simulator that is plugged in, with a way to the network and one back."""
+    """A protocol or a simulator that is plugged in. hears: whether bytes are for it at all, which
+    spares it to decode what it does nothing about; spoil: where damage is not that of the bus."""
 
-    def __init__(self, bus: Bus, link: ProtocolLink) -> None:
-        self._bus, self.link = bus, link
-        self.outward = bus.channel()
-        self.inward = bus.channel()
+    def __init__(
+        self,
+        bus: Bus,
+        name: str,
+        link: ProtocolLink,
+        hears: Callable[[bytes], bool] = lambda data: True,
+        spoil: Spoil | None = None,
+    ) -> None:
+        self._bus, self.name, self.link, self.hears = bus, name, link, hears
+        self.way: Way = []
         #: It hangs, or has no power: nothing is read and nothing is sent until then, virtual s.
         self.dead_until = 0.0
+        #: What came while it hung.
+        self.waiting: list[bytes] = []
+        self.outward, self.inward = bus.add(self, spoil)
+
+    def asleep_until(self) -> float:
+        """It does not run until then, virtual s."""
+        return self.dead_until
 
     def update(self, now: float) -> None:
         """Look at the clock."""
-        if now >= self.dead_until:
-            self.link.update(now)
-            self.flush()
+        if now < self.asleep_until():
+            return
+        waiting, self.waiting = self.waiting, []
+        for data in waiting:
+            self.link.receive(data, now)
+        self.link.update(now)
+        self.flush()
 
     def next_deadline(self) -> float:
         """When update has something to do."""
-        return max(self.link.next_deadline(), self.dead_until)
+        return max(self.link.next_deadline(), self.asleep_until())
 
     def flush(self) -> None:
         """Send what it has to say."""
         for data in self.link.take_output():
-            self.outward.send(data, self.arrived_at_the_bus)
+            self.send(data)
+
+    def send(self, data: bytes) -> None:
+        """To all others."""
+        self.outward.send(data, self._bus.carrier(self))
 
     def hear(self, data: bytes, now: float) -> None:
-        """A datagram came."""
-        if now >= self.dead_until:
+        """Bytes came."""
+        if now >= self.asleep_until():
             self.link.receive(data, now)
             self.flush()
+            self._bus.world.stir(self)
+        elif self.keeps_waiting():
+            self.waiting.append(data)
 
-    def arrived_at_the_bus(self, data: bytes, now: float) -> None:
-        """What it sent has got so far."""
-        self._bus.carry(data, self)
+    def keeps_waiting(self) -> bool:
+        """A system keeps for it what it does not read."""
+        return False
 
 
 PlugT = TypeVar("PlugT", bound=Plug)
 
 
 class Bus:
-    """Like a switch with a multicast address."""
+    """Like a switch with a multicast address. seed: of its chances, with its plugs' names."""
 
-    def __init__(self, world: World, chance: random.Random) -> None:
-        self._world, self._chance = world, chance
+    def __init__(self, world: World, medium: Medium, seed: str) -> None:
+        self.world, self._medium, self._seed = world, medium, seed
         self._plugs: list[Plug] = []
 
-    def plug(self, link: ProtocolLink) -> Plug:
-        """Plug it in."""
-        return self.add(Plug(self, link))
-
-    def add(self, plug: PlugT) -> PlugT:
-        """The same for a plug that was made already."""
+    def add(self, plug: Plug, spoil: Spoil | None) -> tuple[Channel[bytes], Channel[bytes]]:
+        """Its way to the bus, and the one back."""
         self._plugs.append(plug)
-        return plug
+        return self._channel(plug, "out", spoil), self._channel(plug, "in", spoil)
 
-    def channel(self) -> Channel[bytes]:
-        """A new way."""
-        return Channel(self._world, self._chance, _WIRE_DELAY / 2, False, flip_a_byte)
+    def _channel(self, plug: Plug, which: str, spoil: Spoil | None) -> Channel[bytes]:
+        chance = random.Random(f"{self._seed} {plug.name} {which}")
+        medium = self._medium
+        ways = (plug.way,)
+        return Channel(self.world, chance, medium.nature, ways, spoil or medium.spoil)
 
-    def carry(self, data: bytes, source: Plug) -> None:
-        """To everybody else."""
-        for plug in self._plugs:
-            if plug is not source:
-                plug.inward.send(data, plug.hear)
+    def carrier(self, source: Plug) -> Callable[[bytes, float], None]:
+        """What takes bytes that have got to the bus to everybody else."""
+
+        def carry(data: bytes, now: float) -> None:
+            for plug in self._plugs:
+                if plug is not source and plug.hears(data):
+                    plug.inward.send(data, plug.hear)
+
+        return carry

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import multiprocessing
 import time
 from collections import Counter
@@ -10,12 +11,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from chute_ros.campaign.flight import Flight, Flown, load_profiles
+from chute_ros.campaign.flight import Flight, Flown
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
-from chute_ros.campaign.scenario import draw
+from chute_ros.campaign.scenario import Scenario, draw
+from chute_ros.campaign.shipped import Shipped
 
 #: Flights that one process flies before it tells of them.
-_BATCH = 20
+_BATCH = 10
 
 
 @dataclass(frozen=True)
@@ -23,6 +25,7 @@ class Line:
     """One flight in a few numbers. NaN: it was not."""
 
     seed: int
+    vehicle: str
     profile: str
     failure: str
     count: Count
@@ -31,6 +34,8 @@ class Line:
     kill_delay: float
     release_delay: float
     height_lost: float
+    #: Faults that were drawn, by kind.
+    faults: tuple[str, ...] = ()
 
 
 @dataclass
@@ -40,6 +45,9 @@ class Tally:
     flights: int = 0
     counts: Counter[Count] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
+    #: (vehicle, profile, count) -> flights.
+    by_vehicle: Counter[tuple[str, str, Count]] = field(default_factory=Counter)
+    faults: Counter[str] = field(default_factory=Counter)
     wrong: list[Line] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     took: float = 0.0
@@ -48,38 +56,45 @@ class Tally:
         """One more."""
         self.flights += 1
         self.counts[line.count] += 1
+        self.by_vehicle[line.vehicle, line.profile, line.count] += 1
+        self.faults.update(line.faults)
         if line.count is Count.NOT_TOLD:
             self.reasons[line.why] += 1
         if line.count in WRONG:
             self.wrong.append(line)
-        if line.release_delay == line.release_delay:
+        if not math.isnan(line.release_delay):
             self.lines.append(line)
 
 
 #: Of this process; each reads them once.
-_read = functools.cache(load_profiles)
+_shipped = functools.cache(Shipped)
 
 
-def fly_here(folder: Path, seed: int) -> tuple[Flight, Flown, Judged]:
+def fly_here(folder: Path, scenario: Scenario) -> tuple[Flight, Flown, Judged]:
     """One flight, with all that lived in it."""
-    scenario = draw(seed)
-    flight = Flight(scenario, _read(folder)[scenario.profile])
+    flight = Flight(scenario, _shipped(folder))
     flown = flight.run()
     return flight, flown, judge(flown)
 
 
 def _line(folder: Path, seed: int) -> Line:
-    _, flown, judged = fly_here(folder, seed)
+    scenario = draw(seed)
+    faults = tuple(type(one).__name__ for one in scenario.faults)
+    who = (seed, scenario.vehicle.value, scenario.profile, scenario.failure.value)
+    try:
+        _, flown, judged = fly_here(folder, scenario)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
+        why = f"{type(error).__name__}: {error}"
+        return Line(*who, Count.BROKEN, why, math.nan, math.nan, math.nan, faults)
     at = flown.truth.at
     return Line(
-        seed,
-        flown.scenario.profile,
-        flown.scenario.failure.value,
+        *who,
         judged.count,
         judged.why,
         flown.killed - at,
         flown.released - at,
         flown.truth.height - flown.release_height,
+        faults,
     )
 
 
@@ -92,6 +107,7 @@ def run(
         tally.add(line)
         tally.took = time.monotonic() - begun
         progress(tally)
+    tally.wrong.sort(key=lambda line: line.seed)
     return tally
 
 
@@ -100,5 +116,8 @@ def _all(folder: Path, seeds: range, jobs: int) -> Iterator[Line]:
     if jobs == 1:
         yield from map(one, seeds)
         return
+    # Read before the processes part, so that they share it.
+    shipped = _shipped(folder)
+    shipped.read_all()
     with multiprocessing.Pool(jobs) as pool:
         yield from pool.imap_unordered(one, seeds, _BATCH)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from chute_ros.campaign.world import World
@@ -15,7 +15,7 @@ MessageT = TypeVar("MessageT")
 @dataclass(frozen=True)
 class Spell:
     """From begin to end (virtual s) this is so. Chances are 0 to 1 for each message; delay: at
-    most so many s, each message its own."""
+    most so many s, each message its own; reorder: it comes after some of those that follow it."""
 
     begin: float
     end: float
@@ -23,6 +23,7 @@ class Spell:
     double: float = 0.0
     corrupt: float = 0.0
     delay: float = 0.0
+    reorder: float = 0.0
     #: A cable that flaps: this many s there, and as many s gone; 0: it does not.
     flaps: float = 0.0
 
@@ -32,40 +33,63 @@ class Spell:
             return False
         return not self.flaps or int((now - self.begin) / self.flaps) % 2 == 0
 
+    def later(self, by: float) -> Spell:
+        """The same at another time."""
+        return replace(self, begin=self.begin + by, end=self.end + by)
+
+
+#: The spells that lie on a part of the way, now or at some time.
+Way = list[Spell]
+
+
+@dataclass(frozen=True)
+class Nature:
+    """What kind of way it is. delay: s; in_order: what comes later never overtakes what went
+    before, as with one writer of ROS; overtaken: one that is comes at most so much later, s."""
+
+    delay: float
+    in_order: bool = False
+    overtaken: float = 0.0
+
 
 class Channel(Generic[MessageT]):
-    """One direction. spoil: makes a damaged message of a whole one; in_order: what comes later
-    never overtakes what went before, as with one writer of ROS."""
+    """One direction over some ways. spoil: makes a damaged message of a whole one; None: nobody
+    takes it for one."""
 
     def __init__(
         self,
         world: World,
         chance: random.Random,
-        delay: float,
-        in_order: bool,
-        spoil: Callable[[MessageT, random.Random], MessageT] | None = None,
+        nature: Nature,
+        ways: tuple[Way, ...],
+        spoil: Callable[[MessageT, random.Random], MessageT | None] | None = None,
     ) -> None:
-        self._world, self._chance, self._delay = world, chance, delay
-        self._in_order, self._spoil = in_order, spoil
+        self._world, self._chance, self._nature = world, chance, nature
+        self._ways, self._spoil = ways, spoil
         self._newest = 0.0
-        self.spells: list[Spell] = []
 
     def send(self, message: MessageT, deliver: Callable[[MessageT, float], None]) -> None:
         """Deliver it, later, twice, damaged or never."""
-        now, chance = self._world.now, self._chance.random
-        copies, arrives = 1, now + self._delay
-        for spell in self.spells:
-            if not spell.is_on(now):
-                continue
-            if spell.loss and chance() < spell.loss:
-                return
-            if spell.double and chance() < spell.double:
-                copies += 1
-            if spell.corrupt and self._spoil is not None and chance() < spell.corrupt:
-                message = self._spoil(message, self._chance)
-            if spell.delay:
-                arrives += chance() * spell.delay
-        if self._in_order:
+        now, chance, nature = self._world.now, self._chance.random, self._nature
+        copies, arrives = 1, now + nature.delay
+        for way in self._ways:
+            for spell in way:
+                if not spell.is_on(now):
+                    continue
+                if spell.loss and chance() < spell.loss:
+                    return
+                if spell.double and chance() < spell.double:
+                    copies += 1
+                if spell.corrupt and self._spoil is not None and chance() < spell.corrupt:
+                    spoiled = self._spoil(message, self._chance)
+                    if spoiled is None:
+                        return
+                    message = spoiled
+                if spell.delay:
+                    arrives += chance() * spell.delay
+                if spell.reorder and chance() < spell.reorder:
+                    arrives += chance() * nature.overtaken
+        if nature.in_order:
             arrives = self._newest = max(arrives, self._newest)
         for _ in range(copies):
-            self._world.post(arrives, lambda at, message=message: deliver(message, at))
+            self._world.post(arrives, lambda at: deliver(message, at))

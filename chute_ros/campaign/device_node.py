@@ -1,124 +1,260 @@
-"""What the node mavlink_parachute does between its protocol and ROS, with the same gate."""
+"""What every device node does between its protocol and ROS, with the same gate."""
 
 from __future__ import annotations
 
+import math
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
+from typing import Any
 
-from chute_ros.campaign.bus import Bus, Plug
+from chute_ros.campaign.bus import Bus, Plug, Spoil
+from chute_ros.campaign.ros import Process, Ros
+from chute_ros.campaign.supervisor_host import SupervisorBeat
 from chute_ros.model import Action, Decision, LinkState, Outcome
-from chute_ros.protocol.events import ParachuteChanged, RequestReport, VehicleChanged
-from chute_ros.protocol.mavlink.link import MavlinkLink
+from chute_ros.protocol.events import (
+    ParachuteChanged,
+    RequestFinished,
+    RequestReport,
+    VehicleChanged,
+)
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.clock_steps import ClockSteps
 from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
 
-NAME = "mavlink_parachute"
-HEARTBEAT_INTERVAL = 0.1  # s
-MAX_DECISION_AGE = 0.5  # s
-#: Our own MAVLink heartbeat stops when the node has not beaten for so long, s.
+_HEARTBEAT_INTERVAL = 0.1  # s
+_MAX_DECISION_AGE = 0.5  # s
+_SUPERVISOR_LOST_AFTER = 1.0  # s
+_GIVE_UP_AFTER = 5.0  # s
+#: Our own heartbeat on the wire stops when the node has not beaten for so long, s.
 _OWNER_SILENCE = 1.0
+
+Begin = Callable[[int, float], None]
+Ready = Callable[[], bool]
 
 
 @dataclass(frozen=True)
 class Acted:
-    """A decision that the gate let through."""
+    """A decision that the gate of a node let through."""
 
     at: float
+    node: str
     decision: Decision
 
 
-def _is_release(data: bytes) -> bool:
-    """A MAVLink 2 frame with COMMAND_LONG (76) of MAV_CMD_DO_PARACHUTE (208)."""
-    payload = data[10:]
-    return data[7:10] == b"\x4c\0\0" and int.from_bytes(payload[28:30], "little") == 208
+@dataclass(frozen=True)
+class ActionTold:
+    """A report on safety/action, as other nodes hear it."""
+
+    action: Action
+    report: i.ActionReport
 
 
 class DeviceNode(Plug):
-    """tell: gives the supervisor an input, over ROS."""
+    """One node. make_link: its protocol, anew with each start."""
 
-    def __init__(self, bus: Bus, link: MavlinkLink, tell: Callable[[i.Input], None]) -> None:
-        super().__init__(bus, link)
-        self.mavlink, self._tell = link, tell
-        self._gate = DecisionGate(NAME, MAX_DECISION_AGE)
-        self._seq = count()
+    link: Any
+
+    def __init__(
+        self,
+        bus: Bus,
+        process: Process,
+        ros: Ros,
+        make_link: Callable[[], Any],
+        spoil: Spoil | None = None,
+    ) -> None:
+        super().__init__(bus, process.name, make_link(), spoil=spoil)
+        self.process, self._ros, self._make_link = process, ros, make_link
         self._tokens = count(1)
+        self.acted: list[Acted] = []
+        #: How often it ordered a release that it knew had happened.
+        self.ordered_again = 0
+        self._begin(0.0)
+        ros.subscribe(Decision, process, self._decide)
+        ros.subscribe(SupervisorBeat, process, self._supervisor)
+
+    def _begin(self, now: float) -> None:
+        self._gate = DecisionGate(self.name, _MAX_DECISION_AGE)
+        self._seq = count()
         self._decisions: dict[int, Decision] = {}
         self._reports: dict[tuple[int, int], i.ActionReport] = {}
-        self._beat_at = 0.0
-        self.acted: list[Acted] = []
-        #: It has heard that the parachute is out; how often it ordered that all the same.
-        self._knows_release = False
-        self.ordered_again = 0
+        #: Deploys that wait for a parachute: (token, begin, until).
+        self._held: list[tuple[int, Begin, Ready, float]] = []
+        self._waiting_callers: dict[int, Callable[[bool, str], None]] = {}
+        #: Of each supervisor, and of the one that leads: its clock, and when it was heard.
+        self._clocks: dict[str, ClockSteps] = {}
+        self._clock = ClockSteps(_MAX_DECISION_AGE / 2)
+        self._heard, self._lost = math.nan, False
+        #: Why flight is blocked by decision; empty: it is not.
+        self.decided_block = ""
+        self.knows_release = False
+        self._beat_at = now
+
+    def start_again(self, now: float) -> None:
+        """It was killed."""
+        self.link = self._make_link()
+        self.waiting.clear()
+        self._begin(now)
+        self.update(now)
+        self._ros.world.stir(self)
+
+    # -- for the subclass ------------------------------------------------------------------------
+
+    @abstractmethod
+    def carry_out(self, decision: Decision, now: float) -> None:
+        """Do what the gate let through."""
+
+    @abstractmethod
+    def summary(self, now: float) -> tuple[LinkState, bool]:
+        """How the device is: its link, and whether it is healthy."""
+
+    @abstractmethod
+    def is_release(self, data: bytes) -> bool:
+        """These bytes order a release."""
+
+    def event(self, event: Any) -> None:
+        """One that only this kind of link has."""
+
+    def flight_block(self, reason: str, now: float) -> None:
+        """Keep a vehicle that stands on the ground for reason, or no longer (empty)."""
+        self.link.flight_block(reason, now)
+
+    # -- time ------------------------------------------------------------------------------------
+
+    def asleep_until(self) -> float:
+        return self.process.stopped_until
+
+    def keeps_waiting(self) -> bool:
+        return not math.isinf(self.process.stopped_until)
 
     def update(self, now: float) -> None:
         """The protocol's time, and the heartbeat."""
         super().update(now)
-        if now >= max(self._beat_at, self.dead_until):
-            self._beat_at = now + HEARTBEAT_INTERVAL
+        if now >= max(self._beat_at, self.asleep_until()):
+            self._beat_at = now + _HEARTBEAT_INTERVAL
             self._beat(now)
 
     def next_deadline(self) -> float:
         """Of both."""
-        return max(min(self.link.next_deadline(), self._beat_at), self.dead_until)
+        due: float = min(self.link.next_deadline(), self._beat_at)
+        return max(due, self.asleep_until())
 
     def flush(self) -> None:
         """Send frames, and publish what happened."""
         for data in self.link.take_output():
-            self.ordered_again += self._knows_release and _is_release(data)
-            self.outward.send(data, self.arrived_at_the_bus)
-        for event in self.mavlink.take_events():
+            self.ordered_again += self.knows_release and self.is_release(data)
+            self.send(data)
+        for event in self.link.take_events():
             if isinstance(event, ParachuteChanged):
-                self._knows_release |= event.status.deployed
-                self._tell(i.ParachuteReport(NAME, event.status))
+                self.knows_release |= event.status.deployed
+                self.publish(i.ParachuteReport(self.name, event.status))
             elif isinstance(event, VehicleChanged):
-                self._tell(i.VehicleReport(event.state))
+                self.publish(i.VehicleReport(event.state))
             elif isinstance(event, RequestReport):
                 report = event.report
-                self._report(self._decisions[report.token], report.outcome, report.detail)
+                if (decision := self._decisions.get(report.token)) is not None:
+                    self.report(decision, report.outcome, report.detail)
+            elif isinstance(event, RequestFinished):
+                self._finished(event)
+            else:
+                self.event(event)
 
-    def decide(self, decision: Decision, age: float, now: float) -> None:
-        """A decision came that was made age s ago."""
-        if now < self.dead_until:
+    def publish(self, message: Any) -> None:
+        """On its topic."""
+        self._ros.publish(self.process, message)
+
+    # -- requests --------------------------------------------------------------------------------
+
+    def arm(self, arm: bool, triggers: int, answered: Callable[[bool, str], None]) -> None:
+        """Its arm service is called."""
+        now = self._ros.world.now
+        if now < self.asleep_until():
             return
-        verdict = self._gate.judge(decision, age)
+        token = next(self._tokens)
+        self._waiting_callers[token] = answered
+        self.link.arm(token, arm, triggers, now)
+        self._after(now)
+
+    def request_for(self, decision: Decision, begin: Begin, now: float) -> None:
+        """Begin a request on behalf of a decision: its steps are reported."""
+        token = next(self._tokens)
+        self._decisions[token] = decision
+        begin(token, now)
+
+    def deploy_for(self, decision: Decision, begin: Begin, now: float) -> None:
+        """The same for a deploy, once a parachute is heard."""
+        self.request_once(decision, begin, self.link.has_parachute, now)
+
+    def request_once(self, decision: Decision, begin: Begin, ready: Ready, now: float) -> None:
+        """The same once there is a device for it: a node that has just started waits for it."""
+        token = next(self._tokens)
+        self._decisions[token] = decision
+        if ready():
+            begin(token, now)
+        else:
+            self._held.append((token, begin, ready, now + _GIVE_UP_AFTER))
+
+    def report(self, decision: Decision, outcome: Outcome, detail: str) -> None:
+        """Tell the supervisor how far a decision got."""
+        gate = self._gate
+        report = i.ActionReport(
+            *(decision.epoch, decision.id, self.name, outcome, detail),
+            *(gate.newest_epoch, gate.newest_id),
+        )
+        self._reports[decision.epoch, decision.id] = report
+        self.publish(report)
+        self.publish(ActionTold(decision.action, report))
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _after(self, now: float) -> None:
+        self.flush()
+        self._ros.world.stir(self)
+
+    def _finished(self, event: RequestFinished) -> None:
+        finished = event.finished
+        self._decisions.pop(finished.token, None)
+        caller = self._waiting_callers.pop(finished.token, None)
+        if caller is not None:
+            caller(finished.success, finished.message)
+
+    def _decide(self, decision: Decision, difference: float, now: float) -> None:
+        verdict = self._gate.judge(decision, self._clock.age(difference))
         if verdict is Verdict.ACT:
-            self.acted.append(Acted(now, decision))
-            self._carry_out(decision, now)
-            self.flush()
+            self.acted.append(Acted(now, self.name, decision))
+            self.carry_out(decision, now)
+            self._after(now)
         elif verdict is Verdict.REPEATED:
             report = self._reports.get((decision.epoch, decision.id))
             if report is not None:
-                self._tell(report)
+                self.publish(report)
         elif verdict is Verdict.OLDER:
-            self._report(decision, Outcome.FAILED, verdict.value)
+            self.report(decision, Outcome.FAILED, verdict.value)
 
-    def _carry_out(self, decision: Decision, now: float) -> None:
-        token = next(self._tokens)
-        if decision.action is Action.KILL:
-            self._decisions[token] = decision
-            self.mavlink.kill(token, now)
-        elif decision.action is Action.DEPLOY:
-            self._decisions[token] = decision
-            self.mavlink.deploy(token, False, now, decision.device)
-        else:
-            blocks = decision.action is Action.FLIGHT_BLOCK
-            self.mavlink.flight_block("; ".join(decision.reasons) if blocks else "", now)
-            self._report(decision, Outcome.CONFIRMED, "told")
+    def decided_flight_block(self, decision: Decision, now: float) -> None:
+        """What the supervisor decided of it."""
+        blocks = decision.action is Action.FLIGHT_BLOCK
+        self.decided_block = ("; ".join(decision.reasons) or decision.rule) if blocks else ""
+        self.flight_block(self.decided_block, now)
+        self.report(decision, Outcome.CONFIRMED, "told")
 
-    def _report(self, decision: Decision, outcome: Outcome, detail: str) -> None:
-        gate = self._gate
-        report = i.ActionReport(
-            decision.epoch, decision.id, NAME, outcome, detail, gate.newest_epoch, gate.newest_id
-        )
-        self._reports[decision.epoch, decision.id] = report
-        self._tell(report)
+    def _supervisor(self, beat: SupervisorBeat, difference: float, now: float) -> None:
+        clock = self._clocks.setdefault(beat.name, ClockSteps(_MAX_DECISION_AGE / 2))
+        clock.heard(difference, now)
+        if beat.leading:
+            self._heard, self._clock = now, clock
 
     def _beat(self, now: float) -> None:
-        self.mavlink.owner_alive(now + _OWNER_SILENCE)
-        chosen = self.mavlink.chosen_parachute()
-        state, healthy = LinkState.NEVER_SEEN, False
-        if chosen is not None:
-            state, healthy = chosen.liveness.state, chosen.status(now).healthy
-        self._tell(i.LinkHeartbeat(NAME, state, healthy, next(self._seq)))
+        self.link.owner_alive(now + _OWNER_SILENCE)
+        held, self._held = self._held, []
+        for token, begin, ready, until in held:
+            if ready() or now >= until:
+                begin(token, now)
+            else:
+                self._held.append((token, begin, ready, until))
+        self.publish(i.LinkHeartbeat(self.name, *self.summary(now), next(self._seq)))
+        if (lost := now - self._heard > _SUPERVISOR_LOST_AFTER) is not self._lost:
+            self._lost = lost
+            self.flight_block("the supervisor is lost" if lost else self.decided_block, now)
         self.flush()

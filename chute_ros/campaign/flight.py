@@ -3,37 +3,30 @@
 from __future__ import annotations
 
 import math
-import random
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
-from chute_ros.campaign.bus import Bus
-from chute_ros.campaign.channel import Channel, Spell
-from chute_ros.campaign.device_node import NAME, DeviceNode
-from chute_ros.campaign.scenario import FOLLOWED, Failure, Scenario, Stop, WayFault
-from chute_ros.campaign.supervisor_host import SupervisorHost
-from chute_ros.campaign.truth import Truth, observe
-from chute_ros.campaign.vehicle import CampaignAutopilot, SensorFault, WindyModel
-from chute_ros.campaign.world import World
-from chute_ros.model import Action, Decision, DeploymentTrigger
-from chute_ros.protocol.mavlink.config import MavlinkConfig
-from chute_ros.protocol.mavlink.link import MavlinkLink
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
+from chute_ros.campaign.aircraft import Aircraft
+from chute_ros.campaign.device_node import Acted
+from chute_ros.campaign.person import Call
+from chute_ros.campaign.rig import Rig
+from chute_ros.campaign.rocket import RocketRig
+from chute_ros.campaign.scenario import ClockJump, Fault, Scenario, Stop, Vehicle, WayFault
+from chute_ros.campaign.shipped import Shipped
+from chute_ros.campaign.truth import Truth
+from chute_ros.model import Action, Decision
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.rules import Profile
 
-#: From a message's publisher to its subscription over ROS on one host, s.
-_ROS_DELAY = 0.0005
-#: FC and OFFBOARD.
-_ARMED_TRIGGERS = 12
-_CLIMB_SPEED = 20.0  # m/s
-_READY_WITHIN = 12.0  # s
-#: A pilot looks at the vehicle so often, s.
-_LOOKS = 0.1
+_READY_WITHIN, _UP_WITHIN = 15.0, 6.0  # s
+#: A pilot looks at the vehicle so often, and not before, s.
+_LOOKS, _FIRST_LOOK = 0.05, 0.5
+#: From its height on, before anything may happen: attitude and landed state have been told, s.
+_SETTLES = 0.3
+#: A flight is followed so long after the last thing that happens to it, and after its release: as
+#: long as anybody would order that again, s.
+_FOLLOWED, _FOLLOWED_RELEASE = 1.5, 2.5
+#: What falls is on the ground by then, s.
+_FALLS = 30.0
 
 
 @dataclass(frozen=True)
@@ -44,218 +37,157 @@ class Flown:
     truth: Truth
     #: Why it never took off; empty: it did.
     grounded: str
-    took_off: float
+    #: From when on the scenario's times count.
+    up: float
     killed: float
     released: float
     landed: float
     landing_speed: float
     release_height: float
-    #: Orders to release that the node sent although it had heard that the parachute is out.
+    #: Orders to release that a node sent, or a supervisor decided, although it had heard that the
+    #: parachute is out.
     ordered_again: int
+    #: By whichever supervisor, in the order of time.
     decided: tuple[tuple[float, Decision], ...]
-    acted: tuple[tuple[float, Decision], ...]
-    #: When the supervisor was told of the vehicle.
-    told: tuple[float, ...]
+    acted: tuple[Acted, ...]
+    said: tuple[tuple[float, str], ...]
+    #: What the person was answered; empty: nothing.
+    answer: str = ""
 
 
-class ReleasedParachute(ParachuteDevice):
-    """Its release acts on the vehicle, whoever hears of it."""
-
-    def __init__(self, settings: ParachuteSettings, out: Callable[[], None]) -> None:
-        super().__init__(settings, [])
-        self._out = out
-
-    def _deploy(self, trigger: DeploymentTrigger) -> None:
-        super()._deploy(trigger)
-        self._out()
-
-
-def load_profiles(folder: Path) -> Mapping[str, Profile]:
-    """Those that are shipped."""
-    return {
-        path.stem: read_profile(path.read_text(encoding="utf-8"), path.stem, (NAME,))
-        for path in folder.glob("*.yaml")
-    }
+def _end_of(fault: Fault) -> float:
+    if isinstance(fault, WayFault):
+        return fault.spell.end
+    if isinstance(fault, Stop):
+        return fault.at + fault.lasts
+    return fault.at if isinstance(fault, ClockJump) else fault.end
 
 
 class Flight:
     """Everything that lives in one world."""
 
-    def __init__(self, scenario: Scenario, profile: Profile) -> None:
+    def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
         self.scenario = scenario
-        chance = random.Random(scenario.seed + 1)
-        self.world = World()
-        bus = Bus(self.world, chance)
-        self.model = WindyModel(
-            fall_speed=scenario.fall_speed,
-            climb_speed=_CLIMB_SPEED,
-            gusts=scenario.gusts,
-            chance=chance,
-        )
-        self.autopilot = CampaignAutopilot(self.model, chance)
-        settings = ParachuteSettings(armed_triggers=_ARMED_TRIGGERS)
-        self.parachute = ReleasedParachute(settings, self._parachute_out)
-        self.autopilot_plug, self.parachute_plug = (
-            bus.plug(self.autopilot),
-            bus.plug(self.parachute),
-        )
-        #: One of each kind of message: a topic keeps its order, topics overtake each other.
-        self._topics: dict[type, Channel[i.Input]] = {}
-        self._chance = chance
-        self._spells_to_supervisor: list[Spell] = []
-        self._decisions: Channel[Decision] = Channel(self.world, chance, _ROS_DELAY, True)
-        config = SupervisorConfig(
-            required_links=(NAME,), kill_links=(NAME,), deploy_links=(NAME,), profile=profile
-        )
-        self.supervisor = SupervisorHost(config, self._send_decision)
-        self.node = DeviceNode(bus, MavlinkLink(MavlinkConfig()), self._tell)
-        bus.add(self.node)
-        self.world.parts += [
-            self.autopilot_plug,
-            self.parachute_plug,
-            self.node,
-            self.supervisor,
-            self,
-        ]
-        self._look_at = 0.0
-        self.truth = Truth()
-        self.took_off = self.up_at = self.released = self.landed = math.nan
-        self.landing_speed = self.release_height = math.nan
-        self._speed = 0.0
+        kind: type[Rig] = RocketRig if scenario.vehicle is Vehicle.ROCKET else Aircraft
+        self.rig: Rig = kind(scenario, shipped)
+        self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
+        wish = self._deploy if scenario.person and scenario.person.does == "deploy" else self._kill
+        self._person = Call(self.rig, wish)
+        self.up = math.nan
+        self._took_off = math.nan
+        self._arms_at = math.nan
+        self.rig.world.post(_FIRST_LOOK, self._look)
 
-    # -- ROS --------------------------------------------------------------------------------------
+    @staticmethod
+    def _deploy(token: int) -> i.Input:
+        return i.DeployRequest(token, False, "a person saw it")
 
-    def _tell(self, one: i.Input) -> None:
-        topic = self._topics.get(type(one))
-        if topic is None:
-            topic = self._topics[type(one)] = Channel(self.world, self._chance, _ROS_DELAY, True)
-            topic.spells = self._spells_to_supervisor
-        topic.send(one, self.supervisor.take)
-
-    def _send_decision(self, decision: Decision) -> None:
-        sent = self.world.now
-        self._decisions.send(decision, lambda one, now: self.node.decide(one, now - sent, now))
-
-    # -- the pilot, the failure and the faults ---------------------------------------------------
-
-    def next_deadline(self) -> float:
-        """The pilot's next look."""
-        return self._look_at
-
-    def update(self, now: float) -> None:
-        """The pilot looks."""
-        self._look_at = now + _LOOKS
-        stage = self.supervisor.state.stage
-        if math.isnan(self.took_off):
-            if stage is Stage.READY and now > 1.5:
-                self.autopilot.act("arm")
-                self.autopilot.act(f"takeoff={self.scenario.height}")
-                self.took_off = now
-        elif math.isnan(self.up_at) and self.model.height > self.scenario.height - 1.0:
-            self.up_at = now
-            self._plan(now)
-        self._watch(now)
-
-    def _watch(self, now: float) -> None:
-        if self.model.on_ground and not math.isnan(self.up_at) and math.isnan(self.landed):
-            self.landed, self.landing_speed = now, self._speed
-        self._speed = max(0.0, -self.model.vertical_speed)
-
-    def _plan(self, up: float) -> None:
-        """From here on the scenario's times are known."""
-        post, failure = self.world.post, self.scenario.failure
-        if failure is not Failure.NOTHING:
-            post(up + self.scenario.failure_at, self._fail)
-        ways = {
-            "autopilot": (self.autopilot_plug.outward, self.autopilot_plug.inward),
-            "parachute": (self.parachute_plug.outward, self.parachute_plug.inward),
-            "node": (self.node.outward, self.node.inward),
-            "from the supervisor": (self._decisions,),
-        }
-        for fault in self.scenario.faults:
-            if isinstance(fault, WayFault):
-                spell = fault.spell
-                moved = Spell(**{**vars(spell), "begin": up + spell.begin, "end": up + spell.end})
-                if fault.way == "to the supervisor":
-                    self._spells_to_supervisor.append(moved)
-                else:
-                    for channel in ways[fault.way]:
-                        channel.spells.append(moved)
-            elif isinstance(fault, SensorFault):
-                moved_fault = SensorFault(fault.kind, up + fault.begin, up + fault.end)
-                self.autopilot.faults.append(moved_fault)
-            else:
-                post(up + fault.at, lambda now, fault=fault: self._stop(fault, now))
-
-    def _stop(self, fault: Stop, now: float) -> None:
-        if fault.who == "supervisor":
-            self.supervisor.hangs_until = now + fault.lasts
-            if fault.dies:
-                self.world.post(now + fault.lasts, self.supervisor.start_again)
-        elif fault.who == "parachute":
-            self.parachute_plug.dead_until = now + fault.lasts
-            if fault.dies:
-                self.world.post(now + fault.lasts, lambda _: self.parachute.reboot())
-        else:
-            self.node.dead_until = now + fault.lasts
-
-    def _fail(self, now: float) -> None:
-        failure = self.scenario.failure
-        self.autopilot.step(now)
-        if failure.falls and math.isnan(self.model.released_for):
-            self.truth = observe(self.model, now)
-        if failure is Failure.MOTOR:
-            self.autopilot.act("fail-motor")
-        elif failure is Failure.REBOOT:
-            self.autopilot.reboot()
-        elif failure is Failure.POWER:
-            self.model.motors_failed = True
-            self.autopilot_plug.dead_until = math.inf
-            self._fall_unseen(now)
-        elif failure is Failure.HANG:
-            self.autopilot_plug.dead_until = now + 6.0
-
-    def _fall_unseen(self, now: float) -> None:
-        """Nobody steps a vehicle whose autopilot has no power but nature."""
-        self.autopilot.step(now)
-        self._watch(now)
-        self.world.post(now + 0.05, self._fall_unseen)
-
-    def _parachute_out(self) -> None:
-        self.released, self.release_height = self.world.now, self.model.height
-        self.model.release()
+    @staticmethod
+    def _kill(token: int) -> i.Input:
+        return i.KillRequest(token, "operator", "a person saw it")
 
     def run(self) -> Flown:
         """Live through it."""
-        self.world.run(_READY_WITHIN, lambda: not math.isnan(self.took_off))
+        rig, scenario = self.rig, self.scenario
+        rig.world.run(_READY_WITHIN, lambda: not math.isnan(self._took_off))
+        if not math.isnan(self._took_off):
+            rig.world.run(self._took_off + _UP_WITHIN, lambda: not math.isnan(self.up))
+        if not math.isnan(self.up):
+            last = max([scenario.failure_at, *map(_end_of, scenario.faults)])
+            last = max(
+                last, scenario.apogee_at + 1.0, scenario.person.at if scenario.person else 0.0
+            )
+            quiet = self.up + last + _FOLLOWED
+            rig.world.run(quiet + _FALLS, lambda: self._over(quiet))
+        return self._flown()
+
+    # -- the pilot -------------------------------------------------------------------------------
+
+    def _look(self, now: float) -> None:
+        rig = self.rig
+        if math.isnan(self._took_off):
+            if self._may_fly(now):
+                rig.take_off(now)
+                self._took_off = now
+        elif rig.is_up() and self._is_believed():
+            self.up = now + (0.0 if self.scenario.burn else _SETTLES)
+            rig.plan(self.up)
+            if self.scenario.person is not None:
+                rig.world.post(self.up + self.scenario.person.at, self._person.begin)
+            return
+        rig.world.post(now + _LOOKS, self._look)
+
+    def _may_fly(self, now: float) -> bool:
+        leader = self.rig.leader
+        if leader is None or leader.state.stage not in (Stage.READY, Stage.ARMED):
+            return False
+        if not self.scenario.arms:
+            return True
+        if math.isnan(self._arms_at):
+            self._arms_at = now
+            self._arming.begin(now)
+        answer = self._arming.answer
+        if answer is not None and not answer.success:
+            self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
+            self._arms_at = math.nan
+        return answer is not None and answer.success
+
+    def _is_believed(self) -> bool:
+        leader = self.rig.leader
+        return leader is not None and leader.state.airborne
+
+    # -- the end ---------------------------------------------------------------------------------
+
+    def _over(self, quiet: float) -> bool:
+        """It is down, or hangs under its canopy for longer than anybody would fire again."""
+        rig = self.rig
+        now = rig.world.now
+        if now > rig.landed + 1.0:
+            return True
+        if not math.isnan(rig.released):
+            return now > max(
+                rig.released + _FOLLOWED_RELEASE, quiet if self.scenario.burn else 0.0
+            )
+        return now > quiet and not rig.truth.falls
+
+    def _flown(self) -> Flown:
+        rig = self.rig
+        acted = sorted((one for node in rig.nodes.values() for one in node.acted), key=_at)
+        killed = [one.at for one in acted if one.decision.action is Action.KILL]
+        again = sum(node.ordered_again for node in rig.nodes.values())
+        for host in rig.supervisors:
+            deploys = [at for at, one in host.decided if one.action is Action.DEPLOY]
+            again += sum(at > host.knew_release for at in deploys)
+        decided = sorted(
+            (one for host in rig.supervisors for one in host.decided), key=lambda one: one[0]
+        )
+        said = sorted(one for host in rig.supervisors for one in host.said)
         grounded = ""
-        if math.isnan(self.took_off):
-            grounded = "; ".join(text for _, text in self.supervisor.said) or "nothing was said"
-        else:
-            climb = self.took_off + self.scenario.height / _CLIMB_SPEED + 15.0
-            self.world.run(climb, lambda: not math.isnan(self.up_at))
-            end = self.up_at + self.scenario.failure_at + FOLLOWED
-            self.world.run(end, self._over)
-        acted = tuple((one.at, one.decision) for one in self.node.acted)
-        killed = [at for at, one in acted if one.action is Action.KILL]
+        if math.isnan(self.up):
+            grounded = "; ".join(text for _, text in said) or "nothing was said"
+        answer = self._person.answer
         return Flown(
             self.scenario,
-            self.truth,
+            rig.truth,
             grounded,
-            self.took_off,
+            self.up,
             killed[0] if killed else math.nan,
-            self.released,
-            self.landed,
-            self.landing_speed,
-            self.release_height,
-            self.node.ordered_again,
-            tuple(self.supervisor.decided),
-            acted,
-            tuple(self.supervisor.vehicle_reports),
+            rig.released,
+            rig.landed,
+            rig.landing_speed,
+            rig.release_height,
+            again,
+            tuple(decided),
+            tuple(acted),
+            tuple(said),
+            "" if answer is None else f"{answer.success}: {answer.message}",
         )
 
-    def _over(self) -> bool:
-        """It is down, or hangs under its canopy for longer than anybody would fire again."""
-        now = self.world.now
-        under_canopy = not math.isnan(self.released) and now > self.released + 3.0
-        return under_canopy or now > self.landed + 1.0
+
+def _at(one: Acted) -> float:
+    return one.at
+
+
+def fly(scenario: Scenario, shipped: Shipped) -> Flown:
+    """One flight from beginning to end."""
+    return Flight(scenario, shipped).run()

@@ -5,15 +5,27 @@ from __future__ import annotations
 import enum
 import random
 from dataclasses import dataclass
+from typing import TypeVar
 
 from chute_ros.campaign.channel import Spell
-from chute_ros.campaign.vehicle import SensorFault
+from chute_ros.campaign.sensors import SensorFault
+
+KindT = TypeVar("KindT")
 
 #: At most so many things go wrong besides the failure.
 MOST_FAULTS = 3
-#: How long a flight is followed after what fails, s.
-FOLLOWED = 14.0
-PROFILES = ("multirotor", "fixed_wing")
+_GRAVITY = 9.81  # m/s^2
+#: About what the rocket's motor pushes it with, m/s^2.
+_BURN = 51.0
+
+
+class Vehicle(enum.Enum):
+    """What flies, and how its parachute is spoken to."""
+
+    MAVLINK = "mavlink"
+    UPF = "upf"
+    BOTH = "both"
+    ROCKET = "rocket"
 
 
 class Failure(enum.Enum):
@@ -24,23 +36,63 @@ class Failure(enum.Enum):
     REBOOT = "the autopilot starts anew, and does not hold the vehicle"
     POWER = "the vehicle's power fails, and with it the autopilot"
     HANG = "the autopilot hangs, and the vehicle flies on"
-
-    @property
-    def falls(self) -> bool:
-        """Nothing but a parachute helps."""
-        return self in (Failure.MOTOR, Failure.REBOOT, Failure.POWER)
+    NO_DROGUE = "the drogue does not come by itself at the apogee"
+    FAULT = "the flight computer goes to Fault"
+    COMPUTER_REBOOT = "the flight computer starts anew"
+    COMPUTER_POWER = "the flight computer has no power any more"
+    COMPUTER_SILENT = "the flight computer falls silent, and does its work"
 
 
 _LIKELY = {
-    Failure.NOTHING: 4,
-    Failure.MOTOR: 6,
-    Failure.REBOOT: 2,
+    Failure.NOTHING: 5,
+    Failure.MOTOR: 7,
+    Failure.REBOOT: 3,
     Failure.POWER: 1,
     Failure.HANG: 1,
 }
-#: The ways that a spell can lie on.
-WAYS = ("autopilot", "parachute", "node", "to the supervisor", "from the supervisor")
-_SENSORS = ("height", "speed", "tilt", "force", "landed", "disarmed")
+_LIKELY_ROCKET = {
+    Failure.NOTHING: 4,
+    Failure.NO_DROGUE: 5,
+    Failure.FAULT: 3,
+    Failure.COMPUTER_REBOOT: 3,
+    Failure.COMPUTER_POWER: 1,
+    Failure.COMPUTER_SILENT: 1,
+}
+_VEHICLES = {Vehicle.MAVLINK: 4, Vehicle.UPF: 3, Vehicle.BOTH: 2, Vehicle.ROCKET: 2}
+PROFILES = ("multirotor", "fixed_wing", "rocket")
+
+_ROS_WAYS = ("to the supervisor", "from the supervisor")
+_STANDBY_WAYS = ("to the standby", "from the standby")
+_AUTOPILOT = ("autopilot", "mavlink_parachute")
+#: The ways that a spell can lie on, and the processes and devices that can stop.
+WAYS = {
+    Vehicle.MAVLINK: (*_AUTOPILOT, "parachute"),
+    Vehicle.UPF: (*_AUTOPILOT, "controller", "trigger", "upf_can"),
+    Vehicle.BOTH: (*_AUTOPILOT, "parachute", "controller", "trigger", "upf_can"),
+    Vehicle.ROCKET: ("flight_computer", "umbilical"),
+}
+STOPPING = {
+    Vehicle.MAVLINK: ("mavlink_parachute", "parachute"),
+    Vehicle.UPF: ("mavlink_parachute", "upf_can", "controller", "trigger"),
+    Vehicle.BOTH: ("mavlink_parachute", "upf_can", "parachute", "controller", "trigger"),
+    Vehicle.ROCKET: ("umbilical",),
+}
+#: Those of WAYS and STOPPING that are nodes: they hang as well as die, and have a wall clock.
+NODES = ("mavlink_parachute", "upf_can", "umbilical")
+_SENSORS = {
+    "height": ("sticks", "drifts", "jumps", "noise"),
+    "speed": ("sticks", "drifts", "jumps", "noise", "zero"),
+    "tilt": ("sticks", "jumps", "noise", "gone"),
+    "force": ("sticks", "noise", "zero"),
+    "landed": ("lies",),
+    "disarmed": ("lies",),
+}
+_ROCKET_SENSORS = {
+    "height": ("sticks", "drifts", "jumps", "noise", "gone"),
+    "speed": ("sticks", "jumps", "noise", "gone"),
+    "force": ("sticks", "noise", "zero"),
+    "fix": ("lies",),
+}
 
 
 @dataclass(frozen=True)
@@ -53,7 +105,8 @@ class WayFault:
 
 @dataclass(frozen=True)
 class Stop:
-    """A process hangs for so long, or dies and is there again after it. Times: virtual s."""
+    """A process hangs for so long, or dies and is there again after it; a device has no power for
+    so long. Times: virtual s."""
 
     who: str
     at: float
@@ -61,60 +114,139 @@ class Stop:
     dies: bool = False
 
 
-Fault = WayFault | Stop | SensorFault
+@dataclass(frozen=True)
+class Stalls:
+    """The supervisor's host is overloaded: it stands still again and again, at most longest s."""
+
+    who: str
+    begin: float
+    end: float
+    longest: float
+
+
+@dataclass(frozen=True)
+class ClockJump:
+    """The wall clock of a process is set by so many s."""
+
+    who: str
+    at: float
+    by: float
+
+
+Fault = WayFault | Stop | Stalls | ClockJump | SensorFault
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody at the supervisor's services. does: deploy or kill."""
+
+    does: str
+    at: float
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Times are s after the vehicle has reached its height; negative: before."""
+    """Times are s after the vehicle has reached its height, or the rocket was launched; negative:
+    before. height (m), gusts (m/s^2), fall_speed (m/s): of an aircraft; burn: of a rocket, s."""
 
     seed: int
+    vehicle: Vehicle
     profile: str
     height: float
     gusts: float
     fall_speed: float
+    burn: float
     failure: Failure
     failure_at: float
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault, ...] = ()
+    #: A second supervisor stands by.
+    standby: bool = False
+    #: The UPF parachute may release itself.
+    aps: bool = False
+    #: The parachute is armed by safety/arm; an aircraft's may be armed from the start.
+    arms: bool = False
+    person: Person | None = None
+
+    @property
+    def apogee_at(self) -> float:
+        """About when the rocket turns over, s after its launch."""
+        return self.burn * (1.0 + (_BURN - _GRAVITY) / _GRAVITY)
 
 
 def draw(seed: int) -> Scenario:
     """The same for the same seed, on any machine."""
     chance = random.Random(seed)
-    failure = chance.choices(list(_LIKELY), list(_LIKELY.values()))[0]
-    failure_at = round(chance.uniform(0.5, 3.0), 3)
+    vehicle = _one_of(chance, _VEHICLES)
+    is_rocket = vehicle is Vehicle.ROCKET
+    failure = _one_of(chance, _LIKELY_ROCKET if is_rocket else _LIKELY)
+    burn = round(chance.uniform(1.5, 3.0), 2) if is_rocket else 0.0
+    apogee = Scenario(0, vehicle, "", 0.0, 0.0, 0.0, burn, failure, 0.0).apogee_at
+    failure_at = round(chance.uniform(0.5, apogee + 2.0 if is_rocket else 3.0), 3)
+    # Most of what goes wrong goes wrong around the failure; that is what hurts.
+    around = max(failure_at, apogee + 3.0) if is_rocket and chance.random() < 0.7 else failure_at
+    standby = chance.random() < 0.25
     count = chance.choices((0, 1, 2, 3), (3, 4, 2, 1))[0]
     return Scenario(
         seed,
-        chance.choice(PROFILES),
+        vehicle,
+        "rocket" if is_rocket else chance.choice(PROFILES[:2]),
         round(chance.choice((chance.uniform(12.0, 40.0), chance.uniform(40.0, 120.0))), 1),
         round(chance.choice((0.0, chance.uniform(0.0, 2.0))), 2),
         round(chance.uniform(18.0, 35.0), 1),
+        burn,
         failure,
         failure_at,
-        tuple(_fault(chance, failure_at) for _ in range(count)),
+        tuple(_fault(chance, vehicle, around, standby) for _ in range(count)),
+        standby,
+        aps=chance.random() < 0.5,
+        arms=is_rocket or chance.random() < 0.3,
+        person=_person(chance, apogee + 1.0),
     )
 
 
-def _fault(chance: random.Random, failure_at: float) -> Fault:
-    # Most of what goes wrong goes wrong around the failure; that is what hurts.
-    begin = round(failure_at + chance.uniform(-2.0, 2.0), 3)
-    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 8.0))), 3)
-    kind = chance.choice(("way", "way", "way", "stop", "sensor"))
+def _one_of(chance: random.Random, likely: dict[KindT, int]) -> KindT:
+    return chance.choices(list(likely), list(likely.values()))[0]
+
+
+def _person(chance: random.Random, earliest: float) -> Person | None:
+    if chance.random() > 0.12:
+        return None
+    return Person(chance.choice(("deploy", "kill")), round(chance.uniform(0.5, 4.0) + earliest, 3))
+
+
+def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool) -> Fault:
+    begin = round(around + chance.uniform(-2.0, 2.0), 3)
+    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
+    end = round(begin + lasts, 3)
+    supervisors = ("supervisor", "standby") if standby else ("supervisor",)
+    kind = chance.choices(("way", "stop", "stalls", "clock", "sensor"), (9, 3, 1, 1, 4))[0]
     if kind == "sensor":
-        return SensorFault(chance.choice(_SENSORS), begin, begin + lasts)
+        sensors = _ROCKET_SENSORS if vehicle is Vehicle.ROCKET else _SENSORS
+        sensor = chance.choice(list(sensors))
+        return SensorFault(sensor, chance.choice(sensors[sensor]), begin, end)
+    if kind == "stalls":
+        return Stalls(chance.choice(supervisors), begin, end, round(chance.uniform(0.05, 0.6), 3))
+    nodes = tuple(one for one in STOPPING[vehicle] if one in NODES)
+    if kind == "clock":
+        by = chance.choice((-1.0, 1.0)) * 10.0 ** chance.uniform(-1.0, 5.0)
+        return ClockJump(chance.choice((*supervisors, *nodes)), begin, round(by, 3))
     if kind == "stop":
-        who = chance.choice(("node", "supervisor", "parachute"))
-        return Stop(who, begin, min(lasts, 3.0), dies=who != "node" and chance.random() < 0.5)
+        who = chance.choice((*supervisors, *supervisors, *STOPPING[vehicle]))
+        return Stop(who, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
+    ways = (*WAYS[vehicle], *_ROS_WAYS, *(_STANDBY_WAYS if standby else ()))
+    return WayFault(chance.choice(ways), _spell(chance, begin, end))
+
+
+def _spell(chance: random.Random, begin: float, end: float) -> Spell:
     strength = round(chance.uniform(0.05, 0.5), 3)
-    spell = chance.choice(
+    return chance.choice(
         (
-            Spell(begin, begin + lasts, loss=strength),
-            Spell(begin, begin + lasts, loss=1.0),
-            Spell(begin, begin + lasts, double=strength),
-            Spell(begin, begin + lasts, corrupt=strength),
-            Spell(begin, begin + lasts, delay=strength),
-            Spell(begin, begin + lasts, loss=1.0, flaps=round(chance.uniform(0.1, 1.2), 3)),
+            Spell(begin, end, loss=strength),
+            Spell(begin, end, loss=1.0),
+            Spell(begin, end, double=strength),
+            Spell(begin, end, corrupt=strength),
+            Spell(begin, end, delay=strength),
+            Spell(begin, end, reorder=strength),
+            Spell(begin, end, loss=1.0, flaps=round(chance.uniform(0.1, 1.2), 3)),
         )
     )
-    return WayFault(chance.choice(WAYS), spell)

@@ -1,79 +1,237 @@
-"""The supervisor's core in its process: a loop that may be late, hang, or die and start again."""
+"""The supervisor's core in its process, and what its node does between core and ROS: a loop that
+may be late, hang, or die and start again; a lease, where there are two."""
 
 from __future__ import annotations
 
-from collections import deque
+import itertools
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
-from chute_ros.model import Decision
+from chute_ros.campaign.ros import Process, Ros
+from chute_ros.model import Action, Decision
+from chute_ros.supervisor import handover
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.epochs import epoch_above
+from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
+from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written
 from chute_ros.supervisor.state import State
 
-#: What a queue of ROS keeps of what nobody reads.
-_QUEUE = 10
 _BOOT = _SETTINGS = "the same"
 _RESUME_WITHIN = 30.0  # s
+_HEARTBEAT_INTERVAL = 0.1  # s
+_STATE_INTERVAL = 1.0  # s, at the latest
+#: Finding each other takes no time here: one that starts looks so long for a leader, s.
+_LISTEN = 0.6
+#: What it hears of device nodes, besides their heartbeats.
+_HEARD: tuple[type[i.Input], ...] = (
+    *(i.ParachuteReport, i.VehicleReport, i.ActionReport, i.KillRequest, i.BlockRequest),
+)
+
+
+@dataclass(frozen=True)
+class SupervisorBeat:
+    """Its own heartbeat (safety/heartbeat)."""
+
+    name: str
+    leading: bool
+
+
+@dataclass(frozen=True)
+class SafetyPicture:
+    """Of safety/state what device nodes look at."""
+
+    blocked: bool
+    device_blocks: frozenset[str]
+
+
+@dataclass(frozen=True)
+class LeaseClaim:
+    """On safety/lease. state: the leader's."""
+
+    claim: Claim
+    state: str
 
 
 class SupervisorHost:
-    """send: carries a decision to the device nodes, over ROS."""
+    """One of the supervisors. arm_devices: calls the arm services that an order names."""
 
-    def __init__(self, config: SupervisorConfig, send: Callable[[Decision], None]) -> None:
-        self.config, self._send = config, send
-        self.state = State(epoch=8, started_at=0.0)
-        self._waiting: dict[type, deque[i.Input]] = {}
-        self._deadline = 0.0
-        #: It hangs until then, virtual s.
-        self.hangs_until = 0.0
+    def __init__(
+        self,
+        config: SupervisorConfig,
+        process: Process,
+        ros: Ros,
+        arm_devices: Callable[[SupervisorHost, i.ArmDevices], None],
+    ) -> None:
+        self.config, self.process, self._ros = config, process, ros
+        self._arm_devices = arm_devices
+        self._lease_config = LeaseConfig(process.name, config.rank, config.standby, listen=_LISTEN)
+        self._tokens = itertools.count(1)
+        self._callers: dict[int, Callable[[i.Finish], None]] = {}
         #: When each decision was first made, in their order.
         self.decided: list[tuple[float, Decision]] = []
         self.said: list[tuple[float, str]] = []
-        self.vehicle_reports: list[float] = []
+        #: When it was first told that a parachute is out.
+        self.knew_release = math.nan
+        self._kept: State | None = None
+        self._begin(State(epoch_above(8, config.rank), 0.0, leading=not config.standby), 0.0)
+        for kind in _HEARD:
+            ros.subscribe(kind, process, self._take)
+        ros.subscribe(i.LinkHeartbeat, process, self._heartbeat)
+        if config.standby:
+            ros.subscribe(LeaseClaim, process, self._claim)
 
-    def take(self, one: i.Input, now: float) -> None:
-        """An input came."""
-        if now < self.hangs_until:
-            self._waiting.setdefault(type(one), deque(maxlen=_QUEUE)).append(one)
-            return
-        if isinstance(one, i.VehicleReport):
-            self.vehicle_reports.append(now)
-        self._turn((one,), now)
+    def _begin(self, state: State, now: float) -> None:
+        self.state = state
+        self.lease = Lease.begin(self._lease_config, now)
+        self._experienced = False
+        self._beat_at = self._state_at = now
+        self._published: tuple[object, ...] = ()
+        self._deadline = now
+        self._callers.clear()
+
+    @property
+    def leading(self) -> bool:
+        """What it decides is sent."""
+        return self.lease.role is Role.LEADING
+
+    # -- for a person ----------------------------------------------------------------------------
+
+    def call(self, make: Callable[[int], i.Input], answered: Callable[[i.Finish], None]) -> None:
+        """One of its services is called."""
+        token = next(self._tokens)
+        self._callers[token] = answered
+        self._turn((make(token),), self._ros.world.now)
+
+    def armed(self, done: i.ArmDone) -> None:
+        """What came of an order to arm devices."""
+        if self.process.runs(self._ros.world.now):
+            self._turn((done,), self._ros.world.now)
+
+    # -- time ------------------------------------------------------------------------------------
 
     def update(self, now: float) -> None:
         """Its deadline, or the end of its sleep."""
-        if now < self.hangs_until:
-            return
-        waiting, self._waiting = self._waiting, {}
-        for queue in waiting.values():
-            for one in queue:
-                self.take(one, now)
-        self._turn((), now)
+        if self.process.runs(now):
+            self._turn((), now)
 
     def next_deadline(self) -> float:
-        """Of the core, but not before it runs again."""
-        return max(self._deadline, self.hangs_until)
+        """Of the core, the lease and its heartbeat, but not before it runs again."""
+        deadline = min(self._deadline, self._beat_at, self.lease.deadline(self._lease_config))
+        return max(deadline, self.process.stopped_until)
 
     def start_again(self, now: float) -> None:
         """It was killed; what it left is what it goes on with."""
-        left = written(Left(_BOOT, _SETTINGS, self.state))
-        epoch = self.state.epoch + 4
-        if worth_leaving(self.state):
-            self.state = resumed(left, _BOOT, _SETTINGS, _RESUME_WITHIN, now)
-            self._turn((i.TakeOver(epoch),), now)
-        else:
-            self.state = State(epoch=epoch, started_at=now)
+        left, self._kept = self._kept, None
+        rank, standby = self.config.rank, self.config.standby
+        # The epoch is made of the wall clock's seconds, which have moved on.
+        epoch = epoch_above(self.state.epoch, rank)
+        if left is None or not worth_leaving(left):
+            self._begin(State(epoch, now, leading=not standby), now)
             self._turn((), now)
+            return
+        text = written(Left(_BOOT, _SETTINGS, left))
+        state = resumed(text, _BOOT, _SETTINGS, _RESUME_WITHIN, now)
+        self._begin(state, now)
+        self._turn(() if standby else (i.TakeOver(epoch),), now)
 
-    def _turn(self, inputs: tuple[i.Input, ...], now: float) -> None:
-        self.state, outputs = update(self.config, self.state, inputs, now)
+    # -- what comes ------------------------------------------------------------------------------
+
+    def _take(self, one: i.Input, difference: float, now: float) -> None:
+        released = isinstance(one, i.ParachuteReport) and one.status.deployed
+        if released and math.isnan(self.knew_release):
+            self.knew_release = now
+        self._turn((one,), now)
+
+    def _heartbeat(self, one: i.LinkHeartbeat, difference: float, now: float) -> None:
+        self._turn(
+            (i.LinkHeartbeat(one.link, one.link_state, one.device_healthy, one.seq, difference),),
+            now,
+        )
+
+    def _claim(self, told: LeaseClaim, difference: float, now: float) -> None:
+        self.lease, event = self.lease.heard(self._lease_config, self._own(now), told.claim, now)
+        if event is not None:
+            self._happened(event, now)
+        if told.claim.leading and not self.leading and told.state:
+            self.state = handover.followed(self.state, told.state, now)
+            self._experienced = True
+        self._ros.world.stir(self)
+
+    # -- the loop --------------------------------------------------------------------------------
+
+    def _turn(self, new: tuple[i.Input, ...], now: float) -> None:
+        heard = self.state.newest_heartbeat() if self.config.standby else math.nan
+        self.lease, event = self.lease.looked(self._lease_config, now, heard)
+        if event is not None:
+            self._happened(event, now)
+        self.state, outputs = update(self.config, self.state, new, now)
+        if outputs:
+            self._carry_out(outputs, now)
+        if now >= self._beat_at:
+            self._beat_at = max(self._beat_at + _HEARTBEAT_INTERVAL, now)
+            self._ros.publish(self.process, SupervisorBeat(self.process.name, self.leading))
+            self._tell(now)
+        if self.leading:
+            self._publish_state(now)
         self._deadline = next_deadline(self.config, self.state, now)
+        self._ros.world.stir(self)
+
+    def _carry_out(self, outputs: tuple[i.Output, ...], now: float) -> None:
+        if any(isinstance(output, i.Decide) for output in outputs):
+            self._tell(now)
+            self._kept = self.state
         for output in outputs:
             if isinstance(output, i.Decide):
                 if not output.again:
                     self.decided.append((now, output.decision))
-                self._send(output.decision)
+                self._ros.publish(self.process, output.decision)
             elif isinstance(output, i.Say):
                 self.said.append((now, output.text))
+            elif isinstance(output, i.Finish):
+                caller = self._callers.pop(output.token, None)
+                if caller is not None:
+                    caller(output)
+            elif isinstance(output, i.ArmDevices):
+                self._arm_devices(self, output)
+            elif self.leading:
+                self.lease, event = self.lease.refused(output.newest_epoch, now)
+                self._happened(event, now)
+
+    def _publish_state(self, now: float) -> None:
+        state = self.state
+        told = (state.stage, state.mode, state.next_id, state.alarms, state.device_blocks)
+        if told == self._published and now < self._state_at:
+            return
+        self._published, self._state_at = told, now + _STATE_INTERVAL
+        self._kept = state
+        block = state.block.decision if state.block is not None else None
+        blocked = block is not None and block.action is Action.FLIGHT_BLOCK and not block.shadow
+        self._ros.publish(self.process, SafetyPicture(blocked, frozenset(state.device_blocks)))
+
+    # -- the lease -------------------------------------------------------------------------------
+
+    def _happened(self, event: Event, now: float) -> None:
+        if self.leading:
+            epoch = self.lease.next_epoch(self._lease_config, self.state.epoch)
+            new: i.Input = i.TakeOver(epoch)
+        else:
+            new = i.StepDown(event.value)
+        self.said.append((now, f"{'leads' if self.leading else 'looks on'}: {event.value}"))
+        self.state, outputs = update(self.config, self.state, (new,), now)
+        self._carry_out(outputs, now)
+        self._tell(now)
+
+    def _own(self, now: float) -> Claim:
+        state, config = self.state, self._lease_config
+        empty = not self._experienced and not state.flown and state.stage in ON_GROUND
+        heard = state.links_heard(self.config, now)
+        return Claim(config.name, config.rank, state.epoch, self.leading, empty, heard)
+
+    def _tell(self, now: float) -> None:
+        if self.config.standby:
+            state = handover.told(self.state, now) if self.leading else ""
+            self._ros.publish(self.process, LeaseClaim(self._own(now), state))

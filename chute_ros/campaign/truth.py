@@ -1,19 +1,22 @@
-"""What a perfect observer knows: from the flight model alone, not from any rule."""
+"""What a perfect observer knows: from the flight models alone, not from any rule."""
 
 from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.sim.flight import FlightModel
+from chute_ros.sim.rocket import Rocket
 
 STEP = 0.02  # s
 #: Softer than this nobody is hurt: canopy speed and a quarter, m/s.
 SOFT = 6.5
-#: How far the release may be put off in steps of this, s.
-_GRAIN = 0.05
-_LONGEST_FALL = 30.0  # s
+#: The same of a rocket under its drogue, whose main may fail as well.
+SOFT_UNDER_DROGUE = 31.0
+#: The release may be put off by so much, s, and that is found to this.
+_LONGEST_FALL, _GRAIN = 60.0, 0.02
 
 
 @dataclass(frozen=True)
@@ -37,13 +40,26 @@ class Truth:
 
 
 def observe(model: FlightModel, now: float) -> Truth:
-    """Control is lost now."""
-    latest = math.nan
-    late = 0.0
-    while late < _LONGEST_FALL and touchdown_speed(model, late) <= SOFT:
-        latest = now + late
-        late += _GRAIN
-    return Truth(now, latest, model.height)
+    """Nothing carries the aircraft from now on."""
+    late = _latest(lambda after: touchdown_speed(model, after) <= SOFT)
+    return Truth(now, now + late, model.height)
+
+
+def observe_rocket(rocket: Rocket, now: float) -> Truth:
+    """The rocket comes down from now on, and nothing on board will brake it by itself."""
+    late = _latest(lambda after: landing_speed(rocket, after) <= SOFT_UNDER_DROGUE)
+    return Truth(now, now + late, rocket.height)
+
+
+def _latest(is_soft: Callable[[float], bool]) -> float:
+    """The longest time (s) that a release may take; NaN: there is none."""
+    if not is_soft(0.0):
+        return math.nan
+    low, high = 0.0, _LONGEST_FALL
+    while high - low > _GRAIN:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if is_soft(middle) else (low, middle)
+    return low
 
 
 def touchdown_speed(model: FlightModel, released_after: float) -> float:
@@ -54,12 +70,29 @@ def touchdown_speed(model: FlightModel, released_after: float) -> float:
     )
     one.armed = False
     passed, speed = 0.0, 0.0
-    while not one.on_ground:
+    while not one.on_ground and passed < 5.0 * _LONGEST_FALL:
         if passed >= released_after:
             one.release()
+            if one.canopy >= 1.0 and -one.vertical_speed <= SOFT:
+                return -one.vertical_speed  # it will not become faster again
         speed = -one.vertical_speed
         one.step(STEP)
         passed += STEP
-        if passed > 10.0 * _LONGEST_FALL:
-            break
+    return speed
+
+
+def landing_speed(rocket: Rocket, released_after: float) -> float:
+    """m/s, with a drogue that comes out so much later, s."""
+    one, passed, speed = copy.copy(rocket), 0.0, 0.0
+    while not one.on_ground and passed < 5.0 * _LONGEST_FALL:
+        if passed >= released_after:
+            one.release_drogue()
+            if (
+                one.drogue_out_for > one.drogue_opening_time
+                and -one.vertical_speed <= one.drogue_speed
+            ):
+                return -one.vertical_speed
+        speed = -one.vertical_speed
+        one.step(STEP)
+        passed += STEP
     return speed

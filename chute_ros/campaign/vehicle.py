@@ -1,17 +1,22 @@
-"""The vehicle of a campaign: the simulator's flight model in wind, with sensors that may lie."""
+"""The aircraft of a campaign: the simulator's flight model in wind, with sensors that may lie."""
 
 from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
+from chute_ros.campaign.sensors import Sensors
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.sim.autopilot_device import AutopilotDevice
-from chute_ros.sim.flight import FlightModel
+from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
+from chute_ros.sim.flight import GRAVITY, FlightModel
 
 #: Gusts change within about this time, s.
 _GUST_TIME = 1.0
+#: It is carried up to where the flight begins, by more than any vehicle climbs, m/s.
+_LIFT = 200.0
 
 
 @dataclass
@@ -39,65 +44,71 @@ class WindyModel(FlightModel):
             self.roll = self._sway
 
 
-@dataclass(frozen=True)
-class SensorFault:
-    """From begin to end (virtual s) a part of what the autopilot tells is wrong.
+class Nature:
+    """Moves the vehicle on, whoever hangs or has no power. moved: called after each step."""
 
-    kind: height (drifts), speed (sticks), tilt (noise), force (reads 0), landed (says on ground),
-    disarmed (says disarmed).
-    """
+    def __init__(self, model: FlightModel, moved: Callable[[float], None]) -> None:
+        self.model, self._moved = model, moved
+        self._at = STEP
+        #: It is being carried to its height.
+        self.lifts = False
 
-    kind: str
-    begin: float
-    end: float
+    def update(self, now: float) -> None:
+        """One step."""
+        self._at += STEP
+        model = self.model
+        if self.lifts:
+            model.height = min(model.target_height, model.height + _LIFT * STEP)
+            model.vertical_speed = 0.0
+            self.lifts = model.height < model.target_height
+        else:
+            model.step(STEP)
+        self._moved(now)
+
+    def next_deadline(self) -> float:
+        """Of the next step."""
+        return self._at
 
 
 class CampaignAutopilot(AutopilotDevice):
-    """Tells what its sensors say."""
+    """Tells what its sensors say; nature moves the vehicle."""
 
-    def __init__(self, model: WindyModel, chance: random.Random) -> None:
+    def __init__(self, model: FlightModel, sensors: Sensors) -> None:
         super().__init__(1, [], model)
-        self._chance = chance
-        self.faults: list[SensorFault] = []
-        self._stuck: int | None = None
+        self._sensors = sensors
 
-    def _wrong(self, kind: str) -> SensorFault | None:
-        for fault in self.faults:
-            if fault.kind == kind and fault.begin <= self.now < fault.end:
-                return fault
-        return None
+    def step(self, now: float) -> None:
+        """Nature does."""
 
-    def _global_position_int(self) -> object:
-        message = super()._global_position_int()
-        if drift := self._wrong("height"):
-            message.relative_alt += int(3000.0 * (self.now - drift.begin))  # 3 m/s
-        if self._wrong("speed"):
-            self._stuck = message.vz if self._stuck is None else self._stuck
-            message.vz = self._stuck
-        else:
-            self._stuck = None
+    def next_step(self) -> float:
+        return math.inf
+
+    def _global_position_int(self) -> Any:
+        message: Any = super()._global_position_int()
+        height = self._sensors.read("height", self.model.height, self.now)
+        speed = self._sensors.read("speed", self.model.vertical_speed, self.now)
+        message.relative_alt, message.vz = int(height * 1000.0), int(speed * -100.0)
         return message
 
-    def _attitude(self) -> object:
-        message = super()._attitude()
-        if self._wrong("tilt"):
-            message.roll = self._chance.uniform(-math.pi, math.pi)
+    def _attitude(self) -> Any:
+        message: Any = super()._attitude()
+        message.roll = self._sensors.read("tilt", self.model.roll, self.now)
         return message
 
-    def _scaled_imu(self) -> object:
-        message = super()._scaled_imu()
-        if self._wrong("force"):
-            message.xacc = message.yacc = message.zacc = 0
+    def _scaled_imu(self) -> Any:
+        message: Any = super()._scaled_imu()
+        force = self._sensors.read("force", self.model.acceleration, self.now)
+        message.zacc = -min(int(abs(force) / GRAVITY * 1000.0), 32767)
         return message
 
-    def _extended_sys_state(self) -> object:
-        message = super()._extended_sys_state()
-        if self._wrong("landed"):
+    def _extended_sys_state(self) -> Any:
+        message: Any = super()._extended_sys_state()
+        if self._sensors.lies("landed", self.now):
             message.landed_state = dialect.MAV_LANDED_STATE_ON_GROUND
         return message
 
-    def _heartbeat(self) -> object:
-        message = super()._heartbeat()
-        if self._wrong("disarmed"):
+    def _heartbeat(self) -> Any:
+        message: Any = super()._heartbeat()
+        if self._sensors.lies("disarmed", self.now):
             message.base_mode = 0
         return message

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import heapq
 import itertools
 import math
@@ -27,29 +28,46 @@ class World:
 
     def __init__(self) -> None:
         self.now = 0.0
-        self.parts: list[Part] = []
-        self._mail: list[tuple[float, int, Callable[[float], None]]] = []
+        self._due: list[tuple[float, int, Callable[[float], None]]] = []
         self._order = itertools.count()
+        #: Part -> the earliest moment at which it will be looked at.
+        self._alarms: dict[Part, float] = {}
+
+    @property
+    def is_empty(self) -> bool:
+        """Nothing is to come."""
+        return not self._due
 
     def post(self, when: float, deliver: Callable[[float], None]) -> None:
         """Have deliver(now) called then; of two at the same time the one posted first."""
-        heapq.heappush(self._mail, (max(when, self.now), next(self._order), deliver))
+        heapq.heappush(self._due, (max(when, self.now), next(self._order), deliver))
+
+    def add(self, part: Part) -> None:
+        """It lives here from now on. Whoever gives it something to do calls stir."""
+        self._alarms[part] = math.inf
+        self.stir(part)
+
+    def stir(self, part: Part) -> None:
+        """Something has happened to it: its next deadline may be another one."""
+        # What is due already has its turn a moment later, as every loop takes its time.
+        deadline = max(part.next_deadline(), self.now + _TURN)
+        if deadline < self._alarms[part]:
+            self._alarms[part] = deadline
+            self.post(deadline, functools.partial(self._ring, part))
+
+    def _ring(self, part: Part, now: float) -> None:
+        if now < self._alarms[part]:
+            return  # it has been looked at meanwhile
+        self._alarms[part] = math.inf
+        if part.next_deadline() <= now:
+            part.update(now)
+        self.stir(part)
 
     def run(self, until: float, over: Callable[[], bool]) -> None:
         """Live on until then, or until it is over."""
         while not over():
-            deadlines = [part.next_deadline() for part in self.parts]
-            wake = min(deadlines, default=math.inf)
-            if self._mail:
-                wake = min(wake, self._mail[0][0])
-            if wake > until or math.isinf(wake):
+            if not self._due or self._due[0][0] > until:
                 self.now = until
                 return
-            # What is still due has its turn a moment later, as every loop takes its time.
-            self.now = max(self.now + _TURN, wake)
-            while self._mail and self._mail[0][0] <= self.now:
-                heapq.heappop(self._mail)[2](self.now)
-            # One that the mail has just given something to do has its turn a moment later.
-            for part, deadline in zip(self.parts, deadlines, strict=True):
-                if deadline <= self.now:
-                    part.update(self.now)
+            self.now, _, deliver = heapq.heappop(self._due)
+            deliver(self.now)

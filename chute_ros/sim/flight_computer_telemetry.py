@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_DOWN, Context, Decimal
 from fractions import Fraction
 from functools import lru_cache
 
@@ -15,6 +15,7 @@ from chute_ros.sim.flight_computer_settings import Mode
 from chute_ros.sim.rocket import GRAVITY, Rocket
 
 _INFINITE_F32 = 0x7F80_0000
+_MANTISSA = 0x007F_FFFF
 
 
 def rust_text(value: float, bits: int) -> str:
@@ -141,6 +142,13 @@ def _shortest_f32(value: float) -> Decimal:
     if value == 0.0:
         return Decimal(0)
     bits = struct.unpack("<I", struct.pack("<f", value))[0]
+    if bits & _MANTISSA:
+        # Its neighbours are equally far: the nearest decimal of so many digits reads back as it,
+        # or none of so many does.
+        for digits in range(1, 10):
+            near = Context(digits, ROUND_HALF_DOWN).create_decimal_from_float(value)
+            if _rounded_to_f32(float(near)) == value:
+                return near
     exact = Fraction(value)
     low, high = (exact + _f32(bits - 1)) / 2, (exact + _f32(bits + 1)) / 2
     # What lies half way between two numbers reads as the one with the even last bit.

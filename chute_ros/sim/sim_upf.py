@@ -62,12 +62,9 @@ def _run() -> None:
 
     from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, Definitions
     from chute_ros.sim.upf_bus import UpfBus
-    from chute_ros.sim.upf_controller import (
-        CONTROLLER_PARAMETERS,
-        ControllerSettings,
-        UpfController,
-    )
+    from chute_ros.sim.upf_controller import ControllerSettings, UpfController
     from chute_ros.sim.upf_errors import error_places
+    from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
     from chute_ros.sim.upf_node import NodeSettings, UpfNode
     from chute_ros.sim.upf_trigger import TRIGGER_PARAMETERS, UpfTrigger
     from chute_ros.transport.data_types import load_data_types

@@ -1,6 +1,7 @@
 """Executable campaign: many flights in virtual time with faults at every layer, counted.
 
-A flight that must not be is saved by its seed: --replay SEED tells it step by step.
+A flight that must not be is saved as a scenario, as text: --replay SEED or FILE tells it step by
+step.
 """
 
 from __future__ import annotations
@@ -13,12 +14,18 @@ import time
 from pathlib import Path
 
 from chute_ros.campaign import campaign
-from chute_ros.campaign.judge import WRONG, Count
-from chute_ros.campaign.page import page, picture
-from chute_ros.campaign.scenario import draw
+from chute_ros.campaign.judge import Count
+from chute_ros.campaign.page import page
+from chute_ros.campaign.picture import picture
+from chute_ros.campaign.scenario import Scenario, draw
+from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.errors import RecordError
 from chute_ros.nodes.config_folder import config_folder
+from chute_ros.nodes.ros_home import ros_home
 
 _TELL_EVERY = 5.0  # s
+#: So many of those that must not be are told; all are saved.
+_MOST_TOLD = 20
 
 
 def main() -> None:
@@ -27,40 +34,57 @@ def main() -> None:
     options.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
     options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
-    options.add_argument("--page", type=writable, help="write the results there, beside a picture")
-    options.add_argument("--replay", type=int, metavar="SEED", help="tell one flight")
+    options.add_argument("--page", type=writable, help="write the results there, beside pictures")
+    options.add_argument(
+        "--failures",
+        type=Path,
+        default=ros_home() / "campaign_failures",
+        help="folder for the flights that must not be (default: %(default)s)",
+    )
+    options.add_argument(
+        "--replay", type=scenario, metavar="SEED|FILE", help="tell one flight step by step"
+    )
     # `ros2 run` adds arguments for nodes, which this is none of.
     chosen, _ = options.parse_known_args()
     profiles = config_folder() / "profiles"
     if chosen.replay is not None:
         _replay(profiles, chosen.replay)
         return
-    told = {"at": time.monotonic()}
-
-    def progress(tally: campaign.Tally) -> None:
-        if time.monotonic() - told["at"] >= _TELL_EVERY:
-            told["at"] = time.monotonic()
-            wrong = sum(tally.counts[one] for one in WRONG)
-            rate = tally.flights / tally.took * 60.0
-            print(
-                f"{tally.flights} of {chosen.flights} flights, {rate:.0f} a minute, "
-                f"{wrong} that must not be",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    tally = campaign.run(profiles, chosen.flights, chosen.seed, chosen.jobs, progress)
+    progress = _Progress(chosen.flights)
+    tally = campaign.run(profiles, chosen.flights, chosen.seed, chosen.jobs, progress.look)
     for count in Count:
         print(f"{tally.counts[count]:8d}  {count.value}")
-    for line in tally.wrong[:20]:
-        print(f"  seed {line.seed}, {line.profile}, {line.failure}: {line.count.name}: {line.why}")
+    for line in tally.wrong[:_MOST_TOLD]:
+        what = f"{line.vehicle}, {line.profile}, {line.failure}"
+        print(f"  seed {line.seed}, {what}: {line.count.name}: {line.why}")
     print(f"{tally.flights} flights in {tally.took:.0f} s")
+    if tally.wrong:
+        _save(tally.wrong, chosen.failures)
     if chosen.page:
-        drawn = chosen.page.with_suffix(".svg")
-        drawn.write_text(picture(tally))
-        chosen.page.write_text(page(tally, chosen.seed, drawn.name))
+        _write(tally, chosen.seed, chosen.page)
     if tally.wrong:
         sys.exit(1)
+
+
+class _Progress:
+    """A line each few seconds, on the terminal's second channel."""
+
+    def __init__(self, flights: int) -> None:
+        self._flights = flights
+        self._told_at = time.monotonic()
+
+    def look(self, tally: campaign.Tally) -> None:
+        """One more flight has been flown."""
+        if time.monotonic() - self._told_at < _TELL_EVERY:
+            return
+        self._told_at = time.monotonic()
+        rate = tally.flights / tally.took * 60.0
+        print(
+            f"{tally.flights} of {self._flights} flights, {rate:.0f} a minute, "
+            f"{len(tally.wrong)} that must not be",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def positive(text: str) -> int:
@@ -79,35 +103,61 @@ def writable(text: str) -> Path:
     return path
 
 
-def _replay(profiles: Path, seed: int) -> None:
+def scenario(text: str) -> Scenario:
+    """Of a seed, or in a file that was saved."""
+    if text.removeprefix("-").isdecimal():
+        return draw(int(text))
+    try:
+        return scenario_of(Path(text).read_text(encoding="utf-8"), text)[0]
+    except (OSError, UnicodeDecodeError) as error:
+        raise argparse.ArgumentTypeError(f"{text}: need a seed, or a file: {error}") from None
+    except RecordError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _save(wrong: list[campaign.Line], folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for line in wrong:
+            text = text_of(draw(line.seed), f"{line.count.name}: {line.why}")
+            (folder / f"{line.seed}.json").write_text(text, encoding="utf-8")
+    except OSError as error:
+        print(f"they cannot be saved, name another folder with --failures: {error}")
+        return
+    print(f"saved in {folder}; --replay FILE tells one step by step")
+
+
+def _write(tally: campaign.Tally, seed: int, path: Path) -> None:
+    drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
+    drawn["delays"].write_text(picture(tally.lines, "release_delay"))
+    drawn["heights"].write_text(picture(tally.lines, "height_lost"))
+    path.write_text(page(tally, seed, {what: one.name for what, one in drawn.items()}))
+
+
+def _replay(profiles: Path, scenario: Scenario) -> None:
     """What was drawn, what happened, what it is counted as."""
-    scenario = draw(seed)
-    print(
-        f"seed {seed}: {scenario.profile}, {scenario.height:g} m, gusts {scenario.gusts:g} m/s^2"
-    )
-    print(f"  {scenario.failure.value} at {scenario.failure_at:g} s")
-    for fault in scenario.faults:
-        print(f"  {fault}")
-    flight, flown, judged = campaign.fly_here(profiles, seed)
-    up = flight.up_at
-    lines = [(at, f"said: {text}") for at, text in flight.supervisor.said]
-    lines += [
-        (at, f"decided {one.action.name} by {one.rule!r}: {'; '.join(one.reasons)}")
-        for at, one in flown.decided
-    ]
-    lines += [(at, f"acted on {one.action.name}") for at, one in flown.acted]
+    _, flown, judged = campaign.fly_here(profiles, scenario)
+    print("\n".join(text_of(scenario, "").splitlines()[3:-1]))
+    up, truth, person = flown.up, flown.truth, scenario.person
+    lines = [(at, f"said: {text}") for at, text in flown.said]
+    for at, one in flown.decided:
+        what = f"decided {one.epoch}.{one.id} {one.action.name} by {one.rule!r}"
+        lines.append((at, f"{what}: {'; '.join(one.reasons)}"))
+    lines += [(act.at, f"{act.node} acts on {act.decision.action.name}") for act in flown.acted]
     for at, what in (
-        (flown.took_off, "takes off"),
         (up, "is up"),
-        (flown.truth.at, "ONLY A PARACHUTE HELPS"),
-        (flown.truth.latest, "the last moment for its release"),
+        (up + scenario.failure_at, scenario.failure.value),
+        (up + person.at if person else math.nan, f"a person wants: {person and person.does}"),
+        (truth.at, "ONLY A PARACHUTE HELPS"),
+        (truth.latest, "the last moment for its release"),
         (flown.released, "RELEASED"),
         (flown.landed, f"lands at {flown.landing_speed:.1f} m/s"),
     ):
         if not math.isnan(at):
             lines.append((at, what))
-    for at, text in sorted(lines):
-        print(f"  {at - up:8.3f} s  {text}")
+    begin = 0.0 if math.isnan(up) else up
+    for at, text in sorted(lines, key=lambda line: line[0]):
+        print(f"  {at - begin:8.3f} s  {text}")
     print(f"  {judged.count.value}{': ' if judged.why else ''}{judged.why}")
 
 

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from chute_ros.campaign.truth import SOFT, observe, touchdown_speed
+from chute_ros.campaign.truth import (
+    SOFT,
+    SOFT_UNDER_DROGUE,
+    landing_speed,
+    observe,
+    observe_rocket,
+    touchdown_speed,
+)
 from chute_ros.sim.flight import FlightModel
+from chute_ros.sim.rocket import Rocket
 
 
 def falling_from(height: float, fall_speed: float = 25.0) -> FlightModel:
@@ -33,3 +41,13 @@ def test_the_higher_the_more_time() -> None:
 
 def test_without_a_parachute_it_hits_the_ground_hard() -> None:
     assert touchdown_speed(falling_from(100.0), 1e9) > 20.0
+
+
+def test_a_rocket_has_until_its_drogue_just_brakes_it() -> None:
+    rocket = Rocket(height=400.0, burned_for=60.0)
+    truth = observe_rocket(rocket, 10.0)
+    assert 5.0 < truth.leeway < 10.0
+    assert landing_speed(rocket, truth.leeway - 0.05) <= SOFT_UNDER_DROGUE
+    assert landing_speed(rocket, truth.leeway + 0.1) > SOFT_UNDER_DROGUE
+    assert rocket.height == 400.0, "the rocket itself has not moved"
+    assert observe_rocket(Rocket(height=3.0, vertical_speed=-90.0), 0.0).leeway == -1.0

@@ -1,10 +1,20 @@
-"""The command line of the campaign: mistakes are said before the first flight."""
+"""The command line of the campaign: mistakes are said before any flight, results are kept."""
 
 import sys
+from dataclasses import replace
 
 import pytest
 
+from chute_ros.campaign import campaign as flights
+from chute_ros.campaign.judge import Count, Judged
+from chute_ros.campaign.scenario import draw
+from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign
+
+
+def run(monkeypatch, *arguments):
+    monkeypatch.setattr(sys, "argv", ["campaign", *arguments])
+    campaign.main()
 
 
 @pytest.mark.parametrize(
@@ -16,23 +26,72 @@ from chute_ros.tools import campaign
         (["--jobs", "many"], "argument --jobs: invalid positive value: 'many'"),
         (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
         (["--page", "/tmp"], "argument --page: /tmp: no file can be written there"),
+        (["--replay", "/nowhere"], "argument --replay: /nowhere: need a seed, or a file: "),
+        (["--replay", __file__], "is no scenario of a campaign: JSONDecodeError"),
     ],
 )
 def test_a_mistake_is_said_at_once(arguments, words, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["campaign", *arguments])
     with pytest.raises(SystemExit) as ended:
-        campaign.main()
+        run(monkeypatch, *arguments)
     assert ended.value.code == 2
     told = capsys.readouterr()
     assert words in told.err
     assert told.out == ""
 
 
-def test_it_writes_its_page_and_its_picture(monkeypatch, tmp_path, capsys):
+def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
     page = tmp_path / "campaign.md"
-    arguments = ["--flights", "3", "--seed", "5", "--jobs", "1", "--page", str(page)]
-    monkeypatch.setattr(sys, "argv", ["campaign", *arguments])
-    campaign.main()
+    failures = str(tmp_path / "failures")
+    with_page = ("--jobs", "1", "--page", str(page), "--failures", failures)
+    run(monkeypatch, "--flights", "3", "--seed", "5", *with_page)
     assert "3 flights in" in capsys.readouterr().out
-    assert "`make campaign FLIGHTS=3 SEED=5`" in page.read_text()
-    assert page.with_suffix(".svg").read_text().startswith("<svg")
+    text = page.read_text()
+    assert "`make campaign FLIGHTS=3 SEED=5`" in text
+    assert "| mavlink, " in text or "| upf, " in text or "| both, " in text
+    for suffix in (".svg", ".heights.svg"):
+        assert f"]({page.with_suffix(suffix).name})" in text
+        assert page.with_suffix(suffix).read_text().startswith("<svg")
+    assert not (tmp_path / "failures").exists()
+
+
+@pytest.fixture
+def all_missed(monkeypatch):
+    """A campaign whose every flight is judged as missed."""
+    monkeypatch.setattr(flights, "judge", lambda flown: Judged(Count.MISSED, "for a test"))
+
+
+def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_path, capsys):
+    folder = tmp_path / "failures"
+    with pytest.raises(SystemExit) as ended:
+        run(
+            *(monkeypatch, "--flights", "1", "--seed", "7", "--jobs", "1"),
+            *("--failures", str(folder)),
+        )
+    assert ended.value.code == 1
+    told = capsys.readouterr().out
+    assert "  seed 7, " in told
+    assert f"saved in {folder}" in told
+    saved = folder / "7.json"
+    assert scenario_of(saved.read_text(), "x") == (draw(7), "MISSED: for a test")
+    run(monkeypatch, "--replay", str(saved))
+    from_file = capsys.readouterr().out
+    run(monkeypatch, "--replay", "7")
+    assert capsys.readouterr().out == from_file
+    assert '"seed": 7' in from_file
+    assert "   0.000 s  is up" in from_file
+
+
+def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_path, capsys):
+    taken = tmp_path / "taken"
+    taken.write_text("")
+    with pytest.raises(SystemExit):
+        run(monkeypatch, "--flights", "1", "--jobs", "1", "--failures", str(taken))
+    assert "they cannot be saved, name another folder with --failures: " in capsys.readouterr().out
+
+
+def test_a_changed_scenario_can_be_flown(monkeypatch, tmp_path, capsys):
+    calm = replace(draw(7), faults=(), gusts=0.0)
+    file = tmp_path / "calm.json"
+    file.write_text(text_of(calm, "made by hand"))
+    run(monkeypatch, "--replay", str(file))
+    assert '"faults": []' in capsys.readouterr().out

@@ -1,0 +1,130 @@
+"""A multirotor or aeroplane with its autopilot on MAVLink, and its parachute on either bus or on
+both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from chute_ros.campaign.bus import CAN, MAVLINK, Bus, Plug
+from chute_ros.campaign.device_nodes import MAVLINK_NODE, UPF_NODE, MavlinkNode, UpfNode
+from chute_ros.campaign.rig import Rig
+from chute_ros.campaign.scenario import Failure, Scenario, Vehicle
+from chute_ros.campaign.shipped import Shipped
+from chute_ros.campaign.truth import observe
+from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
+from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.upf import parameters as p
+from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
+from chute_ros.sim.upf_aps import Motion
+from chute_ros.sim.upf_bus import UpfBus
+from chute_ros.sim.upf_controller import ControllerSettings, UpfController
+from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
+from chute_ros.sim.upf_node import NodeSettings
+from chute_ros.sim.upf_trigger import UpfTrigger
+
+#: FC and OFFBOARD.
+_ARMED_TRIGGERS = 12
+#: How long the autopilot that hangs does, s.
+_HANGS = 6.0
+#: GLOBAL_POSITION_INT, COMMAND_INT and COMMAND_LONG: all that the simulators react to.
+_HEARD = (b"\x21\0\0", b"\x4b\0\0", b"\x4c\0\0")
+
+
+def _is_for_devices(data: bytes) -> bool:
+    """A MAVLink 2 frame of a kind to which a simulator reacts, or a damaged one."""
+    return data[7:10] in _HEARD or data[0] != 0xFD
+
+
+class ReleasedParachute(ParachuteDevice):
+    """Its release acts on the vehicle, whoever hears of it."""
+
+    def __init__(self, settings: ParachuteSettings, out: Callable[[], None]) -> None:
+        super().__init__(settings, [])
+        self._out = out
+
+    def _deploy(self, trigger: DeploymentTrigger) -> None:
+        super()._deploy(trigger)
+        self._out()
+
+
+class Aircraft(Rig):
+    """MAVLINK, UPF or BOTH."""
+
+    def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
+        super().__init__(scenario, shipped)
+        self.model = WindyModel(
+            fall_speed=scenario.fall_speed, gusts=scenario.gusts, chance=self.chance("wind")
+        )
+        self.controller: UpfController | None = None
+        bus = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
+        self.autopilot = CampaignAutopilot(self.model, self.sensors)
+        plug = Plug(bus, "autopilot", self.autopilot, _is_for_devices)
+        self.add_device(plug, self.autopilot.reboot)
+        on_mavlink = scenario.vehicle is not Vehicle.UPF
+        if on_mavlink:
+            settings = ParachuteSettings(armed_triggers=0 if scenario.arms else _ARMED_TRIGGERS)
+            parachute = ReleasedParachute(settings, self._out)
+            self.add_device(Plug(bus, "parachute", parachute, _is_for_devices), parachute.reboot)
+        self.add_node(MavlinkNode(bus, self.process(MAVLINK_NODE), self.ros, on_mavlink))
+        if scenario.vehicle is not Vehicle.MAVLINK:
+            self._add_upf()
+        self.nature = Nature(self.model, self._moved)
+        self.world.add(self.nature)
+        self._speed = 0.0
+        self._flew = False
+
+    def _add_upf(self) -> None:
+        bus = Bus(self.world, CAN, f"{self.scenario.seed} can")
+        by_itself = dict.fromkeys((p.AUTO_TAKEOFF, p.AUTO_ARM), not self.scenario.arms)
+        values = {**CONTROLLER_PARAMETERS, p.ENABLE_APS: self.scenario.aps, **by_itself}
+        node = NodeSettings("upf.controller", values)
+        self.controller = UpfController(self.shipped.definitions, ControllerSettings(node))
+        trigger = UpfTrigger(self.shipped.definitions, on_fire=self._out)
+        for name, device in (("controller", self.controller), ("trigger", trigger)):
+            self.add_device(Plug(bus, name, UpfBus([device])), device.reboot)
+        self.add_node(UpfNode(bus, self.process(UPF_NODE), self.ros, self.shipped.types))
+
+    # -- the flight ------------------------------------------------------------------------------
+
+    def take_off(self, now: float) -> None:
+        self.autopilot.act("arm")
+        self.autopilot.act(f"takeoff={self.scenario.height}")
+        self.nature.lifts = True
+        self.world.stir(self.plugs["autopilot"])
+
+    def is_up(self) -> bool:
+        return self._flew and not self.nature.lifts
+
+    def fail(self, now: float) -> None:
+        failure, plug = self.scenario.failure, self.plugs["autopilot"]
+        if failure is Failure.MOTOR:
+            self.autopilot.act("fail-motor")
+        elif failure is Failure.REBOOT:
+            self.autopilot.reboot()
+        elif failure is Failure.POWER:
+            self.model.motors_failed = True
+            plug.dead_until = math.inf
+        elif failure is Failure.HANG:
+            plug.dead_until = now + _HANGS
+
+    def _moved(self, now: float) -> None:
+        model = self.model
+        if self.controller is not None:
+            self.controller.motion = Motion(
+                model.height, model.vertical_speed, abs(model.roll), model.acceleration
+            )
+        carried = model.armed and not model.motors_failed
+        if not self._flew:
+            self._flew = not model.on_ground
+        elif model.on_ground:
+            if math.isnan(self.landed):
+                self.landed, self.landing_speed = now, self._speed
+        elif not carried and not self.truth.falls and math.isnan(self.released):
+            self.truth = observe(model, now)
+        self._speed = max(0.0, -model.vertical_speed)
+
+    def _out(self) -> None:
+        if math.isnan(self.released):
+            self.released, self.release_height = self.world.now, self.model.height
+        self.model.release()

@@ -1,0 +1,100 @@
+"""Did enough reach the supervisor, and its orders the vehicle?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, Vehicle, WayFault
+from chute_ros.campaign.sensors import SensorFault
+
+#: What the chain may take where all goes well: to see the fall (the slowest rule that sees it),
+#: the kill's `kill_to_deploy_delay`, and the release, s. A rocket must fall for 3 s first, so that
+#: a drogue that comes late by itself is waited for.
+_ENOUGH_TIME, _ENOUGH_FOR_ROCKET = 2.0, 6.5
+#: A way that loses more than this for a while is no way meanwhile; so are stalls as long as that.
+_MOST_LOSS, _MOST_STALL = 0.6, 0.3
+#: A standby has taken over from a supervisor that stopped or whose ways are cut by then, s:
+#: `lease_timeout` (twice, by rank) after the last claim, or after the links have become LOST.
+_TAKEN_OVER, _TAKEN_OVER_DEAF = 1.5, 2.5
+_NO_POWER = {
+    Failure.POWER: "the autopilot had no power, and nothing else tells of the vehicle",
+    Failure.COMPUTER_POWER: "the flight computer had no power, and nothing else fires the drogue",
+    Failure.COMPUTER_SILENT: "the flight computer told nothing",
+}
+
+
+@dataclass(frozen=True)
+class Need:
+    """Something had to happen between these times, virtual s."""
+
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class _Hidden:
+    """In this time nothing could be known or done, for this cause."""
+
+    begin: float
+    end: float
+    cause: str
+
+
+def enough_time(scenario: Scenario) -> float:
+    """How long the chain may take, s."""
+    return _ENOUGH_FOR_ROCKET if scenario.vehicle is Vehicle.ROCKET else _ENOUGH_TIME
+
+
+def blinded(scenario: Scenario, up: float, need: Need) -> str:
+    """Which faults left no time in a row that is enough; empty: there was."""
+    failed_at = up + scenario.failure_at
+    if scenario.failure in _NO_POWER and failed_at < need.end:
+        return _NO_POWER[scenario.failure]
+    hidden = [one for one in _all_hidden(scenario) if up + one.begin < need.end]
+    free, best = need.begin, 0.0
+    for one in sorted(hidden, key=lambda one: one.begin):
+        best = max(best, up + one.begin - free)
+        free = max(free, up + one.end)
+    best = max(best, need.end - free)
+    if best >= enough_time(scenario):
+        return ""
+    return "; ".join(sorted(one.cause for one in hidden if up + one.end > need.begin))
+
+
+def _all_hidden(scenario: Scenario) -> list[_Hidden]:
+    hidden = []
+    sensors = [one for one in scenario.faults if isinstance(one, SensorFault)]
+    for fault in scenario.faults:
+        if isinstance(fault, Stop):
+            end = fault.at + fault.lasts
+            if scenario.standby and fault.who == "supervisor":
+                end = min(end, fault.at + _TAKEN_OVER)
+            hidden.append(_Hidden(fault.at, end, f"{fault.who} stopped"))
+        elif isinstance(fault, Stalls) and fault.longest > _MOST_STALL:
+            hidden.append(_Hidden(fault.begin, fault.end, f"{fault.who} stalled"))
+        elif isinstance(fault, WayFault) and fault.spell.loss > _MOST_LOSS:
+            hidden.append(_cut(fault, scenario.standby))
+    if len(sensors) > 1:
+        hidden += [
+            _Hidden(one.begin, one.end, f"sensor {one.sensor} was wrong") for one in sensors
+        ]
+    return [one for one in hidden if not _is_idle(one.cause, scenario)]
+
+
+def _cut(fault: WayFault, standby: bool) -> _Hidden:
+    spell, end = fault.spell, fault.spell.end
+    if standby and not spell.flaps and fault.way.endswith("the supervisor"):
+        deaf = fault.way.startswith("to")
+        end = min(end, spell.begin + (_TAKEN_OVER_DEAF if deaf else _TAKEN_OVER))
+    what = "flapped" if spell.flaps else "was cut"
+    return _Hidden(spell.begin, end, f"the way {fault.way} {what}")
+
+
+def _is_idle(cause: str, scenario: Scenario) -> bool:
+    """What stands by may be away, as long as the one that leads is not."""
+    names = [
+        one.way if isinstance(one, WayFault) else one.who
+        for one in scenario.faults
+        if isinstance(one, (Stop, Stalls, WayFault))
+    ]
+    return "standby" in cause and not any(name.endswith("supervisor") for name in names)

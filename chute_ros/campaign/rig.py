@@ -1,0 +1,168 @@
+"""What every flight has: processes and what becomes of them, ways and what lies on them."""
+
+from __future__ import annotations
+
+import math
+import random
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+
+from chute_ros.campaign.bus import Plug
+from chute_ros.campaign.channel import Way
+from chute_ros.campaign.device_node import DeviceNode
+from chute_ros.campaign.ros import Process, Ros
+from chute_ros.campaign.scenario import ClockJump, Fault, Scenario, Stalls, Stop, WayFault
+from chute_ros.campaign.sensors import SensorFault, Sensors
+from chute_ros.campaign.shipped import Shipped
+from chute_ros.campaign.supervisor_host import SupervisorHost
+from chute_ros.campaign.truth import Truth
+from chute_ros.campaign.world import World
+from chute_ros.supervisor import inputs as i
+
+#: Between two stalls of an overloaded host, at most, s.
+_BETWEEN_STALLS = 0.5
+
+
+class Rig(ABC):
+    """The subclass plugs in its devices and nodes, and says what becomes of the vehicle."""
+
+    def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
+        self.scenario, self.shipped = scenario, shipped
+        self.world = World()
+        self.ros = Ros(self.world, scenario.seed)
+        self.sensors = Sensors(self.chance("sensors"))
+        self.supervisors: list[SupervisorHost] = []
+        self.nodes: dict[str, DeviceNode] = {}
+        self.plugs: dict[str, Plug] = {}
+        self._processes: dict[str, Process] = {}
+        self._restart: dict[str, Callable[[float], None]] = {}
+        self.truth = Truth()
+        self.released = self.release_height = self.landed = self.landing_speed = math.nan
+        for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
+            config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
+            process = self.process(name)
+            host = SupervisorHost(config, process, self.ros, self._arm_devices)
+            self.supervisors.append(host)
+            self._restart[name] = host.start_again
+            self.world.add(host)
+
+    def chance(self, what: str) -> random.Random:
+        """Of one part, so that what another draws does not change it."""
+        return random.Random(f"{self.scenario.seed} {what}")
+
+    def process(self, name: str) -> Process:
+        """A new one."""
+        self._processes[name] = Process(name)
+        return self._processes[name]
+
+    def add_node(self, node: DeviceNode) -> None:
+        """A device node."""
+        self.nodes[node.name] = self.plugs[node.name] = node
+        self._restart[node.name] = node.start_again
+        self.world.add(node)
+
+    def add_device(self, plug: Plug, reboot: Callable[[], None]) -> None:
+        """A simulated device."""
+        self.plugs[plug.name] = plug
+        self._restart[plug.name] = lambda _: reboot()
+        self.world.add(plug)
+
+    @property
+    def leader(self) -> SupervisorHost | None:
+        """The supervisor whose services are there and answer."""
+        leading = [one for one in self.supervisors if one.leading]
+        return next((one for one in leading if one.process.runs(self.world.now)), None)
+
+    # -- for the subclass ------------------------------------------------------------------------
+
+    @abstractmethod
+    def take_off(self, now: float) -> None:
+        """The pilot flies; called once flight is not blocked."""
+
+    @abstractmethod
+    def is_up(self) -> bool:
+        """The times of the scenario begin."""
+
+    @abstractmethod
+    def fail(self, now: float) -> None:
+        """What fails, fails."""
+
+    # -- faults ----------------------------------------------------------------------------------
+
+    def plan(self, up: float) -> None:
+        """From here on the scenario's times are known."""
+        self.world.post(up + self.scenario.failure_at, self._fail)
+        for fault in self.scenario.faults:
+            self._plan_one(fault, up)
+
+    def _plan_one(self, fault: Fault, up: float) -> None:
+        post = self.world.post
+        if isinstance(fault, WayFault):
+            self._way(fault.way).append(fault.spell.later(up))
+        elif isinstance(fault, SensorFault):
+            self.sensors.faults.append(fault.later(up))
+        elif isinstance(fault, ClockJump):
+            post(up + fault.at, lambda _: self._set_clock(fault))
+        elif isinstance(fault, Stalls):
+            chance = self.chance(f"stalls of {fault.who}")
+            post(up + fault.begin, partial(self._stall, fault, up + fault.end, chance))
+        else:
+            post(up + fault.at, partial(self._stop, fault))
+
+    def _fail(self, now: float) -> None:
+        self.fail(now)
+        for plug in self.plugs.values():
+            self.world.stir(plug)
+
+    def _way(self, name: str) -> Way:
+        if name in self.plugs:
+            return self.plugs[name].way
+        process = self._processes["standby" if name.endswith("standby") else "supervisor"]
+        return process.outward if name.startswith("from") else process.inward
+
+    def _set_clock(self, jump: ClockJump) -> None:
+        self._processes[jump.who].clock += jump.by
+
+    def _stall(self, stalls: Stalls, end: float, chance: random.Random, now: float) -> None:
+        process = self._processes[stalls.who]
+        lasts = chance.uniform(0.0, stalls.longest)
+        if process.runs(now):
+            process.hang(self.world, now + lasts)
+        following = now + lasts + chance.uniform(0.05, _BETWEEN_STALLS)
+        if following < end:
+            self.world.post(following, partial(self._stall, stalls, end, chance))
+
+    def _stop(self, stop: Stop, now: float) -> None:
+        until, process = now + stop.lasts, self._processes.get(stop.who)
+        if process is None:
+            self.plugs[stop.who].dead_until = until
+            if stop.dies:
+                self.world.post(until, self._restart[stop.who])
+        elif stop.dies:
+            process.die()
+            self.world.post(until, partial(self._start, stop.who))
+        else:
+            process.hang(self.world, until)
+
+    def _start(self, who: str, now: float) -> None:
+        self._processes[who].start(now)
+        self._restart[who](now)
+
+    # -- what people and supervisors ask ---------------------------------------------------------
+
+    def _arm_devices(self, host: SupervisorHost, order: i.ArmDevices) -> None:
+        answers: dict[str, tuple[bool, str]] = {}
+
+        def answered(link: str, success: bool, message: str) -> None:
+            answers[link] = (success, message)
+            if len(answers) == len(order.links):
+                good = all(success for success, _ in answers.values())
+                text = "; ".join(f"{name}: {text}" for name, (_, text) in answers.items())
+                now = self.world.now
+                self.world.post(
+                    now, lambda _: host.armed(i.ArmDone(order.token, order.arm, good, text))
+                )
+
+        for link in order.links:
+            self.nodes[link].arm(order.arm, order.triggers, partial(answered, link))

@@ -1,0 +1,102 @@
+"""What ROS does between processes: topics, queues, and clocks that stamp."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from chute_ros.campaign.channel import Channel, Nature, Way
+from chute_ros.campaign.world import World
+
+#: From a publisher to a subscription on one host, s.
+_NATURE = Nature(0.0005, in_order=True)
+#: What a queue keeps of what nobody reads.
+_QUEUE = 10
+
+#: Gets a message, the wall clock here less its stamp (s), and the time.
+Take = Callable[[Any, float, float], None]
+
+
+class Process:
+    """One process on its host."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        #: What leaves it, and what enters it, over ROS.
+        self.outward: Way = []
+        self.inward: Way = []
+        #: Its wall clock less the true time, s.
+        self.clock = 0.0
+        #: It does not run until then, virtual s.
+        self.stopped_until = 0.0
+        self._queues: dict[Any, deque[tuple[Any, float, Take]]] = {}
+
+    def runs(self, now: float) -> bool:
+        """It neither hangs nor is dead."""
+        return now >= self.stopped_until
+
+    def hang(self, world: World, until: float) -> None:
+        """Do nothing until then, and read then what the queues have kept."""
+        self.stopped_until = max(self.stopped_until, until)
+        world.post(until, self._go_on)
+
+    def die(self) -> None:
+        """Do nothing until it is started."""
+        self.stopped_until = math.inf
+
+    def start(self, now: float) -> None:
+        """Run, with empty queues: nobody has read what came."""
+        self.stopped_until = now
+        self._queues.clear()
+
+    def deliver(self, message: Any, stamp: float, take: Take, now: float) -> None:
+        """A message came."""
+        if not self.runs(now):
+            queue = self._queues.setdefault(take, deque(maxlen=_QUEUE))
+            queue.append((message, stamp, take))
+        else:
+            take(message, now + self.clock - stamp, now)
+
+    def _go_on(self, now: float) -> None:
+        if not self.runs(now):
+            return
+        queues, self._queues = self._queues, {}
+        for queue in queues.values():
+            for message, stamp, take in queue:
+                take(message, now + self.clock - stamp, now)
+
+
+class Ros:
+    """One of each kind of message from one process to another: a topic keeps its order, topics
+    overtake each other."""
+
+    def __init__(self, world: World, seed: int) -> None:
+        self.world, self._seed = world, seed
+        self._takers: dict[type, list[tuple[Process, Take]]] = {}
+        self._channels: dict[tuple[str, str, type], Channel[Any]] = {}
+
+    def subscribe(self, kind: type, process: Process, take: Take) -> None:
+        """Have messages of this kind given to it."""
+        self._takers.setdefault(kind, []).append((process, take))
+
+    def publish(self, source: Process, message: Any) -> None:
+        """To all others that want it."""
+        kind = type(message)
+        stamp = self.world.now + source.clock
+        for process, take in self._takers.get(kind, ()):
+            if process is not source:
+                self._send(source, process, kind, message, stamp, take)
+
+    def _send(
+        self, source: Process, to: Process, kind: type, message: Any, stamp: float, take: Take
+    ) -> None:
+        key = (source.name, to.name, kind)
+        channel = self._channels.get(key)
+        if channel is None:
+            chance = random.Random(f"{self._seed} {source.name} {to.name} {kind.__name__}")
+            ways = (source.outward, to.inward)
+            channel = self._channels[key] = Channel(self.world, chance, _NATURE, ways)
+        channel.send(message, lambda one, now: to.deliver(one, stamp, take, now))

@@ -1,0 +1,74 @@
+"""A scenario as text that a person can read and change, and that stays the same flight when
+scenarios are drawn differently one day."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.scenario import (
+    ClockJump,
+    Failure,
+    Fault,
+    Person,
+    Scenario,
+    Stalls,
+    Stop,
+    Vehicle,
+    WayFault,
+)
+from chute_ros.campaign.sensors import SensorFault
+from chute_ros.errors import RecordError
+
+#: Rises when what is written means something else.
+FORMAT = 1
+_FAULTS: dict[str, type[Any]] = {
+    one.__name__: one for one in (WayFault, Stop, Stalls, ClockJump, SensorFault)
+}
+
+
+def text_of(scenario: Scenario, was: str) -> str:
+    """As JSON. was: what became of it, in words."""
+    values = asdict(scenario)
+    values["vehicle"], values["failure"] = scenario.vehicle.name, scenario.failure.name
+    values["faults"] = [{"kind": type(one).__name__, **_short(one)} for one in scenario.faults]
+    return json.dumps({"format": FORMAT, "was": was, "scenario": values}, indent=2) + "\n"
+
+
+def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
+    """The scenario, and what became of it. RecordError, with the file's name: it is none."""
+    try:
+        whole = json.loads(text)
+        if whole["format"] != FORMAT:
+            raise RecordError(f"{named}: format {whole['format']}: need {FORMAT}")
+        values = dict(whole["scenario"])
+        values["vehicle"] = Vehicle[values["vehicle"]]
+        values["failure"] = Failure[values["failure"]]
+        values["faults"] = tuple(map(_fault, values["faults"]))
+        values["person"] = Person(**values["person"]) if values["person"] else None
+        return Scenario(**values), str(whole["was"])
+    except (KeyError, TypeError, ValueError) as error:
+        kind = type(error).__name__
+        raise RecordError(f"{named} is no scenario of a campaign: {kind}: {error}") from None
+
+
+def _short(fault: Fault) -> dict[str, Any]:
+    """Its fields; of a spell only what it does."""
+    values = asdict(fault)
+    if isinstance(fault, WayFault):
+        spell = values["spell"]
+        values["spell"] = {
+            name: value for name, value in spell.items() if value or name in ("begin", "end")
+        }
+    return values
+
+
+def _fault(values: dict[str, Any]) -> Fault:
+    fields = dict(values)
+    kind = _FAULTS[fields.pop("kind")]
+    if kind is WayFault:
+        fields["spell"] = Spell(**fields["spell"])
+    made: Fault = kind(**fields)
+    return made

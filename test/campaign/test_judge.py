@@ -1,0 +1,105 @@
+"""What a flight is counted as."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from campaign_bench import fired, flown, scenario
+
+from chute_ros.campaign.blind import Need, blinded
+from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.flight import Flown
+from chute_ros.campaign.judge import WRONG, Count, judge
+from chute_ros.campaign.scenario import Failure, Person, Stop, WayFault
+from chute_ros.campaign.sensors import SensorFault
+from chute_ros.campaign.truth import Truth
+
+
+@pytest.fixture(scope="module")
+def good() -> Flown:
+    return flown(Failure.MOTOR)
+
+
+def test_each_thing_that_must_not_be_is_counted_as_such(good: Flown) -> None:
+    truth = good.truth
+    hard = {"landed": truth.latest + 1.0, "landing_speed": 20.0}
+    kill, deploy = fired(good)
+    unexplained = replace(deploy, decision=replace(deploy.decision, reasons=()))
+    cases = {
+        Count.MISSED: {"released": math.nan, **hard},
+        Count.LATE: {"released": truth.latest + 0.3, **hard},
+        Count.FALSE: {"acted": (replace(kill, at=truth.at - 0.1), deploy)},
+        Count.DOUBLED: {"ordered_again": 1},
+        Count.OUT_OF_ORDER: {"acted": (deploy, kill)},
+        Count.UNEXPLAINED: {"acted": (kill, unexplained)},
+        Count.GROUNDED: {"grounded": "a required link is not healthy"},
+    }
+    assert set(cases) == set(WRONG) - {Count.BROKEN}
+    for count, changed in cases.items():
+        assert judge(replace(good, **changed)).count is count
+    assert judge(good).count is Count.RIGHT
+
+
+def test_what_a_person_orders_is_never_false(good: Flown) -> None:
+    early = tuple(replace(one, at=good.up + 0.5) for one in fired(good))
+    assert judge(replace(good, acted=early)).count is Count.FALSE
+    wanted = replace(good.scenario, person=Person("kill", 0.4))
+    assert judge(replace(good, acted=early, scenario=wanted)).count is Count.RIGHT
+
+
+@pytest.mark.parametrize("does", ["deploy", "kill"])
+def test_what_a_person_orders_and_is_not_done_is_missed(good: Flown, does: str) -> None:
+    wanted = replace(good.scenario, person=Person(does, 0.4), failure=Failure.NOTHING)
+    quiet = {"truth": Truth(), "acted": (), "released": math.nan, "landed": math.nan}
+    judged = judge(replace(good, scenario=wanted, answer="", **quiet))
+    assert (judged.count, judged.why) == (Count.MISSED, f"a person's {does}: no answer")
+    hangs = replace(wanted, faults=(Stop("supervisor", 0.0, 9.0),))
+    judged = judge(replace(good, scenario=hangs, **quiet))
+    assert (judged.count, judged.why) == (Count.NOT_TOLD, "supervisor stopped")
+
+
+def test_a_kill_under_a_canopy_is_not_false(good: Flown) -> None:
+    out = replace(good, acted=fired(good)[:1], released=good.up + 0.1)
+    assert judge(out).count is Count.RIGHT
+
+
+CUT = Spell(1.0, 3.0, loss=1.0)
+
+
+@pytest.mark.parametrize(
+    ("faults", "end", "cause"),
+    [
+        ((), 4.0, ""),
+        ((WayFault("autopilot", CUT),), 4.0, "the way autopilot was cut"),
+        # 2 s are left after it, or before it.
+        ((WayFault("autopilot", CUT),), 5.0, ""),
+        ((WayFault("autopilot", Spell(3.0, 9.0, loss=1.0)),), 5.0, ""),
+        ((WayFault("autopilot", Spell(1.0, 3.0, loss=0.5)),), 4.0, ""),
+        ((Stop("mavlink_parachute", 1.0, 2.5),), 5.0, "mavlink_parachute stopped"),
+        # One sensor that lies is no excuse, two are.
+        ((SensorFault("speed", "zero", 0.0, 9.0),), 5.0, ""),
+        (
+            (SensorFault("speed", "zero", 0.0, 9.0), SensorFault("tilt", "gone", 0.0, 9.0)),
+            *(5.0, "sensor speed was wrong; sensor tilt was wrong"),
+        ),
+    ],
+)
+def test_what_hid_the_fall(faults, end: float, cause: str) -> None:
+    assert blinded(scenario(Failure.MOTOR, *faults), 0.0, Need(1.0, end)) == cause
+
+
+def test_where_another_stands_by_a_stop_hides_nothing_for_long() -> None:
+    stop = Stop("supervisor", 1.0, 8.0)
+    need = Need(1.0, 5.0)
+    assert blinded(scenario(Failure.MOTOR, stop), 0.0, need) == "supervisor stopped"
+    assert blinded(scenario(Failure.MOTOR, stop, standby=True), 0.0, need) == ""
+
+
+def test_a_standby_that_stops_hides_nothing_while_the_other_leads() -> None:
+    away, need = Stop("standby", 0.0, 9.0), Need(1.0, 5.0)
+    alone = WayFault("to the supervisor", Spell(0.0, 9.0, loss=1.0))
+    assert blinded(scenario(Failure.MOTOR, away, standby=True), 0.0, need) == ""
+    both = blinded(scenario(Failure.MOTOR, away, alone, standby=True), 0.0, need)
+    assert both == "standby stopped; the way to the supervisor was cut"

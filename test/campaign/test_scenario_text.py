@@ -1,0 +1,50 @@
+"""Scenarios as text: what was written reads back, and what is none is told so."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from campaign_bench import scenario
+
+from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.scenario import Failure, Person, WayFault, draw
+from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.errors import RecordError
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_it_reads_back_as_it_was(seed: int) -> None:
+    drawn = draw(seed)
+    assert scenario_of(text_of(drawn, "MISSED: for a test"), "x") == (drawn, "MISSED: for a test")
+
+
+def test_a_person_can_read_it() -> None:
+    cut = WayFault("autopilot", Spell(0.5, 2.0, loss=1.0))
+    text = text_of(scenario(Failure.MOTOR, cut, person=Person("kill", 3.0)), "was late")
+    told = json.loads(text)
+    assert told["format"] == 1
+    assert told["scenario"]["failure"] == "MOTOR"
+    assert told["scenario"]["person"] == {"does": "kill", "at": 3.0}
+    spell = {"begin": 0.5, "end": 2.0, "loss": 1.0}
+    assert told["scenario"]["faults"] == [{"kind": "WayFault", "way": "autopilot", "spell": spell}]
+
+
+GOOD = text_of(scenario(Failure.MOTOR), "")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "old.json is no scenario of a campaign: JSONDecodeError"),
+        ("{}", "KeyError: 'format'"),
+        (GOOD.replace('"format": 1', '"format": 7'), "old.json: format 7: need 1"),
+        (GOOD.replace("MOTOR", "WHEEL"), "KeyError: 'WHEEL'"),
+        (GOOD.replace('"height"', '"depth"'), "TypeError"),
+        ("[1]", "TypeError"),
+    ],
+)
+def test_what_is_none_is_told_with_its_name(text: str, words: str) -> None:
+    with pytest.raises(RecordError, match=r"old\.json") as told:
+        scenario_of(text, "old.json")
+    assert words in str(told.value)
