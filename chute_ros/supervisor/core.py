@@ -9,7 +9,6 @@ until a device's own status confirms it. A fire command leaves only through Step
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import MappingProxyType
 
 from chute_ros.model import Action
@@ -22,6 +21,7 @@ from chute_ros.supervisor.measurements import on_earth
 from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
 #: What people ask for, besides a kill, which devices want as well.

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.rules import Rule
 
 #: Two floats that count the same seconds may differ by this, s.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
@@ -11,6 +9,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.gate import OPERATOR, too_low
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.policy import Policy
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending, State
 
 

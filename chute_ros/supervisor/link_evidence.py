@@ -12,12 +12,13 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, ParachuteStatus
 from chute_ros.supervisor.inputs import LinkHeartbeat
+from chute_ros.supervisor.quick_replace import replace
 
 _NOTHING: MappingProxyType[str, ParachuteStatus] = MappingProxyType({})
 #: Devices of one link that are remembered: made-up names must not grow us.

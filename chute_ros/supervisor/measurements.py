@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import VehicleState
+from chute_ros.supervisor.quick_replace import replace
 
 #: Samples in a row that must agree before a jump, or a clock that was set back, is believed.
 CONFIRMING_SAMPLES = 3

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.gate import OPERATOR, out_already
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending
 from chute_ros.supervisor.steps import Steps
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from chute_ros.model import Action
@@ -13,6 +13,7 @@ from chute_ros.supervisor.conditions import Finding, find
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.gate import against_rule, too_low
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.reports import Reports
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 from chute_ros.supervisor.state import State

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import MappingProxyType
 
 from chute_ros.model import Armed, LinkState, Outcome, VehicleState
@@ -12,6 +11,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.machine import Stage, Stimulus
 from chute_ros.supervisor.measurements import samples_of
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.requests import Requests
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from types import MappingProxyType
 
 from chute_ros.model import Action
@@ -13,6 +12,7 @@ from chute_ros.supervisor.gate import OPERATOR, against_person
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.orders import ON_GROUND, Orders
 from chute_ros.supervisor.preflight import arm_reasons
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.rules import DeviceCondition, DeviceFact
 from chute_ros.supervisor.state import ASK_LASTS, Ask
 

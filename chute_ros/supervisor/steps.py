@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -11,6 +10,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage, Stimulus, next_stage
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending, State
 
 #: A decision that may be on its way; a number is that of the deploy's step, from 0.

@@ -20,6 +20,8 @@ from chute_ros.transport.wire import Wire
 REOPEN_INTERVAL = 0.5  # s
 #: The loop runs at least this often (s), so that a hung one can be told from an idle one.
 LONGEST_WAIT = 0.2
+#: A caller waits at most so long (s) for its call; a thread that hangs must not hang the caller.
+HAND_OVER = 0.002
 
 
 class ProtocolLink(Protocol):
@@ -81,7 +83,7 @@ class WireLoop(Generic[LinkT]):
         self.last_run = time.monotonic()
         self._deliver = deliver
         self._opened = opened
-        self._calls: deque[Callable[[LinkT, float], None]] = deque()
+        self._calls: deque[tuple[Callable[[LinkT, float], None], threading.Event]] = deque()
         self._wake_in, self._wake_out = socket.socketpair()
         self._wake_in.setblocking(False)
         self._wake_out.setblocking(False)
@@ -106,9 +108,16 @@ class WireLoop(Generic[LinkT]):
         self._wake_out.close()
 
     def call(self, function: Callable[[LinkT, float], None]) -> None:
-        """Have function(link, now) called in the loop's thread, soon, in order."""
-        self._calls.append(function)
+        """Have function(link, now) called in the loop's thread, soon, in order.
+
+        The caller rests until that is done and on the wire, at most HAND_OVER: two threads that
+        both want the interpreter take turns, and the wire would wait for half of them.
+        """
+        done = threading.Event()
+        self._calls.append((function, done))
         self._wake()
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            done.wait(HAND_OVER)
 
     def _wake(self) -> None:
         try:
@@ -139,10 +148,12 @@ class WireLoop(Generic[LinkT]):
             else:
                 self._read(file, now)
         while self._calls:
-            self._guarded(self._calls.popleft(), self.link, now)
+            function, done = self._calls.popleft()
+            self._guarded(function, self.link, now)
+            self._send()
+            done.set()
         self.link.update(now)
-        for frame in self.link.take_output():
-            self._write(frame)
+        self._send()
         events = self.link.take_events()
         if events:
             self._deliver(events)
@@ -174,6 +185,10 @@ class WireLoop(Generic[LinkT]):
                 self._guarded(self.link.receive, data, now, stream)
             else:
                 self._guarded(self.link.stream_ended, stream)
+
+    def _send(self) -> None:
+        for frame in self.link.take_output():
+            self._write(frame)
 
     def _write(self, frame: bytes) -> None:
         if not self.wire.is_open:
