@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bench import kill_switch, umbilical_decoding, umbilical_telemetry
+from bench import (
+    device_decoding,
+    kill_switch,
+    umbilical_decoding,
+    umbilical_telemetry,
+    vehicle,
+)
 from bench.command import run
 
 if __name__ == "__main__":
-    parts = [kill_switch, umbilical_decoding, umbilical_telemetry]
+    parts = [kill_switch, vehicle, device_decoding, umbilical_decoding, umbilical_telemetry]
     run("bench", __doc__ or "", parts, Path("docs/bench.md"))

@@ -25,7 +25,6 @@ from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.protocol.upf.link import UpfLink
 from chute_ros.sim.autopilot_device import AutopilotDevice
-from chute_ros.sim.bundle import Bundle
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.sim.upf_bus import UpfBus
 from chute_ros.sim.upf_controller import UpfController
@@ -47,6 +46,23 @@ class Device(Protocol):
     def update(self, now: float) -> None: ...
     def next_deadline(self) -> float: ...
     def take_output(self) -> list[bytes]: ...
+
+
+class Network:
+    """Several devices as one."""
+
+    def __init__(self, devices: list[Device]) -> None:
+        self._devices = devices
+
+    def update(self, now: float) -> None:
+        for device in self._devices:
+            device.update(now)
+
+    def next_deadline(self) -> float:
+        return min(device.next_deadline() for device in self._devices)
+
+    def take_output(self) -> list[bytes]:
+        return [data for device in self._devices for data in device.take_output()]
 
 
 class Bare:
@@ -103,7 +119,7 @@ class BareCan:
         frame = unpack(data)
         assert frame is not None
         frames = self._manager.receive_frame(
-            self._frame(frame.identifier, frame.data, True, ts_monotonic=now)
+            self._frame(frame.identifier, frame.data, ts_monotonic=now)
         )
         if not frames:
             return 0
@@ -136,7 +152,7 @@ def section(chosen: argparse.Namespace) -> str:
     """Measure; the section without its heading."""
     before = load()
     definitions = Definitions(load_data_types("", "bench"))
-    network = Bundle([AutopilotDevice(1, []), ParachuteDevice(ParachuteSettings(), [])])
+    network = Network([AutopilotDevice(1, []), ParachuteDevice(ParachuteSettings(), [])])
     bus = UpfBus([UpfController(definitions), UpfTrigger(definitions)])
     mavlink = MavlinkLink(MavlinkConfig())
     upf = UpfLink(UpfConfig(allocator=False), definitions.types)
@@ -152,7 +168,7 @@ def section(chosen: argparse.Namespace) -> str:
         )
     }
     print("  decoding: MAVLink", file=sys.stderr, flush=True)
-    endpoint = upf.node.endpoint
+    endpoint = upf.bus.endpoint
     measured["DroneCAN"] = take_turns(
         "DroneCAN",
         {

@@ -126,7 +126,7 @@ class Ends:
         count = max(1, round(rate * seconds))
         self.came.clear()
         written: dict[int, int] = {}
-        before, start = _cpu_time(self.pid), time.monotonic()
+        before, start = cpu_time(self.pid), time.monotonic()
         for number in range(count):
             while (left := start + number / rate - time.monotonic()) > 0.0:
                 time.sleep(left)
@@ -136,7 +136,7 @@ class Ends:
         end = start + took + LATE
         while len(self.came) < count and time.monotonic() < end:
             time.sleep(0.002)
-        cpu = (_cpu_time(self.pid) - before) / (time.monotonic() - start)
+        cpu = (cpu_time(self.pid) - before) / (time.monotonic() - start)
         arrivals = self._arrivals()
         delays = [(arrivals[c] - at) / 1e6 for c, at in written.items() if c in arrivals]
         return Step(rate, count, delays, cpu, (count - 1) / took >= _PACE * rate)
@@ -166,7 +166,7 @@ class Ends:
         return {round(message.device_uptime * 1000.0): at for at, message in taken}
 
 
-def _cpu_time(pid: int) -> float:
+def cpu_time(pid: int) -> float:
     """What a process has taken so far, s."""
     # The second field is a name in brackets, with anything in it.
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

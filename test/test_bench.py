@@ -17,6 +17,7 @@ KILL_SWITCH, DECODING, TELEMETRY = (
     "bench.umbilical_telemetry",
 )
 FEW = ("--requests", "5", "--batches", "3", "--seconds", "0.5", "--top-rate", "100")
+FEW += ("--rounds", "2", "--cost-seconds", "1", "--message-batches", "3")
 PEERS = ("chute_ros", "ROS alone", "bare relay")
 HOPS = ("to the kill on MAVLink", "to the answer on the bus")
 LAYOUTS = (
@@ -27,6 +28,15 @@ LAYOUTS = (
     "telem57_airbrake_deployment",
 )
 DECODERS = ("chute_ros, whole link", "chute_ros, decoder", "bare split and float")
+WIRES = {
+    "MAVLink": ("chute_ros, whole link", "chute_ros, decoder", "pymavlink"),
+    "DroneCAN": ("chute_ros, whole link", "chute_ros, decoder", "dronecan"),
+}
+WAYS = (
+    "a link's limit passed, until flight is blocked on the wire",
+    "safety/deploy called, until the release is on the wire",
+)
+HOW = ("idle", "under 10 times the frames")
 ENDS = ("chute_ros", "bare script")
 RATES = ("at 13 lines/s", "at 100 lines/s")
 ROW = re.compile(r"^\| ([^|:]+): ([^|]+) \| (.+) \|$", re.MULTILINE)
@@ -84,6 +94,28 @@ def check_decoding(text):
     return int(re.search(r"^(\d+) batches of 100 lines to each, taking turns", text, re.M)[1])
 
 
+def check_vehicle(text):
+    """The same; how many rounds it is of."""
+    times, cost = parts(text)
+    assert set(rows(times)) == {(way, how) for way in WAYS for how in HOW}
+    for cells in rows(times).values():
+        median, late, largest = (number(cell, " ms") for cell in cells)
+        assert 0.0 < median <= late <= largest
+    nodes = re.findall(r"^\| (\w+) \| (\S+) % \| (\d+) MB \|$", cost, re.M)
+    assert [name for name, _, _ in nodes] == ["mavlink_parachute", "safety_supervisor", "together"]
+    assert all(float(share) > 0.0 and int(memory) > 10 for _, share, memory in nodes)
+    assert re.search(r"From the start of both processes to READY: \d+\.\d s\.$", text, re.M)
+    return int(re.search(r"frames/s\. (\d+) rounds of each\.$", text, re.M)[1])
+
+
+def check_messages(text):
+    """The same; how many batches it is of."""
+    for (wire, peers), table in zip(WIRES.items(), parts(text), strict=True):
+        assert set(rows(table)) == {(wire, peer) for peer in peers}
+        check_times(rows(table), " us", peers[-1])
+    return int(re.search(r"^(\d+) batches of 100 reads to each, taking turns", text, re.M)[1])
+
+
 def check_telemetry(text):
     """The same; how many lines at the real rate it is of."""
     latency, cpu, highest = parts(text)
@@ -103,12 +135,12 @@ def check_telemetry(text):
 
 
 def sections(text):
-    """The whole file is of the form that the command writes: its three sections."""
-    heading = re.compile(r"^##+ (?:Kill switch|Decoding a line|Through the node)$", re.M)
-    head, *found = heading.split(text)
-    assert len(found) == 3
+    """The whole file is of the form that the command writes: its five sections."""
+    names = "Kill switch|A vehicle|Decoding|Decoding a line|Through the node"
+    head, *found = re.split(rf"^##+ (?:{names})$", text, flags=re.M)
+    assert len(found) == 5
     assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+; ROS 2 \w+\.$", head, re.M)
-    assert found[0].rstrip().endswith("## Umbilical telemetry")
+    assert found[2].rstrip().endswith("## Umbilical telemetry")
     assert text.count("## Umbilical telemetry") == 1
     for section in found:
         assert re.match(r"\n\nLoad before the run: \d+\.\d ", section)
@@ -131,8 +163,10 @@ def bench(module, *arguments):
 def test_all_parts_are_measured_in_one_run(tmp_path):
     output = tmp_path / "bench.md"
     done = bench("bench", *FEW, "--output", str(output))
-    kill_switch, decoding, telemetry = sections(output.read_text())
+    kill_switch, vehicle, messages, decoding, telemetry = sections(output.read_text())
     assert check_kill_switch(kill_switch) == 5
+    assert check_vehicle(vehicle) == 2
+    assert check_messages(messages) == 3
     assert check_decoding(decoding) == 3
     assert check_telemetry(telemetry) == 6 * 6
     assert output.read_text() in done.stdout, "it prints what it writes"
@@ -149,26 +183,36 @@ def test_a_part_alone_writes_nothing_but_where_it_is_told_to(tmp_path):
 
 def test_what_is_in_docs_is_what_the_command_writes():
     text = (ROOT / "docs" / "bench.md").read_text()
-    kill_switch, decoding, telemetry = sections(text)
+    kill_switch, vehicle, messages, decoding, telemetry = sections(text)
     # Of fewer the 99th percentile would be the largest.
     assert check_kill_switch(kill_switch) >= 200
+    assert check_vehicle(vehicle) >= 100
+    assert check_messages(messages) >= 100
     assert check_decoding(decoding) >= 100
     assert check_telemetry(telemetry) >= 200
     # All but the numbers and the machine's line is the command's own text.
     program = (
         "from types import SimpleNamespace as Some\n"
         "from bench import kill_switch as k, umbilical_decoding as d, umbilical_telemetry as t\n"
+        "from bench import device_decoding as m, vehicle as v\n"
         "from bench.report import document, load\n"
         "from bench.umbilical_ends import Step\n"
         "from bench.wire_ends import Round\n"
         "names = (k.OURS, k.ROS, k.BARE)\n"
         "peers = [k.Peer(name, Some(kills=0), [Round(1.0, 2.0)]) for name in names]\n"
         "times = {name: d.Times([1.0]) for name in (d.LINK, d.DECODER, d.BARE)}\n"
+        "bare = {'MAVLink': m.PYMAVLINK, 'DroneCAN': m.DRONECAN}\n"
+        "wires = {wire: {name: d.Times([1.0]) for name in (m.LINK, m.DECODER, one)}\n"
+        "    for wire, one in bare.items()}\n"
+        "ways = {how: [1.0] for how in (v.IDLE, v.LOADED)}\n"
+        "result = v.Result(1.0, ways, ways, dict.fromkeys(v.NODES, (0.1, 1.0)), 1.0)\n"
+        "few = Some(rounds=1, cost_seconds=1.0)\n"
         f"measured = dict.fromkeys({LAYOUTS}, times)\n"
         "step = Step(13.0, 1, [1.0], 0.1)\n"
         "ends = [t.Peer(n, None, t.Search(1.0, step, step)) for n in (t.OURS, t.BARE)]\n"
         "[turns.append(step) for end in ends for turns in end.turns.values()]\n"
         "print(document([(k.HEADING, k.report(peers, load())),\n"
+        "    (v.HEADING, v.report(result, few, load())), (m.HEADING, m.report(wires, 1, load())),\n"
         "    (d.HEADING, d.report(measured, load())),\n"
         "    (t.HEADING, t.report(ends, 4.0, load()))]), end='')\n"
     )

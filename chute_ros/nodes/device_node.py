@@ -113,7 +113,8 @@ class DeviceNode(Node, ABC):
         # A service that awaits the device must not keep the other callbacks from running.
         self._service_group = ReentrantCallbackGroup()
         guard = self.create_guard_condition(self._drain)
-        self._inbox = Inbox(self._take, guard.trigger, self.PICTURES)
+        # An autopilot tells its measurements one right after the other; each picture has all.
+        self._inbox = Inbox(self._take, guard.trigger, self.PICTURES, (VehicleChanged,))
         self.desk = RequestDesk(self.in_link, self.deliver, self.decisions.report)
         #: The newest picture of each device.
         self.statuses: dict[str, model.ParachuteStatus] = {}

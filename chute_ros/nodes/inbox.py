@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -15,16 +16,21 @@ MOST_AT_ONCE = 100
 
 class Inbox:
     """take: gets each event, in the executor; wake: has drain called there; pictures: the types of
-    events that may be left out where the executor does not keep up."""
+    events that may be left out where the executor does not keep up; replaced: those of them that
+    tell all that one before them told, which is left out if it still waits just ahead."""
 
     def __init__(
         self,
         take: Callable[[Any], None],
         wake: Callable[[], None],
         pictures: tuple[type, ...],
+        replaced: tuple[type, ...] = (),
     ) -> None:
         self._take, self._wake, self._pictures = take, wake, pictures
+        self._replaced = replaced
         self._waiting: deque[Any] = deque()
+        # Between the look at the last one that waits and its replacement nobody may take it.
+        self._lock = threading.Lock()
         #: Pictures that were left out.
         self.left_out = 0
 
@@ -34,13 +40,21 @@ class Inbox:
             kept = [event for event in events if not isinstance(event, self._pictures)]
             self.left_out += len(events) - len(kept)
             events = kept
-        self._waiting.extend(events)
+        with self._lock:
+            for event in events:
+                last = self._waiting[-1] if self._waiting else None
+                if isinstance(event, self._replaced) and type(last) is type(event):
+                    self._waiting[-1] = event
+                else:
+                    self._waiting.append(event)
         self._wake()
 
     def drain(self) -> None:
         """In the executor: take what is there. What comes meanwhile waits for its turn: a flood
         must not keep decisions from theirs."""
         for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
-            self._take(self._waiting.popleft())
+            with self._lock:
+                event = self._waiting.popleft()
+            self._take(event)
         if self._waiting:
             self._wake()

@@ -38,6 +38,23 @@ def test_what_comes_while_it_is_drained_waits_for_its_turn():
     assert executor.wakes == 3, "put, put meanwhile, and once more for what is left"
 
 
+class Whole(Picture):
+    """Each tells all that the one before told."""
+
+
+def test_a_newer_whole_picture_takes_the_place_of_one_that_waits_just_ahead():
+    taken = []
+    inbox = Inbox(taken.append, lambda: None, (Picture,), (Whole,))
+    pictures = [Whole() for _ in range(5)]
+    inbox.put(pictures[:2])
+    inbox.put([pictures[2], "a report", pictures[3]])
+    inbox.drain()
+    assert taken == [pictures[2], "a report", pictures[3]], "in order with what is not left out"
+    inbox.put([pictures[4]])
+    inbox.drain()
+    assert taken[-1] is pictures[4], "what was taken is not taken back"
+
+
 def test_an_executor_that_does_not_keep_up_loses_pictures_and_nothing_else():
     executor = Executor()
     for _ in range(MOST_WAITING + 1):
