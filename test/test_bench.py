@@ -212,7 +212,8 @@ def test_what_is_in_docs_is_what_the_command_writes():
         "ends = [t.Peer(n, None, t.Search(1.0, step, step)) for n in (t.OURS, t.BARE)]\n"
         "[turns.append(step) for end in ends for turns in end.turns.values()]\n"
         "print(document([(k.HEADING, k.report(peers, load())),\n"
-        "    (v.HEADING, v.report(result, few, load())), (m.HEADING, m.report(wires, 1, load())),\n"
+        "    (v.HEADING, v.report(result, few, load())),\n"
+        "    (m.HEADING, m.report(wires, 1, load())),\n"
         "    (d.HEADING, d.report(measured, load())),\n"
         "    (t.HEADING, t.report(ends, 4.0, load()))]), end='')\n"
     )
