@@ -28,6 +28,9 @@ NEW_STREAM_LAG = 60 * UNITS_PER_SECOND
 UNSIGNED = "frame without a signature"
 WRONG_SIGNATURE = "frame with a wrong signature"
 REPLAYED = "frame with an old signature time (replayed)"
+TOO_MANY_STREAMS = "frame of one signed stream too many"
+#: A device has one, or a few; who holds the key could make up 2^24.
+MOST_STREAMS = 256
 
 #: RADIO_STATUS comes from the radios themselves, which hold no key.
 UNSIGNED_ALLOWED = frozenset({109})
@@ -125,6 +128,8 @@ class Verifier:
         stream = (raw[5], raw[6], raw[_LINK_ID])
         if timestamp <= max(self.streams.get(stream, 0), self._clock.at(now) - NEW_STREAM_LAG):
             return REPLAYED
+        if stream not in self.streams and len(self.streams) >= MOST_STREAMS:
+            return TOO_MANY_STREAMS
         self.streams[stream] = timestamp
         self._clock.heard(timestamp)
         return ""

@@ -126,6 +126,15 @@ def test_streams_of_other_links_and_components_have_their_own_time():
     assert len(decoder.feed_datagram(signed(now=NOW, ids=(1, 1)), NOW)) == 1
 
 
+def test_streams_that_a_holder_of_the_key_makes_up_do_not_grow_us():
+    decoder = reader()
+    for number in range(signing.MOST_STREAMS):
+        decoder.feed_datagram(signed(ids=(1 + number % 250, 1 + number // 250)), NOW)
+    assert decoder.feed_datagram(signed(ids=(251, 1)), NOW) == []
+    assert decoder.counts[signing.TOO_MANY_STREAMS] == 1
+    assert decoder.feed_datagram(signed(now=NOW + 1.0, ids=(1, 1)), NOW), "a known one goes on"
+
+
 @pytest.mark.parametrize("at", range(1, len(signed())))
 def test_one_changed_byte_anywhere_in_a_signed_frame_is_enough_to_drop_it(at):
     raw = bytearray(signed())
