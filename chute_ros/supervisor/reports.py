@@ -48,7 +48,10 @@ class Reports(Requests):
         if one.link not in self.config.links:
             return
         status, alive = one.status, one.status.link_state is LinkState.OK
-        was_out = status.device in self.evidence(one.link).deployed
+        said = self.evidence(one.link).devices.get(status.device)
+        was_out = said is not None and said.deployed
+        # One that started anew has forgotten it, which takes nothing back.
+        forgot = said is not None and status.uptime < said.uptime
         self.set_evidence(one.link, self.evidence(one.link).with_status(status, self.now))
         if alive and not status.deployed:
             before = self.state.released_before - {(one.link, status.device)}
@@ -56,7 +59,7 @@ class Reports(Requests):
             aloft = flight.in_air(self.config, self.state, self.now) is not False
             if was_out and aloft and self.state.stage is Stage.DEPLOYED:
                 text = f"{one.link} {status.device} says no more that it is deployed"
-                if self.state.deploys or not self.state.airborne:
+                if self.state.deploys or not self.state.airborne or forgot:
                     self.alarm(f"{text}; a forced deploy goes on with the next")
                 else:
                     # It may have erred when it said so; with nothing out, the rules must live.

@@ -1,6 +1,7 @@
 """What the field has lived through, told once more: each of these has cost a vehicle, or more."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -299,6 +300,20 @@ def test_a_release_that_nobody_ordered_and_that_is_taken_back_leaves_the_rules_a
     assert story.fired()[-1] == "DEPLOY"
     story.at(story.t + 0.1, story.heartbeat(), parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
+
+
+def test_a_device_that_restarts_after_its_own_release_takes_nothing_back() -> None:
+    story = aloft()
+    out = parachute(deployed=True)
+    story.at(
+        story.t + 0.05, story.heartbeat(), replace(out, status=replace(out.status, uptime=60.0))
+    )
+    packed = parachute(deployed=False)
+    story.at(story.t + 0.5, replace(packed, status=replace(packed.status, uptime=0.4)))
+    assert story.state.stage is Stage.DEPLOYED
+    assert "a forced deploy goes on" in story.alarms()[-1]
+    story.fall(story.t + 3.0, armed=Armed.DISARMED)
+    assert story.fired() == ["KILL"], "it hangs under the canopy that it had released"
 
 
 def test_a_supervisor_that_restarts_under_the_canopy_does_not_deploy_again() -> None:
