@@ -134,10 +134,11 @@ def recognise(line: bytes) -> tuple[Saying | None, str]:
     if start >= 0:
         rest = text[start + len(_TELEM) :]
         # A cut record with another line on its heels is that line.
-        said = None if NUMBERS.fullmatch(rest) else _known(rest)[0]
+        whole = NUMBERS.fullmatch(rest)
+        said = None if whole else _known(rest)[0]
         if said is not None:
             return said, CUT_LINE
-        if not NUMBERS.fullmatch(rest) and _LOG.match(text):
+        if not whole and _LOG.match(text):
             return _known(text)  # it only speaks of telemetry
         return Telemetry(rest), CUT_LINE if start else ""
     return _known(text)
