@@ -24,8 +24,8 @@ _HEADER_V2 = 10
 _CHECKSUM = 2
 _SIGNATURE = 13
 _FLAG_SIGNED = 0x01
-#: A frame of 280 bytes takes 49 ms at 57,600 baud: one that is not complete after this is noise.
-LONGEST_FRAME_TIME = 0.25  # s
+#: A frame of 280 bytes takes 292 ms at 9,600 baud: one that is not complete after this is noise.
+LONGEST_FRAME_TIME = 0.3  # s
 
 #: Reasons under which received bytes are dropped.
 NOISE = "bytes that are no MAVLink frame"

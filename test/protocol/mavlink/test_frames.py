@@ -144,6 +144,19 @@ def test_a_false_start_mark_does_not_hold_back_the_true_frames_for_long():
     assert names(found) == ["HEARTBEAT"]
 
 
+def test_the_longest_frame_is_read_from_the_slowest_line():
+    """240 bytes of payload, one by one at 9,600 baud, ten bits each."""
+    head = bytes([240, 0, 0, 0, 1, 191]) + (390).to_bytes(3, "little")
+    body = head + bytes(239) + b"\x01"
+    extra = d.mavlink_map[390].crc_extra
+    checksum = d.x25crc(body + bytes([extra])).crc.to_bytes(2, "little")
+    raw = b"\xfd" + body + checksum
+    decoder, found = FrameDecoder(), []
+    for number in range(len(raw)):
+        found += decoder.feed(raw[number : number + 1], number * 10 / 9600)
+    assert names(found) == ["ONBOARD_COMPUTER_STATUS"]
+
+
 def test_a_frame_in_two_parts_after_a_quiet_spell_is_read():
     decoder = FrameDecoder()
     raw = heartbeat()
