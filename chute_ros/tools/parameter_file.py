@@ -88,7 +88,7 @@ def _matches(pattern: str, node: str) -> bool:
     if pattern in ("/**", node):
         return True
     parts, names = pattern.split("/")[1:], node.split("/")[1:]
-    if parts[0] == "**":
+    if parts[:1] == ["**"]:
         tail = parts[1:]
         names = names[len(names) - len(tail) :]
         parts = tail

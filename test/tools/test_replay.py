@@ -204,6 +204,7 @@ def test_a_mistake_in_the_settings_is_told_in_one_line(
         ("a: [", "is no YAML"),
         ("/**/upf_can:\n  ros__parameters: {}\n", "has no ros__parameters for"),
         ("- 1\n", "has no ros__parameters for"),
+        ("ros__parameters: {mode: SHADOW}\n", "has no ros__parameters for"),
         ("[" * 3000, "is no YAML"),
         ("a: 2001-12-14t21:59:43.10-99:99", "is no YAML"),
         ("a: &a {b: *a}", "more than 1000 names in it: no parameter file"),
