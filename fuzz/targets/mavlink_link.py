@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.goals import FORCE_DISARM
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
-from fuzz.orders import Orders, check_not_spinning, run_out
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
+from fuzz.targets.linked import Linked
 from fuzz.targets.mavlink_frames import COMPONENTS, KEY, SYSTEMS, good_frame
 
 _COMMANDS = (
@@ -26,7 +24,6 @@ _COMMANDS = (
     d.MAV_CMD_SET_MESSAGE_INTERVAL,
 )
 _DEVICES = ("", "1/161", "2/161", "9/9")
-_MOST_DUE = 64
 
 
 def _heartbeat(p: Program) -> Any:
@@ -59,7 +56,7 @@ def _interval(p: Program) -> Any:
 _KINDLY = (_heartbeat, _status, _acknowledgement, _landed, _interval)
 
 
-class Linked:
+class MavlinkLinked(Linked):
     """One link, and what it was asked for."""
 
     def __init__(self, signed: bool = False) -> None:
@@ -67,14 +64,12 @@ class Linked:
         signer = Signer(KEY, self._clock) if self._clock else None
         verifier = Verifier(KEY, self._clock) if self._clock else None
         method = KillMethod.FORCED_DISARM if signed else KillMethod.FLIGHT_TERMINATION
-        self._link = MavlinkLink(MavlinkConfig(kill_method=method), signer, verifier)
-        self._orders = Orders()
+        super().__init__(MavlinkLink(MavlinkConfig(kill_method=method), signer, verifier))
         self._ear = FrameDecoder()
         self._encoders: dict[tuple[int, int], FrameEncoder] = {}
-        self._now = 1000.0
         #: Flight was blocked since what left was looked at last.
         self._blocked = False
-        self._steps: tuple[Callable[[Program], None], ...] = (
+        self._steps = (
             self._wait,
             self._to_next_deadline,
             self._kindly,
@@ -91,21 +86,7 @@ class Linked:
             self._owner,
         )
 
-    def held(self) -> object:
-        return self._link
-
-    def feed(self, data: bytes) -> None:
-        program = Program(data)
-        while not program.over:
-            program.choice(self._steps)(program)
-            self._turn(self._now)
-        self._link.flight_block("", self._now)
-        self._now = run_out(self._link, self._orders, self._now, self._turn)
-
     # -- steps of a program ----------------------------------------------------------------------
-
-    def _wait(self, p: Program) -> None:
-        self._now += p.choice((0.0, 0.01, 0.1, 0.5, 1.0, 3.0, 10.0, 100.0))
 
     def _to_next_deadline(self, p: Program) -> None:
         deadline = self._link.next_deadline()
@@ -163,24 +144,14 @@ class Linked:
         self._blocked = self._blocked or blocked
         self._link.flight_block("a reason" if blocked else "", self._now)
 
-    def _owner(self, p: Program) -> None:
-        self._link.owner_alive(self._now + p.byte() / 50.0)
-
     # -- what comes of it ------------------------------------------------------------------------
 
+    def _run_out(self) -> None:
+        self._link.flight_block("", self._now)
+        super()._run_out()
+
     def _turn(self, now: float) -> None:
-        self._now = now
-        for _ in range(_MOST_DUE):
-            self._link.update(now)
-            if self._link.next_deadline() > now:
-                break
-        check_not_spinning(self._link, now)
-        for event in self._link.take_events():
-            if isinstance(event, RequestFinished):
-                self._orders.ended(event.finished.token)
-        for raw in self._link.take_output():
-            self._left(raw)
-        self._orders.settled()
+        super()._turn(now)
         self._link.vehicle_state(now)
         self._link.doubts()
 
@@ -215,6 +186,12 @@ class Linked:
 
 
 TARGETS = (
-    Target("mavlink.link", "the link with its transactions", Linked, 30_000, 512),
-    Target("mavlink.link_signed", "the same with a key", lambda: Linked(signed=True), 40_000, 512),
+    Target("mavlink.link", "the link with its transactions", MavlinkLinked, 30_000, 512),
+    Target(
+        "mavlink.link_signed",
+        "the same with a key",
+        lambda: MavlinkLinked(signed=True),
+        40_000,
+        512,
+    ),
 )

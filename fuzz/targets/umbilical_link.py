@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.umbilical.commands import KINDS
 from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.link import UmbilicalLink
 from chute_ros.protocol.umbilical.scheduler import HEARTBEAT
-from fuzz.orders import Orders, check_not_spinning, run_out
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
+from fuzz.targets.linked import Linked
 from fuzz.targets.umbilical_lines import bytes_of, layouts
 
 _NAMES = (*KINDS, "set_target", "no such command")
 #: Token -> the name of its command.
 _TOKENS = {kind.command.token: name for name, kind in KINDS.items()}
-_MOST_DUE = 64
 
 
-class Linked:
+class UmbilicalLinked(Linked):
     """One link, and what it was asked for."""
 
     def __init__(self) -> None:
         config = UmbilicalConfig(deploy=DeployStage.NEXT)
-        self._link = UmbilicalLink(config, list(layouts()))
-        self._orders = Orders()
-        self._now, self._port = 1000.0, 0
+        super().__init__(UmbilicalLink(config, list(layouts())))
+        self._port = 0
         self._link.wire_opened(self._now)
-        self._steps: tuple[Callable[[Program], None], ...] = (
+        self._steps = (
             self._wait,
             self._to_next_deadline,
             self._hear,
@@ -49,23 +44,7 @@ class Linked:
         self._receive(b"the first line may be cut\n")
         self._now += 1.0
 
-    def held(self) -> object:
-        return self._link
-
-    def feed(self, data: bytes) -> None:
-        program = Program(data)
-        while not program.over:
-            program.choice(self._steps)(program)
-            self._turn(self._now)
-        self._now = run_out(self._link, self._orders, self._now, self._turn)
-
     # -- steps of a program ----------------------------------------------------------------------
-
-    def _wait(self, p: Program) -> None:
-        self._now += p.choice((0.0, 0.01, 0.1, 0.5, 1.0, 3.0, 10.0, 100.0))
-
-    def _to_next_deadline(self, p: Program) -> None:
-        self._now = max(self._now, min(self._link.next_deadline(), self._now + 1.0))
 
     def _receive(self, data: bytes) -> None:
         self._link.receive(data, self._now, ("port", self._port))
@@ -109,24 +88,10 @@ class Linked:
             self._port = (self._port + 1) % 4
             self._link.wire_opened(self._now)
 
-    def _owner(self, p: Program) -> None:
-        self._link.owner_alive(self._now + p.byte() / 50.0)
-
     # -- what comes of it ------------------------------------------------------------------------
 
     def _turn(self, now: float) -> None:
-        self._now = now
-        for _ in range(_MOST_DUE):
-            self._link.update(now)
-            if self._link.next_deadline() > now:
-                break
-        check_not_spinning(self._link, now)
-        for event in self._link.take_events():
-            if isinstance(event, RequestFinished):
-                self._orders.ended(event.finished.token)
-        for token in self._link.take_output():
-            self._left(token)
-        self._orders.settled()
+        super()._turn(now)
         self._link.vehicle_state(now)
 
     def _left(self, token: bytes) -> None:
@@ -140,4 +105,6 @@ class Linked:
         )
 
 
-TARGETS = (Target("umbilical.link", "the link with its commands and dumps", Linked, 20_000, 512),)
+TARGETS = (
+    Target("umbilical.link", "the link with its commands and dumps", UmbilicalLinked, 20_000, 512),
+)

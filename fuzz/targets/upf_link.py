@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
 from chute_ros.protocol.dronecan.transfer import Assembler, Kind, Transfer, frames_of
-from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import errands, parameters
 from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.events import ErrandFinished
 from chute_ros.protocol.upf.link import UpfLink
-from fuzz.orders import Orders, check_not_spinning, run_out
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
+from fuzz.targets.linked import Linked
 from fuzz.targets.upf_frames import CONTROLLER, TRIGGER, US, data_types, transfer_of
 
 _NODES = (0, CONTROLLER, TRIGGER, 99)
 _TEXTS = ("true", "false", "50", "-1", "nan", "9" * 40, "", "x" * 200)
-_MOST_DUE = 64
 #: Said all the time, and nothing that fires.
 _CONSTANTLY = (
     "uavcan.protocol.NodeStatus",
@@ -34,19 +32,17 @@ _DEPLOYS = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE")
 _REQUESTS = ("TYPE_TAKEOFF", "TYPE_ARM", "TYPE_DISARM", "TYPE_LAND", *_DEPLOYS)
 
 
-class Linked:
+class UpfLinked(Linked):
     """One link, and what it was asked for."""
 
     def __init__(self, without_controller: bool = False) -> None:
         config = UpfConfig(without_controller=without_controller)
-        self._link = UpfLink(config, data_types())
+        super().__init__(UpfLink(config, data_types()))
         self._definitions = self._link.definitions
-        self._orders = Orders()
         self._ear = Assembler(data_types(), Counter())
-        self._now = 1000.0
         self._kept: list[int] = []
         self._owner_lives = False
-        self._steps: tuple[Callable[[Program], None], ...] = (
+        self._steps = (
             self._wait,
             self._to_next_deadline,
             self._transfer,
@@ -66,26 +62,7 @@ class Linked:
         #: The newest requests that left: what a device may answer.
         self._asked: list[Transfer] = []
 
-    def held(self) -> object:
-        return self._link
-
-    def feed(self, data: bytes) -> None:
-        program = Program(data)
-        while not program.over:
-            program.choice(self._steps)(program)
-            self._turn(self._now)
-        # What is under way ends also without us; and what we say all the time takes its time.
-        lived, self._owner_lives = self._owner_lives, False
-        self._now = run_out(self._link, self._orders, self._now, self._turn)
-        self._owner_lives = lived
-
     # -- steps of a program ----------------------------------------------------------------------
-
-    def _wait(self, p: Program) -> None:
-        self._now += p.choice((0.0, 0.01, 0.1, 0.5, 1.0, 3.0, 10.0, 100.0))
-
-    def _to_next_deadline(self, p: Program) -> None:
-        self._now = max(self._now, min(self._link.next_deadline(), self._now + 1.0))
 
     def _transfer(self, p: Program) -> None:
         frames, _, _ = transfer_of(p)
@@ -192,25 +169,24 @@ class Linked:
 
     # -- what comes of it ------------------------------------------------------------------------
 
+    def _run_out(self) -> None:
+        # What is under way ends also without us; and what we say all the time takes its time.
+        lived, self._owner_lives = self._owner_lives, False
+        super()._run_out()
+        self._owner_lives = lived
+
     def _turn(self, now: float) -> None:
-        self._now = now
         if self._owner_lives:
             self._link.owner_alive(now + 1.0)
-        for _ in range(_MOST_DUE):
-            self._link.update(now)
-            if self._link.next_deadline() > now:
-                break
-        check_not_spinning(self._link, now)
-        for event in self._link.take_events():
-            if isinstance(event, RequestFinished):
-                self._orders.ended(event.finished.token)
-            elif isinstance(event, ErrandFinished):
-                self._orders.ended(event.token)
-            elif isinstance(event, KeepTable):
-                self._kept = [*self._kept, event.number][-4:]
-        for frame in self._link.take_output():
-            self._left(frame)
-        self._orders.settled()
+        super()._turn(now)
+
+    def _happened(self, event: object) -> None:
+        if isinstance(event, ErrandFinished):
+            self._orders.ended(event.token)
+        elif isinstance(event, KeepTable):
+            self._kept = [*self._kept, event.number][-4:]
+        else:
+            super()._happened(event)
 
     def _left(self, data: bytes) -> None:
         frame = unpack(data)
@@ -251,11 +227,13 @@ class Linked:
 
 
 TARGETS = (
-    Target("upf.link", "the link with its transactions, allocator and time", Linked, 60_000, 256),
+    Target(
+        "upf.link", "the link with its transactions, allocator and time", UpfLinked, 60_000, 256
+    ),
     Target(
         "upf.link_triggers",
         "the same where there is no controller",
-        lambda: Linked(without_controller=True),
+        lambda: UpfLinked(without_controller=True),
         60_000,
         256,
     ),
