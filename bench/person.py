@@ -5,55 +5,37 @@ from __future__ import annotations
 import threading
 import time
 
-import rclpy
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState
 from chute_msgs.srv import Deploy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
+from bench.ros_thread import RosThread
 from chute_ros.nodes import qos
 
 _INTERVAL = 0.05  # s, of the heartbeats
 
 
-class Person:
+class Person(RosThread):
     """In a thread of its own; namespace: of the vehicle."""
 
     BLOCKED, READY, DEPLOYED = SafetyState.BLOCKED, SafetyState.READY, SafetyState.DEPLOYED
 
     def __init__(self, namespace: str) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node("person", namespace=namespace)
+        super().__init__("person", namespace)
         #: SafetyState.stage as it was told last; 0: never.
         self.stage = 0
-        self._node.create_subscription(SafetyState, "safety/state", self._state, qos.LATCHED)
+        self.node.create_subscription(SafetyState, "safety/state", self._state, qos.LATCHED)
         #: The parachute says that it is out.
         self.out = False
-        self._node.create_subscription(
+        self.node.create_subscription(
             ParachuteStatus, "parachute/status", self._parachute, qos.newest(qos.STATUS)
         )
-        self._beats = self._node.create_publisher(LinkHeartbeat, "safety/heartbeat", qos.STATUS)
-        self._deploys = self._node.create_client(Deploy, "safety/deploy")
-        self._resets = self._node.create_client(Trigger, "safety/reset")
-        self._node.create_timer(_INTERVAL, self._beat)
+        self._beats = self.node.create_publisher(LinkHeartbeat, "safety/heartbeat", qos.STATUS)
+        self._deploys = self.node.create_client(Deploy, "safety/deploy")
+        self._resets = self.node.create_client(Trigger, "safety/reset")
+        self.node.create_timer(_INTERVAL, self._beat)
         self._speaks, self._seq, self._last = True, 0, 0
         self._lock = threading.Lock()
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-
-    def start(self) -> None:
-        """From now on."""
-        self._thread.start()
-
-    def close(self) -> None:
-        """End the thread."""
-        rclpy.try_shutdown()
-        self._thread.join()
-        self._executor.shutdown()
-        self._node.destroy_node()
 
     def fall_silent(self) -> int:
         """No more heartbeats; perf_counter_ns of the last one."""
@@ -84,7 +66,7 @@ class Person:
             message = LinkHeartbeat(
                 link="person", link_state=healthy, seq=self._seq, device_healthy=True
             )
-            message.header.stamp = self._node.get_clock().now().to_msg()
+            message.header.stamp = self.node.get_clock().now().to_msg()
             self._last = time.perf_counter_ns()
             self._beats.publish(message)
 
@@ -93,9 +75,3 @@ class Person:
 
     def _parachute(self, message: ParachuteStatus) -> None:
         self.out = message.deployed
-
-    def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            pass

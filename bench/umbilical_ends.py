@@ -6,19 +6,15 @@ Both are in the measuring process; what is between them, one process, is measure
 from __future__ import annotations
 
 import os
-import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import rclpy
 from chute_msgs.msg import Telem
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
-from rclpy.signals import SignalHandlerOptions
 
 from bench.flight_lines import FlightLines
+from bench.ros_thread import RosThread
 from chute_ros.errors import ChuteError
 from chute_ros.nodes import qos
 from chute_ros.sim.pty_wire import PtyWire
@@ -57,15 +53,11 @@ class Step:
         return self.kept_pace and not self.lost
 
 
-class Subscriber:
+class Subscriber(RosThread):
     """A node with a thread: what comes, as it comes, is put down with its time."""
 
     def __init__(self) -> None:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node("bench_subscriber")
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._thread = threading.Thread(target=self._spin, daemon=True)
+        super().__init__("bench_subscriber")
 
     def follow(self, topic: str) -> list[tuple[int, bytes]]:
         """(perf_counter_ns, message) of all that comes there. All before start."""
@@ -75,26 +67,8 @@ class Subscriber:
             came.append((time.perf_counter_ns(), message))
 
         # Not taken apart yet: that would take as long as what is measured.
-        self._node.create_subscription(Telem, topic, callback, qos.STATUS, raw=True)
+        self.node.create_subscription(Telem, topic, callback, qos.STATUS, raw=True)
         return came
-
-    def start(self) -> None:
-        """From now on it listens."""
-        self._thread.start()
-
-    def close(self) -> None:
-        """End the thread."""
-        rclpy.try_shutdown()
-        if self._thread.is_alive():
-            self._thread.join()
-        self._executor.shutdown()
-        self._node.destroy_node()
-
-    def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            pass
 
 
 @dataclass

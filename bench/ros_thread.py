@@ -1,0 +1,40 @@
+"""A ROS node of the measuring process, in a thread of its own."""
+
+from __future__ import annotations
+
+import threading
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+
+class RosThread:
+    """name, namespace: of the node. There is one in a process; its subclass adds to it before it
+    is started."""
+
+    def __init__(self, name: str, namespace: str = "") -> None:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        self.node = Node(name, namespace=namespace)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+
+    def start(self) -> None:
+        """From now on it listens."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread."""
+        rclpy.try_shutdown()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            pass
