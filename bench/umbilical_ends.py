@@ -5,15 +5,14 @@ Both are in the measuring process; what is between them, one process, is measure
 
 from __future__ import annotations
 
-import os
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from chute_msgs.msg import Telem
 from rclpy.serialization import deserialize_message
 
 from bench.flight_lines import FlightLines
+from bench.process_cost import cpu_time
 from bench.ros_thread import RosThread
 from chute_ros.errors import ChuteError
 from chute_ros.nodes import qos
@@ -138,10 +137,3 @@ class Ends:
         """The device's clock in each message that came -> perf_counter_ns."""
         taken = [(at, deserialize_message(message, Telem)) for at, message in self.came]
         return {round(message.device_uptime * 1000.0): at for at, message in taken}
-
-
-def cpu_time(pid: int) -> float:
-    """What a process has taken so far, s."""
-    # The second field is a name in brackets, with anything in it.
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

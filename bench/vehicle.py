@@ -7,17 +7,15 @@ and a person.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from bench.command import Children, at_least, run, with_children
 from bench.person import Person
+from bench.process_cost import cpu_time, resident_memory
 from bench.report import load, summary, table
-from bench.umbilical_ends import cpu_time
 from bench.vehicle_wire import NOMINAL_RATE, VehicleWire
 from chute_ros.errors import ChuteError
 from chute_ros.tools.isolation import free_udp_ports
@@ -153,14 +151,8 @@ def _cost(
     time.sleep(seconds)
     took = time.monotonic() - begun
     shares = {name: (cpu_time(children.pid(name)) - before[name]) / took for name in NODES}
-    memory = {name: _resident(children.pid(name)) for name in NODES}
+    memory = {name: resident_memory(children.pid(name)) for name in NODES}
     return {name: (shares[name], memory[name]) for name in NODES}, (wire.said - said) / took
-
-
-def _resident(pid: int) -> float:
-    """MB in memory."""
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
 def report(result: Result, chosen: argparse.Namespace, before: str) -> str:

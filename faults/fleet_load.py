@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from bench.process_cost import cpu_time
 
 #: What a command line contains -> what it is counted as.
 _KINDS = {
@@ -18,7 +19,6 @@ _KINDS = {
     "faults.switch": "switch",
     "fast-discovery-server": "discovery server",
 }
-_TICKS = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def usage() -> dict[str, Usage]:
         command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode()
         for part, kind in _KINDS.items():
             if part in command:
-                every[kind] = every[kind].plus(_processor(process), _memory(process))
+                every[kind] = every[kind].plus(cpu_time(pid), _memory(process))
     return every
 
 
@@ -61,12 +61,6 @@ def busy(count: int) -> Iterator[None]:
 def _children() -> list[str]:
     tasks = Path("/proc/self/task").iterdir()
     return [pid for task in tasks for pid in (task / "children").read_text().split()]
-
-
-def _processor(process: Path) -> float:
-    # What follows the name, which may contain anything: state is field 3.
-    fields = (process / "stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / _TICKS
 
 
 def _memory(process: Path) -> float:

@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from bench.process_cost import resident_memory
 from chute_ros.tools.processes import END_TIMEOUT
 
 #: As vehicle.launch.py waits before it starts a process again, s.
@@ -23,7 +24,6 @@ _TROUBLE = re.compile(
     r"double free|corrupted|Fatal Python error|\[FATAL\]|Exception in thread|Exception ignored"
 )
 _LAST_LINES = 25
-_PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 @dataclass(frozen=True)
@@ -131,9 +131,8 @@ class Keeper:
     def sample(self, name: str) -> Sample:
         """What it holds now."""
         pid = self.pid(name)
-        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
         return Sample(
-            pages * _PAGE / 1e6,
+            resident_memory(pid),
             len(os.listdir(f"/proc/{pid}/fd")),
             len(os.listdir(f"/proc/{pid}/task")),
         )

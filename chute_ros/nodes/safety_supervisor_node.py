@@ -155,7 +155,8 @@ class SafetySupervisorNode(Node):
     def _update(
         self, new: tuple[inputs.Input, ...], now: float
     ) -> tuple[inputs.Output, ...] | None:
-        """One turn of the core; None: it failed, the state is as before, and it was reported."""
+        """One turn of the core, whose decisions leave at once; None: it failed, the state is as
+        before, and it was reported."""
         before = self.state
         try:
             self.state, outputs = update(self.config, before, new, now)
