@@ -41,7 +41,9 @@ def run(name: str, class_name: str) -> None:
     set_up_middleware()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy
-    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.executors import ExternalShutdownException
+
+    from chute_ros.nodes.node_executor import NodeExecutor
 
     try:
         rclpy.init()
@@ -51,7 +53,7 @@ def run(name: str, class_name: str) -> None:
     node = None
     try:
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
-        executor = SingleThreadedExecutor()
+        executor = NodeExecutor()
         node = node_class()
         executor.add_node(node)
         executor.spin()
@@ -70,6 +72,7 @@ def run(name: str, class_name: str) -> None:
         # A second Ctrl-C must not cut the ending short: the link's thread is being joined.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
+            executor.shutdown()
             node.destroy_node()
         # The signal's own handler may be shutting down at this very moment.
         with contextlib.suppress(RuntimeError):

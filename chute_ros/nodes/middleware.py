@@ -1,4 +1,10 @@
-"""How the middleware repairs what a network loses: at once, unless the user says otherwise."""
+"""How Fast DDS carries messages between our processes, unless the user says otherwise.
+
+Over UDP, on one host too: what a process left in shared memory that was killed, or that ran out of
+descriptors, kept processes that were started after it from hearing some of the others for 20 s and
+more, until a supervisor that was back in flight did not see what it had to deploy for (`make soak`
+showed it). And what a network loses is sent again at once.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +14,38 @@ from chute_ros.nodes.config_folder import config_folder
 
 #: Where Fast DDS looks for settings, and what is shipped for it: from version 3 (Kilted) on, and
 #: in version 2.
-_SETTINGS = ("FASTDDS_DEFAULT_PROFILES_FILE", "fastdds.xml")
-_SETTINGS_2 = ("FASTRTPS_DEFAULT_PROFILES_FILE", "fastrtps.xml")
+_SETTINGS = ("FASTDDS_DEFAULT_PROFILES_FILE", "fastdds")
+_SETTINGS_2 = ("FASTRTPS_DEFAULT_PROFILES_FILE", "fastrtps")
 _WITH_VERSION_2 = ("humble", "iron", "jazzy")
+_TRANSPORTS = ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+_RANGE, _OLD_RANGE, _PEERS = (
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_LOCALHOST_ONLY",
+    "ROS_STATIC_PEERS",
+)
 
 
 def set_up_middleware() -> None:
     """Before rclpy.init, for this process and those that it starts. Another middleware does not
     look at it."""
-    if not any(name in os.environ for name, _ in (_SETTINGS, _SETTINGS_2)):
-        # Version 3 reads the old variable as well, and does not understand the old file.
-        old = os.environ.get("ROS_DISTRO") in _WITH_VERSION_2
-        name, file = _SETTINGS_2 if old else _SETTINGS
-        os.environ[name] = str(config_folder() / file)
+    if any(name in os.environ for name, _ in (_SETTINGS, _SETTINGS_2)):
+        return
+    os.environ.setdefault(*_TRANSPORTS)
+    # Version 3 reads the old variable as well, and does not understand the old file.
+    old = os.environ.get("ROS_DISTRO") in _WITH_VERSION_2
+    variable, name = _SETTINGS_2 if old else _SETTINGS
+    if _keeps_to_this_host():
+        # rmw_fastrtps adds shared memory to LOCALHOST, whatever the settings say; this file keeps
+        # to this host as well.
+        name += "_localhost"
+        os.environ[_RANGE] = "SUBNET"
+        os.environ.pop(_OLD_RANGE, None)
+    os.environ[variable] = str(config_folder() / f"{name}.xml")
+
+
+def _keeps_to_this_host() -> bool:
+    if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
+        return False
+    only = os.environ.get(_OLD_RANGE) == "1" or os.environ.get(_RANGE) == "LOCALHOST"
+    # Peers elsewhere that are named are to be heard all the same.
+    return only and not os.environ.get(_PEERS)

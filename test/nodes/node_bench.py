@@ -10,11 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from chute_ros.nodes import qos
+from chute_ros.nodes.node_executor import NodeExecutor
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.transport.address import parse_address
@@ -39,7 +39,7 @@ class Bench:
         self.namespace = namespace
         #: For files of this test; removed at its end.
         self.folder = Path(tempfile.mkdtemp(prefix="chute_ros_test_"))
-        self.executor = SingleThreadedExecutor()
+        self.executor = NodeExecutor()
         self.nodes: list[Node] = []
         self.loops: list[WireLoop[Any]] = []
         self.client = Node("client", namespace=namespace)
