@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import shutil
@@ -21,6 +22,8 @@ GROWN, FOUND_FOLDER = HERE / "grown", HERE / "found"
 #: A process larger than this is a finding, MB; so is an input that takes longer than this, s, in
 #: code that is not Python's.
 MOST_MEMORY, HANGS_AFTER = 2048, 60
+#: Where files cost no disk.
+_MEMORY = Path("/dev/shm")
 #: How long it may take besides, on a busy machine, s.
 _PATIENCE = 900
 _STATUS = re.compile(r"^#\d+\s+(\w+)\s+cov: (\d+) ft: (\d+) corp: (\d+)/\S+ .*?rss: (\d+)Mb", re.M)
@@ -141,7 +144,11 @@ def _child(name: str, *arguments: str, patience: float) -> tuple[str, int]:
     """What a process with one target says, and how it ends."""
     found = FOUND_FOLDER / name
     found.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="fuzz_call_") as folder:
+    memory = _MEMORY if _MEMORY.is_dir() else None
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz_call_") as folder,
+        tempfile.TemporaryDirectory(prefix="fuzz_", dir=memory) as left,
+    ):
         call = Path(folder) / name
         command = shlex.join([sys.executable, "-m", "fuzz.child", str(call), name, str(found)])
         call.write_text(f'#!/bin/sh\nexec {command} "$@"\n')
@@ -150,6 +157,8 @@ def _child(name: str, *arguments: str, patience: float) -> tuple[str, int]:
             done = subprocess.run(
                 [str(call), *arguments],
                 cwd=HERE.parent,
+                # libFuzzer ends it in the middle of things: what it leaves goes with the folder.
+                env={**os.environ, "TMPDIR": left},
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 timeout=patience,

@@ -21,8 +21,6 @@ from fuzz.plain_json import BOOT, NOW, SETTINGS, anything, left
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 
-#: Where a file is written in which a target reads: in memory, if there is such a place.
-_MEMORY = Path("/dev/shm")
 _LINKS = ("mavlink_parachute", "upf_can")
 
 
@@ -83,8 +81,7 @@ class InFile(Reading):
 
     def __init__(self, name: str, read: Callable[[Path], object]) -> None:
         super().__init__(self._write_and_read)
-        memory = _MEMORY if _MEMORY.is_dir() else None
-        self._folder = tempfile.TemporaryDirectory(prefix="fuzz_", dir=memory)
+        self._folder = tempfile.TemporaryDirectory(prefix="fuzz_")
         self._path = Path(self._folder.name) / name
         self._read_file = read
 
