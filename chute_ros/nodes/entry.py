@@ -72,7 +72,6 @@ def run(name: str, class_name: str) -> None:
         # A second Ctrl-C must not cut the ending short: the link's thread is being joined.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
-            executor.shutdown()
             node.destroy_node()
         # The signal's own handler may be shutting down at this very moment.
         with contextlib.suppress(RuntimeError):

@@ -58,12 +58,23 @@ class NodeExecutor(SingleThreadedExecutor):
         self._changed = True
         super().remove_node(node)
 
+    def spin(self) -> None:
+        """As rclpy's; afterwards nothing keeps a node from being destroyed."""
+        try:
+            super().spin()
+        finally:
+            self._let_go()
+
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """As rclpy's; not while another thread spins."""
         ended = bool(super().shutdown(timeout_sec))
+        self._let_go()
+        return ended
+
+    def _let_go(self) -> None:
         if self._wait_set is not None:
             self._wait_set.close()
-        return ended
+            self._wait_set = None
 
     def _spin_once_impl(
         self, timeout_sec: Any = None, wait_condition: Callable[[], bool] = lambda: False
@@ -86,8 +97,7 @@ class NodeExecutor(SingleThreadedExecutor):
         """The wait set for what there is to wait for now."""
         if self._changed or self._wait_set is None:
             self._changed = False  # before it looks: it may be woken meanwhile
-            if self._wait_set is not None:
-                self._wait_set.close()
+            self._let_go()
             nodes = self.get_nodes()
             names = {kind: f"{kind.removesuffix('_condition')}s" for kind in KINDS}
             self._wait_set = KeptWaitSet(
