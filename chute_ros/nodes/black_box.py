@@ -7,6 +7,7 @@ is left out and counted: a decision never waits for a disk.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -57,6 +58,9 @@ class BlackBox:
         #: Until when everything that came was written, and is on the disk; monotonic s.
         self._taken_until = self._kept_until = time.monotonic()
         self._retry_at = self._taken_until
+        #: Since when a step writes, which takes less than a second on a disk that takes something,
+        #: however busy the processor is; monotonic s, infinity: none does.
+        self._step_since = math.inf
         self._writer = BoxWriter(folder, topics, limit)
         self._ending = Event()
         self._thread = Thread(target=self._run, name="black_box", daemon=True)
@@ -99,7 +103,7 @@ class BlackBox:
             "bytes in the file": self._writer.size,
             "entries written": self._written,
             "entries waiting": len(self._waiting),
-            "entries left out, the disk being slow": self._left_out,
+            "entries left out, written too slowly": self._left_out,
             "entries lost with a file that failed": self._lost,
             "entries that are no messages": self._unwritable,
             "all on the disk (s ago)": time.monotonic() - self._kept_until,
@@ -119,9 +123,12 @@ class BlackBox:
             return "the black box has ended"
         if self._error:
             return f"the black box cannot write: {self._error}"
-        if behind > SLOW_AFTER:
-            return f"the black box: the disk takes nothing for {behind:.0f} s"
-        return ""
+        if behind <= SLOW_AFTER:
+            return ""
+        if (blocked := time.monotonic() - self._step_since) > SLOW_AFTER:
+            return f"the black box: the disk takes nothing for {blocked:.0f} s"
+        waiting = f"{len(self._waiting)} entries wait, not all on the disk for {behind:.0f} s"
+        return f"the black box is written slowly: {waiting}"
 
     def close(self) -> None:
         """Write what waits and end the file; gives up where the disk takes too long."""
@@ -172,6 +179,7 @@ class BlackBox:
 
     def _guarded(self, step: Callable[[], None]) -> bool:
         """Do it; whether it went well. A disk's failure ends the file, not the recording."""
+        self._step_since = time.monotonic()
         try:
             step()
         except OSError as error:
@@ -179,4 +187,6 @@ class BlackBox:
             self._lost += self._writer.abandon()
             self._retry_at = time.monotonic() + RETRY_INTERVAL
             return False
+        finally:
+            self._step_since = math.inf
         return True

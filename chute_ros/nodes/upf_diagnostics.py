@@ -60,7 +60,7 @@ def details_of(link: UpfLink, now: float) -> Details:
         troubles=tuple(bus.troubles()),
         received=bus.endpoint.received_count,
         sent=bus.endpoint.sent_count,
-        dropped=Counter(bus.counts + link.requests.commands.counts),
+        dropped=bus.counts + link.requests.commands.counts + link.devices.counts,
         bus_off_count=bus.endpoint.bus_off_count,
         nodes={
             f"node {node.node_id}": f"{node.name or 'not known'} {node.unique_id.hex()}".strip()

@@ -91,8 +91,10 @@ class Deploying(Policy):
             text = step.newest_details() or "no device node reported"
             waited = self.now - step.decided_at
             last = len(self.state.deploys) >= len(self.ladder)
-            link = step.targets[0]
-            silent = self.evidence(link).silent(self.config.limits(link).lost_after, self.now)
+            silent = all(
+                self.evidence(link).silent(self.config.limits(link).lost_after, self.now)
+                for link in step.targets
+            )
             over = step.all_failed() or self.now >= step_deadline(self.config, self.state, step)
             if not over and (last or not silent):
                 return
@@ -125,6 +127,8 @@ class Deploying(Policy):
         """The end of the ladder without a parachute is an alarm that does not stop until one is
         out or a person resets, whatever is tried meanwhile."""
         if self.state.stage is not Stage.DEPLOYED and self.now >= self.state.alarm_at:
-            self.outputs.append(i.Say(f"still no parachute: {self.state.alarms[-1]}", alarm=True))
+            # A state that was handed over or read from a black box may know of no alarm.
+            text = ": ".join(("still no parachute", *self.state.alarms[-1:]))
+            self.outputs.append(i.Say(text, alarm=True))
             alarm_at = self.now + self.config.alarm_interval
             self.state = replace(self.state, alarm_at=alarm_at)

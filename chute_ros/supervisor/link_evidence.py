@@ -23,6 +23,8 @@ from chute_ros.supervisor.quick_replace import replace
 _NOTHING: MappingProxyType[str, ParachuteStatus] = MappingProxyType({})
 #: Devices of one link that are remembered: made-up names must not grow us.
 MOST_DEVICES = 16
+#: Wall clocks are judged by the heartbeats of at least so long, s.
+_CLOCK_SPELL = 1.0
 
 
 class LinkJudgement(enum.IntEnum):
@@ -71,6 +73,10 @@ class LinkEvidence:
     #: The wall clock here less that of the sender's newest heartbeat, s: the way and the
     #: difference of the clocks. NaN: not known.
     clock_difference: float = math.nan
+    #: The smallest of these, of the spell since this monotonic s, and of the spell before it.
+    clock_spell_since: float = math.nan
+    clock_least: float = math.nan
+    clock_least_before: float = math.nan
     #: When a device last said that it is released, monotonic s; NaN: never.
     released_at: float = math.nan
     #: The newest picture of each device on this link.
@@ -80,6 +86,13 @@ class LinkEvidence:
     def deployed(self) -> frozenset[str]:
         """The devices whose own status said released when they were last heard."""
         return frozenset(name for name, status in self.devices.items() if status.deployed)
+
+    @property
+    def clocks_differ_by(self) -> float:
+        """By the heartbeats of a spell and more, s; NaN: not known. A message that is delayed can
+        only look late, and clocks that differ show in all, so that the smallest counts."""
+        unknown = math.isnan(self.clock_least_before)
+        return math.nan if unknown else min(self.clock_least, self.clock_least_before)
 
     def silent(self, limit: float, now: float) -> bool:
         """The node itself, not only its device, was not heard for limit s, or never.
@@ -118,7 +131,7 @@ class LinkEvidence:
         if newly_lost or fell_silent:
             lost_count += 1
         return replace(
-            self,
+            self._with_clock(one.clock_difference, now),
             heard=now,
             reported=one.link_state,
             device_healthy=one.device_healthy,
@@ -126,6 +139,18 @@ class LinkEvidence:
             regained_at=regained_at,
             lost_count=lost_count,
             clock_difference=one.clock_difference,
+        )
+
+    def _with_clock(self, difference: float, now: float) -> LinkEvidence:
+        if math.isnan(difference):
+            return self
+        passed = now - self.clock_spell_since
+        if passed < _CLOCK_SPELL:
+            return replace(self, clock_least=min(self.clock_least, difference))
+        # What was heard before a long silence says nothing of now.
+        before = self.clock_least if passed < 3 * _CLOCK_SPELL else math.nan
+        return replace(
+            self, clock_spell_since=now, clock_least=difference, clock_least_before=before
         )
 
     def with_status(self, status: ParachuteStatus, now: float) -> LinkEvidence:

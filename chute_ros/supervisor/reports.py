@@ -26,10 +26,7 @@ class Reports(Requests):
         known = not math.isnan(before.heard)
         silent = before.silent(limits.lost_after, self.now)
         self.set_evidence(one.link, before.with_heartbeat(one, limits, self.now))
-        if abs(one.clock_difference) > self.config.preflight.max_clock_difference:
-            text = f"{one.link}: its wall clock differs; it may refuse decisions as too old"
-            if text not in self.state.alarms:
-                self.alarm(text)
+        self._look_at_clock(one.link)
         if known and (silent or one.seq <= before.seq):
             # It may know of no decision; what still holds for it is decided anew.
             restarted = one.seq <= before.seq
@@ -42,6 +39,18 @@ class Reports(Requests):
                 begun = not restarted and one.link not in pending.not_begun()
                 if slot == "block" or not begun:
                     self.renew(slot, why)
+
+    def _look_at_clock(self, link: str) -> None:
+        """Its wall clock against the one here."""
+        text = f"{link}: its wall clock differs; it may refuse decisions as too old"
+        difference = abs(self.evidence(link).clocks_differ_by)
+        told, limit = text in self.state.alarms, self.config.preflight.max_clock_difference
+        if difference > limit and not told:
+            self.alarm(text)
+        elif difference <= limit and told:
+            alarms = tuple(one for one in self.state.alarms if one != text)
+            self.state = replace(self.state, alarms=alarms)
+            self.outputs.append(i.Say(f"{link}: its wall clock agrees again"))
 
     def parachute(self, one: i.ParachuteReport) -> None:
         """One device on a link tells its picture."""

@@ -198,7 +198,7 @@ class Steps:
         return "; ".join(d.newest_details() for d in self.state.deploys if d.details)
 
     def alarm(self, text: str) -> None:
-        """Something that stays until a reset."""
+        """Something that stays until a reset, or until what it tells is over."""
         if text not in self.state.alarms:
             self.state = replace(self.state, alarms=(*self.state.alarms, text)[-_MOST_ALARMS:])
         self.outputs.append(i.Say(text, alarm=True))

@@ -33,6 +33,9 @@ LEFT_OUT = frozenset(
         "seq",  # of which every heartbeat here brings the next, or begins anew
         "lost_count",
         "clock_difference",
+        "clock_spell_since",  # no clock is told here
+        "clock_least",
+        "clock_least_before",
         "same_since",  # no value here stays the same
         "sent_at",
         "details",

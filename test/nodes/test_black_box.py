@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import signal
 import stat
 import subprocess
@@ -153,6 +154,35 @@ def test_a_blocked_disk_delays_nobody_and_is_told(tmp_path, monkeypatch, await_u
     done, skipped = replayed(recorder.files())
     assert done == 1 + 10 + 5, "what was left out is bridged by a new snapshot"
     assert skipped == 0
+
+
+def test_a_writer_that_has_no_time_is_no_disk_that_takes_nothing(
+    tmp_path, monkeypatch, await_until
+):
+    """Given a processor that is busy, when entries come faster than they are written, then it says
+    how many wait."""
+    monkeypatch.setattr(black_box, "SLOW_AFTER", 0.6)
+    write, may_go_on = box_writer.BoxWriter.write, threading.Event()
+
+    def slowly(writer, entry):
+        may_go_on.wait(0.02)
+        write(writer, entry)
+
+    monkeypatch.setattr(box_writer.BoxWriter, "write", slowly)
+    recorder, told = Recorder(tmp_path), []
+    try:
+        recorder.beat(1000)
+        await_until(lambda: told.append(recorder.box.trouble) or told[-1], "it is told")
+        assert re.fullmatch(
+            r"the black box is written slowly: \d+ entries wait, not all on the disk for \d+ s",
+            told[-1],
+        )
+        assert recorder.count("entries written") > 0
+    finally:
+        may_go_on.set()
+    await_until(lambda: recorder.box.trouble == "", "it has caught up")
+    recorder.box.close()
+    assert recorder.count("entries written") == 1000
 
 
 def test_an_end_does_not_wait_for_a_disk_for_ever(tmp_path, monkeypatch):

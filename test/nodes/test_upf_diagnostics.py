@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from chute_msgs.msg import TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import OTHER_LAYOUT, Devices, Network, follow_log, tasks, values
 
 from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.definitions import VEHICLE_SERVICE
+from chute_ros.protocol.upf.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -66,6 +67,27 @@ def test_a_request_with_a_bad_magic_number_is_counted_and_answered_so(bench):
     said = tasks(diagnostics)["vehicle service"]
     assert said.message == "bad request of 33: BAD_MAGIC_NUMBER"
     assert values(said)["requests with a bad magic number"] == "1"
+
+
+def test_a_launch_that_nobody_ordered_is_told_by_its_reason(bench):
+    network = Network(bench)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    statuses = bench.follow(TriggerStatus, "upf/trigger_status")
+    party = network.party(34)
+    state = network.definitions.constant(TRIGGER_STATUS, "STATE_LAUNCHED")
+    party.say(TRIGGER_STATUS, state=state)
+    reason = "dropped: launched that nobody ordered, the first from a trigger"
+    bench.until(
+        lambda: (
+            "trigger 34" in tasks(diagnostics)
+            and values(tasks(diagnostics)["link"]).get(reason) == "1"
+        ),
+        "it is counted",
+    )
+    assert values(tasks(diagnostics)["trigger 34"])["has fired"] == "False"
+    assert not any(one.launched for one in statuses)
+    party.say(TRIGGER_STATUS, state=state)
+    bench.until(lambda: statuses[-1].launched, "said again, it is believed")
 
 
 def test_fields_that_the_types_lack_are_in_the_log_at_the_start(bench):

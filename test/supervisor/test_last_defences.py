@@ -49,6 +49,25 @@ def test_beyond_the_last_step_of_the_ladder_nothing_is_fired() -> None:
     assert steps.outputs == []
 
 
+@pytest.mark.parametrize("alarms", [(), ("no parachute confirmed within 5.0 s: x",)])
+def test_an_alarm_that_is_due_is_said_though_the_state_knows_of_none(alarms: tuple) -> None:
+    """A state that contradicts itself, of a black box or of a leader: it still falls."""
+    story = deploying()
+    story.state = replace(story.state, stage=Stage.FAULT, alarms=alarms, alarm_at=START + 1.2)
+    said = [o.text for o in story.at(1.2) if isinstance(o, i.Say)]
+    assert ": ".join(("still no parachute", *alarms)) in said
+    assert story.state.alarm_at == START + 1.2 + story.config.alarm_interval
+
+
+def test_a_step_of_the_ladder_that_addresses_nobody_is_followed_by_the_next() -> None:
+    story = deploying()
+    (step,) = story.state.deploys
+    nobody = replace(step, targets=(), decision=replace(step.decision, targets=()))
+    story.state = replace(story.state, deploys=(nobody,))
+    story.at(1.2)
+    assert story.newest(D).targets == ("upf_can",)
+
+
 @pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
 def test_a_ladder_that_is_found_in_another_mode_sends_nothing_and_ends(mode: i.Mode) -> None:
     story = deploying()

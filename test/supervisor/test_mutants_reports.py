@@ -30,7 +30,7 @@ BOTH = SupervisorConfig(kill_links=(LINK, UPF), deploy_links=(LINK, UPF))
 )
 def test_a_wall_clock_that_differs_is_an_alarm_once(difference: float, differs: bool) -> None:
     story = Story(SupervisorConfig(preflight=PreflightLimits(max_clock_difference=0.5)))
-    for tick in range(3):
+    for tick in range(15):
         story.at(tick * 0.1, replace(story.heartbeat(), clock_difference=difference))
     text = "mavlink_parachute: its wall clock differs; it may refuse decisions as too old"
     assert story.alarms() == [text] * differs

@@ -19,6 +19,7 @@ from chute_ros.model import (
 )
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.umbilical.canopies import CANOPIES, Canopies
 from chute_ros.protocol.umbilical.gate import Situation
 from chute_ros.protocol.umbilical.layouts import Record
 from chute_ros.protocol.umbilical.modes import GROUND, IN_FLIGHT, FlightMode
@@ -29,12 +30,9 @@ DEVICE = "flight_computer"
 #: deployment: the slowest canopy falls several times as fast.
 _REST_HEIGHT, _REST_TIME = 3.0, 5.0
 _REST_SPEED = 1.0  # m/s
+#: A clock that falls behind ours by more, from one record to the next, may have started anew, s.
+_FALLS_BEHIND = 0.5
 _FIX_3D = 3
-#: Command -> the flag and the flight mode that show it.
-CANOPIES = {
-    "drogue": ("ssa_drogue_deployed", FlightMode.DROGUE_DEPLOYED),
-    "main": ("ssa_main_deployed", FlightMode.MAIN_DEPLOYED),
-}
 _MODES = {int(mode): mode for mode in FlightMode}
 _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
 
@@ -58,10 +56,7 @@ class FlightComputer:
         self._rest_altitude = NAN
         self._rest_since = NAN
         self._was_out = False
-        #: What came out in this flight, by the names of the commands.
-        self._came_out: set[str] = set()
-        #: What was fired from here in this flight.
-        self._fired: set[str] = set()
+        self._canopies = Canopies()
         self._clock_moved_at = NAN
         self._paused = False
         self._was_fresh = False
@@ -74,6 +69,8 @@ class FlightComputer:
         age = self._clock.observe(max(1, int(record["ms_since_boot_cfc"])))
         if age in (Age.OLD, Age.DOUBTFUL):
             return [], age
+        if self._has_restarted(record):
+            age = Age.RESTARTED
         if age is Age.RESTARTED:
             self.restarts += 1
             self.restarted_in_flight = self._flying
@@ -88,7 +85,9 @@ class FlightComputer:
         self.records += 1
         self._watch_rest(before, record, now)
         self._watch_flight()
-        self._watch_canopies(before, record)
+        self._canopies.watch(before, record, self.mode)
+        if self.mode in GROUND and not self._flying:
+            self._canopies = Canopies()
         return self.liveness.heard(now), age
 
     def cable_pulled(self) -> None:
@@ -98,7 +97,7 @@ class FlightComputer:
     def fired(self, name: str) -> None:
         """A command that fires the drogue or the main has left."""
         if self._flying:
-            self._fired.add(name)
+            self._canopies.fired.add(name)
 
     def alive(self, now: float) -> list[LinkChange]:
         """It is heard, though a long work keeps it from sending telemetry."""
@@ -155,11 +154,12 @@ class FlightComputer:
 
     @property
     def deployed(self) -> bool:
-        """The parachute is out, by the newest record: drogue or main, or the main alone."""
+        """The parachute is out: drogue or main, or the main alone. By the newest record, or by
+        those of before a restart in this flight."""
         if not self._main_counts:
-            return self._is_out
+            return self._is_out or any(self.forgot(name) for name in CANOPIES)
         flag = self.record is not None and self.record["ssa_main_deployed"]
-        return bool(flag) or self.mode is FlightMode.MAIN_DEPLOYED
+        return bool(flag) or self.mode is FlightMode.MAIN_DEPLOYED or self.forgot("main")
 
     @property
     def _is_out(self) -> bool:
@@ -177,11 +177,17 @@ class FlightComputer:
     def came_out(self, name: str) -> bool:
         """The drogue or the main came out in this flight: a flag that was set before it, as by a
         test on the ground, does not count, and a restart does not undo it."""
-        return name in self._came_out
+        return name in self._canopies.came_out
+
+    def forgot(self, name: str) -> bool:
+        """The drogue or the main surely came out in this flight, and it has restarted since: that
+        its records say so no more means nothing."""
+        surely_out = name in self._canopies.surely_out
+        return self._flying and self.restarted_in_flight and surely_out
 
     def was_fired(self, name: str) -> bool:
         """It came out in this flight, or was fired from here: not every firmware tells."""
-        return name in self._came_out or name in self._fired
+        return name in self._canopies.came_out or name in self._canopies.fired
 
     @property
     def armed(self) -> bool:
@@ -238,6 +244,18 @@ class FlightComputer:
 
     # -- inside ----------------------------------------------------------------------------------
 
+    def _has_restarted(self, record: Record) -> bool:
+        """In flight, when its clock does not show it: as it runs for longer than before by now.
+
+        Only a restart leads from a mode of the flight, or a fault in it, to one of the ground
+        with a clock that falls behind.
+        """
+        before, mode = self.record, _mode(record)
+        if before is None or not self._flying or mode not in GROUND or _mode(before) in GROUND:
+            return False
+        ran = (int(record["ms_since_boot_cfc"]) - int(before["ms_since_boot_cfc"])) / 1000.0
+        return record.received - before.received - ran > _FALLS_BEHIND
+
     def _watch_rest(self, before: Record | None, record: Record, now: float) -> None:
         altitude = record.number("altitude")
         came_out, self._was_out = self._is_out and not self._was_out, self._is_out
@@ -255,17 +273,6 @@ class FlightComputer:
             self._flying = not self.landed
         elif self._at_rest or (self.mode in GROUND and not self.restarted_in_flight):
             self._flying = False
-
-    def _watch_canopies(self, before: Record | None, record: Record) -> None:
-        for name, (flag, mode) in CANOPIES.items():
-            rose = before is not None and not before[flag] and record[flag]
-            if rose or self.mode is mode:
-                self._came_out.add(name)
-        if self.mode is FlightMode.MAIN_DEPLOYED:
-            self._came_out.add("drogue")  # its mode comes after the drogue's
-        if self.mode in GROUND and not self._flying:
-            self._came_out.clear()
-            self._fired.clear()
 
     @property
     def _at_rest(self) -> bool:

@@ -12,10 +12,11 @@ from chute_ros.errors import ParameterError
 from chute_ros.protocol.events import Notice, Severity
 from chute_ros.protocol.requests import Requests
 from chute_ros.protocol.umbilical import commands, gate
+from chute_ros.protocol.umbilical.canopies import CANOPIES
 from chute_ros.protocol.umbilical.commands import CommandKind, Effect
 from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
-from chute_ros.protocol.umbilical.flight_computer import CANOPIES, FlightComputer
+from chute_ros.protocol.umbilical.flight_computer import FlightComputer
 from chute_ros.protocol.umbilical.gate import Situation
 from chute_ros.protocol.umbilical.memory import MemoryWorks
 from chute_ros.protocol.umbilical.sayings import FlashUsage
@@ -245,13 +246,17 @@ class Orders:
         # Where it shows already, only what is said once the command has been taken counts.
         settles = _SETTLES if computer.record and effect.shown(computer.record) else 0.0
 
+        def forgot() -> bool:
+            return not even_if_shown and computer.forgot(name)
+
         def shown() -> bool:
             record = computer.record
             if record is None or not (believed or record.received > since() + settles):
                 return False
-            return effect.shown(record)
+            return effect.shown(record) or forgot()
 
-        return shown, effect.text
+        text = "it was out before the flight computer restarted" if forgot() else effect.text
+        return shown, text
 
     def _effect(self, kind: CommandKind) -> Effect | None:
         if kind.command.name == "safe" and self._config.safe_opens_sv:

@@ -231,7 +231,7 @@ class UpfLink:
     def counts(self) -> Counter[str]:
         """Why something was dropped -> how often."""
         counts = self.bus.counts + self.requests.commands.counts + self.vehicle_service.counts
-        return counts + Counter({"status of devices not followed": self.devices.refused_count})
+        return counts + self.devices.counts
 
     # -- inside ----------------------------------------------------------------------------------
 
@@ -251,7 +251,8 @@ class UpfLink:
             if controller is not None:
                 self.vehicle_service.state(controller.device, controller.state, now)
         elif heard.name == names.TRIGGER_STATUS:
-            self.devices.trigger_status(heard.source, heard.values, now)
+            ordered = self.requests.under_way(goals.DEPLOY)
+            self.devices.trigger_status(heard.source, heard.values, now, ordered)
         elif heard.name == NODE_STATUS:
             for node_id in self.bus.nodes.take_restarted():
                 self.devices.restarted(node_id)

@@ -7,6 +7,7 @@ trigger; one node may be both. Source: Flyfire UPF UAVCAN protocol V1.0, "system
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -31,8 +32,8 @@ class UpfDevices:
         self.definitions = definitions
         self.controllers: dict[int, Controller] = {}
         self.triggers: dict[int, Trigger] = {}
-        #: Devices that were not followed: not ours by a parameter, or too many.
-        self.refused_count = 0
+        #: Why something was not taken as it was said -> how often.
+        self.counts: Counter[str] = Counter()
         #: Controllers whose parameters are to be read anew.
         self.to_read: list[Controller] = []
         self._events: list[Event | TriggerChanged] = []
@@ -97,16 +98,23 @@ class UpfDevices:
             self.notice(Severity.INFO, text)
         self._events.append(ParachuteChanged(self.picture_of(controller, now)))
 
-    def trigger_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
-        """A TriggerStatus came."""
+    def trigger_status(
+        self, node_id: int, values: Mapping[str, Any], now: float, ordered: bool
+    ) -> None:
+        """A TriggerStatus came. ordered: a release is under way."""
         trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
         if trigger is not None:
             fired = trigger.launched
-            self._changed(trigger, trigger.status_message(values, now))
+            expected = ordered or self._controller_says_out()
+            self._changed(trigger, trigger.status_message(values, now, expected))
             self._trigger_changed(trigger, now)
             if trigger.launched and not fired:
                 self.notice(Severity.WARNING, f"trigger {node_id} has fired")
                 self._controllers_changed(now)
+            elif trigger.doubted:
+                self.counts["launched that nobody ordered, the first from a trigger"] += 1
+                text = f"trigger {node_id} says that it has fired, which nobody ordered"
+                self.notice(Severity.WARNING, f"{text}: believed when it says so again")
 
     def node_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A NodeStatus of anybody."""
@@ -162,7 +170,8 @@ class UpfDevices:
         if found is not None or node_id == 0:
             return found
         if wanted not in (0, node_id) or len(known) >= MOST_DEVICES:
-            self.refused_count += 1
+            # Not ours by a parameter, or too many.
+            self.counts["status of devices not followed"] += 1
             return None
         made: Device
         if known is self.controllers:
@@ -180,6 +189,10 @@ class UpfDevices:
         if isinstance(device, Controller) and any(change.regained for change in changes):
             # Nobody knows what was done to it meanwhile.
             self.to_read.append(device)
+
+    def _controller_says_out(self) -> bool:
+        """With several, nobody says which trigger is whose."""
+        return len(self.controllers) == 1 and all(c.deployed for c in self.controllers.values())
 
     def _controllers_changed(self, now: float) -> None:
         """What a trigger says is part of the picture of the only controller."""

@@ -304,7 +304,7 @@ def test_named_one_of_several_controllers_is_not_gone_round(bench):
 
 
 def test_trigger_of_another_controller_is_no_confirmation(bench):
-    story = armed(bench("")).status("ARMED", 40).trigger_status("LAUNCHED").clear()
+    story = armed(bench("")).status("ARMED", 40).trigger_out().clear()
     assert deploy(story, node_id=40).after(0.2).ends(1) == []
     assert len(story.requests(SERVICE)) == 1
 
@@ -384,7 +384,7 @@ def test_trigger_that_refuses_is_asked_until_time_is_up(bench):
 
 
 def test_trigger_that_has_fired_is_not_fired_again(bench):
-    story = deploy(bench("").trigger_status("LAUNCHED").clear())
+    story = deploy(bench("").trigger_out().clear())
     assert story.end(1).success
     assert not fired_at(story.at(9.0))
 
@@ -430,7 +430,7 @@ def test_triggers_are_fired_at_once_and_again_until_one_says_that_it_has(bench):
 
 
 def test_triggers_that_have_fired_are_not_fired_again_at_the_end_of_a_ladder(bench):
-    story = fire(bench("").trigger_status("LAUNCHED").clear())
+    story = fire(bench("").trigger_out().clear())
     assert story.end(1).success
     assert not fired_at(story.at(9.0))
 

@@ -152,7 +152,7 @@ def test_first_controller_that_is_not_lost_is_chosen(bench):
 
 
 def test_with_several_controllers_nobody_knows_whose_a_trigger_is(bench):
-    story = bench("").status("READY", 33).trigger_status("LAUNCHED")
+    story = bench("").status("READY", 33).trigger_out()
     assert story.picture().state is S.LAUNCHED
     story.status("READY", 35)
     assert story.picture().state is S.READY
@@ -254,9 +254,9 @@ def test_trigger_that_is_abnormal_without_a_reason(bench):
     assert "trigger 34 is ABNORMAL" in story.picture().faults
 
 
-def test_trigger_that_fires_is_told_at_once_with_the_picture_of_its_controller(bench):
+def test_trigger_that_fires_is_told_with_the_picture_of_its_controller(bench):
     story = bench("").status("ARMED").trigger_status().at(5.0).clear()
-    story.trigger_status("LAUNCHED")  # the controller is lost
+    story.trigger_out()  # the controller is lost
     assert "trigger 34 has fired" in story.notices()
     assert story.pictures()[-1].state is S.LAUNCHED
     assert story.pictures()[-1].deployed
@@ -291,7 +291,9 @@ def test_trigger_alone_is_no_parachute_unless_the_parameter_says_so(bench):
     ],
 )
 def test_trigger_is_the_parachute_where_there_is_no_controller(bench, said, state):
-    story = bench("", without_controller=True).trigger_status(said, supply_voltage=12.0)
+    story = bench("", without_controller=True)
+    for _ in range(2):
+        story.trigger_status(said, supply_voltage=12.0)
     picture = story.picture()
     assert (picture.device, picture.state, picture.backup_voltage) == ("34", state, 12.0)
     assert picture.deployed is (said == "LAUNCHED")

@@ -213,6 +213,10 @@ class Bench:
         more = {"is_launched": state == "LAUNCHED", **more}
         return self.say(node_id, names.TRIGGER_STATUS, state=state, **more)
 
+    def trigger_out(self, node_id: int = TRIGGER) -> Bench:
+        """A trigger says that it has fired, and once more, which is believed of itself."""
+        return self.trigger_status("LAUNCHED", node_id).trigger_status("LAUNCHED", node_id)
+
     def node_status(self, node_id: int = CONTROLLER, uptime: int = 5, health: int = 0) -> Bench:
         """A NodeStatus."""
         values = {"uptime_sec": uptime, "health": health}

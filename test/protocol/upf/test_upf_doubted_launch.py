@@ -1,0 +1,118 @@
+"""A trigger that says "launched" though nobody ordered it: one frame may have been damaged."""
+
+import pytest
+from upf_link_bench import Bench
+
+from chute_ros.model import LinkState, ParachuteState
+
+COUNT = "launched that nobody ordered, the first from a trigger"
+DOUBT = "trigger 34 says that it has fired, which nobody ordered: believed when it says so again"
+
+
+def flying(bench, **config) -> Bench:
+    """An armed controller and its trigger, both made up."""
+    return bench("", **config).trigger_status().status("ARMED").at(0.1).clear()
+
+
+def damaged(story: Bench) -> Bench:
+    """READY, whose bit for "launched" was turned over between the adapter and us."""
+    return story.trigger_status(is_launched=True, **no_bit(story))
+
+
+def no_bit(story: Bench) -> dict[str, str]:
+    """The types that have no such bit tell it by the state alone."""
+    has = "is_launched" in story.layout.types.message("flyfire.TriggerStatus").fields
+    return {} if has else {"state": "LAUNCHED"}
+
+
+def test_one_damaged_status_opens_no_parachute(bench):
+    story = flying(bench)
+    damaged(story)
+    assert not any(one.deployed for one in story.pictures())
+    assert story.picture().state is ParachuteState.ARMED
+    assert story.notices() == [DOUBT]
+    assert story.link.counts[COUNT] == 1
+    story.after(0.2).trigger_status()
+    assert not story.picture().deployed
+    assert story.link.devices.triggers[34].sound
+
+
+def test_damage_again_and_again_but_never_in_a_row_opens_none(bench):
+    story = flying(bench)
+    for _ in range(5):
+        damaged(story.after(0.2).status("ARMED")).after(0.2).status("ARMED").trigger_status()
+    assert not any(one.deployed for one in story.pictures())
+    assert story.link.counts[COUNT] == 5
+
+
+def test_trigger_that_says_so_again_is_believed(bench):
+    """APS, whose controller died; or we were started while the parachute is out."""
+    story = flying(bench).trigger_status("LAUNCHED").after(0.2)
+    assert not story.picture().deployed
+    story.trigger_status("LAUNCHED")
+    assert story.picture().deployed
+    assert story.pictures()[-1].state is ParachuteState.LAUNCHED
+    assert story.notices() == [DOUBT, "trigger 34 has fired"]
+    assert story.after(0.2).trigger_status("LAUNCHED").picture().deployed
+    assert story.link.counts[COUNT] == 1
+
+
+def test_started_while_it_is_out_the_second_status_tells(bench):
+    story = bench("", without_controller=True).trigger_status("LAUNCHED")
+    assert (story.picture().deployed, story.picture().state) == (False, ParachuteState.UNKNOWN)
+    assert not story.link.devices.triggers[34].sound, "it may be out"
+    assert story.after(0.2).trigger_status("LAUNCHED").picture().deployed
+
+
+def test_two_triggers_do_not_speak_for_each_other(bench):
+    story = flying(bench).trigger_status(node_id=36)
+    story.trigger_status("LAUNCHED").trigger_status("LAUNCHED", 36)
+    assert not story.picture().deployed
+    assert story.trigger_status("LAUNCHED").picture().deployed
+
+
+def test_first_is_believed_when_the_controller_says_so_too(bench):
+    story = flying(bench).status("LAUNCHED").trigger_status("LAUNCHED")
+    assert story.link.devices.triggers[34].launched
+    assert not story.link.counts[COUNT]
+
+
+def test_controller_that_says_so_needs_no_trigger(bench):
+    assert flying(bench).trigger_status("LAUNCHED").status("LAUNCHED").picture().deployed
+
+
+def test_one_of_several_controllers_does_not_speak_for_a_trigger(bench):
+    story = flying(bench).status("READY", 35).status("LAUNCHED").trigger_status("LAUNCHED")
+    assert not story.link.devices.triggers[34].launched
+
+
+@pytest.mark.parametrize("config", [{}, {"without_controller": True}])
+def test_first_is_believed_when_a_deploy_is_under_way(bench, config):
+    story = flying(bench, **config)
+    story.link.deploy(1, False, story.now)
+    story.after(0.05).trigger_status("LAUNCHED")
+    assert story.end(1).success
+    assert story.picture().deployed
+    assert story.after(0.2).trigger_status("LAUNCHED").picture().deployed, "and stays so"
+    assert not story.link.counts[COUNT]
+
+
+@pytest.mark.parametrize("config", [{}, {"without_controller": True}])
+def test_damage_before_an_order_keeps_nothing_from_being_sent(bench, config):
+    story = flying(bench, **config)
+    damaged(story)
+    story.link.deploy(1, False, story.now)
+    story.step()
+    assert story.requests("flyfire.ParachuteService") or story.requests("flyfire.TriggerService")
+    assert story.ends(1) == []
+    assert story.after(0.05).trigger_status("LAUNCHED").end(1).success
+
+
+def test_trigger_that_is_doubted_was_heard(bench):
+    story = flying(bench)
+    for _ in range(5):
+        damaged(story.after(0.7)).trigger_status()
+    trigger = story.link.devices.triggers[34]
+    assert trigger.liveness.state is LinkState.OK
+    damaged(story.after(0.4))
+    assert not trigger.overdue(story.now + 0.5)
