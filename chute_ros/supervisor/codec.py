@@ -32,6 +32,7 @@ _MISFITS = (
 )
 #: What JSON has as well; most values are of these, and are what they stand for.
 _SIMPLE = (float, int, str, bool)
+_SIZED = (str, tuple, frozenset, MappingProxyType)
 
 
 class Codec:
@@ -154,6 +155,8 @@ def _is_default(field: dataclasses.Field[Any], value: object) -> bool:
         default = field.default_factory()
     else:
         return False
-    if value is default:
-        return True
-    return type(value) is type(default) and repr(value) == repr(default)
+    if value is default or type(value) is not type(default):
+        return value is default
+    if isinstance(value, _SIZED) and isinstance(default, _SIZED) and len(value) != len(default):
+        return False  # their texts may be long
+    return repr(value) == repr(default)
