@@ -14,6 +14,8 @@ from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import observe
 from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
 from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.dronecan import time_sync
+from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.sim.upf_aps import Motion
@@ -21,6 +23,7 @@ from chute_ros.sim.upf_bus import UpfBus
 from chute_ros.sim.upf_controller import ControllerSettings, UpfController
 from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
 from chute_ros.sim.upf_node import NodeSettings
+from chute_ros.sim.upf_node import UpfNode as UpfDevice
 from chute_ros.sim.upf_trigger import UpfTrigger
 
 #: FC and OFFBOARD.
@@ -34,6 +37,19 @@ _HEARD = (b"\x21\0\0", b"\x4b\0\0", b"\x4c\0\0")
 def _is_for_devices(data: bytes) -> bool:
     """A MAVLink 2 frame of a kind to which a simulator reacts, or a damaged one."""
     return data[7:10] in _HEARD or data[0] != 0xFD
+
+
+def _is_for(node: UpfDevice) -> Callable[[bytes], bool]:
+    """A service's frame, an anonymous one, or one of a message to which this node reacts."""
+    names = (*node.messages, ALLOCATION, time_sync.MESSAGE)
+    wanted = frozenset(node.definitions.types.message(name).id for name in names)
+
+    def hears(frame: bytes) -> bool:
+        identifier = int.from_bytes(frame[:4], "little")
+        is_service, source = identifier & 0x80, identifier & 0x7F
+        return bool(is_service) or not source or identifier >> 8 & 0xFFFF in wanted
+
+    return hears
 
 
 class ReleasedParachute(ParachuteDevice):
@@ -82,7 +98,8 @@ class Aircraft(Rig):
         self.controller = UpfController(self.shipped.definitions, ControllerSettings(node))
         trigger = UpfTrigger(self.shipped.definitions, on_fire=self._out)
         for name, device in (("controller", self.controller), ("trigger", trigger)):
-            self.add_device(Plug(bus, name, UpfBus([device])), device.reboot)
+            plug = Plug(bus, name, UpfBus([device]), _is_for(device))
+            self.add_device(plug, device.reboot)
         self.add_node(UpfNode(bus, self.process(UPF_NODE), self.ros, self.shipped.types))
 
     # -- the flight ------------------------------------------------------------------------------

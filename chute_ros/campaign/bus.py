@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from chute_ros.campaign.channel import Channel, Nature, Way
@@ -67,6 +68,7 @@ class Plug:
         #: What came while it hung.
         self.waiting: list[bytes] = []
         self.outward, self.inward = bus.add(self, spoil)
+        self._carry = partial(bus.carry, self)
 
     def asleep_until(self) -> float:
         """It does not run until then, virtual s."""
@@ -88,21 +90,22 @@ class Plug:
 
     def flush(self) -> None:
         """Send what it has to say."""
-        for data in self.link.take_output():
-            self.send(data)
+        self.send(self.link.take_output())
 
-    def send(self, data: bytes) -> None:
+    def send(self, frames: Sequence[bytes]) -> None:
         """To all others."""
-        self.outward.send(data, self._bus.carrier(self))
+        if frames:
+            self.outward.send(frames, self._carry)
 
-    def hear(self, data: bytes, now: float) -> None:
-        """Bytes came."""
+    def hear(self, frames: Sequence[bytes], now: float) -> None:
+        """Bytes came; a loop reads all that is there before it looks at anything else."""
         if now >= self.asleep_until():
-            self.link.receive(data, now)
+            for data in frames:
+                self.link.receive(data, now)
             self.flush()
             self._bus.world.stir(self)
         elif self.keeps_waiting():
-            self.waiting.append(data)
+            self.waiting += frames
 
     def keeps_waiting(self) -> bool:
         """A system keeps for it what it does not read."""
@@ -130,12 +133,10 @@ class Bus:
         ways = (plug.way,)
         return Channel(self.world, chance, medium.nature, ways, spoil or medium.spoil)
 
-    def carrier(self, source: Plug) -> Callable[[bytes, float], None]:
-        """What takes bytes that have got to the bus to everybody else."""
-
-        def carry(data: bytes, now: float) -> None:
-            for plug in self._plugs:
-                if plug is not source and plug.hears(data):
-                    plug.inward.send(data, plug.hear)
-
-        return carry
+    def carry(self, source: Plug, frames: Sequence[bytes], now: float) -> None:
+        """What source said has got to the bus: take it to everybody else."""
+        for plug in self._plugs:
+            if plug is not source:
+                heard = [data for data in frames if plug.hears(data)]
+                if heard:
+                    plug.inward.send(heard, plug.hear)

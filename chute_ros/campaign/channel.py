@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Generic, TypeVar
 
 from chute_ros.campaign.world import World
@@ -68,28 +69,50 @@ class Channel(Generic[MessageT]):
         self._ways, self._spoil = ways, spoil
         self._newest = 0.0
 
-    def send(self, message: MessageT, deliver: Callable[[MessageT, float], None]) -> None:
-        """Deliver it, later, twice, damaged or never."""
-        now, chance, nature = self._world.now, self._chance.random, self._nature
-        copies, arrives = 1, now + nature.delay
-        for way in self._ways:
-            for spell in way:
-                if not spell.is_on(now):
-                    continue
-                if spell.loss and chance() < spell.loss:
+    def send(
+        self, messages: Sequence[MessageT], deliver: Callable[[Sequence[MessageT], float], None]
+    ) -> None:
+        """Deliver them, later, twice, damaged or never. What is sent in one go arrives in one go,
+        as long as nothing happens to it on the way."""
+        now = self._world.now
+        spells = [spell for way in self._ways for spell in way if spell.is_on(now)]
+        if not spells:
+            self._post(now + self._nature.delay, messages, deliver)
+            return
+        for message in messages:
+            self._send_one(message, spells, deliver)
+
+    def _send_one(
+        self,
+        message: MessageT,
+        spells: list[Spell],
+        deliver: Callable[[Sequence[MessageT], float], None],
+    ) -> None:
+        chance, nature = self._chance.random, self._nature
+        copies, arrives = 1, self._world.now + nature.delay
+        for spell in spells:
+            if spell.loss and chance() < spell.loss:
+                return
+            if spell.double and chance() < spell.double:
+                copies += 1
+            if spell.corrupt and self._spoil is not None and chance() < spell.corrupt:
+                spoiled = self._spoil(message, self._chance)
+                if spoiled is None:
                     return
-                if spell.double and chance() < spell.double:
-                    copies += 1
-                if spell.corrupt and self._spoil is not None and chance() < spell.corrupt:
-                    spoiled = self._spoil(message, self._chance)
-                    if spoiled is None:
-                        return
-                    message = spoiled
-                if spell.delay:
-                    arrives += chance() * spell.delay
-                if spell.reorder and chance() < spell.reorder:
-                    arrives += chance() * nature.overtaken
-        if nature.in_order:
-            arrives = self._newest = max(arrives, self._newest)
+                message = spoiled
+            if spell.delay:
+                arrives += chance() * spell.delay
+            if spell.reorder and chance() < spell.reorder:
+                arrives += chance() * nature.overtaken
         for _ in range(copies):
-            self._world.post(arrives, lambda at: deliver(message, at))
+            self._post(arrives, (message,), deliver)
+
+    def _post(
+        self,
+        arrives: float,
+        messages: Sequence[MessageT],
+        deliver: Callable[[Sequence[MessageT], float], None],
+    ) -> None:
+        if self._nature.in_order:
+            arrives = self._newest = max(arrives, self._newest)
+        self._world.post(arrives, partial(deliver, messages))

@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
+from itertools import count, zip_longest
 from typing import Any
 
 from chute_ros.campaign.bus import Bus, Plug, Spoil
@@ -142,10 +142,14 @@ class DeviceNode(Plug):
 
     def flush(self) -> None:
         """Send frames, and publish what happened."""
-        for data in self.link.take_output():
-            self.ordered_again += self.knows_release and self.is_release(data)
-            self.send(data)
-        for event in self.link.take_events():
+        frames = self.link.take_output()
+        if self.knows_release:
+            self.ordered_again += sum(map(self.is_release, frames))
+        self.send(frames)
+        events = self.link.take_events()
+        for event, following in zip_longest(events, events[1:]):
+            if isinstance(event, VehicleChanged) and type(following) is type(event):
+                continue  # the next tells all that this one does, as in the node's Inbox
             if isinstance(event, ParachuteChanged):
                 self.knows_release |= event.status.deployed
                 self.publish(i.ParachuteReport(self.name, event.status))

@@ -99,4 +99,4 @@ class Ros:
             chance = random.Random(f"{self._seed} {source.name} {to.name} {kind.__name__}")
             ways = (source.outward, to.inward)
             channel = self._channels[key] = Channel(self.world, chance, _NATURE, ways)
-        channel.send(message, lambda one, now: to.deliver(one, stamp, take, now))
+        channel.send((message,), lambda ones, now: to.deliver(ones[0], stamp, take, now))

@@ -34,17 +34,17 @@ class Shipped:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._configs: dict[tuple[Vehicle, str, bool, int], SupervisorConfig] = {}
+        self._configs: dict[tuple[Vehicle, str], SupervisorConfig] = {}
 
     def config(self, vehicle: Vehicle, profile: str, standby: bool, rank: int) -> SupervisorConfig:
         """The settings of a supervisor."""
-        key = (vehicle, profile, standby, rank)
+        key = (vehicle, profile)
         if key not in self._configs:
             required, kill, deploy, ladder = _VEHICLES[vehicle]
             text = (self._folder / f"{profile}.yaml").read_text(encoding="utf-8")
-            plain = SupervisorConfig(required, kill, deploy, ladder, standby=standby, rank=rank)
+            plain = SupervisorConfig(required, kill, deploy, ladder)
             self._configs[key] = replace(plain, profile=read_profile(text, profile, plain.links))
-        return self._configs[key]
+        return replace(self._configs[key], standby=standby, rank=rank)
 
     def read_all(self) -> None:
         """Now, before processes part that share it."""

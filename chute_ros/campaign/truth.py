@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import bisect
 import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from chute_ros.sim.flight import FlightModel
 from chute_ros.sim.rocket import Rocket
@@ -41,58 +43,108 @@ class Truth:
 
 def observe(model: FlightModel, now: float) -> Truth:
     """Nothing carries the aircraft from now on."""
-    late = _latest(lambda after: touchdown_speed(model, after) <= SOFT)
-    return Truth(now, now + late, model.height)
+    return Truth(now, now + _latest(_fall_of(model), SOFT), model.height)
 
 
 def observe_rocket(rocket: Rocket, now: float) -> Truth:
     """The rocket comes down from now on, and nothing on board will brake it by itself."""
-    late = _latest(lambda after: landing_speed(rocket, after) <= SOFT_UNDER_DROGUE)
-    return Truth(now, now + late, rocket.height)
-
-
-def _latest(is_soft: Callable[[float], bool]) -> float:
-    """The longest time (s) that a release may take; NaN: there is none."""
-    if not is_soft(0.0):
-        return math.nan
-    low, high = 0.0, _LONGEST_FALL
-    while high - low > _GRAIN:
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if is_soft(middle) else (low, middle)
-    return low
+    return Truth(now, now + _latest(_fall_of_rocket(rocket), SOFT_UNDER_DROGUE), rocket.height)
 
 
 def touchdown_speed(model: FlightModel, released_after: float) -> float:
     """m/s, with a release so much later, s, and no wind."""
+    return _fall_of(model).touchdown_speed(released_after)
+
+
+def landing_speed(rocket: Rocket, released_after: float) -> float:
+    """m/s, with a drogue that comes out so much later, s."""
+    return _fall_of_rocket(rocket).touchdown_speed(released_after)
+
+
+def _latest(fall: _Fall, soft: float) -> float:
+    """The longest time (s) that a release may take; NaN: there is none."""
+    if not fall.touchdown_speed(0.0) <= soft:
+        return math.nan
+    low, high = 0.0, _LONGEST_FALL
+    while high - low > _GRAIN:
+        middle = (low + high) / 2.0
+        is_soft = fall.touchdown_speed(middle) <= soft
+        low, high = (middle, high) if is_soft else (low, middle)
+    return low
+
+
+def _fall_of(model: FlightModel) -> _Fall:
     # A plain model: the wind of the flight is not known beforehand.
     one = FlightModel(
         **{name: copy.copy(getattr(model, name)) for name in FlightModel.__dataclass_fields__}
     )
     one.armed = False
-    passed, speed = 0.0, 0.0
-    while not one.on_ground and passed < 5.0 * _LONGEST_FALL:
-        if passed >= released_after:
-            one.release()
-            if one.canopy >= 1.0 and -one.vertical_speed <= SOFT:
-                return -one.vertical_speed  # it will not become faster again
-        speed = -one.vertical_speed
-        one.step(STEP)
-        passed += STEP
-    return speed
+    # Once it is as slow as that it will not become faster again.
+    return _Fall(one, one.release, lambda: one.canopy >= 1.0 and -one.vertical_speed <= SOFT)
 
 
-def landing_speed(rocket: Rocket, released_after: float) -> float:
-    """m/s, with a drogue that comes out so much later, s."""
-    one, passed, speed = copy.copy(rocket), 0.0, 0.0
-    while not one.on_ground and passed < 5.0 * _LONGEST_FALL:
-        if passed >= released_after:
-            one.release_drogue()
-            if (
-                one.drogue_out_for > one.drogue_opening_time
-                and -one.vertical_speed <= one.drogue_speed
-            ):
-                return -one.vertical_speed
-        speed = -one.vertical_speed
-        one.step(STEP)
-        passed += STEP
-    return speed
+def _fall_of_rocket(rocket: Rocket) -> _Fall:
+    one = copy.copy(rocket)
+
+    def is_braked() -> bool:
+        opened = one.drogue_out_for > one.drogue_opening_time
+        return opened and -one.vertical_speed <= one.drogue_speed
+
+    return _Fall(one, one.release_drogue, is_braked)
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """passed: since the beginning, s; speed: downwards, m/s, a step before; body: its fields."""
+
+    passed: float
+    speed: float
+    body: dict[str, Any]
+    is_last: bool
+
+
+class _Fall:
+    """A body that nothing brakes, and what would become of it if something did from some moment
+    on. The fall until then is the same whenever that is: it is lived through once."""
+
+    def __init__(
+        self,
+        body: FlightModel | Rocket,
+        release: Callable[[], None],
+        is_braked: Callable[[], bool],
+    ) -> None:
+        self._body, self._release, self._is_braked = body, release, is_braked
+        self._moments = [self._moment(0.0, 0.0)]
+
+    def touchdown_speed(self, released_after: float) -> float:
+        """m/s, with a release so much later, s."""
+        while self._moments[-1].passed < released_after and not self._moments[-1].is_last:
+            self._fall_on()
+        at = bisect.bisect_left(self._moments, released_after, key=lambda one: one.passed)
+        moment = self._moments[min(at, len(self._moments) - 1)]
+        self._be_at(moment)
+        passed, speed = moment.passed, moment.speed
+        while not self._is_over(passed):
+            self._release()
+            if self._is_braked():
+                return -self._body.vertical_speed
+            passed, speed = self._step(passed)
+        return speed
+
+    def _fall_on(self) -> None:
+        self._be_at(self._moments[-1])
+        self._moments.append(self._moment(*self._step(self._moments[-1].passed)))
+
+    def _step(self, passed: float) -> tuple[float, float]:
+        speed = -self._body.vertical_speed
+        self._body.step(STEP)
+        return passed + STEP, speed
+
+    def _moment(self, passed: float, speed: float) -> _Moment:
+        return _Moment(passed, speed, vars(self._body).copy(), self._is_over(passed))
+
+    def _be_at(self, moment: _Moment) -> None:
+        vars(self._body).update(moment.body)
+
+    def _is_over(self, passed: float) -> bool:
+        return self._body.on_ground or passed >= 5.0 * _LONGEST_FALL

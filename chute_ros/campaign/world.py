@@ -30,7 +30,8 @@ class World:
         self.now = 0.0
         self._due: list[tuple[float, int, Callable[[float], None]]] = []
         self._order = itertools.count()
-        #: Part -> the earliest moment at which it will be looked at.
+        #: Part -> its deadline, and the earliest moment at which it will be looked at.
+        self._deadlines: dict[Part, float] = {}
         self._alarms: dict[Part, float] = {}
 
     @property
@@ -49,17 +50,18 @@ class World:
 
     def stir(self, part: Part) -> None:
         """Something has happened to it: its next deadline may be another one."""
+        self._deadlines[part] = deadline = part.next_deadline()
         # What is due already has its turn a moment later, as every loop takes its time.
-        deadline = max(part.next_deadline(), self.now + _TURN)
-        if deadline < self._alarms[part]:
-            self._alarms[part] = deadline
-            self.post(deadline, functools.partial(self._ring, part))
+        alarm = max(deadline, self.now + _TURN)
+        if alarm < self._alarms[part]:
+            self._alarms[part] = alarm
+            self.post(alarm, functools.partial(self._ring, part))
 
     def _ring(self, part: Part, now: float) -> None:
         if now < self._alarms[part]:
             return  # it has been looked at meanwhile
         self._alarms[part] = math.inf
-        if part.next_deadline() <= now:
+        if self._deadlines[part] <= now:
             part.update(now)
         self.stir(part)
 

@@ -28,11 +28,19 @@ def rust_text(value: float, bits: int) -> str:
     value = abs(value)
     if math.isinf(value):
         return f"{sign}inf"
-    digits = _shortest_f32(value) if bits == 32 else Decimal(repr(value))
+    return sign + (_text_of_f32(value) if bits == 32 else _without_exponent(Decimal(repr(value))))
+
+
+# Most fields do not change from line to line.
+@lru_cache(maxsize=4096)
+def _text_of_f32(value: float) -> str:
+    """value: >= 0."""
+    return _without_exponent(_shortest_f32(value))
+
+
+def _without_exponent(digits: Decimal) -> str:
     text = format(digits, "f")
-    if "." in text:
-        text = text.rstrip("0").rstrip(".")
-    return sign + text
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def telem_body(layout: Layout, values: Mapping[str, float]) -> str:
@@ -135,8 +143,6 @@ def _f32(bits: int) -> Fraction:
     return Fraction(struct.unpack("<f", struct.pack("<I", bits))[0])
 
 
-# Most fields do not change from line to line.
-@lru_cache(maxsize=4096)
 def _shortest_f32(value: float) -> Decimal:
     """The shortest decimal that reads back as value, and of those the nearest. value: >= 0."""
     if value == 0.0:

@@ -30,6 +30,9 @@ _MISFITS = (
     RecursionError,
     OverflowError,
 )
+#: What JSON has as well; most values are of these, and are what they stand for.
+_SIMPLE = (float, int, str, bool)
+_SIZED = (str, tuple, frozenset, MappingProxyType)
 
 
 class Codec:
@@ -54,11 +57,13 @@ class Codec:
 
     def plain(self, value: object, whole: bool) -> Any:
         """value in terms of JSON."""
+        if type(value) in _SIMPLE:
+            return value
         if isinstance(value, enum.Enum):
             return value.value
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             told: dict[str, Any] = {CLASS: type(value).__name__}
-            for field in dataclasses.fields(value):
+            for field in _fields(type(value)):
                 one = getattr(value, field.name)
                 if whole or not _is_default(field, one):
                     told[field.name] = self.plain(one, whole)
@@ -73,6 +78,8 @@ class Codec:
 
     def value(self, plain: Any, kind: Any) -> Any:
         """The value of this type that plain stands for."""
+        if type(plain) is kind and kind in _SIMPLE:
+            return plain
         if isinstance(plain, dict):
             made = self._object(plain)
             # A field of another class would be found out only where it is used.
@@ -80,8 +87,7 @@ class Codec:
                 return made
         if isinstance(kind, type) and dataclasses.is_dataclass(kind):
             raise RecordError(f"{plain!r} is no {kind.__name__}")
-        origin = typing.get_origin(kind)
-        arguments = typing.get_args(kind)
+        origin, arguments = _parts(kind)
         if origin in (types.UnionType, typing.Union):
             if plain is None and type(None) in arguments:
                 return None
@@ -130,6 +136,17 @@ def _hints(kind: type) -> dict[str, Any]:
     return typing.get_type_hints(kind)
 
 
+@functools.cache
+def _fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
+    return dataclasses.fields(kind)
+
+
+@functools.cache
+def _parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Of a type with others in it: tuple[int, str] is tuple, and those two."""
+    return typing.get_origin(kind), typing.get_args(kind)
+
+
 def _is_default(field: dataclasses.Field[Any], value: object) -> bool:
     """Exactly, and all that it holds: 0 and 0.0 and -0.0 and False are equal, and differ."""
     if field.default is not dataclasses.MISSING:
@@ -138,4 +155,8 @@ def _is_default(field: dataclasses.Field[Any], value: object) -> bool:
         default = field.default_factory()
     else:
         return False
-    return type(value) is type(default) and repr(value) == repr(default)
+    if value is default or type(value) is not type(default):
+        return value is default
+    if isinstance(value, _SIZED) and isinstance(default, _SIZED) and len(value) != len(default):
+        return False  # their texts may be long
+    return repr(value) == repr(default)

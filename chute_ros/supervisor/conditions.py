@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.supervisor import flight
@@ -35,13 +36,7 @@ class Finding(NamedTuple):
 
 def find(config: SupervisorConfig, state: State, condition: Condition, now: float) -> Finding:
     """Look at what is known now."""
-    if isinstance(condition, MeasurementCondition):
-        return _measurement(config, state, condition, now)
-    if isinstance(condition, LinkCondition):
-        return _link(config, state, condition, now)
-    if isinstance(condition, AutopilotCondition):
-        return _autopilot(config, state, condition, now)
-    return _device(config, state, condition, now)
+    return _FINDERS[type(condition)](config, state, condition, now)
 
 
 def _measurement(
@@ -126,3 +121,11 @@ def _device(
         and state.links[name].is_heard(config.limits(name), now)
     ]
     return Finding(bool(wrong), "; ".join(wrong) or "no device is ABNORMAL")
+
+
+_FINDERS: dict[type[Condition], Callable[[SupervisorConfig, State, Any, float], Finding]] = {
+    MeasurementCondition: _measurement,
+    LinkCondition: _link,
+    AutopilotCondition: _autopilot,
+    DeviceCondition: _device,
+}

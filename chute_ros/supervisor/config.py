@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 
 from chute_ros.errors import ParameterError
@@ -134,7 +135,7 @@ class SupervisorConfig:
                     f"({', '.join(self.deploy_links)})"
                 )
 
-    @property
+    @cached_property
     def links(self) -> tuple[str, ...]:
         """Every link that is followed, each once, the required ones first."""
         return tuple(dict.fromkeys(self.required_links + self.kill_links + self.deploy_links))

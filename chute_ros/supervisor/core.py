@@ -26,6 +26,8 @@ from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
 #: What people ask for, besides a kill, which devices want as well.
 _PERSONS = (i.ArmRequest, i.DeployRequest, i.ResetRequest, i.ModeRequest)
+#: What the health of the links can do; in flight nothing.
+_OF_LINKS = (Stimulus.LINKS_UNHEALTHY, Stimulus.LINKS_HEALTHY)
 #: A limit that an age may just reach has passed this much later, s.
 _JUST_AFTER = 1e-6
 
@@ -47,11 +49,9 @@ def update(
 
 def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     """When update has something to decide without any input, later than now; infinity: never."""
-    deadlines = [
-        deadline
-        for link, evidence in state.links.items()
-        for deadline in evidence.deadlines(config.limits(link))
-    ]
+    deadlines: list[float] = []
+    for link, evidence in state.links.items():
+        deadlines += evidence.deadlines(config.limits(link))
     if state.stage in (Stage.STARTUP, Stage.READY, Stage.ARMED, Stage.LANDED):
         since = state.vehicle_received - state.vehicle.armed_age
         # Just after the limit, which still counts as young enough.
@@ -76,7 +76,7 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     if state.airborne:
         deadlines.append(flight.landed_at(config, state))
     deadlines += [one + _JUST_AFTER for one in rule_deadlines(config, state, now)]
-    return min((deadline for deadline in deadlines if deadline > now), default=math.inf)
+    return min([deadline for deadline in deadlines if deadline > now], default=math.inf)
 
 
 class _Update(Deploying):
@@ -88,10 +88,12 @@ class _Update(Deploying):
         if math.isnan(state.updated_at):
             return
         passed = self.now - state.updated_at
-        late = self.now - next_deadline(self.config, state, state.updated_at)
-        if late > self.config.late_after:
-            self._was_late(late)
-            passed -= late
+        # A deadline lies after the last update: none can be missed by more than what has passed.
+        if passed > self.config.late_after:
+            late = self.now - next_deadline(self.config, state, state.updated_at)
+            if late > self.config.late_after:
+                self._was_late(late)
+                passed -= late
         self.count_rules(passed)
 
     def _was_late(self, late: float) -> None:
@@ -231,13 +233,16 @@ class _Update(Deploying):
         )
 
     def _look_at_links(self) -> None:
+        stage = self.state.stage
+        if not any(listed(stage, stimulus) for stimulus in _OF_LINKS):
+            return
         reasons = block_reasons(self.config, self.state, self.now)
         grace = max(self.config.limits(link).startup_grace for link in self.config.links)
         starting = self.now < self.state.started_at + grace
-        if self.state.stage is Stage.STARTUP and reasons and starting:
+        if stage is Stage.STARTUP and reasons and starting:
             return
         stimulus = Stimulus.LINKS_UNHEALTHY if reasons else Stimulus.LINKS_HEALTHY
-        if listed(self.state.stage, stimulus):
+        if listed(stage, stimulus):
             self.move(stimulus, "; ".join(reasons))
 
     def _block_or_release(self) -> None:

@@ -45,6 +45,8 @@ class RuleEvidence:
 
     def counted(self, rule: Rule, passed: float) -> RuleEvidence:
         """passed s later, while nothing new was seen."""
+        if self.holds is False and self.level == 0.0 == self.unknown:
+            return self  # most rules stand so at most updates
         unknown = self.unknown + passed if self.holds is None else 0.0
         level = self.level
         if self.holds:
@@ -55,7 +57,6 @@ class RuleEvidence:
             # What cannot be said is no good sample: it leaks only once it has been so for long.
             level -= rule.leak * min(passed, max(0.0, unknown - UNKNOWN_STANDS))
         level = min(max(level, 0.0), rule.hold)
-        # Most rules stand still at most updates.
         if level == self.level and unknown == self.unknown:
             return self
         return replace(self, level=level, unknown=unknown)
@@ -76,16 +77,18 @@ class RuleEvidence:
                 change = 1.0 if holds else 0.0 if holds is None else -rule.leak
                 count = min(max(0.0, count + change), float(rule.samples))
             shown.append(count)
-            weight += condition.weight if holds else 0.0
-            possible += condition.weight if holds is not False else 0.0
-            sure += condition.weight if holds and (seen < 0 or count >= rule.samples) else 0.0
+            if holds:
+                weight += condition.weight
+                sure += condition.weight if seen < 0 or count >= rule.samples else 0.0
+            if holds is not False:
+                possible += condition.weight
         enough = rule.needed - _WEIGHTS_ROUNDING
         rule_holds = True if weight >= enough else None if possible >= enough else False
-        found_now = (rule_holds, tuple(shown), tuple(now_seen), sure >= enough)
-        if found_now == (self.holds, self.shown, self.seen, self.sure):
+        is_sure, shown_now, seen_now = sure >= enough, tuple(shown), tuple(now_seen)
+        same = rule_holds is self.holds and is_sure is self.sure
+        if same and seen_now == self.seen and shown_now == self.shown:
             return self
-        holds, shown_now, seen_now, is_sure = found_now
-        return replace(self, holds=holds, shown=shown_now, seen=seen_now, sure=is_sure)
+        return replace(self, holds=rule_holds, shown=shown_now, seen=seen_now, sure=is_sure)
 
     def fulfilled(self, rule: Rule) -> bool:
         """It holds now, has for long enough, and enough samples showed it."""

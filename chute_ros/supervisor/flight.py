@@ -35,11 +35,14 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name == CLIMB_RATE:
         rate = climb_rate(config, state, now)
         return rate, "too few heights that can be used" if math.isnan(rate) else ""
-    why = state.measured(name).unusable(config.profile.limits[name], now)
-    if why and name == "vertical_speed":
+    known = state.measured(name)
+    why = known.unusable(config.profile.limits[name], now)
+    if not why:
+        return known.value, ""
+    if name == "vertical_speed":
         rate = climb_rate(config, state, now)
         return rate, why if math.isnan(rate) else ""
-    return (math.nan if why else state.measured(name).value), why
+    return math.nan, why
 
 
 def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:

@@ -6,11 +6,11 @@ decided and what became of it.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import MappingProxyType
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
+from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending, State
 
 _CODEC = Codec(State)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
+from chute_ros.supervisor.quick_replace import replace
 
 #: One whose decisions a device refused as older does not lead for so long, s.
 _STAND_BACK = 5.0

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 from chute_ros.model import Action
 from chute_ros.supervisor import flight
@@ -21,8 +21,7 @@ from chute_ros.supervisor.state import State
 _NOTHING, _LATCHED = RuleEvidence(), RuleEvidence(latched=True)
 
 
-@dataclass(frozen=True)
-class Judged:
+class Judged(NamedTuple):
     """One rule as it stands now."""
 
     rule: Rule
@@ -39,7 +38,7 @@ class Judged:
 
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
-    findings = tuple(find(config, state, condition, now) for condition in rule.conditions)
+    findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
     found = [(finding.holds, finding.samples) for finding in findings]
     evidence = state.rule(rule.name).seeing(rule, found)
     return Judged(rule, evidence, findings)

@@ -93,7 +93,9 @@ def sent(messages: int, every: float, in_order: bool = True, **spell: float) -> 
     for number in range(messages):
         world.post(
             number * every,
-            lambda _, number=number: channel.send(number, lambda m, at: arrived.append((m, at))),
+            lambda _, number=number: channel.send(
+                (number,), lambda ones, at: arrived.append((ones[0], at))
+            ),
         )
     world.run(1e6, lambda: world.is_empty)
     return arrived

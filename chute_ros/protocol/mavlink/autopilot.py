@@ -22,6 +22,8 @@ STANDARD_GRAVITY = 9.80665  # m/s^2
 STREAM_SILENCE = 2.5
 STREAM_ASK_INTERVAL = 5.0
 
+_NEVER = Reading()
+
 #: The messages to ask for, and read here.
 STREAMED_MESSAGES: tuple[int, ...] = (
     dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
@@ -107,7 +109,7 @@ class AutopilotTracker:
 
     def on_ground(self, now: float) -> bool:
         """The autopilot says so now: what it said before its stream fell silent proves nothing."""
-        age = self._readings.get("landed_state", Reading()).age(now)
+        age = self._readings.get("landed_state", _NEVER).age(now)
         return self.landed_state is LandedState.ON_GROUND and age < STREAM_SILENCE
 
     @property
@@ -126,7 +128,7 @@ class AutopilotTracker:
     def wants_stream(self, now: float) -> bool:
         """A part of the picture is missing or old, and asking for it is not just done."""
         parts = ("landed_state", "height", "tilt", "acceleration", "battery_voltage")
-        readings = [self._readings.get(part, Reading()) for part in parts]
+        readings = [self._readings.get(part, _NEVER) for part in parts]
         if all(reading.age(now) < STREAM_SILENCE for reading in readings):
             return False
         if now - self._asked_at < STREAM_ASK_INTERVAL:
@@ -150,10 +152,10 @@ class AutopilotTracker:
         """The picture at now, each part with its age."""
 
         def value(name: str) -> float:
-            return self._readings.get(name, Reading()).value
+            return self._readings.get(name, _NEVER).value
 
         def age(name: str) -> float:
-            return self._readings.get(name, Reading()).age(now)
+            return self._readings.get(name, _NEVER).age(now)
 
         return VehicleState(
             source=self.device,
