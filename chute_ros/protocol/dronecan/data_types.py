@@ -23,7 +23,6 @@ from dronecan.transport import (
 )
 
 from chute_ros.errors import MessageError, ParameterError
-from chute_ros.protocol.dronecan.flat_layout import flat_layout, number_range
 
 Values = Mapping[str, Any]
 _MISFITS = (AttributeError, IndexError, KeyError, TypeError, ValueError, OverflowError)
@@ -42,14 +41,10 @@ class DataType:
         self._type, self._mode = dsdl_type, mode
         if mode == "request":
             fields, constants = dsdl_type.request_fields, dsdl_type.request_constants
-            is_union = dsdl_type.request_union
         elif mode == "response":
             fields, constants = dsdl_type.response_fields, dsdl_type.response_constants
-            is_union = dsdl_type.response_union
         else:
             fields, constants = dsdl_type.fields, dsdl_type.constants
-            is_union = dsdl_type.union
-        self._flat = flat_layout(fields, is_union)
         #: Names of the fields in the order of the wire.
         self.fields: tuple[str, ...] = tuple(
             field.name for field in fields if field.type.category != field.type.CATEGORY_VOID
@@ -59,10 +54,6 @@ class DataType:
     def encode(self, values: Values) -> bytes:
         """The payload; fields that are not given are 0. MessageError for a value or name that
         does not fit: the library would cut it to size without a word."""
-        if self._flat is not None:
-            payload = self._flat.encode(values)
-            if payload is not None:
-                return payload
         value = CompoundValue(self._type, _mode=self._mode)
         try:
             _fill(value, values)
@@ -72,8 +63,6 @@ class DataType:
 
     def decode(self, payload: bytes) -> dict[str, Any] | None:
         """The values in payload; None if it is too short or makes no sense. Never raises."""
-        if self._flat is not None:
-            return self._flat.decode(payload)
         value = CompoundValue(self._type, _mode=self._mode)
         try:
             value._unpack(bits_from_bytes(payload))
@@ -178,9 +167,20 @@ def _is_bytes(kind: Any) -> bool:
 
 
 def _check_range(name: str, kind: Any, value: Any) -> None:
-    low, high = number_range(kind)
+    low, high = _range(kind)
     if not low <= value <= high and not (kind.kind == kind.KIND_FLOAT and _fits(kind, value)):
         raise ValueError(f"{name} is {value}, need {low} to {high}")
+
+
+def _range(kind: Any) -> tuple[float, float]:
+    """The library's own is off by one for signed integers of more than 53 bits."""
+    if kind.kind == kind.KIND_FLOAT:
+        low, high = kind.value_range
+        return low, high
+    if kind.kind == kind.KIND_SIGNED_INT:
+        half = 1 << (kind.bitlen - 1)
+        return -half, half - 1
+    return 0, (1 << kind.bitlen) - 1
 
 
 def _fits(kind: Any, value: float) -> bool:
