@@ -27,11 +27,17 @@ _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 
 
 class Finding(NamedTuple):
-    """holds None: it cannot be said. samples: so many distinct ones came so far; -1: none do."""
+    """holds None: it cannot be said. tell: says what was found, asked only where somebody reads
+    it. samples: so many distinct ones came so far; -1: none do."""
 
     holds: bool | None
-    text: str
+    tell: Callable[[], str]
     samples: int = -1
+
+    @property
+    def text(self) -> str:
+        """What was found, with its limit."""
+        return self.tell()
 
 
 def find(config: SupervisorConfig, state: State, condition: Condition, now: float) -> Finding:
@@ -46,31 +52,41 @@ def _measurement(
     samples = known.count
     value, why = flight.reading(config, state, name, now)
     if why:
-        text = f"{name} cannot be used: {why} (asked for: {condition.limits})"
-        if condition.if_unknown:
-            return Finding(True, f"{text}, taken to be so")
-        return Finding(None, text, samples)
+
+        def tell() -> str:
+            taken = ", taken to be so" if condition.if_unknown else ""
+            return f"{name} cannot be used: {why} (asked for: {condition.limits}){taken}"
+
+        return Finding(True, tell) if condition.if_unknown else Finding(None, tell, samples)
     if value != known.value:
         samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
     holds = not (value <= condition.above or value >= condition.below)
-    return Finding(holds, f"{name} {value:.2f} ({condition.limits})", samples)
+    return Finding(holds, lambda: f"{name} {value:.2f} ({condition.limits})", samples)
 
 
 def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:
     names = config.required_links if condition.link in (ANY, ALL) else (condition.link,)
-    wanted = " or ".join(judgement.name for judgement in condition.judged)
-    told, so = [], []
+    looks, so = [], []
     for name in names:
         evidence, limits = state.evidence(name), config.limits(name)
         judged = evidence.judged(limits, now)
         in_grace = now < state.started_at + limits.startup_grace
         starting = judged is LinkJudgement.NEVER_SEEN and in_grace
-        heard = f"{judged.name}, heard {now - evidence.heard:.2f} s ago"
-        told.append(f"{name} is {'still starting' if starting else heard}")
+        looks.append((name, judged, starting, evidence.heard))
         so.append(judged in condition.judged and not starting)
-    holds = all(so) if condition.link == ALL else any(so)
-    return Finding(holds, f"link {', '.join(told)} (asked for: {wanted})")
+
+    def tell() -> str:
+        told = [
+            f"{name} is still starting"
+            if starting
+            else f"{name} is {judged.name}, heard {now - heard:.2f} s ago"
+            for name, judged, starting, heard in looks
+        ]
+        wanted = " or ".join(judgement.name for judgement in condition.judged)
+        return f"link {', '.join(told)} (asked for: {wanted})"
+
+    return Finding(all(so) if condition.link == ALL else any(so), tell)
 
 
 def _autopilot(
@@ -78,21 +94,27 @@ def _autopilot(
 ) -> Finding:
     vehicle, fact = state.vehicle, condition.fact
     if fact is AutopilotFact.REBOOTED:
-        return Finding(state.rebooted, f"autopilot restarts in flight {int(state.rebooted)}")
+        rebooted = state.rebooted
+        return Finding(rebooted, lambda: f"autopilot restarts in flight {int(rebooted)}")
     if fact is AutopilotFact.LOST:
         silence, limit = now - state.vehicle_received, config.vehicle_state_age
         if math.isnan(silence):
-            return Finding(None, "autopilot never heard")
+            return Finding(None, lambda: "autopilot never heard")
         lost = silence > limit or vehicle.link_state is LinkState.LOST
-        text = f"autopilot link {vehicle.link_state.name}, vehicle/state {silence:.2f} s old"
-        return Finding(lost, f"{text} (lost after {limit:g} s)")
+        return Finding(
+            lost,
+            lambda: (
+                f"autopilot link {vehicle.link_state.name}, vehicle/state {silence:.2f} s old "
+                f"(lost after {limit:g} s)"
+            ),
+        )
     if fact is AutopilotFact.DISARMED:
         said = flight.armed(config, state, now)
-        return Finding(said is Armed.DISARMED, f"autopilot says {said.name}")
+        return Finding(said is Armed.DISARMED, lambda: f"autopilot says {said.name}")
     status = vehicle.system_status
     if now - state.vehicle_received > config.vehicle_state_age:
-        return Finding(None, "autopilot's own state is old")
-    return Finding(status in _EMERGENCY, f"autopilot's own state is {status} (6 or 8)")
+        return Finding(None, lambda: "autopilot's own state is old")
+    return Finding(status in _EMERGENCY, lambda: f"autopilot's own state is {status} (6 or 8)")
 
 
 def _device(
@@ -106,13 +128,15 @@ def _device(
             for who, ask in state.asks.items()
             if now < ask.at + ASK_LASTS and (condition.link == ANY or ask.link in names)
         ]
-        return Finding(bool(asks), "; ".join(asks) or "no device asks for a kill")
+        return Finding(bool(asks), lambda: "; ".join(asks) or "no device asks for a kill")
     if condition.fact is DeviceFact.DEPLOYED:
         out = sorted(one for one in state.newly_released(config, now) if one[0] in names)
-        who = ", ".join(" ".join(one) for one in out)
-        return Finding(
-            bool(out), f"{who}: its own status says deployed" if out else "no parachute is out"
-        )
+
+        def tell() -> str:
+            who = ", ".join(" ".join(one) for one in out)
+            return f"{who}: its own status says deployed" if out else "no parachute is out"
+
+        return Finding(bool(out), tell)
     wrong = [
         f"{name} {device} is ABNORMAL ({'; '.join(status.faults) or 'no reason given'})"
         for name in names
@@ -120,7 +144,7 @@ def _device(
         if status.state is ParachuteState.ABNORMAL
         and state.links[name].is_heard(config.limits(name), now)
     ]
-    return Finding(bool(wrong), "; ".join(wrong) or "no device is ABNORMAL")
+    return Finding(bool(wrong), lambda: "; ".join(wrong) or "no device is ABNORMAL")
 
 
 _FINDERS: dict[type[Condition], Callable[[SupervisorConfig, State, Any, float], Finding]] = {

@@ -4,10 +4,10 @@ import math
 
 import pytest
 from story import LINK, SINKS, START, Story, parachute, rule, vehicle, with_rules
+from told import Told, told
 
 from chute_ros.model import Armed, LinkState, ParachuteState, ParachuteStatus
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.conditions import Finding, find
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.rules import (
@@ -26,8 +26,8 @@ from chute_ros.supervisor.rules import (
 TWO = SupervisorConfig((LINK, "upf_can"), deploy_links=(LINK, "upf_can"))
 
 
-def look(story: Story, condition: Condition) -> Finding:
-    return find(story.config, story.state, condition, START + story.t)
+def look(story: Story, condition: Condition) -> Told:
+    return told(story.config, story.state, condition, START + story.t)
 
 
 # -- measurements --------------------------------------------------------------------------------
@@ -51,7 +51,7 @@ def test_a_measurement_holds_beyond_its_limit_not_at_it(
     story = Story()
     story.at(0.0, vehicle(vertical_speed=value))
     found = look(story, MeasurementCondition("vertical_speed", above, below))
-    assert found == Finding(holds, words, samples=1)
+    assert found == Told(holds, words, samples=1)
 
 
 def test_what_cannot_be_used_says_nothing_about_the_vehicle() -> None:
@@ -106,14 +106,14 @@ def test_a_link_that_is_still_starting_is_not_held_against_it() -> None:
 # -- the autopilot -------------------------------------------------------------------------------
 
 
-def autopilot(story: Story, fact: AutopilotFact) -> Finding:
+def autopilot(story: Story, fact: AutopilotFact) -> Told:
     return look(story, AutopilotCondition(fact))
 
 
 def test_an_autopilot_that_was_never_heard_is_not_lost() -> None:
     story = Story()
     story.at(60.0)
-    assert autopilot(story, AutopilotFact.LOST) == Finding(None, "autopilot never heard")
+    assert autopilot(story, AutopilotFact.LOST) == Told(None, "autopilot never heard")
 
 
 def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None:
@@ -122,7 +122,7 @@ def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None
     story.at(2.5)
     assert autopilot(story, AutopilotFact.LOST).holds is False
     story.at(2.51)
-    assert autopilot(story, AutopilotFact.LOST) == Finding(
+    assert autopilot(story, AutopilotFact.LOST) == Told(
         True, "autopilot link OK, vehicle/state 2.51 s old (lost after 2.5 s)"
     )
     story.at(3.0, vehicle(link_state=LinkState.LOST))
@@ -132,9 +132,9 @@ def test_an_autopilot_is_lost_when_its_state_stops_or_its_link_says_so() -> None
 def test_an_autopilot_that_says_disarmed_must_say_so_freshly() -> None:
     story = Story()
     story.at(0.0, vehicle(armed=Armed.DISARMED))
-    assert autopilot(story, AutopilotFact.DISARMED) == Finding(True, "autopilot says DISARMED")
+    assert autopilot(story, AutopilotFact.DISARMED) == Told(True, "autopilot says DISARMED")
     story.at(2.6)
-    assert autopilot(story, AutopilotFact.DISARMED) == Finding(False, "autopilot says UNKNOWN")
+    assert autopilot(story, AutopilotFact.DISARMED) == Told(False, "autopilot says UNKNOWN")
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_an_autopilot_that_terminates_says_so(status: int, holds: bool) -> None:
     story = Story()
     story.at(0.0, vehicle(system_status=status))
     found = autopilot(story, AutopilotFact.EMERGENCY)
-    assert found == Finding(holds, f"autopilot's own state is {status} (6 or 8)")
+    assert found == Told(holds, f"autopilot's own state is {status} (6 or 8)")
     story.at(2.6)
     assert autopilot(story, AutopilotFact.EMERGENCY).holds is None, "what is old is absent"
 
@@ -157,14 +157,14 @@ def test_an_autopilot_that_restarts_counts_in_flight_only() -> None:
     assert autopilot(story, AutopilotFact.REBOOTED).holds is False, "it was counted before"
     story.fly(1.1, reboot_count=2, rebooted_in_flight=True)
     found = autopilot(story, AutopilotFact.REBOOTED)
-    assert found == Finding(True, "autopilot restarts in flight 1")
+    assert found == Told(True, "autopilot restarts in flight 1")
     assert story.said().count("the autopilot started anew in flight") == 1
 
 
 # -- devices -------------------------------------------------------------------------------------
 
 
-def device(story: Story, fact: DeviceFact, link: str = ANY) -> Finding:
+def device(story: Story, fact: DeviceFact, link: str = ANY) -> Told:
     return look(story, DeviceCondition(fact, link))
 
 
@@ -172,11 +172,11 @@ def test_a_device_that_asks_for_a_kill_wants_it_for_a_second() -> None:
     story = Story(TWO)
     story.at(0.0, i.KillRequest(0, "upf_can 33", "about to launch"))
     found = device(story, DeviceFact.ASKS_FOR_KILL)
-    assert found == Finding(True, "upf_can 33: about to launch")
+    assert found == Told(True, "upf_can 33: about to launch")
     assert device(story, DeviceFact.ASKS_FOR_KILL, "upf_can").holds
     assert not device(story, DeviceFact.ASKS_FOR_KILL, LINK).holds
     story.at(1.1)
-    assert device(story, DeviceFact.ASKS_FOR_KILL) == Finding(False, "no device asks for a kill")
+    assert device(story, DeviceFact.ASKS_FOR_KILL) == Told(False, "no device asks for a kill")
 
 
 def test_one_that_is_not_ours_may_ask_for_a_kill_all_the_same() -> None:
@@ -187,10 +187,10 @@ def test_one_that_is_not_ours_may_ask_for_a_kill_all_the_same() -> None:
 
 def test_a_parachute_that_is_out_is_named_with_its_link() -> None:
     story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can"))).flying()
-    assert device(story, DeviceFact.DEPLOYED) == Finding(False, "no parachute is out")
+    assert device(story, DeviceFact.DEPLOYED) == Told(False, "no parachute is out")
     story.at(0.1, story.heartbeat("upf_can"), parachute("upf_can", "33", deployed=True))
     found = device(story, DeviceFact.DEPLOYED)
-    assert found == Finding(True, "upf_can 33: its own status says deployed")
+    assert found == Told(True, "upf_can 33: its own status says deployed")
     assert not device(story, DeviceFact.DEPLOYED, LINK).holds
 
 
@@ -199,12 +199,12 @@ def test_a_device_that_is_abnormal_says_why() -> None:
     broken = ParachuteStatus("33", LinkState.OK, ParachuteState.ABNORMAL, faults=("POD", "IMU"))
     silent = ParachuteStatus("34", LinkState.OK, ParachuteState.ABNORMAL)
     story.at(0.0, story.heartbeat("upf_can"), i.ParachuteReport("upf_can", broken))
-    assert device(story, DeviceFact.ABNORMAL) == Finding(True, "upf_can 33 is ABNORMAL (POD; IMU)")
+    assert device(story, DeviceFact.ABNORMAL) == Told(True, "upf_can 33 is ABNORMAL (POD; IMU)")
     story.at(0.1, i.ParachuteReport("upf_can", silent))
     assert "upf_can 34 is ABNORMAL (no reason given)" in device(story, DeviceFact.ABNORMAL).text
     assert not device(story, DeviceFact.ABNORMAL, LINK).holds
     story.at(1.1)
-    assert device(story, DeviceFact.ABNORMAL) == Finding(False, "no device is ABNORMAL")
+    assert device(story, DeviceFact.ABNORMAL) == Told(False, "no device is ABNORMAL")
 
 
 # -- which of them are only silence --------------------------------------------------------------

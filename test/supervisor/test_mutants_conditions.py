@@ -4,9 +4,9 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
+from told import Told, told
 
 from chute_ros.model import LinkState, ParachuteState, ParachuteStatus, VehicleState
-from chute_ros.supervisor.conditions import Finding, find
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
 from chute_ros.supervisor.measurements import Measured
@@ -45,26 +45,26 @@ def heard(ago: float, *devices: ParachuteStatus) -> LinkEvidence:
 def test_samples_that_cannot_be_used_were_seen_all_the_same() -> None:
     old = Measured(value=70.0, measured_at=NOW - 9.0, same_since=NOW - 9.0, count=4)
     known = state(measurements=MappingProxyType({"tilt_deg": old}))
-    found = find(CONFIG, known, MeasurementCondition("tilt_deg", above=60.0), NOW)
+    found = told(CONFIG, known, MeasurementCondition("tilt_deg", above=60.0), NOW)
     assert (found.holds, found.samples) == (None, 4)
 
 
 def test_every_link_is_told_with_what_was_asked_for() -> None:
     known = state(links=links(a=heard(0.2), b=heard(5.0)))
     text = "link a is OK, heard 0.20 s ago, b is LOST, heard 5.00 s ago (asked for: STALE or LOST)"
-    assert find(CONFIG, known, LinkCondition(ANY, SILENT), NOW) == Finding(True, text)
-    assert find(CONFIG, known, LinkCondition(ALL, SILENT), NOW) == Finding(False, text)
+    assert told(CONFIG, known, LinkCondition(ANY, SILENT), NOW) == Told(True, text)
+    assert told(CONFIG, known, LinkCondition(ALL, SILENT), NOW) == Told(False, text)
 
 
 def test_each_link_is_judged_by_its_own_limits() -> None:
     config = SupervisorConfig(required_links=LINKS, link_limits=MappingProxyType({"b": PATIENT}))
     known = state(links=links(a=heard(0.2), b=heard(5.0)))
-    assert find(config, known, LinkCondition(ANY, SILENT), NOW).holds is False
+    assert told(config, known, LinkCondition(ANY, SILENT), NOW).holds is False
 
 
 def test_one_that_is_still_starting_does_not_hide_the_next() -> None:
     known = State(epoch=7, started_at=NOW - 1.0, links=links(b=heard(5.0)))
-    found = find(CONFIG, known, LinkCondition(ANY, SILENT), NOW)
+    found = told(CONFIG, known, LinkCondition(ANY, SILENT), NOW)
     assert found.holds is True
     assert found.text.startswith("link a is still starting, b is LOST")
 
@@ -74,7 +74,7 @@ def test_what_the_autopilot_says_of_itself_counts_up_to_its_age(
     age: float, holds: bool | None
 ) -> None:
     known = state(vehicle=VehicleState(system_status=8), vehicle_received=NOW - age)
-    found = find(CONFIG, known, AutopilotCondition(AutopilotFact.EMERGENCY), NOW)
+    found = told(CONFIG, known, AutopilotCondition(AutopilotFact.EMERGENCY), NOW)
     assert found.holds is holds
     if holds is None:
         assert found.text == "autopilot's own state is old"
@@ -82,23 +82,23 @@ def test_what_the_autopilot_says_of_itself_counts_up_to_its_age(
 
 def test_one_that_is_being_switched_off_is_no_emergency() -> None:
     known = state(vehicle=VehicleState(system_status=7), vehicle_received=NOW)
-    found = find(CONFIG, known, AutopilotCondition(AutopilotFact.EMERGENCY), NOW)
-    assert found == Finding(False, "autopilot's own state is 7 (6 or 8)")
+    found = told(CONFIG, known, AutopilotCondition(AutopilotFact.EMERGENCY), NOW)
+    assert found == Told(False, "autopilot's own state is 7 (6 or 8)")
 
 
 def test_a_wish_for_a_kill_ends_at_its_time_and_all_are_told() -> None:
     asks = {"a 1": Ask(NOW, "a", "fire"), "b 2": Ask(NOW, "b", "smoke")}
     known, wants = state(asks=MappingProxyType(asks)), DeviceCondition(DeviceFact.ASKS_FOR_KILL)
-    assert find(CONFIG, known, wants, NOW) == Finding(True, "a 1: fire; b 2: smoke")
-    ended = find(CONFIG, known, wants, NOW + ASK_LASTS)
-    assert ended == Finding(False, "no device asks for a kill")
+    assert told(CONFIG, known, wants, NOW) == Told(True, "a 1: fire; b 2: smoke")
+    ended = told(CONFIG, known, wants, NOW + ASK_LASTS)
+    assert ended == Told(False, "no device asks for a kill")
 
 
 def test_all_that_are_out_are_told() -> None:
     out = [ParachuteStatus(name, LinkState.OK, deployed=True) for name in ("1", "2")]
     known = state(links=links(a=heard(0.1, *out)))
-    found = find(CONFIG, known, DeviceCondition(DeviceFact.DEPLOYED), NOW)
-    assert found == Finding(True, "a 1, a 2: its own status says deployed")
+    found = told(CONFIG, known, DeviceCondition(DeviceFact.DEPLOYED), NOW)
+    assert found == Told(True, "a 1, a 2: its own status says deployed")
 
 
 def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link() -> None:
@@ -110,8 +110,8 @@ def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link() -> 
     config = SupervisorConfig(required_links=LINKS, link_limits=MappingProxyType({"a": PATIENT}))
     abnormal = DeviceCondition(DeviceFact.ABNORMAL)
     text = "a 1 is ABNORMAL (hot); a 2 is ABNORMAL (no reason given)"
-    assert find(config, known, abnormal, NOW) == Finding(True, text)
-    assert find(CONFIG, known, abnormal, NOW) == Finding(False, "no device is ABNORMAL")
+    assert told(config, known, abnormal, NOW) == Told(True, text)
+    assert told(CONFIG, known, abnormal, NOW) == Told(False, "no device is ABNORMAL")
 
 
 def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
@@ -120,5 +120,5 @@ def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
         measurements=MappingProxyType({"height": height}),
         heights=((NOW - 1.0, 50.0), (NOW, 30.0)),
     )
-    found = find(CONFIG, known, MeasurementCondition("vertical_speed", below=-12.0), NOW)
+    found = told(CONFIG, known, MeasurementCondition("vertical_speed", below=-12.0), NOW)
     assert (found.holds, found.samples) == (True, 7)

@@ -15,7 +15,7 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, BelowMinimum
 from chute_ros.supervisor.state import Pending, State
 
-HOLDS = Finding(True, "it sinks")
+HOLDS = Finding(True, lambda: "it sinks")
 RULE = rule(SINKS, name="sinks")
 
 
