@@ -18,6 +18,7 @@ from bench.process_cost import cpu_time, resident_memory
 from bench.report import load, summary, table
 from bench.vehicle_wire import NOMINAL_RATE, VehicleWire
 from chute_ros.errors import ChuteError
+from chute_ros.protocol.mavlink.commands import CommandLimits
 from chute_ros.tools.isolation import free_udp_ports
 
 HEADING = "A vehicle"
@@ -53,7 +54,13 @@ def add_options(options: argparse.ArgumentParser) -> None:
         "--rounds",
         type=at_least(int, 2),
         default=100,
-        help="of each way to the wire, idle and under load (default: 100)",
+        help="limits that pass, idle and under load (default: 100)",
+    )
+    options.add_argument(
+        "--deploys",
+        type=at_least(int, 2),
+        default=30,
+        help="deploys by a person, idle and under load (default: 30)",
     )
     options.add_argument(
         "--cost-seconds",
@@ -85,7 +92,7 @@ def _measure(namespace: str, children: Children, chosen: argparse.Namespace) -> 
             wire.flood(times)
             result.limits[how] = [_limit(wire, person, children) for _ in range(chosen.rounds)]
             print(f"  limits, {how}: done", file=sys.stderr, flush=True)
-            result.deploys[how] = [_deploy(wire, person, children) for _ in range(chosen.rounds)]
+            result.deploys[how] = _deploys(wire, person, children, chosen.deploys)
             print(f"  deploys, {how}: done", file=sys.stderr, flush=True)
     finally:
         wire.close()
@@ -126,6 +133,17 @@ def _limit(wire: VehicleWire, person: Person, children: Children) -> float:
     _until("BLOCKED", lambda: person.stage == person.BLOCKED, children)
     person.speak()
     return (wire.blocks[0] - silent_since) / 1e6 - _STALE_AFTER * 1e3
+
+
+def _deploys(wire: VehicleWire, person: Person, children: Children, count: int) -> list[float]:
+    """Each once no acknowledgement of the last one's kill can come any more: until then the link
+    cannot tell whose it is, and asks again."""
+    times, alone_at = [], 0.0
+    for _ in range(count):
+        _until("alone", lambda at=alone_at: time.monotonic() > at, children)
+        times.append(_deploy(wire, person, children))
+        alone_at = time.monotonic() + CommandLimits().late_ack_window
+    return times
 
 
 def _deploy(wire: VehicleWire, person: Person, children: Children) -> float:
@@ -181,7 +199,10 @@ def report(result: Result, chosen: argparse.Namespace, before: str) -> str:
         f"{_STALE_AFTER:g} s, after its last\n"
         "heartbeat was published). The deploy is forced, on the ground: the kill, its\n"
         "confirmation by the autopilot, and then the release. Under load, besides,\n"
-        f"{_LOAD * NOMINAL_RATE:.0f} valid frames/s. {chosen.rounds} rounds of each.\n"
+        f"{_LOAD * NOMINAL_RATE:.0f} valid frames/s. {chosen.rounds} limits and "
+        f"{chosen.deploys} deploys of each, a deploy each\n"
+        f"{CommandLimits().late_ack_window:g} s: for so long the acknowledgement of the last "
+        "kill could come.\n"
         f"From the start of both processes to READY: {result.started / 1e3:.1f} s.\n\n"
         + table(("from ... until", "median", "99th percentile", "largest"), rows)
         + f"\n\nWhile nothing happens, for {chosen.cost_seconds:g} s:\n\n"

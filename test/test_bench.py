@@ -17,7 +17,7 @@ KILL_SWITCH, DECODING, TELEMETRY = (
     "bench.umbilical_telemetry",
 )
 FEW = ("--requests", "5", "--batches", "3", "--seconds", "0.5", "--top-rate", "100")
-FEW += ("--rounds", "2", "--cost-seconds", "1", "--message-batches", "3")
+FEW += ("--rounds", "2", "--deploys", "2", "--cost-seconds", "1", "--message-batches", "3")
 PEERS = ("chute_ros", "ROS alone", "bare relay")
 HOPS = ("to the kill on MAVLink", "to the answer on the bus")
 LAYOUTS = (
