@@ -105,7 +105,8 @@ def check_vehicle(text):
     assert [name for name, _, _ in nodes] == ["mavlink_parachute", "safety_supervisor", "together"]
     assert all(float(share) > 0.0 and int(memory) > 10 for _, share, memory in nodes)
     assert re.search(r"From the start of both processes to READY: \d+\.\d s\.$", text, re.M)
-    return int(re.search(r"frames/s\. (\d+) rounds of each\.$", text, re.M)[1])
+    counts = re.search(r"frames/s\. (\d+) limits and (\d+) deploys of each, ", text)
+    return min(int(count) for count in counts.groups())
 
 
 def check_messages(text):
@@ -185,8 +186,8 @@ def test_what_is_in_docs_is_what_the_command_writes():
     text = (ROOT / "docs" / "bench.md").read_text()
     kill_switch, vehicle, messages, decoding, telemetry = sections(text)
     # Of fewer the 99th percentile would be the largest.
-    assert check_kill_switch(kill_switch) >= 200
-    assert check_vehicle(vehicle) >= 100
+    assert check_kill_switch(kill_switch) >= 150
+    assert check_vehicle(vehicle) >= 15, "deploys, each of which takes 5 s"
     assert check_messages(messages) >= 100
     assert check_decoding(decoding) >= 100
     assert check_telemetry(telemetry) >= 200
