@@ -207,7 +207,7 @@ def test_what_is_in_docs_is_what_the_command_writes():
         "    for wire, one in bare.items()}\n"
         "ways = {how: [1.0] for how in (v.IDLE, v.LOADED)}\n"
         "result = v.Result(1.0, ways, ways, dict.fromkeys(v.NODES, (0.1, 1.0)), 1.0)\n"
-        "few = Some(rounds=1, cost_seconds=1.0)\n"
+        "few = Some(rounds=1, deploys=1, cost_seconds=1.0)\n"
         f"measured = dict.fromkeys({LAYOUTS}, times)\n"
         "step = Step(13.0, 1, [1.0], 0.1)\n"
         "ends = [t.Peer(n, None, t.Search(1.0, step, step)) for n in (t.OURS, t.BARE)]\n"
