@@ -137,6 +137,8 @@ class NodeExecutor(SingleThreadedExecutor):
             ended |= self._step(coroutine)
         with self._tasks_lock:
             tasks = [task for task, _, _ in self._tasks]
+        if not tasks:
+            return ended
         for task in tasks:
             task()
             task.result()  # or raise what it raised
