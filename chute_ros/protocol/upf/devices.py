@@ -135,6 +135,7 @@ class Trigger(Device):
         super().__init__(node_id, config, definitions)
         #: Its newest status says that it has fired, and waits for a second one that says so.
         self.doubted = False
+        self._doubted_values: Mapping[str, Any] = {}
 
     def status_message(
         self, values: Mapping[str, Any], now: float, expected: bool
@@ -147,8 +148,13 @@ class Trigger(Device):
         news = self._says_launched(values) and not self.launched
         self.doubted = news and not expected and not self.doubted
         if self.doubted:
-            values = self.values
+            self._doubted_values, values = values, self.values
         return self.take_status(names.TRIGGER_STATUS, values, now)
+
+    def believe(self) -> None:
+        """Somebody else says so too: what was left aside is true."""
+        if self.doubted:
+            self.doubted, self.values = False, self._doubted_values
 
     @property
     def state(self) -> str:

@@ -46,6 +46,10 @@ class UpfDevices:
             return self.controllers.get(node_id)
         return first_alive(self.controllers.values())
 
+    def only_controller(self) -> Controller | None:
+        """With several, nobody says which trigger is whose."""
+        return next(iter(self.controllers.values())) if len(self.controllers) == 1 else None
+
     def trigger(self) -> Trigger | None:
         """The first that is not lost, or the first."""
         return first_alive(self.triggers.values())
@@ -96,6 +100,11 @@ class UpfDevices:
         elif controller.state is not before:
             text = f"controller {node_id}: {before.name} to {controller.state.name}"
             self.notice(Severity.INFO, text)
+        if self._controller_says_out():
+            for trigger in self.triggers.values():
+                if trigger.doubted:
+                    trigger.believe()
+                    self._has_fired(trigger, now)
         self._events.append(ParachuteChanged(self.picture_of(controller, now)))
 
     def trigger_status(
@@ -107,11 +116,12 @@ class UpfDevices:
             fired = trigger.launched
             expected = ordered or self._controller_says_out()
             self._changed(trigger, trigger.status_message(values, now, expected))
-            self._trigger_changed(trigger, now)
             if trigger.launched and not fired:
-                self.notice(Severity.WARNING, f"trigger {node_id} has fired")
+                self._has_fired(trigger, now)
                 self._controllers_changed(now)
-            elif trigger.doubted:
+                return
+            self._trigger_changed(trigger, now)
+            if trigger.doubted:
                 self.counts["launched that nobody ordered, the first from a trigger"] += 1
                 text = f"trigger {node_id} says that it has fired, which nobody ordered"
                 self.notice(Severity.WARNING, f"{text}: believed when it says so again")
@@ -191,14 +201,18 @@ class UpfDevices:
             self.to_read.append(device)
 
     def _controller_says_out(self) -> bool:
-        """With several, nobody says which trigger is whose."""
-        return len(self.controllers) == 1 and all(c.deployed for c in self.controllers.values())
+        controller = self.only_controller()
+        return controller is not None and controller.deployed
 
     def _controllers_changed(self, now: float) -> None:
         """What a trigger says is part of the picture of the only controller."""
-        if len(self.controllers) == 1:
-            (controller,) = self.controllers.values()
+        controller = self.only_controller()
+        if controller is not None:
             self._events.append(ParachuteChanged(self.picture_of(controller, now)))
+
+    def _has_fired(self, trigger: Trigger, now: float) -> None:
+        self._trigger_changed(trigger, now)
+        self.notice(Severity.WARNING, f"trigger {trigger.node_id} has fired")
 
     def _trigger_changed(self, trigger: Trigger, now: float) -> None:
         self._events.append(TriggerChanged(trigger.node_id, trigger_picture(trigger, now)))

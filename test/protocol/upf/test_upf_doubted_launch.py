@@ -42,6 +42,7 @@ def test_damage_again_and_again_but_never_in_a_row_opens_none(bench):
     for _ in range(5):
         damaged(story.after(0.2).status("ARMED")).after(0.2).status("ARMED").trigger_status()
     assert not any(one.deployed for one in story.pictures())
+    assert not story.link.devices.triggers[34].launched
     assert story.link.counts[COUNT] == 5
 
 
@@ -77,8 +78,26 @@ def test_first_is_believed_when_the_controller_says_so_too(bench):
     assert not story.link.counts[COUNT]
 
 
+def test_first_is_believed_when_the_controller_says_so_after_it(bench):
+    """Whichever is heard first: a node that started anew must not order what is out."""
+    story = flying(bench).trigger_status("LAUNCHED").after(0.05)
+    assert not story.picture().deployed
+    story.status("LAUNCHED")
+    assert story.link.devices.triggers[34].launched
+    assert story.notices()[-1] == "trigger 34 has fired"
+    story.link.fire_triggers(1, story.now)
+    story.step()
+    assert story.end(1).success
+    assert story.requests("flyfire.TriggerService") == []
+
+
 def test_controller_that_says_so_needs_no_trigger(bench):
     assert flying(bench).trigger_status("LAUNCHED").status("LAUNCHED").picture().deployed
+
+
+def test_one_of_several_controllers_does_not_speak_for_a_trigger_before_it(bench):
+    story = flying(bench).status("ARMED", 37).trigger_status("LAUNCHED").status("LAUNCHED", 37)
+    assert story.link.devices.triggers[34].doubted
 
 
 def test_one_of_several_controllers_does_not_speak_for_a_trigger(bench):
