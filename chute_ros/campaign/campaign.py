@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import multiprocessing
+import signal
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -101,13 +102,17 @@ def _line(folder: Path, seed: int) -> Line:
 def run(
     folder: Path, flights: int, seed: int, jobs: int, progress: Callable[[Tally], None]
 ) -> Tally:
-    """Flights with the seeds from seed on. folder: of the profiles."""
+    """Flights with the seeds from seed on, in their order. folder: of the profiles.
+
+    Ended by Ctrl-C, it returns those until then: hours of flights are not lost."""
     tally, begun = Tally(), time.monotonic()
-    for line in _all(folder, range(seed, seed + flights), jobs):
-        tally.add(line)
-        tally.took = time.monotonic() - begun
-        progress(tally)
-    tally.wrong.sort(key=lambda line: line.seed)
+    try:
+        for line in _all(folder, range(seed, seed + flights), jobs):
+            tally.add(line)
+            tally.took = time.monotonic() - begun
+            progress(tally)
+    except KeyboardInterrupt:
+        pass
     return tally
 
 
@@ -119,5 +124,6 @@ def _all(folder: Path, seeds: range, jobs: int) -> Iterator[Line]:
     # Read before the processes part, so that they share it.
     shipped = _shipped(folder)
     shipped.read_all()
-    with multiprocessing.Pool(jobs) as pool:
-        yield from pool.imap_unordered(one, seeds, _BATCH)
+    # Ctrl-C reaches every process of a terminal: ours ends them.
+    with multiprocessing.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        yield from pool.imap(one, seeds, _BATCH)

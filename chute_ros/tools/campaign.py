@@ -1,7 +1,7 @@
 """Executable campaign: many flights in virtual time with faults at every layer, counted.
 
 A flight that must not be is saved as a scenario, as text: --replay SEED or FILE tells it step by
-step.
+step. Ctrl-C ends it: what was flown until then is counted and written.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import signal
 import sys
 import time
 from pathlib import Path
@@ -50,31 +51,48 @@ def main() -> None:
     if chosen.replay is not None:
         _replay(profiles, chosen.replay)
         return
-    progress = _Progress(chosen.flights)
+    progress = _Progress(chosen.flights, chosen.failures)
     tally = campaign.run(profiles, chosen.flights, chosen.seed, chosen.jobs, progress.look)
     for count in Count:
         print(f"{tally.counts[count]:8d}  {count.value}")
     for line in tally.wrong[:_MOST_TOLD]:
-        what = f"{line.vehicle}, {line.profile}, {line.failure}"
-        print(f"  seed {line.seed}, {what}: {line.count.name}: {line.why}")
-    print(f"{tally.flights} flights in {tally.took:.0f} s")
-    if tally.wrong:
-        _save(tally.wrong, chosen.failures)
-    if chosen.page:
+        print(f"  {_told(line)}")
+    print(f"{tally.flights} of {chosen.flights} flights in {tally.took:.0f} s")
+    if progress.unsaved:
+        print(f"not saved, name another folder with --failures: {progress.unsaved}")
+    elif tally.wrong:
+        print(f"saved in {chosen.failures}; --replay FILE tells one step by step")
+    if chosen.page and tally.flights:
         _write(tally, chosen.seed, chosen.page)
     if tally.wrong:
         sys.exit(1)
+    if tally.flights < chosen.flights:
+        sys.exit(128 + signal.SIGINT)
+
+
+def _told(line: campaign.Line) -> str:
+    what = f"{line.vehicle}, {line.profile}, {line.failure}"
+    return f"seed {line.seed}, {what}: {line.count.name}: {line.why}"
 
 
 class _Progress:
-    """A line each few seconds, on the terminal's second channel."""
+    """A line each few seconds, on the terminal's second channel, and one for each flight that must
+    not be, which is saved at once: others may take hours."""
 
-    def __init__(self, flights: int) -> None:
-        self._flights = flights
+    def __init__(self, flights: int, failures: Path) -> None:
+        self._flights, self._failures = flights, failures
         self._told_at = time.monotonic()
+        self._wrong = 0
+        #: Why a flight that must not be could not be saved; empty: all were.
+        self.unsaved = ""
 
     def look(self, tally: campaign.Tally) -> None:
         """One more flight has been flown."""
+        for line in tally.wrong[self._wrong :]:
+            self._wrong += 1
+            if self._wrong <= _MOST_TOLD:
+                print(_told(line), file=sys.stderr, flush=True)
+            self._save(line)
         if time.monotonic() - self._told_at < _TELL_EVERY:
             return
         self._told_at = time.monotonic()
@@ -85,6 +103,14 @@ class _Progress:
             file=sys.stderr,
             flush=True,
         )
+
+    def _save(self, line: campaign.Line) -> None:
+        text = text_of(draw(line.seed), f"{line.count.name}: {line.why}")
+        try:
+            self._failures.mkdir(parents=True, exist_ok=True)
+            (self._failures / f"{line.seed}.json").write_text(text, encoding="utf-8")
+        except OSError as error:
+            self.unsaved = str(error)
 
 
 def positive(text: str) -> int:
@@ -113,18 +139,6 @@ def scenario(text: str) -> Scenario:
         raise argparse.ArgumentTypeError(f"{text}: need a seed, or a file: {error}") from None
     except RecordError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def _save(wrong: list[campaign.Line], folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for line in wrong:
-            text = text_of(draw(line.seed), f"{line.count.name}: {line.why}")
-            (folder / f"{line.seed}.json").write_text(text, encoding="utf-8")
-    except OSError as error:
-        print(f"they cannot be saved, name another folder with --failures: {error}")
-        return
-    print(f"saved in {folder}; --replay FILE tells one step by step")
 
 
 def _write(tally: campaign.Tally, seed: int, path: Path) -> None:

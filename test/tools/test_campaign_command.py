@@ -1,5 +1,9 @@
 """The command line of the campaign: mistakes are said before any flight, results are kept."""
 
+import os
+import re
+import signal
+import subprocess
 import sys
 from dataclasses import replace
 
@@ -44,7 +48,7 @@ def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
     failures = str(tmp_path / "failures")
     with_page = ("--jobs", "1", "--page", str(page), "--failures", failures)
     run(monkeypatch, "--flights", "3", "--seed", "5", *with_page)
-    assert "3 flights in" in capsys.readouterr().out
+    assert "3 of 3 flights in" in capsys.readouterr().out
     text = page.read_text()
     assert "`make campaign FLIGHTS=3 SEED=5`" in text
     assert "| mavlink, " in text or "| upf, " in text or "| both, " in text
@@ -68,8 +72,9 @@ def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_p
             *("--failures", str(folder)),
         )
     assert ended.value.code == 1
-    told = capsys.readouterr().out
+    told, at_once = capsys.readouterr()
     assert "  seed 7, " in told
+    assert at_once.startswith("seed 7, ")
     assert f"saved in {folder}" in told
     saved = folder / "7.json"
     assert scenario_of(saved.read_text(), "x") == (draw(7), "MISSED: for a test")
@@ -86,7 +91,26 @@ def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_pa
     taken.write_text("")
     with pytest.raises(SystemExit):
         run(monkeypatch, "--flights", "1", "--jobs", "1", "--failures", str(taken))
-    assert "they cannot be saved, name another folder with --failures: " in capsys.readouterr().out
+    assert "not saved, name another folder with --failures: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
+    """As in a terminal, where every process of the command gets the signal."""
+    page = tmp_path / "campaign.md"
+    command = [sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"]
+    command += ["--jobs", str(jobs), "--page", str(page), "--failures", str(tmp_path)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        first = process.stderr.readline()
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60.0)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
+    assert flown >= int(first.split()[0]) > 0
+    assert f"`make campaign FLIGHTS={flown} SEED=0`" in page.read_text()
 
 
 def test_a_changed_scenario_can_be_flown(monkeypatch, tmp_path, capsys):
