@@ -10,13 +10,14 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from bench.command import at_least, run, with_children
 from bench.report import load, summary, table
-from bench.wire_ends import Round, RoundFailedError, WireEnds, WrongOrderError
+from bench.wire_ends import NOMINAL_RATE, Round, RoundFailedError, WireEnds, WrongOrderError
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.processes import Processes
@@ -31,6 +32,9 @@ _REST, _KILL_TIMEOUT = 0.4, 0.3
 #: A late answer is a late answer: it is measured, not given up.
 _SERVICE_TIMEOUT, _ROUND_TIMEOUT = 2.0, 3.0
 _READY_TIMEOUT = 40.0
+#: So many times what both ends say by themselves, from a moment before a round until its end, s.
+_LOAD, _LOAD_BEFORE = 10.0, 0.2
+IDLE, LOADED = "idle", f"under {_LOAD:g} times the frames"
 #: One round of so many may go without an answer; it is counted in the table.
 _ONE_OF = 50
 
@@ -41,8 +45,9 @@ class Peer:
 
     name: str
     ends: WireEnds
-    rounds: list[Round] = field(default_factory=list)
-    missed: int = 0
+    #: How -> its rounds, and how many without an answer.
+    rounds: dict[str, list[Round]] = field(default_factory=lambda: {IDLE: [], LOADED: []})
+    missed: Counter[str] = field(default_factory=Counter)
 
 
 def add_options(options: argparse.ArgumentParser) -> None:
@@ -51,7 +56,7 @@ def add_options(options: argparse.ArgumentParser) -> None:
         "--requests",
         type=at_least(int, 2),
         default=200,
-        help="kill switches, to each peer (default: 200)",
+        help="kill switches, to each peer, idle and under load (default: 200)",
     )
 
 
@@ -87,9 +92,10 @@ def _measure(namespace: str, processes: Processes, count: int) -> list[Peer]:
         for peer in peers:
             peer.ends.kills = 0
         for number in range(count):
-            for peer in peers:
-                _rest(peers, _REST / len(peers))
-                _round(peer, count)
+            for how in (IDLE, LOADED):
+                for peer in peers:
+                    _rest(peers, _REST / len(peers))
+                    _round(peer, peers, how, count)
             processes.check()
             if (number + 1) % 25 == 0 or number + 1 == count:
                 print(f"  {number + 1} of {count} rounds", file=sys.stderr, flush=True)
@@ -108,15 +114,22 @@ def _rest(peers: list[Peer], seconds: float) -> None:
             peer.ends.listen(0.005)
 
 
-def _round(peer: Peer, count: int) -> None:
+def _round(peer: Peer, peers: list[Peer], how: str, count: int) -> None:
+    if how == LOADED:
+        peer.ends.flood.set(_LOAD * NOMINAL_RATE)
+        _rest(peers, _LOAD_BEFORE)
     try:
-        peer.rounds.append(peer.ends.kill_switch(_ROUND_TIMEOUT))
+        peer.rounds[how].append(peer.ends.kill_switch(_ROUND_TIMEOUT))
     except WrongOrderError as error:
         raise RoundFailedError(f"{peer.name}: {error}") from None
     except RoundFailedError as error:
-        peer.missed += 1
-        if peer.missed > count // _ONE_OF:
-            raise RoundFailedError(f"{peer.name}: {peer.missed} missed, now: {error}") from None
+        peer.missed[how] += 1
+        missed = peer.missed[how]
+        if missed > count // _ONE_OF:
+            raise RoundFailedError(f"{peer.name}: {missed} missed, now: {error}") from None
+    finally:
+        if how == LOADED:
+            peer.ends.flood.set(0.0)
 
 
 def _start_ours(namespace: str, processes: Processes, bus: int, network: int) -> None:
@@ -175,16 +188,15 @@ def _await_ready(peer: Peer, peers: list[Peer], processes: Processes) -> None:
 def report(peers: list[Peer], before: str) -> str:
     """The section without its heading. before: the load of the machine when it began."""
     rows = []
-    for what, times in (
-        ("to the kill on MAVLink", {p.name: [r.kill for r in p.rounds] for p in peers}),
-        ("to the answer on the bus", {p.name: [r.answer for r in p.rounds] for p in peers}),
-    ):
-        base = summary(times[BARE])
-        for peer in peers:
-            numbers = summary(times[peer.name])
-            ratios = (f"{number / base[i]:.1f}" for i, number in enumerate(numbers[:2]))
-            values = (*(f"{number:.2f} ms" for number in numbers), *ratios, str(peer.missed))
-            rows.append((f"{what}: {peer.name}", *values))
+    for how in (IDLE, LOADED):
+        for what, which in (("the kill on MAVLink", "kill"), ("the answer on the bus", "answer")):
+            times = {p.name: [getattr(r, which) for r in p.rounds[how]] for p in peers}
+            base = summary(times[BARE])
+            for peer in peers:
+                numbers = summary(times[peer.name])
+                ratios = (f"{number / base[i]:.1f}" for i, number in enumerate(numbers[:2]))
+                values = (*(f"{n:.2f} ms" for n in numbers), *ratios, str(peer.missed[how]))
+                rows.append((f"to {what}, {how}: {peer.name}", *values))
     head = (
         "from the kill switch on the bus",
         "median",
@@ -194,7 +206,7 @@ def report(peers: list[Peer], before: str) -> str:
         "of 99th percentiles",
         "missed",
     )
-    count = len(peers[0].rounds) + peers[0].missed
+    count = len(peers[0].rounds[IDLE]) + peers[0].missed[IDLE]
     kills = ", ".join(f"{peer.name} {peer.ends.kills}" for peer in peers)
     return (
         f"{before}\n\n"
@@ -205,7 +217,9 @@ def report(peers: list[Peer], before: str) -> str:
         "the kill and one back. ROS alone: three processes with the same hops and messages, that\n"
         "decide and check nothing (`bench/ros_relay.py`). Bare relay: one process with two\n"
         "sockets, that checks nothing (`bench/bare_relay.py`); the ratios are to it.\n"
-        f"{count} requests to each, taking turns, in one run. Missed: no SUCCESS within\n"
+        f"{count} requests to each, idle and as often under load, taking turns, in one run. Under\n"
+        f"load, besides, {_LOAD * NOMINAL_RATE:.0f} valid frames/s on MAVLink and as many on the "
+        "bus, to the peer\nwhose turn it is. Missed: no SUCCESS within\n"
         f"{_SERVICE_TIMEOUT:g} s. Kills that came: {kills}.\n\n" + table(head, rows) + "\n"
     )
 

@@ -10,6 +10,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+from bench.flood import Flood
 from chute_ros.errors import ChuteError
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import Kind
@@ -25,6 +26,8 @@ from chute_ros.transport.udp import UdpWire
 CONTROLLER, VEHICLE = 33, 10
 #: How often both ends say how they are, s.
 _INTERVAL = 0.05
+#: What both ends say by themselves, frames a second on either wire.
+NOMINAL_RATE = 2.0 / _INTERVAL
 #: Between the newest of that and a kill switch, s: it must not stand in the way.
 _QUIET = 0.02
 
@@ -55,6 +58,9 @@ class WireEnds:
         self._network = UdpWire(parse_address(f"udpout:127.0.0.1:{mavlink_port}"))
         self._bus.open()
         self._network.open()
+        (network,) = self._network.files()
+        #: Frames besides, on both wires.
+        self.flood = Flood(network, mavlink_port, bus_port)
         self._endpoint = Endpoint(definitions.types, CONTROLLER)
         self._encoder = FrameEncoder(1, 1)
         self._decoder = FrameDecoder()
@@ -68,6 +74,7 @@ class WireEnds:
 
     def close(self) -> None:
         """Close both sockets."""
+        self.flood.close()
         self._bus.close()
         self._network.close()
 

@@ -216,7 +216,8 @@ class Maker:
         uv = [str(self.venv / "bin" / "uv"), "pip", "install", "--python", str(self.python)]
         # The few packages without a wheel are built with the setuptools of the same lock.
         hashed = ["--require-hashes", "--build-constraints", lock, "-r", lock]
-        self.run([*uv, *hashed])
+        # Where Python must not keep what it compiles, each start of a node took 0.4 s longer.
+        self.run([*uv, "--compile-bytecode", *hashed])
 
     def fit(self):
         if not self.mode.sourced:
