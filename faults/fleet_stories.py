@@ -61,6 +61,7 @@ SIZES = (
     Size(5),
     Size(5, busy=True),
     Size(5, server=False),
+    Size(10),
     Size(20, slowed=True),
 )
 

@@ -20,7 +20,7 @@ from chute_msgs.msg import (
     SafetyRequest,
 )
 from chute_msgs.srv import Arm, Deploy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -133,9 +133,7 @@ class DeviceNode(Node, ABC):
         self._request_publisher = self.create_publisher(
             SafetyRequest, "safety/request", qos.STATUS
         )
-        self._diagnostics_publisher = self.create_publisher(
-            DiagnosticArray, "/diagnostics", qos.STATUS
-        )
+        self._diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
 
     def begin(self) -> None:
         """Start the link's thread and everything that reacts to it."""
@@ -378,4 +376,4 @@ class DeviceNode(Node, ABC):
             "pictures left out, as the executor did not keep up": self._inbox.left_out,
         }
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
-        self._diagnostics_publisher.publish(diagnostics.array(self.stamp(), statuses))
+        self._diagnostics_publisher.publish(self.stamp(), statuses)

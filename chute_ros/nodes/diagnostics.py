@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
 
+from chute_ros.nodes import qos
 from chute_ros.protocol.liveness import Liveness
 
 OK, WARN, ERROR, STALE = (
@@ -74,11 +76,23 @@ def liveness_values(live: Liveness, now: float) -> dict[str, object]:
     }
 
 
-def array(stamp: Time, statuses: list[DiagnosticStatus]) -> DiagnosticArray:
-    """All tasks of a node."""
-    message = DiagnosticArray(status=statuses)
-    message.header.stamp = stamp
-    return message
+class DiagnosticsPublisher:
+    """Of all tasks of a node: on /diagnostics, which all share, and in a namespace on its own
+    `diagnostics` as well. A black box listens to that: of twenty vehicles each would else be sent
+    what all others say."""
+
+    def __init__(self, node: Node) -> None:
+        names = {node.resolve_topic_name(name): name for name in ("/diagnostics", "diagnostics")}
+        self._publishers = [
+            node.create_publisher(DiagnosticArray, name, qos.STATUS) for name in names.values()
+        ]
+
+    def publish(self, stamp: Time, statuses: list[DiagnosticStatus]) -> None:
+        """Say how they are."""
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = stamp
+        for publisher in self._publishers:
+            publisher.publish(message)
 
 
 def _text(value: object) -> str:

@@ -39,7 +39,8 @@ BESIDES: dict[str, tuple[Any, Any]] = {
     "safety/lease": (SupervisorLease, qos.STATUS),
     "upf/trigger_status": (TriggerStatus, qos.STATUS),
     "umbilical/telem": (Telem, qos.STATUS),
-    "/diagnostics": (DiagnosticArray, qos.STATUS),
+    # Of this vehicle; /diagnostics are those of all.
+    "diagnostics": (DiagnosticArray, qos.STATUS),
 }
 
 

@@ -24,7 +24,6 @@ from chute_msgs.msg import (
     SafetyRequest,
     SafetyState,
 )
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -97,9 +96,7 @@ class SafetySupervisorNode(Node):
         self._heartbeat_publisher = self.create_publisher(
             LinkHeartbeat, "safety/heartbeat", qos.STATUS
         )
-        self._diagnostics_publisher = self.create_publisher(
-            DiagnosticArray, "/diagnostics", qos.STATUS
-        )
+        self._diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
         self.lease = LeaseKeeper(
             self,
             lease,
@@ -327,7 +324,7 @@ class SafetySupervisorNode(Node):
             self._memory.task(name),
             *self._recorder.tasks(),
         ]
-        self._diagnostics_publisher.publish(diagnostics.array(self.wall.now().to_msg(), tasks))
+        self._diagnostics_publisher.publish(self.wall.now().to_msg(), tasks)
 
     def destroy_node(self) -> None:
         """The black box ends its file, the memory is written."""

@@ -25,6 +25,7 @@ PUBLISHED = {
         "safety/request": ("SafetyRequest", STATUS),
         "safety/action": ("ActionReport", DECISION),
         "/diagnostics": ("DiagnosticArray", STATUS),
+        "diagnostics": ("DiagnosticArray", STATUS),
     },
     "umbilical": {
         "parachute/status": ("ParachuteStatus", STATUS),
@@ -34,6 +35,7 @@ PUBLISHED = {
         "safety/request": ("SafetyRequest", STATUS),
         "safety/action": ("ActionReport", DECISION),
         "/diagnostics": ("DiagnosticArray", STATUS),
+        "diagnostics": ("DiagnosticArray", STATUS),
     },
     "safety_supervisor": {
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
@@ -41,6 +43,7 @@ PUBLISHED = {
         "safety/lease": ("SupervisorLease", STATUS),
         "safety/state": ("SafetyState", (1, LATCHED)),
         "/diagnostics": ("DiagnosticArray", STATUS),
+        "diagnostics": ("DiagnosticArray", STATUS),
     },
 }
 SUBSCRIBED = {

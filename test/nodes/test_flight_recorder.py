@@ -36,10 +36,17 @@ def heard(bench):
 
 def test_it_hears_what_others_say_and_keeps_it_under_its_whole_name(bench, node):
     bench.publish(TriggerStatus(link="upf_can"), "upf/trigger_status")
-    bench.publish(DiagnosticArray(), "/diagnostics")
+    bench.publish(DiagnosticArray(), "diagnostics")
     bench.until(lambda: node.recorder.box.counts()["entries written"] >= 2, "both are written")
     node.recorder.close()
-    assert {f"{bench.namespace}/upf/trigger_status", "/diagnostics"} <= set(heard(bench))
+    expected = {f"{bench.namespace}/{name}" for name in ("upf/trigger_status", "diagnostics")}
+    assert expected <= set(heard(bench))
+
+
+def test_it_does_not_listen_to_other_vehicles(bench, node):
+    names = [one.topic_name for one in node.subscriptions]
+    assert f"{bench.namespace}/diagnostics" in names
+    assert "/diagnostics" not in names
 
 
 def test_its_files_are_named_after_the_vehicle(bench, node):
