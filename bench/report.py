@@ -6,6 +6,7 @@ import math
 import os
 import platform
 import statistics
+import sys
 from collections.abc import Sequence
 
 
@@ -26,7 +27,8 @@ def machine() -> str:
     distribution = os.environ.get("ROS_DISTRO", "?")
     return (
         f"{model}, {os.cpu_count()} cores; Linux {platform.release()}; "
-        f"Python {platform.python_version()}; ROS 2 {distribution}"
+        # Whose: one that was built without the compiler's profile is a fifth slower.
+        f"Python {platform.python_version()} of {sys.base_prefix}; ROS 2 {distribution}"
     )
 
 

@@ -144,7 +144,7 @@ def sections(text):
     names = "Kill switch|A vehicle|Decoding|Decoding a line|Through the node"
     head, *found = re.split(rf"^##+ (?:{names})$", text, flags=re.M)
     assert len(found) == 5
-    assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+; ROS 2 \w+\.$", head, re.M)
+    assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+ of /\S+; ROS 2 \w+\.$", head, re.M)
     assert found[2].rstrip().endswith("## Umbilical telemetry")
     assert text.count("## Umbilical telemetry") == 1
     for section in found:
@@ -190,7 +190,7 @@ def test_what_is_in_docs_is_what_the_command_writes():
     text = (ROOT / "docs" / "bench.md").read_text()
     kill_switch, vehicle, messages, decoding, telemetry = sections(text)
     # Of fewer the 99th percentile would be the largest.
-    assert check_kill_switch(kill_switch) >= 150
+    assert check_kill_switch(kill_switch) >= 200
     assert check_vehicle(vehicle) >= 15, "deploys, each of which takes 5 s"
     assert check_messages(messages) >= 100
     assert check_decoding(decoding) >= 100
