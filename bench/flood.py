@@ -39,7 +39,8 @@ class Flood:
 
     def set(self, rate: float) -> None:
         """So many of each a second, once this returns."""
-        assert self._process.stdin is not None and self._process.stdout is not None
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
         self._process.stdin.write(f"{rate}\n")
         self._process.stdin.flush()
         self._process.stdout.readline()

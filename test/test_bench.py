@@ -82,7 +82,8 @@ def check_kill_switch(text):
     check_times(measured, " ms", "bare relay")
     for peer in PEERS:
         medians = [number(measured[hop, peer][0], " ms") for hop in HOPS]
-        assert medians[0] <= medians[1] and medians[2] <= medians[3], "first the kill"
+        assert medians[0] <= medians[1], "first the kill"
+        assert medians[2] <= medians[3], "under load as well"
     assert re.search(
         r"Kills that came: chute_ros \d+, ROS alone \d+, bare relay \d+\.$", text, re.M
     )

@@ -32,6 +32,28 @@ def test_a_clock_that_is_set_shows_with_the_next_heartbeat(step: float) -> None:
     assert clocks.age(0.703 + step) == pytest.approx(0.703), "one that comes late is late"
 
 
+@pytest.mark.parametrize("ahead", [0.3, 49.4, 1e6])
+def test_a_first_heartbeat_from_the_future_tells_of_a_clock_that_is_ahead(ahead: float) -> None:
+    """Of two hosts whose clocks differ one was started anew: nothing arrives before it is sent."""
+    clocks = ClockSteps(MARGIN)
+    assert clocks.heard(0.002 - ahead, 5.0) == pytest.approx(-ahead, abs=0.01)
+    assert clocks.age(0.003 - ahead) == pytest.approx(0.0, abs=0.01), "a decision sent now"
+    assert clocks.age(0.703 - ahead) == pytest.approx(0.7, abs=0.01), "one that comes late is late"
+
+
+def test_one_that_was_late_itself_is_put_right_by_the_next() -> None:
+    clocks = ClockSteps(MARGIN)
+    clocks.heard(-46.0, 5.0)
+    assert clocks.heard(-49.0, 5.1) == pytest.approx(-3.0), "it had taken 3 s"
+    assert clocks.age(-48.3) == pytest.approx(0.7)
+
+
+def test_a_first_heartbeat_that_is_old_is_old() -> None:
+    clocks = ClockSteps(MARGIN)
+    assert clocks.heard(49.4, 5.0) == 0.0
+    assert clocks.age(49.4) == 49.4, "a way may take so long: nothing is put right"
+
+
 def test_one_that_is_set_back_again_is_as_before() -> None:
     clocks, now = heard_so_far()
     clocks.heard(3600.002, now + BEAT)

@@ -113,7 +113,7 @@ class UpfDevices:
         """A TriggerStatus came. ordered: a release is under way."""
         trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
         if trigger is not None:
-            fired = trigger.launched
+            fired, doubted = trigger.launched, trigger.doubted
             expected = ordered or self._controller_says_out()
             self._changed(trigger, trigger.status_message(values, now, expected))
             if trigger.launched and not fired:
@@ -122,9 +122,10 @@ class UpfDevices:
                 return
             self._trigger_changed(trigger, now)
             if trigger.doubted:
-                self.counts["launched that nobody ordered, the first from a trigger"] += 1
+                self.counts["launched that nobody ordered, not believed yet"] += 1
+            if trigger.doubted and not doubted:
                 text = f"trigger {node_id} says that it has fired, which nobody ordered"
-                self.notice(Severity.WARNING, f"{text}: believed when it says so again")
+                self.notice(Severity.WARNING, f"{text}: believed when it goes on saying so")
 
     def node_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A NodeStatus of anybody."""

@@ -292,7 +292,7 @@ def test_trigger_alone_is_no_parachute_unless_the_parameter_says_so(bench):
 )
 def test_trigger_is_the_parachute_where_there_is_no_controller(bench, said, state):
     story = bench("", without_controller=True)
-    for _ in range(2):
+    for _ in range(3):
         story.trigger_status(said, supply_voltage=12.0)
     picture = story.picture()
     assert (picture.device, picture.state, picture.backup_voltage) == ("34", state, 12.0)

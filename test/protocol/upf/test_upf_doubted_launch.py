@@ -5,8 +5,10 @@ from upf_link_bench import Bench
 
 from chute_ros.model import LinkState, ParachuteState
 
-COUNT = "launched that nobody ordered, the first from a trigger"
-DOUBT = "trigger 34 says that it has fired, which nobody ordered: believed when it says so again"
+COUNT = "launched that nobody ordered, not believed yet"
+DOUBT = (
+    "trigger 34 says that it has fired, which nobody ordered: believed when it goes on saying so"
+)
 
 
 def flying(bench, **config) -> Bench:
@@ -37,37 +39,40 @@ def test_one_damaged_status_opens_no_parachute(bench):
     assert story.link.devices.triggers[34].sound
 
 
-def test_damage_again_and_again_but_never_in_a_row_opens_none(bench):
+def test_damage_again_and_again_but_never_three_times_in_a_row_opens_none(bench):
     story = flying(bench)
-    for _ in range(5):
-        damaged(story.after(0.2).status("ARMED")).after(0.2).status("ARMED").trigger_status()
+    for number in range(5):
+        for _ in range(1 + number % 2):
+            damaged(story.after(0.2).status("ARMED"))
+        story.after(0.2).status("ARMED").trigger_status()
     assert not any(one.deployed for one in story.pictures())
     assert not story.link.devices.triggers[34].launched
-    assert story.link.counts[COUNT] == 5
+    assert story.link.counts[COUNT] == 7
 
 
 def test_trigger_that_says_so_again_is_believed(bench):
     """APS, whose controller died; or we were started while the parachute is out."""
-    story = flying(bench).trigger_status("LAUNCHED").after(0.2)
+    story = flying(bench).trigger_status("LAUNCHED").after(0.2).trigger_status("LAUNCHED")
     assert not story.picture().deployed
-    story.trigger_status("LAUNCHED")
+    story.after(0.2).trigger_status("LAUNCHED")
     assert story.picture().deployed
     assert story.pictures()[-1].state is ParachuteState.LAUNCHED
     assert story.notices() == [DOUBT, "trigger 34 has fired"]
     assert story.after(0.2).trigger_status("LAUNCHED").picture().deployed
-    assert story.link.counts[COUNT] == 1
+    assert story.link.counts[COUNT] == 2
 
 
-def test_started_while_it_is_out_the_second_status_tells(bench):
+def test_started_while_it_is_out_the_third_status_tells(bench):
     story = bench("", without_controller=True).trigger_status("LAUNCHED")
     assert (story.picture().deployed, story.picture().state) == (False, ParachuteState.UNKNOWN)
     assert not story.link.devices.triggers[34].sound, "it may be out"
-    assert story.after(0.2).trigger_status("LAUNCHED").picture().deployed
+    story.after(0.2).trigger_status("LAUNCHED").after(0.2).trigger_status("LAUNCHED")
+    assert story.picture().deployed
 
 
 def test_two_triggers_do_not_speak_for_each_other(bench):
     story = flying(bench).trigger_status(node_id=36)
-    story.trigger_status("LAUNCHED").trigger_status("LAUNCHED", 36)
+    story.trigger_status("LAUNCHED").trigger_status("LAUNCHED", 36).trigger_status("LAUNCHED")
     assert not story.picture().deployed
     assert story.trigger_status("LAUNCHED").picture().deployed
 

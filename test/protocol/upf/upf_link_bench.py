@@ -22,6 +22,7 @@ from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.protocol.upf.devices import SAYINGS
 from chute_ros.protocol.upf.events import ErrandFinished
 from chute_ros.protocol.upf.link import UpfLink
 from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
@@ -214,8 +215,10 @@ class Bench:
         return self.say(node_id, names.TRIGGER_STATUS, state=state, **more)
 
     def trigger_out(self, node_id: int = TRIGGER) -> Bench:
-        """A trigger says that it has fired, and once more, which is believed of itself."""
-        return self.trigger_status("LAUNCHED", node_id).trigger_status("LAUNCHED", node_id)
+        """A trigger says that it has fired so often that it is believed of itself."""
+        for _ in range(SAYINGS):
+            self.trigger_status("LAUNCHED", node_id)
+        return self
 
     def node_status(self, node_id: int = CONTROLLER, uptime: int = 5, health: int = 0) -> Bench:
         """A NodeStatus."""
