@@ -218,8 +218,8 @@ def report(peers: list[Peer], before: str) -> str:
         "decide and check nothing (`bench/ros_relay.py`). Bare relay: one process with two\n"
         "sockets, that checks nothing (`bench/bare_relay.py`); the ratios are to it.\n"
         f"{count} requests to each, idle and as often under load, taking turns, in one run.\n"
-        f"Under load, besides, {_LOAD * NOMINAL_RATE:.0f} valid frames/s on MAVLink and as many on the "
-        "bus, to the peer\nwhose turn it is. Missed: no SUCCESS within\n"
+        f"Under load, besides, {_LOAD * NOMINAL_RATE:.0f} valid frames/s on MAVLink and as many "
+        "on the bus, to the\npeer whose turn it is. Missed: no SUCCESS within\n"
         f"{_SERVICE_TIMEOUT:g} s. Kills that came: {kills}.\n\n" + table(head, rows) + "\n"
     )
 
