@@ -219,7 +219,7 @@ def report(peers: list[Peer], before: str) -> str:
         "sockets, that checks nothing (`bench/bare_relay.py`); the ratios are to it.\n"
         f"{count} requests to each, idle and as often under load, taking turns, in one run.\n"
         f"Under load, besides, {_LOAD * NOMINAL_RATE:.0f} valid frames/s on MAVLink and as many "
-        "on the bus, to the\npeer whose turn it is. Missed: no SUCCESS within\n"
+        "on the bus, to the peer\nwhose turn it is. Missed: no SUCCESS within\n"
         f"{_SERVICE_TIMEOUT:g} s. Kills that came: {kills}.\n\n" + table(head, rows) + "\n"
     )
 
