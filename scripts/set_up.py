@@ -167,7 +167,8 @@ class Maker:
         instead of removing the folder under it.
         """
         env = dict(os.environ)
-        for name in ("PYTHONHOME", "PYTHONPATH", "VIRTUAL_ENV"):
+        # The last: of a shell that uses another environment, whose libraries would be taken.
+        for name in ("PYTHONHOME", "PYTHONPATH", "VIRTUAL_ENV", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"):
             env.pop(name, None)
         if pythonpath:
             env["PYTHONPATH"] = pythonpath

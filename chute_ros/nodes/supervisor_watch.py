@@ -94,9 +94,7 @@ class SupervisorWatch:
             text = f"clocks differ: its heartbeat seems {self._delay:.3f} s old"
         elif self._clock.offset:
             level = diagnostics.WARN
-            text = (
-                f"heard; the wall clocks differ by {self._clock.offset:.3f} s, and are put right"
-            )
+            text = f"heard; a wall clock was set, or differs, by {self._clock.offset:.3f} s"
         every = {
             "heartbeat age (s)": age,
             "times lost": self._times_lost,
