@@ -167,9 +167,11 @@ class Maker:
         instead of removing the folder under it.
         """
         env = dict(os.environ)
-        # The last: of a shell that uses another environment, whose libraries would be taken.
-        for name in ("PYTHONHOME", "PYTHONPATH", "VIRTUAL_ENV", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"):
+        for name in ("PYTHONHOME", "PYTHONPATH", "VIRTUAL_ENV"):
             env.pop(name, None)
+        if env.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None):
+            # We run in the Python of another environment, whose libraries these are.
+            env.pop("LD_LIBRARY_PATH", None)
         if pythonpath:
             env["PYTHONPATH"] = pythonpath
         env.update(PIP_DISABLE_PIP_VERSION_CHECK="1", UV_PYTHON_DOWNLOADS="never")
