@@ -54,6 +54,10 @@ def test_a_first_heartbeat_that_is_old_is_old() -> None:
     assert clocks.age(49.4) == 49.4, "a way may take so long: nothing is put right"
 
 
+def test_clocks_that_differ_by_the_margin_are_left_as_they_are() -> None:
+    assert ClockSteps(MARGIN).heard(-MARGIN, 5.0) == 0.0
+
+
 def test_one_that_is_set_back_again_is_as_before() -> None:
     clocks, now = heard_so_far()
     clocks.heard(3600.002, now + BEAT)
