@@ -50,6 +50,11 @@ class Flood:
         self._process.communicate()
 
 
+def attitude(now: float) -> dialect.MAVLink_message:
+    """Level; each a little different."""
+    return dialect.MAVLink_attitude_message(0, 0.0, 0.0, now % 1e-3, 0.0, 0.0, 0.0)
+
+
 def main() -> None:
     """Until stdin ends."""
     network_file, network_port, bus_port = map(int, sys.argv[1:])
@@ -64,18 +69,16 @@ def main() -> None:
         if select.select([sys.stdin], [], [], wait)[0]:
             line = sys.stdin.readline()
             if not line:
-                break
+                return
             rate, due = float(line), time.monotonic()
             print("set", flush=True)
             continue
         now = time.monotonic()
-        level = dialect.MAVLink_attitude_message(0, 0.0, 0.0, now % 1e-3, 0.0, 0.0, 0.0)
-        network.sendto(encoder.encode(level, now), to)
+        network.sendto(encoder.encode(attitude(now), now), to)
         endpoint.broadcast("uavcan.protocol.NodeStatus", {"uptime_sec": int(now - begun)})
         for frame in endpoint.take_output():
             bus.write(frame)
         due += 1.0 / rate
-    bus.close()
 
 
 if __name__ == "__main__":

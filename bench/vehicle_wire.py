@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from bench.flood import attitude
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
@@ -91,8 +92,7 @@ class VehicleWire:
             return
         while self._flood_at <= now:
             self._flood_at += self._flood_interval
-            level = dialect.MAVLink_attitude_message(0, 0.0, 0.0, now % 1e-3, 0.0, 0.0, 0.0)
-            self._wire.write(self._encoder.encode(level, now))
+            self._wire.write(self._encoder.encode(attitude(now), now))
 
     def _hear(self) -> None:
         for file in self._wire.files():

@@ -104,14 +104,14 @@ class Deploying:
         self._requests.begin(token, goal, now)
         # Nobody says which trigger is whose: one of several controllers that was named is not
         # gone round, as that would fire the others' triggers as well.
-        alone = not named or len(self._devices.controllers) == 1
+        alone = not named or self._devices.only_controller() is not None
         if self._config.last_resort and alone and not controller.never_deploys:
             wait = self._config.last_resort_after if controller.alive else 0.0
             self._last_resort.watch(token, goal.commands[-1], now, wait)
 
     def _triggers_of_it(self) -> list[Trigger]:
         """The triggers whose word counts for a controller: those of the only one."""
-        alone = len(self._devices.controllers) == 1
+        alone = self._devices.only_controller() is not None
         return self._devices.alive_triggers() if alone else []
 
     def _by_trigger(self, token: int, trigger: Trigger, now: float) -> None:

@@ -138,10 +138,9 @@ class Trigger(Device):
 
     def __init__(self, node_id: int, config: UpfConfig, definitions: Definitions) -> None:
         super().__init__(node_id, config, definitions)
-        #: It says that it has fired, and is not believed yet.
-        self.doubted = False
         self._sayings = 0
-        self._doubted_values: Mapping[str, Any] = {}
+        #: A status that says that it has fired, and is not believed yet.
+        self._doubted_values: Mapping[str, Any] | None = None
 
     def status_message(
         self, values: Mapping[str, Any], now: float, expected: bool
@@ -154,15 +153,20 @@ class Trigger(Device):
         """
         news = self._says_launched(values) and not self.launched
         self._sayings = self._sayings + 1 if news else 0
-        self.doubted = news and not expected and self._sayings < SAYINGS
-        if self.doubted:
+        self._doubted_values = None
+        if news and not expected and self._sayings < SAYINGS:
             self._doubted_values, values = values, self.values
         return self.take_status(names.TRIGGER_STATUS, values, now)
 
+    @property
+    def doubted(self) -> bool:
+        """It says that it has fired, and is not believed yet."""
+        return self._doubted_values is not None
+
     def believe(self) -> None:
-        """Somebody else says so too: what was left aside is true."""
-        if self.doubted:
-            self.doubted, self.values = False, self._doubted_values
+        """Somebody else says so too: what was left aside, if anything was, is true."""
+        if self._doubted_values is not None:
+            self.values, self._doubted_values = self._doubted_values, None
 
     @property
     def state(self) -> str:

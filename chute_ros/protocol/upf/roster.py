@@ -77,7 +77,7 @@ class UpfDevices:
     def picture_of(self, controller: Controller, now: float) -> ParachuteStatus:
         """One controller; with several, only its own word counts, as nobody says which trigger
         is whose."""
-        alone = len(self.controllers) == 1
+        alone = self.only_controller() is not None
         # A trigger that is lost counts only by being lost: it may have been exchanged.
         return controller.status(now, list(self.triggers.values()) if alone else [])
 
