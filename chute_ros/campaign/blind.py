@@ -16,6 +16,8 @@ _MOST_LOSS, _MOST_STALL = 0.6, 0.3
 #: A standby has taken over from a supervisor that stopped or whose ways are cut by then, s:
 #: `lease_timeout` (twice, by rank) after the last claim, or after the links have become LOST.
 _TAKEN_OVER, _TAKEN_OVER_DEAF = 1.5, 2.5
+#: What a sensor told counts for so long, s.
+_LASTS = 1.0
 _NO_POWER = {
     Failure.POWER: "the autopilot had no power, and nothing else tells of the vehicle",
     Failure.COMPUTER_POWER: "the flight computer had no power, and nothing else fires the drogue",
@@ -59,6 +61,17 @@ def blinded(scenario: Scenario, up: float, need: Need) -> str:
     if best >= enough_time(scenario):
         return ""
     return "; ".join(sorted(one.cause for one in hidden if up + one.end > need.begin))
+
+
+def misled(scenario: Scenario, up: float, at: float) -> str:
+    """Which sensors told together, until then (virtual s), what was not so; empty: one at most.
+    What rests on two signs is as wrong as they are."""
+    lied = {
+        one.sensor
+        for one in scenario.faults
+        if isinstance(one, SensorFault) and up + one.begin <= at <= up + one.end + _LASTS
+    }
+    return f"sensors {', '.join(sorted(lied))} were wrong at once" if len(lied) > 1 else ""
 
 
 def _all_hidden(scenario: Scenario) -> list[_Hidden]:

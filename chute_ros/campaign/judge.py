@@ -6,7 +6,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from chute_ros.campaign.blind import Need, blinded, enough_time
+from chute_ros.campaign.blind import Need, blinded, enough_time, misled
 from chute_ros.campaign.flight import Flown
 from chute_ros.campaign.scenario import Vehicle
 from chute_ros.campaign.truth import SOFT, SOFT_UNDER_DROGUE
@@ -73,6 +73,8 @@ def _never(flown: Flown) -> Judged | None:
     )
     for one in fired:
         if one.at < known:
+            if lied := misled(flown.scenario, flown.up, one.at):
+                return Judged(Count.NOT_TOLD, lied)
             reasons = "; ".join(one.decision.reasons)
             text = f"{one.decision.action.name} {one.at - flown.up:.2f} s after it was up"
             return Judged(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")

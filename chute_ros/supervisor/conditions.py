@@ -52,12 +52,13 @@ def _measurement(
     samples = known.count
     value, why = flight.reading(config, state, name, now)
     if why:
+        taken = condition.if_unknown and flight.is_missing(config, state, name, now)
 
         def tell() -> str:
-            taken = ", taken to be so" if condition.if_unknown else ""
-            return f"{name} cannot be used: {why} (asked for: {condition.limits}){taken}"
+            so = ", taken to be so" if taken else ""
+            return f"{name} cannot be used: {why} (asked for: {condition.limits}){so}"
 
-        return Finding(True, tell) if condition.if_unknown else Finding(None, tell, samples)
+        return Finding(True, tell) if taken else Finding(None, tell, samples)
     if value != known.value:
         samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
@@ -106,6 +107,17 @@ def _autopilot(
             lambda: (
                 f"autopilot link {vehicle.link_state.name}, vehicle/state {silence:.2f} s old "
                 f"(lost after {limit:g} s)"
+            ),
+        )
+    if fact is AutopilotFact.KILLED_ALOFT:
+        left, minimum = flight.height_since_kill(state, now), config.profile.minimum_height
+        silent = flight.blind(config, state, now)
+        return Finding(
+            left >= minimum and silent,
+            lambda: (
+                f"killed aloft {now - state.killed_at:.2f} s ago, at least {left:.1f} m are left "
+                f"(minimum {minimum:g} m), and {'nothing' if silent else 'something'} tells "
+                "whether it falls"
             ),
         )
     if fact is AutopilotFact.DISARMED:

@@ -28,6 +28,8 @@ from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 _PERSONS = (i.ArmRequest, i.DeployRequest, i.ResetRequest, i.ModeRequest)
 #: What the health of the links can do; in flight nothing.
 _OF_LINKS = (Stimulus.LINKS_UNHEALTHY, Stimulus.LINKS_HEALTHY)
+#: A vehicle that nobody watched may have climbed as fast, m/s.
+_CLIMBS_UNSEEN = 20.0
 #: A limit that an age may just reach has passed this much later, s.
 _JUST_AFTER = 1e-6
 
@@ -102,10 +104,13 @@ class _Update(Deploying):
             link: replace(evidence, heard=evidence.heard + late)
             for link, evidence in self.state.links.items()
         }
+        unseen = late * _CLIMBS_UNSEEN >= self.config.profile.minimum_height
         self.state = replace(
             self.state,
             links=MappingProxyType(heard),
             late_count=self.state.late_count + 1,
+            # A height that can be used counts all the same.
+            was_high=self.state.was_high or (self.state.airborne and unseen),
         )
         text = f"an update came {late:.2f} s late (limit {self.config.late_after:g} s)"
         self.outputs.append(i.Say(f"{text}: silence meanwhile does not count", alarm=True))
@@ -147,6 +152,8 @@ class _Update(Deploying):
         """What has not been begun is decided anew, so that no shot is lost; what a device has
         begun goes on there, so that there is no second one."""
         self.state = replace(self.state, leading=True, epoch=one.epoch)
+        # A parachute that this one has heard to be out is not ordered once more.
+        self.look_at_parachutes()
         self.renew_not_begun("another supervisor took over")
 
     def look(self) -> None:
@@ -176,6 +183,11 @@ class _Update(Deploying):
                 self.alarm(f"in the air although {stage.name}")
             self.move(Stimulus.TAKEN_OFF)
             self._took_off(anew=stage is not Stage.LANDED)
+        elif in_air and self._falls_since_kill():
+            self.alarm("it falls since the kill, although it said that it stood")
+            self.state = replace(
+                self.state, airborne=True, airborne_since=self.now, killed_in_flight=True
+            )
         elif in_air is False and listed(stage, Stimulus.LANDED):
             self.move(Stimulus.LANDED)
             self.state = replace(self.state, airborne=False, rebooted=False, landed_at=self.now)
@@ -191,6 +203,12 @@ class _Update(Deploying):
             return True
         again = state.kill is not None and self.armed_since(state.kill)
         return not state.killed_in_flight and not state.deploy_rule and again
+
+    def _falls_since_kill(self) -> bool:
+        """It was killed as one on the ground, and was in the air all the same."""
+        state = self.state
+        on_ground = state.stage is Stage.KILLING and not state.killed_in_flight
+        return on_ground and bool(flight.moving(self.config, state, self.now))
 
     def _note_down(self) -> None:
         """Since when it says that it stands, and nothing contradicts it."""

@@ -9,21 +9,29 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
-from statistics import median
+from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.measurements import CLIMB_RATE
+from chute_ros.supervisor.measurements import CLIMB_RATE, Measured
 from chute_ros.supervisor.state import State
 
+#: m/s^2.
+GRAVITY = 9.81
 #: Less specific force than this is free fall, m/s^2 (half of what a body at rest feels).
 FREE_FALL = 4.9
 #: An autopilot that started anew in flight must say for so long that it stands, s.
 _LANDED_HOLD_AFTER_REBOOT = 10.0
+#: One that says so higher than a deploy needs, on a roof or a hill, for so long, s: the land
+#: detectors of autopilots have erred in a hover.
+_LANDED_HOLD_ALOFT = 5.0
 #: For so long after a landing a vehicle may turn out not to have landed, s.
 _FLIGHT_JUST_BEFORE = 60.0
 #: A climb rate needs heights this far apart at least, s.
 _CLIMB_OVER = 0.4
+#: The heights lie so near to a climb with the rate that they tell, m, and so much more for each
+#: m/s of it: a second of free fall bends them by 0.4 m, one of ten times the gravity by 4 m.
+_SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
 
@@ -33,8 +41,7 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name == "height" and state.rebooted:
         return math.nan, "the autopilot started anew in flight, and its height with it"
     if name == CLIMB_RATE:
-        rate = climb_rate(config, state, now)
-        return rate, "too few heights that can be used" if math.isnan(rate) else ""
+        return _climb_rate(config, state, now)
     known = state.measured(name)
     why = known.unusable(config.profile.limits[name], now)
     if not why:
@@ -45,6 +52,18 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     return math.nan, why
 
 
+def is_missing(config: SupervisorConfig, state: State, name: str, now: float) -> bool:
+    """Nothing tells a measurement that cannot be used; otherwise what tells it is wrong."""
+    told_by = "height" if name == CLIMB_RATE else name
+    known, limits = state.measured(told_by), config.profile.limits[told_by]
+    if told_by == "height" and state.rebooted:
+        return True
+    if name == CLIMB_RATE and not known.unusable(limits, now):
+        # One that was doubted a moment ago is told, and wrong.
+        return _too_few(state, known) and not now - known.doubted_at <= limits.max_age
+    return known.is_missing(limits, now)
+
+
 def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
     """A measurement, or NaN where it cannot be used."""
     return reading(config, state, name, now)[0]
@@ -53,17 +72,48 @@ def measured(config: SupervisorConfig, state: State, name: str, now: float) -> f
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
     """Vertical speed from the heights of the last second, m/s, for sources that tell none (a
     receiver without a fix, a barometer alone). NaN: not known."""
+    return _climb_rate(config, state, now)[0]
+
+
+def _climb_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
     heights, limits = state.heights, config.profile.limits["height"]
     height = state.measured("height")
-    if not heights or height.unusable(limits, now) or state.rebooted:
-        return math.nan
-    if height.measured_at - heights[0][0] < _CLIMB_OVER:
-        return math.nan
+    if height.unusable(limits, now) or state.rebooted or _too_few(state, height):
+        return math.nan, "too few heights that can be used"
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rates = [
         (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)
     ]
-    return median(rates)
+    rate = median(rates)
+    # Noise has a middle one as well, which may be any; but its heights do not follow it.
+    rests = [value - rate * at for at, value in heights]
+    middle = median(rests)
+    scatter = fmean([abs(one - middle) for one in rests])
+    limit = _SCATTER + _SCATTER_OF_RATE * abs(rate)
+    if scatter > limit:
+        return math.nan, f"the heights scatter by {scatter:.1f} m (limit {limit:.1f} m)"
+    return rate, ""
+
+
+def _too_few(state: State, height: Measured) -> bool:
+    heights = state.heights
+    return not heights or height.measured_at - heights[0][0] < _CLIMB_OVER
+
+
+def blind(config: SupervisorConfig, state: State, now: float) -> bool:
+    """Nothing that can be used tells whether it falls."""
+    signs = ("vertical_speed", "acceleration")
+    return all(unusable(config, state, name, now) for name in signs)
+
+
+def height_since_kill(state: State, now: float) -> float:
+    """What a body without drag has left of the height, m, in which our kill was decided in flight;
+    NaN: it was not, or the height or the speed was not known. A vehicle that says that it stood, or
+    that its motors were off, was not stopped by it."""
+    if not state.killed_in_flight or state.killed_standing:
+        return math.nan
+    passed = now - state.killed_at
+    return state.killed_height - state.killed_sinking * passed - GRAVITY / 2.0 * passed**2
 
 
 def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
@@ -157,11 +207,19 @@ def _falls_against_its_word(
     return falls and (sinks or high)
 
 
+def _told_high(config: SupervisorConfig, state: State) -> bool:
+    """By the last height that was told, it is high enough for a deploy."""
+    height = state.measured("height").value - state.armed_height
+    return height > config.profile.minimum_height
+
+
 def landed_at(config: SupervisorConfig, state: State) -> float:
     """When one that says that it stands is believed, monotonic s; NaN: it does not say so."""
     hold = config.profile.landed_hold
     if state.rebooted:
         hold = max(hold, _LANDED_HOLD_AFTER_REBOOT)
+    elif hold > 0.0 and _told_high(config, state):
+        hold = max(hold, _LANDED_HOLD_ALOFT)
     return state.down_since + hold
 
 

@@ -7,6 +7,7 @@ allows.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from chute_ros.supervisor import flight
@@ -18,6 +19,8 @@ from chute_ros.supervisor.state import State
 
 #: In place of a rule's name: a person ordered it.
 OPERATOR = "operator"
+#: A height that has jumped holds no deploy back for so long, s: as long as a fall may last.
+_JUMP_DOUBTED = 10.0
 #: Where a person may deploy without force.
 _IN_FLIGHT = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
 
@@ -80,6 +83,8 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
     height = flight.lowest_height(config, state, now)
+    if now < state.measured("height").jumped_at + _JUMP_DOUBTED:
+        height = math.nan  # the world, or its source, is another one; which one nobody knows
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
     if -profile.minimum_height <= height < profile.minimum_height:
         return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"

@@ -82,10 +82,14 @@ class Orders(Steps):
                 stood = flight.down_undisputed(
                     self.config, self.state, self.now
                 ) or flight.disarmed(self.config, self.state, self.now)
+                sinking = -flight.measured(self.config, self.state, "vertical_speed", self.now)
                 self.state = replace(
                     self.state,
                     killed_in_flight=self.state.airborne,
                     killed_standing=stood,
+                    killed_at=self.now,
+                    killed_height=flight.measured(self.config, self.state, "height", self.now),
+                    killed_sinking=max(sinking, 0.0),
                 )
             self.move(Stimulus.KILL, why)
 

@@ -18,6 +18,8 @@ from chute_ros.supervisor.reports import Reports
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 from chute_ros.supervisor.state import State
 
+#: Two floats that tell the same time may differ by this, s.
+_ROUNDING = 1e-6
 _NOTHING, _LATCHED = RuleEvidence(), RuleEvidence(latched=True)
 
 
@@ -54,12 +56,35 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
         deadlines.append(evidence.deadline(rule, now))
         if rule.asks_the_autopilot:
             deadlines.append(state.vehicle_received + config.vehicle_state_age)
+        if rule.asks_for_a_kill_aloft:
+            deadlines += [
+                state.measured(name).turns_at(limits, now)
+                for name, limits in config.profile.limits.items()
+            ]
         if evidence.holds:
             deadlines += [
                 state.measured(name).measured_at + config.profile.limits[name].max_age
                 for name in rule.measured
             ]
     return deadlines
+
+
+def rests_until(config: SupervisorConfig, state: State, now: float) -> float:
+    """Until when time alone changes nothing of what is known of the vehicle, monotonic s."""
+    after = now - _ROUNDING
+    limits = config.profile.limits
+    turns = [state.measured(name).turns_at(limits[name], after) for name in limits]
+    # What it says of itself is young enough until then.
+    said = state.vehicle_received + config.vehicle_state_age
+    turns += [turn for turn in (said, said - state.vehicle.armed_age) if turn >= after]
+    return min(turns) - _ROUNDING
+
+
+def _as_before(rule: Rule, evidence: RuleEvidence) -> bool:
+    """Looked at again, it is what it was: a rule that did not hold, of a vehicle that rests."""
+    looked_at = len(evidence.seen) == len(rule.conditions)
+    quiet = evidence.holds is False and not evidence.latched
+    return rule.rests_on_the_vehicle and looked_at and quiet
 
 
 class Policy(Reports):
@@ -77,11 +102,14 @@ class Policy(Reports):
         """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
         fulfilled: list[Judged] = []
         stage, rules = self.state.stage, dict(self.state.rules)
+        rests = self._vehicle_rests()
         for rule in self.config.profile.rules:
             if stage not in rule.states:
                 # What was counted in another state says nothing about the next time.
                 latched = self.state.rule(rule.name).latched and rule.clears is Clears.NEVER
                 rules[rule.name] = _LATCHED if latched else _NOTHING
+                continue
+            if rests and _as_before(rule, self.state.rule(rule.name)):
                 continue
             judged = judge(self.config, self.state, rule, self.now)
             rules[rule.name] = self._cleared(rule, judged.evidence)
@@ -91,6 +119,22 @@ class Policy(Reports):
         # A stable sort: of two that want the same, the one that the profile names first.
         for judged in sorted(fulfilled, key=lambda one: -one.rule.action):
             self._act(judged)
+
+    def _vehicle_rests(self) -> bool:
+        """Of the vehicle the same is known as at the last look: most updates are heartbeats."""
+        state, before = self.state, self.before
+        if (
+            state.measurements is before.measurements
+            and state.heights is before.heights
+            and state.vehicle is before.vehicle
+            and state.vehicle_received == before.vehicle_received
+            and state.rebooted == before.rebooted
+            and self.now < before.vehicle_rests_until
+        ):
+            return True
+        until = rests_until(self.config, state, self.now)
+        self.state = replace(state, vehicle_rests_until=until)
+        return False
 
     def _cleared(self, rule: Rule, evidence: RuleEvidence) -> RuleEvidence:
         if not evidence.latched:

@@ -26,7 +26,9 @@ class Reports(Requests):
         known = not math.isnan(before.heard)
         silent = before.silent(limits.lost_after, self.now)
         self.set_evidence(one.link, before.with_heartbeat(one, limits, self.now))
-        self._look_at_clock(one.link)
+        if self.state.leading:
+            # The alarms of one that follows are those of the leader, which has another clock.
+            self._look_at_clock(one.link)
         if known and (silent or one.seq <= before.seq):
             # It may know of no decision; what still holds for it is decided anew.
             restarted = one.seq <= before.seq
@@ -98,10 +100,13 @@ class Reports(Requests):
             self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
 
     def _note_height_told(self) -> None:
-        """Keep the heights of the last second, at most ten of them."""
+        """Keep the heights of the last second, at most ten of them, all since one was doubted:
+        what is left of noise without its jumps may look like a fall."""
         height = self.state.measured("height")
         kept = tuple(
-            one for one in self.state.heights if 0.0 <= height.measured_at - one[0] <= 1.0
+            one
+            for one in self.state.heights
+            if 0.0 <= height.measured_at - one[0] <= 1.0 and not one[0] < height.doubted_at
         )
         if not kept or height.measured_at - kept[-1][0] >= 0.1:
             kept = (*kept, (height.measured_at, height.value))

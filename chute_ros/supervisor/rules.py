@@ -44,6 +44,8 @@ class AutopilotFact(enum.Enum):
     REBOOTED = "rebooted"  # it started anew in flight
     DISARMED = "disarmed"  # it says that the motors are off
     EMERGENCY = "emergency"  # it says MAV_STATE_EMERGENCY or MAV_STATE_FLIGHT_TERMINATION
+    #: We stopped its motors in the air, so long ago that it still falls, and nothing tells how.
+    KILLED_ALOFT = "killed_aloft"
 
 
 class DeviceFact(enum.Enum):
@@ -62,7 +64,8 @@ class MeasurementCondition:
     above: float = math.nan
     below: float = math.nan
     weight: float = 1.0
-    #: Where nothing usable tells, it is taken to hold: a second sign that may be missing.
+    #: Where nothing tells it, it is taken to hold: a second sign that may be missing. One that is
+    #: told and cannot be is not missing.
     if_unknown: bool = False
 
     @cached_property
@@ -142,6 +145,22 @@ class Rule:
     def asks_the_autopilot(self) -> bool:
         """One of its conditions is what the autopilot says of itself."""
         return any(isinstance(one, AutopilotCondition) for one in self.conditions)
+
+    @cached_property
+    def rests_on_the_vehicle(self) -> bool:
+        """All its conditions are what the vehicle tells, and nothing of what we did."""
+        kinds = (MeasurementCondition, AutopilotCondition)
+        return not self.asks_for_a_kill_aloft and all(
+            isinstance(one, kinds) for one in self.conditions
+        )
+
+    @cached_property
+    def asks_for_a_kill_aloft(self) -> bool:
+        """One of its conditions is AutopilotFact.KILLED_ALOFT."""
+        return any(
+            isinstance(one, AutopilotCondition) and one.fact is AutopilotFact.KILLED_ALOFT
+            for one in self.conditions
+        )
 
 
 @dataclass(frozen=True)

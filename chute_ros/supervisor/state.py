@@ -115,6 +115,9 @@ class State:
     #: (monotonic s, m) of the heights of the last second, the oldest first.
     heights: tuple[tuple[float, float], ...] = ()
     rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
+    #: Until then time alone changes nothing of what is known of the vehicle, monotonic s;
+    #: -infinity: nobody has looked.
+    vehicle_rests_until: float = -math.inf
     #: "link device" -> its newest wish for a kill.
     asks: Mapping[str, Ask] = field(default_factory=lambda: MappingProxyType({}))
     block: Pending | None = None
@@ -134,6 +137,10 @@ class State:
     airborne: bool = False
     #: The kill that is under way, or was the last, was decided in flight.
     killed_in_flight: bool = False
+    #: When that was, the height then, m, and how fast it sank, m/s.
+    killed_at: float = math.nan
+    killed_height: float = math.nan
+    killed_sinking: float = math.nan
     #: Since when the vehicle says that it stands and nothing contradicts it.
     down_since: float = math.nan
     #: It said before that kill that it stands, or is disarmed: that is not the kill's effect.

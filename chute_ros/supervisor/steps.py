@@ -26,6 +26,8 @@ class Steps:
 
     def __init__(self, config: SupervisorConfig, state: State, now: float) -> None:
         self.config, self.state, self.now = config, state, now
+        #: As it was at the end of the last update.
+        self.before = state
         self.outputs: list[i.Output] = []
 
     def move(self, stimulus: Stimulus, why: str = "") -> None:

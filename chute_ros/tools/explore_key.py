@@ -41,6 +41,12 @@ LEFT_OUT = frozenset(
         "details",
         "earlier",
         "heights",  # only where no speed is told, which is told here with every height
+        "vehicle_rests_until",  # told by the measurements
+        "doubted_at",  # as the next: only after a jump, and no story here jumps
+        "jumped_at",
+        "killed_at",  # as the two after it, told by the height that is left since
+        "killed_height",
+        "killed_sinking",
         "home",  # from it only the fence is measured, whose rule raises an alarm
     }
 )
@@ -76,6 +82,7 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         math.isnan(state.landed_at),
         state.reboots_before,
         state.killed_standing,
+        _left(flight.height_since_kill(state, now), config.profile.minimum_height),
         _since(state.down_since, now, 10.0 if state.rebooted else config.profile.landed_hold),
         round(state.armed_height, 3),
         tuple(sorted(state.released_before)),
@@ -83,6 +90,11 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         (len(state.kill_tokens) > 0, len(state.deploy_tokens) > 0),
         (bool(state.alarms), math.isnan(state.alarm_at)),
     )
+
+
+def _left(height: float, minimum: float) -> float:
+    """Of a height, m, above the minimum; -1: it is not known, or below it."""
+    return round(height - minimum, 3) if height >= minimum else -1.0
 
 
 def _since(when: float, now: float, limit: float) -> float:
@@ -130,6 +142,7 @@ def _measured(config: SupervisorConfig, state: State, name: str, now: float) -> 
     return (
         round(measured.value, 3) if not math.isnan(measured.value) else None,
         _since(measured.measured_at, now, limits.max_age),
+        _since(measured.told_at, now, limits.max_age),
         bool(measured.rejected),
         round(measured.candidate, 3) if measured.candidates else None,
         _since(measured.candidate_at, now, limits.max_age),

@@ -29,7 +29,8 @@ PROPERTIES = {
     "ground": "no rule deploys from a stage on the ground, nor a vehicle that says undisputedly "
     "that it stands or is disarmed, unless it does so since a kill in flight, or says disarmed "
     "since its autopilot started anew in flight",
-    "silence": "no rule deploys unless a sign of a fall came within the last second: silence and "
+    "silence": "no rule deploys unless a sign of a fall came within the last second, or a kill "
+    "was decided in flight, so high and so short a time ago that it is not down yet: silence and "
     "lost links alone never do",
     "at once": "a rule that is fulfilled in flight and not denied kills in the same update, and "
     "it is denied only where the vehicle stands, is disarmed or is too low",
@@ -63,6 +64,11 @@ class Memory:
     kill_confirmed: bool = False
     #: It was decided of a vehicle that stood, or was disarmed, already.
     kill_standing: bool = False
+    #: In flight, at this height, m, sinking so fast, m/s; NaN: it was not, or was not told.
+    kill_height: float = math.nan
+    kill_sinking: float = math.nan
+    #: When that was.
+    first_killed_at: float = math.nan
     deploy_numbers: frozenset[tuple[int, int]] = frozenset()
     deploy_confirmed: bool = False
     newest: tuple[int, int] = (0, 0)
@@ -71,7 +77,19 @@ class Memory:
         """Equal for two that judge the same from now on."""
         waited = min(round(now - self.killed_at, 3), config.kill_to_deploy_delay)
         since = waited if self.kill is not None else None
-        return since, self.kill_confirmed, self.kill_standing, self.deploy_confirmed
+        left = self.height_left(now)
+        return (
+            since,
+            self.kill_confirmed,
+            self.kill_standing,
+            self.deploy_confirmed,
+            round(left, 3) if left >= config.profile.minimum_height else None,
+        )
+
+    def height_left(self, now: float) -> float:
+        """At least so many m are left of its height since the kill; NaN: not known."""
+        passed = now - self.first_killed_at
+        return self.kill_height - self.kill_sinking * passed - 9.81 / 2.0 * passed**2
 
 
 @dataclass
@@ -170,7 +188,8 @@ class Properties:
             # One that has just taken off is told to be in the air in this very update.
             ground = before.stage in ON_GROUND and not self._says_in_air(after)
             self._expect("ground", not ground and not stands, told)
-            self._expect("silence", falls, told)
+            aloft = memory.height_left(now) + _EPSILON >= self.config.profile.minimum_height
+            self._expect("silence", falls or aloft, told)
         elif stands and falls:
             self.exercised["ground"] += 1
         elif before.airborne and not falls and now - after.vehicle_received > 1.0:
@@ -242,13 +261,27 @@ class Properties:
         if again or before.deploy_rule:
             # The delay goes on counting from the first.
             return replace(memory, kill_numbers=memory.kill_numbers | {number})
-        return Memory(
+        told, stands = after.vehicle, self._stands(after, now)
+        new = Memory(
             decision,
             now,
             frozenset({number}),
-            kill_standing=self._stands(after, now) and before.stage is not Stage.KILLING,
             deploy_confirmed=memory.deploy_confirmed,
             newest=memory.newest,
+        )
+        if before.stage is Stage.KILLING:
+            return replace(
+                new,
+                kill_height=memory.kill_height,
+                kill_sinking=memory.kill_sinking,
+                first_killed_at=memory.first_killed_at,
+            )
+        return replace(
+            new,
+            kill_standing=stands,
+            kill_height=told.height if after.airborne and not stands else math.nan,
+            kill_sinking=max(-told.vertical_speed, 0.0),
+            first_killed_at=now,
         )
 
     def _stands(self, state: State, now: float) -> bool:

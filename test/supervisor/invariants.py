@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from story import LINK, START
 
@@ -55,6 +56,14 @@ class Watch:
         self.killed_at = math.nan
         self.forced = False
 
+    def _looks_at_all_that_changes(self, before: State, inputs: tuple[i.Input, ...]) -> None:
+        """A rule that is not looked at, as nothing has changed, would be what it was."""
+        looked_at = replace(before, vehicle_rests_until=-math.inf)
+        state, outputs = update(self.config, looked_at, inputs, self.now)
+        until = state.vehicle_rests_until
+        same = replace(self.state, vehicle_rests_until=until)
+        assert (repr(same), repr(outputs)) == (repr(state), repr(self.outputs))
+
     def feed(self, *inputs: i.Input) -> tuple[i.Output, ...]:
         """One update, watched."""
         before = self.state
@@ -64,6 +73,7 @@ class Watch:
             if isinstance(one, i.DeployRequest):
                 self.forced |= one.force
         self.state, self.outputs = update(self.config, before, inputs, self.now)
+        self._looks_at_all_that_changes(before, inputs)
         new = [
             output.decision
             for output in self.outputs

@@ -40,19 +40,30 @@ def test_one_that_steps_down_with_a_deploy_ordered_fires_it_when_it_leads_again(
 
 def test_a_landed_state_that_was_wrong_in_a_hover_does_not_veto_the_fall_after_it() -> None:
     story = Story(shipped("multirotor")).flying().fly(2.0)
-    story.fly(4.0, landed_state=GROUND)
+    story.fly(8.0, landed_state=GROUND)
     assert story.state.stage is Stage.LANDED
-    story.fall(6.0, landed_state=GROUND, tilt=90.0)
+    story.fall(10.0, landed_state=GROUND, tilt=90.0)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
 
 
 def test_nor_one_after_which_the_autopilot_disarmed_by_itself() -> None:
     off: dict[str, Any] = {"landed_state": GROUND, "armed": Armed.DISARMED}
     story = Story(shipped("multirotor")).flying().fly(2.0)
-    story.fly(4.0, landed_state=GROUND).fly(4.2, **off)
+    story.fly(8.0, landed_state=GROUND).fly(8.2, **off)
     assert story.state.stage is Stage.READY
-    story.fall(6.5, **off)
+    story.fall(10.5, **off)
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize(("height", "believed_after"), [(50.0, 5.0), (9.0, 1.0)])
+def test_one_that_says_so_high_above_its_take_off_must_say_it_for_longer(
+    height: float, believed_after: float
+) -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0, height=height)
+    story.fly(2.0 + believed_after - 0.1, height=height, landed_state=GROUND)
+    assert story.state.stage is Stage.IN_FLIGHT
+    story.fly(2.0 + believed_after + 0.15, height=height, landed_state=GROUND)
+    assert story.state.stage is Stage.LANDED
 
 
 @pytest.mark.parametrize(
@@ -222,7 +233,7 @@ def test_but_one_that_falls_after_it_is_not_left_alone() -> None:
 def test_far_below_the_take_off_nobody_knows_the_height_above_the_ground(
     height: float, last: str
 ) -> None:
-    story = Story(shipped("multirotor")).flying().fly(2.0).fly(3.0, height=20.0)
+    story = Story(shipped("multirotor")).flying().fly(3.0, height=20.0)
     for step in range(20):
         story.fly(story.t + 0.1, height=20.0 + (height - 20.0) * (step + 1) / 20)
     story.fly(story.t + 2.0, height=height, vertical_speed=-4.0, tilt=90.0)

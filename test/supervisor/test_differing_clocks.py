@@ -92,3 +92,11 @@ def test_without_stamps_nothing_is_known() -> None:
     story = Story()
     story.alive(5.0)
     assert story.alarms() == []
+
+
+def test_one_that_follows_says_nothing_of_clocks_which_its_leader_tells() -> None:
+    story = Story()
+    for number in range(100):
+        story.state = replace(story.state, leading=False, alarms=(TEXT,) if number % 2 else ())
+        story.at(number / 10, replace(story.heartbeat(), clock_difference=5.0 * (number < 50)))
+    assert story.said() == ""

@@ -129,15 +129,16 @@ def test_how_it_moves_as_nothing_on_the_ground_does(told: dict[str, float], word
 @pytest.mark.parametrize("sign", [{"vertical_speed": -5.0}, {"acceleration": 1.0}])
 def test_a_landing_that_a_falling_vehicle_reports_is_not_believed(sign: dict[str, float]) -> None:
     story = Story(landing()).flying()
+    sign, down = {"height": -1.0, **sign}, {"height": -1.0, "landed_state": GROUND}
     for armed in (Armed.ARMED, Armed.DISARMED):
         story.fly(story.t + 3.0, landed_state=GROUND, armed=armed, **sign)
         assert story.state.stage is Stage.IN_FLIGHT
         assert in_air(story) is True
     assert not flight.disarmed(story.config, story.state, START + story.t)
     # It has come to rest: from then on the hold counts.
-    story.fly(story.t + 0.95, landed_state=GROUND, armed=Armed.DISARMED)
+    story.fly(story.t + 0.95, armed=Armed.DISARMED, **down)
     assert story.state.stage is Stage.IN_FLIGHT
-    story.fly(story.t + 0.2, landed_state=GROUND, armed=Armed.DISARMED)
+    story.fly(story.t + 0.2, armed=Armed.DISARMED, **down)
     assert story.state.stage is Stage.READY
 
 

@@ -156,3 +156,18 @@ def test_two_that_hear_the_same_are_in_the_same_state() -> None:
     own = handed(story)
     again = handed(story, own)
     assert CODEC.to_json(own) == CODEC.to_json(again)
+
+
+def test_a_parachute_that_the_follower_has_heard_to_be_out_is_not_ordered_once_more() -> None:
+    """The leader has not, as nothing reaches it any more."""
+    story = falling()
+    story.at(1.1, story.report(K, Outcome.CONFIRMED))
+    assert story.state.stage is Stage.DEPLOYING
+    state, outputs = take_over(handed(story), 1.2)
+    assert decided(outputs, D), "it has not heard of it either"
+    now = START + AHEAD
+    state, _ = update(CONFIG, follower(), (story.heartbeat(), parachute()), now + 1.0)
+    heard, _ = update(CONFIG, state, (story.heartbeat(), parachute(deployed=True)), now + 1.15)
+    state, outputs = take_over(handed(story, heard), 1.2)
+    assert state.stage is Stage.DEPLOYED
+    assert not decided(outputs, D)

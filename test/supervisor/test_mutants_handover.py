@@ -60,6 +60,7 @@ def leader(clock: float) -> State:
         vehicle_received=clock - 0.25,
         measurements=frozen(height=Measured(30.0, clock, clock, 9)),
         heights=((clock - 0.25, 30.0),),
+        vehicle_rests_until=clock + 0.125,
         rules=frozen(tested=RuleEvidence(level=0.5, shown=(3.0,))),
         asks=MappingProxyType({"upf_can 33": Ask(clock - 0.5, "upf_can", "launching")}),
         block=pending(Action.FLIGHT_BLOCK, clock),
@@ -72,6 +73,9 @@ def leader(clock: float) -> State:
         flown=True,
         airborne=True,
         killed_in_flight=True,
+        killed_at=clock - 4.0,
+        killed_height=80.0,
+        killed_sinking=1.5,
         down_since=clock - 3.0,
         killed_standing=True,
         landed_at=clock - 64.0,
@@ -100,6 +104,7 @@ OWN: dict[str, Any] = {
     "vehicle_received": HERE - 0.125,
     "measurements": frozen(height=Measured(31.0, HERE, HERE, 8)),
     "heights": ((HERE - 0.125, 31.0),),
+    "vehicle_rests_until": -math.inf,
 }
 #: Nobody waits at the one that follows, which does not decide.
 NOBODY: dict[str, Any] = {"leading": False, "kill_tokens": (), "deploy_tokens": ()}

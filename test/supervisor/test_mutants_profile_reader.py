@@ -209,6 +209,7 @@ def test_without_any_link_only_any_can_be_named() -> None:
     assert "mine.yaml, line 19: link in rule 'falls' is 'x': need any" in str(caught.value)
 
 
+FACTS = "lost or rebooted or disarmed or emergency or killed_aloft"
 MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate")
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED"
 PROFILE_KEYS = (
@@ -327,7 +328,7 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
         (
             "{autopilot: rebooted}",
             "{autopilot: 7}",
-            "18: autopilot in rule 'falls' is 7: need lost or rebooted or disarmed or emergency",
+            f"18: autopilot in rule 'falls' is 7: need {FACTS}",
         ),
         (
             "{autopilot: rebooted}",

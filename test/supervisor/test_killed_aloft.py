@@ -1,0 +1,127 @@
+"""The motors were stopped in the air, and nothing tells how it falls; or it was said to stand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from story import DOWN, START, Story, shipped
+
+from chute_ros.model import Action, Armed, LandedState
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.core import next_deadline
+from chute_ros.supervisor.machine import Stage
+
+D = Action.DEPLOY
+BOTH = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+GROUND = LandedState.ON_GROUND
+#: Nothing of how it moves: its autopilot has hung.
+SILENT: dict[str, Any] = {"vertical_speed": math.nan, "acceleration": math.nan}
+#: So long nobody can say what the newest measurements are still worth: their age, and the hold, s.
+WAITS = 1.0 + 0.3
+
+
+def killed(profile: str, height: float, **told: Any) -> Story:
+    """It flew, and a person stopped its motors at t + 2.0."""
+    story = Story(shipped(profile)).flying().fly(2.0, **{"height": height, **told})
+    story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
+    assert story.fired() == ["KILL"]
+    return story
+
+
+def silence(story: Story, until: float) -> Story:
+    """Only the heartbeats of the nodes."""
+    for _ in range(round((until - story.t) / 0.05)):
+        story.at(story.t + 0.05, story.heartbeat())
+    return story
+
+
+@BOTH
+def test_what_is_silent_since_its_motors_were_stopped_high_is_deployed(profile: str) -> None:
+    story = silence(killed(profile, 80.0), 4.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    (deploy,) = story.decisions(D)
+    assert deploy.rule == "killed aloft and silent"
+    assert any("killed aloft" in reason and "70.2" not in reason for reason in deploy.reasons)
+
+
+def test_it_waits_until_the_newest_measurements_are_too_old_and_no_longer() -> None:
+    story = silence(killed("multirotor", 80.0), 2.0 + WAITS - 0.1)
+    assert story.fired() == ["KILL"]
+    silence(story, 2.0 + WAITS + 0.1)
+    assert story.state.deploy_rule == "killed aloft and silent"
+
+
+def test_nobody_needs_to_be_heard_for_it() -> None:
+    """The supervisor wakes by itself when the measurements become too old, and at the hold."""
+    story = killed("multirotor", 80.0)
+    while not story.state.deploy_rule and story.t < 9.0:
+        due = next_deadline(story.config, story.state, START + story.t)
+        assert due < math.inf
+        story.at(due - START)
+    assert story.t == pytest.approx(2.0 + WAITS, abs=0.01)
+
+
+def test_one_whose_speed_or_force_is_told_is_judged_by_that() -> None:
+    for still in ("vertical_speed", "acceleration"):
+        told = {name: value for name, value in SILENT.items() if name != still}
+        story = killed("multirotor", 80.0).fly(6.0, height=math.nan, **told)
+        assert story.fired() == ["KILL"], f"{still} says that it flies on"
+
+
+@pytest.mark.parametrize(
+    ("height", "sinking", "deploys"),
+    [
+        # After WAITS, by half a g t^2, 8.3 m are gone.
+        (10.0 + 8.4, 0.0, True),
+        (10.0 + 8.1, 0.0, False),
+        (10.0 + 8.1 + 13.0, 10.0, False),
+        (10.0 + 8.6 + 13.0, 10.0, True),
+        # That it climbed is not counted on.
+        (10.0 + 8.1, -10.0, False),
+        (0.0, 0.0, False),
+    ],
+)
+def test_it_must_still_be_above_the_minimum_height_without_any_drag(
+    height: float, sinking: float, deploys: bool
+) -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0, height=60.0)
+    story.fly(2.0, every=0.01, height=height, vertical_speed=-sinking)
+    story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
+    silence(story, 9.0)
+    assert story.fired() == (["KILL", "DEPLOY"] if deploys else ["KILL"])
+
+
+@pytest.mark.parametrize("told", [{"height": math.nan}, DOWN])
+def test_one_of_unknown_height_or_that_said_that_it_stood_is_not(told: dict[str, Any]) -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0, height=60.0).fly(1.9, **told)
+    story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
+    assert silence(story, 9.0).fired() == ["KILL"]
+
+
+def test_one_that_was_unplugged_after_its_landing_is_not() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0).fly(5.0, height=0.2, **DOWN)
+    story.at(5.0, i.KillRequest(1, "operator", "to be sure"))
+    assert silence(story, 20.0).fired() == ["KILL"]
+
+
+def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed() -> None:
+    story = Story(shipped("fixed_wing")).flying().fly(2.0, height=80.0)
+    story.fly(8.0, height=80.0, landed_state=GROUND)
+    assert story.state.stage is Stage.LANDED
+    story.at(8.0, i.KillRequest(1, "operator", "a person saw it"))
+    story.fall(12.0, 80.0, landed_state=GROUND, armed=Armed.DISARMED)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert "it falls since the kill, although it said that it stood" in story.alarms()
+
+
+def test_one_that_stands_when_it_is_killed_and_is_carried_away_is_not() -> None:
+    story = Story(shipped("fixed_wing")).ready()
+    story.fly(2.0, height=0.0, **DOWN)
+    story.at(2.0, i.KillRequest(1, "operator", "a test"))
+    # Somebody takes it up, and sets it down not very softly.
+    for speed, force in ((1.5, 9.8), (-1.5, 8.0), (-3.0, 9.0), (0.0, 14.0)):
+        story.fly(story.t + 0.5, height=1.0, vertical_speed=speed, acceleration=force, **DOWN)
+    assert story.fired() == ["KILL"]
+    assert not story.state.killed_in_flight

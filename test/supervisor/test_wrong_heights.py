@@ -1,0 +1,111 @@
+"""Heights that scatter, jump, or stay the same, beside one that is not told at all."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import replace
+
+import pytest
+from story import START, Story, falling, shipped
+
+from chute_ros.supervisor import flight
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Stage
+
+SEEDS = pytest.mark.parametrize("seed", range(8))
+
+
+@SEEDS
+@pytest.mark.parametrize("size", [5.0, 10.0, 30.0])
+def test_noise_on_the_height_is_no_sink_though_nothing_else_tells_a_speed(
+    seed: int, size: float
+) -> None:
+    chance = random.Random(seed)
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    for _ in range(300):
+        height = 60.0 + chance.uniform(-size, size)
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=math.nan)
+    assert story.fired() == []
+
+
+@SEEDS
+def test_a_fall_that_only_a_barometer_tells_is_seen(seed: int) -> None:
+    """Half a metre of noise, as one has; the climb rate stands for the speed."""
+    chance = random.Random(seed)
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    for step in range(1, 41):
+        told = falling(step * 0.1, 120.0)
+        story.fly(
+            story.t + 0.1,
+            every=0.1,
+            height=told["height"] + chance.uniform(-0.5, 0.5),
+            vertical_speed=math.nan,
+            acceleration=told["acceleration"],
+        )
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def rate(*heights: float, every: float = 0.1) -> tuple[float, str]:
+    story = Story(shipped("multirotor")).flying()
+    for height in heights:
+        story.fly(story.t + every, every=every, height=height)
+    return flight.reading(story.config, story.state, "climb_rate", START + story.t)
+
+
+@pytest.mark.parametrize("acceleration", [-9.81, 0.0, 50.0, 100.0])
+def test_a_climb_rate_that_changes_as_a_vehicle_does_is_none_that_scatters(
+    acceleration: float,
+) -> None:
+    way = [acceleration / 2.0 * (step * 0.1) ** 2 for step in range(11)]
+    value, why = rate(*way)
+    assert why == ""
+    assert value == pytest.approx(acceleration * 0.5, abs=abs(acceleration) * 0.2 + 1e-6)
+
+
+def test_heights_that_scatter_say_so() -> None:
+    value, why = rate(*[50.0, 57.0] * 6)
+    assert math.isnan(value)
+    assert why.startswith("the heights scatter by ")
+    assert "limit" in why
+
+
+def test_a_speed_that_is_wrong_beside_a_height_that_stays_the_same_ends_no_flight() -> None:
+    """A height that is told and cannot be is not missing: it does not make the speed enough."""
+    story = Story(shipped("multirotor")).flying()
+    story.fly(12.0, height=50.0 + 1e-13)
+    for _ in range(150):
+        told = replace(story.told(vertical_speed=-15.0).state, height=50.0)
+        story.at(story.t + 0.05, story.heartbeat(), i.VehicleReport(told))
+    assert "stuck" in flight.unusable(story.config, story.state, "height", START + story.t)
+    assert story.fired() == []
+
+
+def test_a_height_that_jumps_down_in_the_fall_holds_no_deploy_back() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0, height=60.0)
+    for step in range(1, 41):
+        told = falling(step * 0.05, 60.0)
+        wrong = 55.0 if step > 4 else 0.0
+        story.fly(story.t + 0.05, **{**told, "height": told["height"] - wrong, "tilt": 80.0})
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
+def test_a_height_that_jumped_long_ago_holds_it_back_again() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0, height=60.0)
+    story.fly(14.0, height=5.0)
+    story.fly(15.0, height=5.0, vertical_speed=-5.0, tilt=80.0)
+    assert story.fired() == ["KILL"]
+    assert "below the minimum 10 m" in story.said()
+
+
+@pytest.mark.parametrize(("unseen", "deploys"), [(0.9, True), (0.4, False)])
+def test_one_that_nobody_watched_after_its_take_off_may_be_high(
+    unseen: float, deploys: bool
+) -> None:
+    """The supervisor hung; meanwhile it climbed, and its autopilot started anew."""
+    story = Story(shipped("multirotor")).flying().fly(0.3, height=3.0, vertical_speed=8.0)
+    again = {"reboot_count": 1, "rebooted_in_flight": True}
+    story._update((story.told(**again),), 0.3 + unseen)
+    story.fly(story.t + 1.0, vertical_speed=-9.0, tilt=70.0, acceleration=1.0, **again)
+    assert story.fired() == (["KILL", "DEPLOY"] if deploys else ["KILL"])
+    assert story.state.stage is (Stage.DEPLOYING if deploys else Stage.KILLING)
