@@ -107,8 +107,8 @@ def blind(config: SupervisorConfig, state: State, now: float) -> bool:
 
 
 def height_since_kill(state: State, now: float) -> float:
-    """What a body without drag has left of the height, m, in which our kill was decided in flight;
-    NaN: it was not, or the height or the speed was not known. A vehicle that says that it stood, or
+    """What a body without drag has left of the height, m, in which our kill was decided in
+    flight; NaN: it was not, or height or speed were not known. One that said that it stood, or
     that its motors were off, was not stopped by it."""
     if not state.killed_in_flight or state.killed_standing:
         return math.nan
