@@ -35,7 +35,8 @@ PROPERTIES = {
     "at once": "a rule that is fulfilled in flight and not denied kills in the same update, and "
     "it is denied only where the vehicle stands, is disarmed or is too low",
     "confirmed": "no deploy leaves after one was confirmed, until a person forces another",
-    "deployed": "only a reset, or a deploy that a person forces, leaves DEPLOYED",
+    "deployed": "only a reset, a deploy that a person forces, or a parachute that nobody ordered "
+    "out and that says in the air that it is not, leaves DEPLOYED",
     "stays out": "in DEPLOYED no deploy leaves, and flight is released only by leaving ACTIVE",
     "shadow": "in SHADOW nothing leaves but what is marked shadow, and the taking back of a "
     "flight block",
@@ -120,6 +121,7 @@ class Properties:
             memory = replace(memory, deploy_confirmed=False)
         if before.stage is Stage.DEPLOYED:
             kept = after.stage is Stage.DEPLOYED or reset or forced
+            kept = kept or self._taken_back(memory, before, after, inputs)
             self._expect("deployed", kept, f"DEPLOYED became {after.stage.name}")
         self._answers(before, after, inputs, outputs)
         self._orders(memory, before, after, outputs, now)
@@ -130,6 +132,13 @@ class Properties:
                 self._mode(before, after, output)
                 memory = self._decision(memory, before, after, output, now)
         return memory
+
+    def _taken_back(
+        self, memory: Memory, before: State, after: State, inputs: tuple[i.Input, ...]
+    ) -> bool:
+        said = any(isinstance(o, i.ParachuteReport) and not o.status.deployed for o in inputs)
+        ordered = bool(memory.deploy_numbers)
+        return said and not ordered and before.airborne and after.stage is Stage.IN_FLIGHT
 
     def _expect(self, name: str, holds: bool, what: str) -> None:
         self.exercised[name] += 1
