@@ -8,7 +8,8 @@ import importlib
 import os
 import signal
 import sys
-from typing import NoReturn
+from collections.abc import Iterator
+from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.nodes.middleware import set_up_middleware
@@ -26,19 +27,8 @@ _NOT_BUILT = (
 
 def run(name: str, class_name: str) -> None:
     """Make the class of node name and spin it until the end; exits with 2 on a user's mistake."""
-    module = f"chute_ros.nodes.{name}_node"
-    try:
-        node_class = getattr(importlib.import_module(module), class_name)
-    except ImportError as error:
-        missing = getattr(error, "name", None) or ""
-        if missing.startswith("chute_msgs") or isinstance(error, ChuteError):
-            sys.exit(f"{_NOT_BUILT}\n({error})")
-        if missing:
-            sys.exit(
-                f"{missing} is not installed: `rosdep install --from-paths src` and "
-                "`pip install -r requirements/runtime.in` bring all that is needed"
-            )
-        raise
+    with _nothing_to_end():
+        node_class = _imported(f"chute_ros.nodes.{name}_node", class_name)
     set_up_middleware()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy
@@ -46,13 +36,9 @@ def run(name: str, class_name: str) -> None:
 
     from chute_ros.nodes.node_executor import NodeExecutor
 
-    try:
-        rclpy.init()
-    except RuntimeError as error:
-        # Arguments and parameter files that cannot be read; ROS names them before its own code.
-        _refused(name, error)
     node = None
     try:
+        _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
         executor = NodeExecutor()
         node = node_class()
@@ -81,6 +67,46 @@ def run(name: str, class_name: str) -> None:
         # The signal's own handler may be shutting down at this very moment.
         with contextlib.suppress(RuntimeError):
             rclpy.try_shutdown()
+
+
+@contextlib.contextmanager
+def _nothing_to_end() -> Iterator[None]:
+    """Ctrl-C ends the process at once: while it imports there is nothing that must be ended, and
+    Python would tell where in an import it was."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:
+        yield  # who started us wants it otherwise
+        return
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _imported(module: str, class_name: str) -> Any:
+    try:
+        return getattr(importlib.import_module(module), class_name)
+    except ImportError as error:
+        missing = getattr(error, "name", None) or ""
+        if missing.startswith("chute_msgs") or isinstance(error, ChuteError):
+            sys.exit(f"{_NOT_BUILT}\n({error})")
+        if missing:
+            sys.exit(
+                f"{missing} is not installed: `rosdep install --from-paths src` and "
+                "`pip install -r requirements/runtime.in` bring all that is needed"
+            )
+        raise
+
+
+def _init(name: str) -> None:
+    import rclpy
+
+    try:
+        rclpy.init()
+    except RuntimeError as error:
+        # Arguments and parameter files that cannot be read; ROS names them before its own code.
+        _refused(name, error)
 
 
 def _security() -> bool:

@@ -137,6 +137,21 @@ def test_a_real_node_ends_cleanly_when_told_to(node, number, namespace, tmp_path
     assert "Traceback" not in log.read_text()
 
 
+@pytest.mark.parametrize("node", NODES)
+def test_ctrl_c_while_a_node_is_being_loaded_ends_it_without_a_word(node):
+    command = [sys.executable, "-X", "importtime", "-m", f"chute_ros.nodes.{node}"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        # Each module is told of once it has been imported.
+        for line in process.stderr:
+            if "rclpy." in line:
+                process.send_signal(signal.SIGINT)
+                break
+        rest = process.stderr.read()
+    assert process.returncode == -signal.SIGINT
+    assert [line for line in rest.splitlines() if not line.startswith("import time:")] == []
+
+
 # config/mavlink_vehicle.yaml
 
 
