@@ -22,13 +22,13 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "mutation.md"
 #: Module -> the tests that were written for it; those of its mutants come with them.
 TESTS = {
-    "gate": ("gate",),
+    "gate": ("gate", "wrong_heights"),
     "machine": ("machine",),
     "counter": ("counter",),
     "lease": ("lease",),
-    "conditions": ("conditions",),
-    "flight": ("flight_picture", "against_its_word", "gate"),
-    "policy": ("policy", "conditions", "gate"),
+    "conditions": ("conditions", "killed_aloft", "wrong_heights"),
+    "flight": ("flight_picture", "against_its_word", "gate", "killed_aloft", "wrong_heights"),
+    "policy": ("policy", "conditions", "gate", "vehicle_rests"),
     "orders": (
         "core_requests",
         "core_device_blocks",
@@ -51,7 +51,7 @@ TESTS = {
     "handover": ("handover",),
     "resume": ("resume",),
     "link_evidence": ("link_evidence",),
-    "measurements": ("measurements",),
+    "measurements": ("measurements", "wrong_heights", "vehicle_rests"),
     "preflight": ("preflight",),
     "profile_reader": ("profile_reader",),
     "yaml_lines": ("profile_reader",),
