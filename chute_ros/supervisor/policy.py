@@ -56,7 +56,7 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
         deadlines.append(evidence.deadline(rule, now))
         if rule.asks_the_autopilot:
             deadlines.append(state.vehicle_received + config.vehicle_state_age)
-        if rule.asks_for_a_kill_aloft:
+        if rule.turns_by_silence:
             deadlines += [
                 state.measured(name).turns_at(limits, now)
                 for name, limits in config.profile.limits.items()

@@ -147,6 +147,13 @@ class Rule:
         return any(isinstance(one, AutopilotCondition) for one in self.conditions)
 
     @cached_property
+    def turns_by_silence(self) -> bool:
+        """It may come to hold as something is told no more."""
+        return self.asks_for_a_kill_aloft or any(
+            isinstance(one, MeasurementCondition) and one.if_unknown for one in self.conditions
+        )
+
+    @cached_property
     def rests_on_the_vehicle(self) -> bool:
         """All its conditions are what the vehicle tells, and nothing of what we did."""
         kinds = (MeasurementCondition, AutopilotCondition)

@@ -109,3 +109,16 @@ def test_one_that_nobody_watched_after_its_take_off_may_be_high(
     story.fly(story.t + 1.0, vertical_speed=-9.0, tilt=70.0, acceleration=1.0, **again)
     assert story.fired() == (["KILL", "DEPLOY"] if deploys else ["KILL"])
     assert story.state.stage is (Stage.DEPLOYING if deploys else Stage.KILLING)
+
+
+def test_a_height_that_is_told_no_more_is_missing_from_then_on_though_nobody_is_heard() -> None:
+    """The vertical speed stays young: it is told once more, without a height."""
+    story = Story(shipped("multirotor")).flying().fly(2.0, vertical_speed=-14.0)
+    for step in range(1, 13):
+        told = story.told(vertical_speed=-14.0).state
+        story.at(2.0 + step / 10, i.VehicleReport(replace(told, height_age=step / 10 - 0.05)))
+    assert story.fired() == []
+    told = story.told(vertical_speed=-14.0).state
+    story.at(3.25, i.VehicleReport(replace(told, height=50.0, height_age=0.9)))
+    story.at(4.2)
+    assert story.decisions()[-1].rule == "critical sink"
