@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, Vehicle, WayFault
@@ -18,6 +19,13 @@ _MOST_LOSS, _MOST_STALL = 0.6, 0.3
 _TAKEN_OVER, _TAKEN_OVER_DEAF = 1.5, 2.5
 #: What a sensor told counts for so long, s.
 _LASTS = 1.0
+#: Sensor -> the measurements of the reasons that it tells.
+_TOLD_BY = {
+    "height": ("height", "climb_rate"),
+    "speed": ("vertical_speed",),
+    "tilt": ("tilt_deg",),
+    "force": ("acceleration",),
+}
 _NO_POWER = {
     Failure.POWER: "the autopilot had no power, and nothing else tells of the vehicle",
     Failure.COMPUTER_POWER: "the flight computer had no power, and nothing else fires the drogue",
@@ -63,15 +71,26 @@ def blinded(scenario: Scenario, up: float, need: Need) -> str:
     return "; ".join(sorted(one.cause for one in hidden if up + one.end > need.begin))
 
 
-def misled(scenario: Scenario, up: float, at: float) -> str:
-    """Which sensors told together, until then (virtual s), what was not so; empty: one at most.
-    What rests on two signs is as wrong as they are."""
-    lied = {
-        one.sensor
+def misled(scenario: Scenario, up: float, at: float, reasons: str) -> str:
+    """Which sensors told together, until then (virtual s), what was not so and was a reason;
+    empty: one at most. What rests on two signs is as wrong as they are."""
+    lied = [
+        one
         for one in scenario.faults
-        if isinstance(one, SensorFault) and up + one.begin <= at <= up + one.end + _LASTS
-    }
-    return f"sensors {', '.join(sorted(lied))} were wrong at once" if len(lied) > 1 else ""
+        if isinstance(one, SensorFault)
+        and one.how != "gone"
+        and up + one.begin <= at <= up + one.end + _LASTS
+        and any(name in reasons for name in _TOLD_BY.get(one.sensor, ()))
+    ]
+    names = sorted(
+        {one.sensor for one, other in itertools.permutations(lied, 2) if _both(one, other)}
+    )
+    return f"sensors {', '.join(names)} were wrong at once" if len(names) > 1 else ""
+
+
+def _both(one: SensorFault, other: SensorFault) -> bool:
+    """They lie at the same time, or what one told last still counts as the other begins."""
+    return one.begin < other.end + _LASTS and other.begin < one.end + _LASTS
 
 
 def _all_hidden(scenario: Scenario) -> list[_Hidden]:
@@ -87,10 +106,11 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
             hidden.append(_Hidden(fault.begin, fault.end, f"{fault.who} stalled"))
         elif isinstance(fault, WayFault) and fault.spell.loss > _MOST_LOSS:
             hidden.append(_cut(fault, scenario.standby))
-    if len(sensors) > 1:
-        hidden += [
-            _Hidden(one.begin, one.end, f"sensor {one.sensor} was wrong") for one in sensors
-        ]
+    for one, other in itertools.combinations(sensors, 2):
+        begin, end = max(one.begin, other.begin), min(one.end, other.end) + _LASTS
+        if one.sensor != other.sensor and begin < end:
+            both = ", ".join(sorted((one.sensor, other.sensor)))
+            hidden.append(_Hidden(begin, end, f"sensors {both} were wrong"))
     return [one for one in hidden if not _is_idle(one.cause, scenario)]
 
 

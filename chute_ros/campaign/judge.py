@@ -73,9 +73,9 @@ def _never(flown: Flown) -> Judged | None:
     )
     for one in fired:
         if one.at < known:
-            if lied := misled(flown.scenario, flown.up, one.at):
-                return Judged(Count.NOT_TOLD, lied)
             reasons = "; ".join(one.decision.reasons)
+            if lied := misled(flown.scenario, flown.up, one.at, reasons):
+                return Judged(Count.NOT_TOLD, lied)
             text = f"{one.decision.action.name} {one.at - flown.up:.2f} s after it was up"
             return Judged(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")
     decided = [one.action for _, one in flown.decided if one.action in fires]

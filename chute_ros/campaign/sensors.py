@@ -6,6 +6,8 @@ import math
 import random
 from dataclasses import dataclass, replace
 
+#: The noise of one that is whole, standard deviation: m, m/s, rad, m/s^2.
+_NOISE = {"height": 0.15, "speed": 0.08, "tilt": 0.01, "force": 0.15}
 #: How much each is wrong: m, m/s, rad, m/s^2.
 _SCALES = {"height": 30.0, "speed": 15.0, "tilt": math.pi, "force": 20.0}
 
@@ -41,6 +43,7 @@ class Sensors:
 
     def read(self, sensor: str, value: float, now: float) -> float:
         """What it says where value is so."""
+        value += self._chance.gauss(0.0, _NOISE[sensor])
         for fault in self.faults:
             if fault.sensor == sensor and fault.begin <= now < fault.end:
                 value = self._wrong(fault, value, now)

@@ -15,8 +15,9 @@ from chute_ros.sim.flight import GRAVITY, FlightModel
 
 #: Gusts change within about this time, s.
 _GUST_TIME = 1.0
-#: It is carried up to where the flight begins, by more than any vehicle climbs, m/s.
-_LIFT = 200.0
+#: It is carried up to where the flight begins, by more than any vehicle climbs, and by less than a
+#: height jumps, m/s.
+_LIFT = 80.0
 
 
 @dataclass

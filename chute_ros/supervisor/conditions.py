@@ -52,13 +52,12 @@ def _measurement(
     samples = known.count
     value, why = flight.reading(config, state, name, now)
     if why:
-        taken = condition.if_unknown and flight.is_missing(config, state, name, now)
 
         def tell() -> str:
-            so = ", taken to be so" if taken else ""
-            return f"{name} cannot be used: {why} (asked for: {condition.limits}){so}"
+            taken = ", taken to be so" if condition.if_unknown else ""
+            return f"{name} cannot be used: {why} (asked for: {condition.limits}){taken}"
 
-        return Finding(True, tell) if taken else Finding(None, tell, samples)
+        return Finding(True, tell) if condition.if_unknown else Finding(None, tell, samples)
     if value != known.value:
         samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
@@ -110,8 +109,8 @@ def _autopilot(
             ),
         )
     if fact is AutopilotFact.KILLED_ALOFT:
-        left, minimum = flight.height_since_kill(state, now), config.profile.minimum_height
-        silent = flight.blind(config, state, now)
+        left, minimum = flight.height_since_kill(config, state, now), config.profile.minimum_height
+        silent = flight.silent_since_kill(config, state, now)
         return Finding(
             left >= minimum and silent,
             lambda: (

@@ -191,6 +191,9 @@ class _Update(Deploying):
         elif in_air is False and listed(stage, Stimulus.LANDED):
             self.move(Stimulus.LANDED)
             self.state = replace(self.state, airborne=False, rebooted=False, landed_at=self.now)
+        if in_air is False and not math.isnan(self.state.killed_height):
+            # It has come down, whatever is told, or not told any more, from now on.
+            self.state = replace(self.state, killed_height=math.nan)
         if self.state.stage is Stage.LANDED and flight.disarmed(self.config, self.state, self.now):
             self.move(Stimulus.SECURED)
         if in_air is False and not self.state.flown and self.state.stage in ON_GROUND:

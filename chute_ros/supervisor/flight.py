@@ -13,7 +13,7 @@ from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.measurements import CLIMB_RATE, Measured
+from chute_ros.supervisor.measurements import CLIMB_RATE
 from chute_ros.supervisor.state import State
 
 #: m/s^2.
@@ -22,13 +22,21 @@ GRAVITY = 9.81
 FREE_FALL = 4.9
 #: An autopilot that started anew in flight must say for so long that it stands, s.
 _LANDED_HOLD_AFTER_REBOOT = 10.0
-#: One that says so higher than a deploy needs, on a roof or a hill, for so long, s: the land
-#: detectors of autopilots have erred in a hover.
+#: One that is armed and says so higher than a deploy needs, on a roof or a hill, for so long, s:
+#: the land detectors of autopilots have erred in a hover.
 _LANDED_HOLD_ALOFT = 5.0
 #: For so long after a landing a vehicle may turn out not to have landed, s.
 _FLIGHT_JUST_BEFORE = 60.0
 #: A climb rate needs heights this far apart at least, s.
 _CLIMB_OVER = 0.4
+#: A height that has jumped is doubted for so long, s: as long as a fall may last.
+JUMP_DOUBTED = 10.0
+#: What tells of a fall whichever way up it is.
+_SIGNS = ("vertical_speed", "acceleration")
+#: A vehicle whose motors were stopped is seen to fall so long after it, s.
+_FALLS_AFTER = 1.0
+#: A vehicle was heard until a kill if it was at most so long before it, s.
+_HEARD_BEFORE = 1.0
 #: The heights lie so near to a climb with the rate that they tell, m, and so much more for each
 #: m/s of it: a second of free fall bends them by 0.4 m, one of ten times the gravity by 4 m.
 _SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
@@ -52,18 +60,6 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     return math.nan, why
 
 
-def is_missing(config: SupervisorConfig, state: State, name: str, now: float) -> bool:
-    """Nothing tells a measurement that cannot be used; otherwise what tells it is wrong."""
-    told_by = "height" if name == CLIMB_RATE else name
-    known, limits = state.measured(told_by), config.profile.limits[told_by]
-    if told_by == "height" and state.rebooted:
-        return True
-    if name == CLIMB_RATE and not known.unusable(limits, now):
-        # One that was doubted a moment ago is told, and wrong.
-        return _too_few(state, known) and not now - known.doubted_at <= limits.max_age
-    return known.is_missing(limits, now)
-
-
 def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
     """A measurement, or NaN where it cannot be used."""
     return reading(config, state, name, now)[0]
@@ -78,42 +74,74 @@ def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
 def _climb_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
     heights, limits = state.heights, config.profile.limits["height"]
     height = state.measured("height")
-    if height.unusable(limits, now) or state.rebooted or _too_few(state, height):
+    if height.unusable(limits, now) or state.rebooted or not _enough(heights, height.measured_at):
         return math.nan, "too few heights that can be used"
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rates = [
         (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)
     ]
     rate = median(rates)
-    # Noise has a middle one as well, which may be any; but its heights do not follow it.
+    # The noise of neighbours has a middle one as well; over the whole second it is small, where a
+    # step is large. What both of them tell is flown.
+    over = _slope(heights)
+    flown = min(rate, over, key=abs) if rate * over > 0.0 else 0.0
+    # And where it is no noise but nonsense, the heights do not follow the rate.
     rests = [value - rate * at for at, value in heights]
     middle = median(rests)
     scatter = fmean([abs(one - middle) for one in rests])
     limit = _SCATTER + _SCATTER_OF_RATE * abs(rate)
     if scatter > limit:
         return math.nan, f"the heights scatter by {scatter:.1f} m (limit {limit:.1f} m)"
-    return rate, ""
+    return flown, ""
 
 
-def _too_few(state: State, height: Measured) -> bool:
-    heights = state.heights
-    return not heights or height.measured_at - heights[0][0] < _CLIMB_OVER
+def _enough(heights: tuple[tuple[float, float], ...], newest: float) -> bool:
+    return bool(heights) and newest - heights[0][0] >= _CLIMB_OVER
 
 
-def blind(config: SupervisorConfig, state: State, now: float) -> bool:
-    """Nothing that can be used tells whether it falls."""
-    signs = ("vertical_speed", "acceleration")
-    return all(unusable(config, state, name, now) for name in signs)
+def _slope(heights: tuple[tuple[float, float], ...]) -> float:
+    """Of the straight line that is nearest to them by least squares, m/s."""
+    middle = fmean([at for at, _ in heights])
+    weights = [at - middle for at, _ in heights]
+    ways = [weight * height for weight, (_, height) in zip(weights, heights, strict=True)]
+    return sum(ways) / sum([weight**2 for weight in weights])
 
 
-def height_since_kill(state: State, now: float) -> float:
+def height_not_jumped_to(config: SupervisorConfig, state: State, now: float) -> float:
+    """The height, m; of one that has just jumped the lower one. NaN: it cannot be used."""
+    height, known = measured(config, state, "height", now), state.measured("height")
+    if now < known.jumped_at + JUMP_DOUBTED:
+        return min(height, known.before_jump)
+    return height
+
+
+def silent_since_kill(config: SupervisorConfig, state: State, now: float) -> bool:
+    """The vehicle was heard until the kill, whoever stops its motors is heard, and nothing that
+    can be used tells whether it falls. Where nobody is heard, the vehicle may not be silent."""
+    if not state.vehicle_received >= state.killed_at - _HEARD_BEFORE:
+        return False
+    links = [(state.evidence(link), config.limits(link)) for link in config.kill_links]
+    heard = any(not evidence.silent(limits.stale_after, now) for evidence, limits in links)
+    return heard and all(unusable(config, state, name, now) for name in _SIGNS)
+
+
+def height_since_kill(config: SupervisorConfig, state: State, now: float) -> float:
     """What a body without drag has left of the height, m, in which our kill was decided in
-    flight; NaN: it was not, or height or speed were not known. One that said that it stood, or
-    that its motors were off, was not stopped by it."""
-    if not state.killed_in_flight or state.killed_standing:
+    flight; NaN: it was not, or height or speed were not known, or it was seen since not to fall.
+    One that said that it stood, or that its motors were off, was not stopped by it."""
+    if not state.killed_in_flight or state.killed_standing or _seen_not_to_fall(config, state):
         return math.nan
     passed = now - state.killed_at
     return state.killed_height - state.killed_sinking * passed - GRAVITY / 2.0 * passed**2
+
+
+def _seen_not_to_fall(config: SupervisorConfig, state: State) -> bool:
+    """What was told last, at a time at which it had to fall since the kill, was no fall."""
+    known = {name: state.measured(name) for name in _SIGNS}
+    told = [n for n, one in known.items() if one.measured_at > state.killed_at + _FALLS_AFTER]
+    sinks = known["vertical_speed"].value < -config.profile.moving_speed
+    falls = {"vertical_speed": sinks, "acceleration": known["acceleration"].value < FREE_FALL}
+    return bool(told) and not any(falls[name] for name in told)
 
 
 def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
@@ -215,12 +243,17 @@ def _told_high(config: SupervisorConfig, state: State) -> bool:
 
 def landed_at(config: SupervisorConfig, state: State) -> float:
     """When one that says that it stands is believed, monotonic s; NaN: it does not say so."""
+    return state.down_since + landed_hold(config, state)
+
+
+def landed_hold(config: SupervisorConfig, state: State) -> float:
+    """For how long one must say that it stands, s."""
     hold = config.profile.landed_hold
     if state.rebooted:
-        hold = max(hold, _LANDED_HOLD_AFTER_REBOOT)
-    elif hold > 0.0 and _told_high(config, state):
-        hold = max(hold, _LANDED_HOLD_ALOFT)
-    return state.down_since + hold
+        return max(hold, _LANDED_HOLD_AFTER_REBOOT)
+    if hold > 0.0 and state.vehicle.armed is Armed.ARMED and _told_high(config, state):
+        return max(hold, _LANDED_HOLD_ALOFT)
+    return hold
 
 
 def disarmed(config: SupervisorConfig, state: State, now: float) -> bool:

@@ -19,8 +19,6 @@ from chute_ros.supervisor.state import State
 
 #: In place of a rule's name: a person ordered it.
 OPERATOR = "operator"
-#: A height that has jumped holds no deploy back for so long, s: as long as a fall may last.
-_JUMP_DOUBTED = 10.0
 #: Where a person may deploy without force.
 _IN_FLIGHT = (Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
 
@@ -83,8 +81,9 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
     height = flight.lowest_height(config, state, now)
-    if now < state.measured("height").jumped_at + _JUMP_DOUBTED:
-        height = math.nan  # the world, or its source, is another one; which one nobody knows
+    known = state.measured("height")
+    if now < known.jumped_at + flight.JUMP_DOUBTED and known.value < known.before_jump:
+        height = math.nan  # it has jumped down: that it is low may be as wrong as before
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
     if -profile.minimum_height <= height < profile.minimum_height:
         return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"

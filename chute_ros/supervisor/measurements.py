@@ -100,13 +100,13 @@ class Measured:
     same_since: float = math.nan
     #: Samples taken so far; a rule counts the distinct ones.
     count: int = 0
-    #: When a number was last told, taken or not, monotonic s; NaN: the newest was none.
-    told_at: float = math.nan
     #: Why the newest sample was not taken; empty: it was.
     rejected: str = ""
     #: When one was last doubted, and when a jump was last believed, monotonic s.
     doubted_at: float = math.nan
     jumped_at: float = math.nan
+    #: What it was before that jump.
+    before_jump: float = math.nan
     #: The newest that was not taken, and how many like it came in a row.
     candidate: float = math.nan
     candidate_at: float = math.nan
@@ -128,17 +128,9 @@ class Measured:
             return f"stuck at {self.value:g} for {same:.1f} s (limit {limits.stuck_after:g} s)"
         return ""
 
-    def is_missing(self, limits: Limits, now: float) -> bool:
-        """No number is told, or not any more; one that is told and cannot be is another thing."""
-        return not now - self.told_at <= limits.max_age
-
     def turns_at(self, limits: Limits, now: float) -> float:
-        """When time alone makes it usable, too old or missing; infinity: it does not."""
-        turns = (
-            self.measured_at - _JITTER,
-            self.measured_at + limits.max_age,
-            self.told_at + limits.max_age,
-        )
+        """When time alone makes it usable, or too old; infinity: it does not."""
+        turns = (self.measured_at - _JITTER, self.measured_at + limits.max_age)
         return min([turn for turn in turns if turn >= now], default=math.inf)
 
     def usable(self, limits: Limits, now: float) -> float:
@@ -159,10 +151,8 @@ class Measured:
                 return self
         wrong = self._impossible(sample, limits)
         if wrong:
-            told_at = sample.measured_at if math.isfinite(sample.value) else math.nan
             return replace(
                 self,
-                told_at=told_at,
                 rejected=wrong,
                 candidate=math.nan,
                 candidate_at=math.nan,
@@ -175,7 +165,6 @@ class Measured:
             if candidates < CONFIRMING_SAMPLES:
                 return replace(
                     self,
-                    told_at=sample.measured_at,
                     rejected=doubtful,
                     doubted_at=sample.measured_at,
                     candidate=sample.value,
@@ -187,15 +176,21 @@ class Measured:
         same = sample.value == self.value and not doubtful
         # With the time since the last that was taken, a jump may come to be one that can be.
         nearer = abs(sample.value - self.candidate) < abs(sample.value - self.value)
-        jumped = bool(doubtful) or (self.candidates > 0 and nearer)
+        jumped_at, before_jump = self.jumped_at, self.before_jump
+        if doubtful or (self.candidates and nearer):
+            # A jump back to what it was before ends what the first one has put in doubt.
+            back = abs(sample.value - before_jump) <= limits.jump
+            jumped_at, before_jump = (
+                (math.nan, math.nan) if back else (sample.measured_at, self.value)
+            )
         return Measured(
             value=sample.value,
             measured_at=sample.measured_at,
             same_since=self.same_since if same else sample.measured_at,
             count=self.count + 1,
-            told_at=sample.measured_at,
             doubted_at=self.doubted_at,
-            jumped_at=sample.measured_at if jumped else self.jumped_at,
+            jumped_at=jumped_at,
+            before_jump=before_jump,
         )
 
     def _impossible(self, sample: Sample, limits: Limits) -> str:

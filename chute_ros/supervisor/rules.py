@@ -64,8 +64,7 @@ class MeasurementCondition:
     above: float = math.nan
     below: float = math.nan
     weight: float = 1.0
-    #: Where nothing tells it, it is taken to hold: a second sign that may be missing. One that is
-    #: told and cannot be is not missing.
+    #: Where nothing usable tells, it is taken to hold: a second sign that may be missing.
     if_unknown: bool = False
 
     @cached_property

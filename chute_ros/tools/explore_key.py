@@ -42,11 +42,8 @@ LEFT_OUT = frozenset(
         "earlier",
         "heights",  # only where no speed is told, which is told here with every height
         "vehicle_rests_until",  # told by the measurements
-        "doubted_at",  # as the next: only after a jump, and no story here jumps
-        "jumped_at",
-        "killed_at",  # as the two after it, told by the height that is left since
+        "killed_at",  # as the next, told by the height that is left since
         "killed_height",
-        "killed_sinking",
         "home",  # from it only the fence is measured, whose rule raises an alarm
     }
 )
@@ -82,8 +79,9 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         math.isnan(state.landed_at),
         state.reboots_before,
         state.killed_standing,
-        _left(flight.height_since_kill(state, now), config.profile.minimum_height),
-        _since(state.down_since, now, 10.0 if state.rebooted else config.profile.landed_hold),
+        _left(flight.height_since_kill(config, state, now), config.profile.minimum_height),
+        round(state.killed_sinking, 3) if not math.isnan(state.killed_sinking) else None,
+        _since(state.down_since, now, flight.landed_hold(config, state)),
         round(state.armed_height, 3),
         tuple(sorted(state.released_before)),
         tuple(sorted(state.device_blocks)),
@@ -142,7 +140,9 @@ def _measured(config: SupervisorConfig, state: State, name: str, now: float) -> 
     return (
         round(measured.value, 3) if not math.isnan(measured.value) else None,
         _since(measured.measured_at, now, limits.max_age),
-        _since(measured.told_at, now, limits.max_age),
+        _since(measured.doubted_at, now, 1.0),
+        _since(measured.jumped_at, now, flight.JUMP_DOUBTED),
+        round(measured.before_jump, 3) if not math.isnan(measured.before_jump) else None,
         bool(measured.rejected),
         round(measured.candidate, 3) if measured.candidates else None,
         _since(measured.candidate_at, now, limits.max_age),

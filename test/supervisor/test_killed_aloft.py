@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import DOWN, START, Story, shipped
+from story import DOWN, LINK, START, Story, shipped
 
-from chute_ros.model import Action, Armed, LandedState
+from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.core import next_deadline
+from chute_ros.supervisor.link_evidence import LinkLimits
 from chute_ros.supervisor.machine import Stage
 
 D = Action.DEPLOY
 BOTH = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
 GROUND = LandedState.ON_GROUND
+#: Of a link whose node is heard although it says nothing for long.
+PATIENT = MappingProxyType({LINK: LinkLimits(stale_after=20.0, lost_after=30.0)})
 #: Nothing of how it moves: its autopilot has hung.
 SILENT: dict[str, Any] = {"vertical_speed": math.nan, "acceleration": math.nan}
 #: So long nobody can say what the newest measurements are still worth: their age, and the hold, s.
@@ -53,14 +58,52 @@ def test_it_waits_until_the_newest_measurements_are_too_old_and_no_longer() -> N
     assert story.state.deploy_rule == "killed aloft and silent"
 
 
-def test_nobody_needs_to_be_heard_for_it() -> None:
+def test_nothing_needs_to_come_for_it() -> None:
     """The supervisor wakes by itself when the measurements become too old, and at the hold."""
-    story = killed("multirotor", 80.0)
+    config = shipped("multirotor", link_limits=PATIENT)
+    story = Story(config).flying().fly(2.0, height=80.0)
+    story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
     while not story.state.deploy_rule and story.t < 9.0:
         due = next_deadline(story.config, story.state, START + story.t)
         assert due < math.inf
         story.at(due - START)
     assert story.t == pytest.approx(2.0 + WAITS, abs=0.01)
+
+
+def test_where_nobody_is_heard_it_is_not_the_vehicle_that_is_silent() -> None:
+    story = killed("multirotor", 80.0)
+    story.at(9.0)
+    assert story.fired() == ["KILL"]
+
+
+def test_one_that_was_not_heard_before_its_kill_tells_nothing_by_its_silence() -> None:
+    """A supervisor that has heard of the kill, and never of the vehicle."""
+    story = killed("multirotor", 80.0)
+    story.state = replace(story.state, vehicle_received=math.nan)
+    assert silence(story, 5.0).fired() == ["KILL"]
+
+
+@pytest.mark.parametrize("height", [60.0, 600.0])
+def test_one_that_comes_down_on_a_hill_and_is_unplugged_is_not_deployed(height: float) -> None:
+    """Its motors were stopped before the land detector spoke."""
+    story = killed("multirotor", height)
+    stands = {**DOWN, "vertical_speed": 0.0, "acceleration": 9.8, "height": height}
+    story.fly(2.4, height=height, vertical_speed=0.0).fly(3.5, **stands)
+    assert silence(story, 15.0).fired() == ["KILL"]
+
+
+def test_one_whose_kill_failed_and_that_flew_on_is_not_deployed() -> None:
+    story = killed("multirotor", 80.0)
+    story.at(2.1, story.report(Action.KILL, Outcome.FAILED))
+    story.fly(4.0, height=80.0)
+    assert silence(story, 15.0).fired() == ["KILL"]
+
+
+def test_a_height_that_has_just_jumped_up_is_not_counted_on() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0, height=3.0).fly(2.0, height=60.0)
+    story.at(2.0, i.KillRequest(1, "operator", "it flies away"))
+    assert story.state.killed_height == pytest.approx(3.0, abs=0.1)
+    assert silence(story, 9.0).fired() == ["KILL"]
 
 
 def test_one_whose_speed_or_force_is_told_is_judged_by_that() -> None:

@@ -62,7 +62,7 @@ def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: A
 def sinks(profile: str, hold: float, sink: float, before: float = 0.1) -> list[Case]:
     """It sinks too fast, and one more sign says so; or only the one sensor."""
     over, under = {"vertical_speed": -sink - 0.1}, {"vertical_speed": -sink}
-    signs = ({"acceleration": 6.9}, {"acceleration": 7.1}), ({"tilt": 45.1}, {"tilt": 44.9})
+    signs = ({"acceleration": 4.9}, {"acceleration": 5.1}), ({"tilt": 45.1}, {"tilt": 44.9})
     cases, said = [], {"vertical_speed": before}
     for more, less in signs:
         cases += [
