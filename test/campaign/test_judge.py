@@ -65,6 +65,30 @@ def test_a_kill_under_a_canopy_is_not_false(good: Flown) -> None:
     assert judge(out).count is Count.RIGHT
 
 
+@pytest.mark.parametrize(
+    ("faults", "count"),
+    [
+        (("speed", "jumps", 0.0, 9.0), Count.FALSE),
+        (("speed", "jumps", 0.0, 9.0, "tilt", "jumps", 0.0, 9.0), Count.NOT_TOLD),
+        # What is gone tells nothing that is not so; nor did who was no reason, or long before.
+        (("speed", "jumps", 0.0, 9.0, "tilt", "gone", 0.0, 9.0), Count.FALSE),
+        (("speed", "jumps", 0.0, 9.0, "force", "zero", 0.0, 9.0), Count.FALSE),
+        (("speed", "jumps", 1.8, 9.0, "tilt", "jumps", 0.0, 0.5), Count.FALSE),
+    ],
+)
+def test_what_two_sensors_that_lied_led_to_is_named(
+    good: Flown, faults: tuple, count: Count
+) -> None:
+    lies = tuple(SensorFault(*faults[n : n + 4]) for n in range(0, len(faults), 4))
+    kill, _ = fired(good)
+    reasons = ("vertical_speed -15.00 (below -3)", "tilt_deg 170.00 (above 60)")
+    early = replace(kill, at=good.up + 2.0, decision=replace(kill.decision, reasons=reasons))
+    wrong = replace(good.scenario, faults=lies, failure=Failure.NOTHING)
+    ended = replace(good, scenario=wrong, truth=Truth(), acted=(early,), released=math.nan)
+    judged = judge(ended)
+    assert judged.count is count
+
+
 CUT = Spell(1.0, 3.0, loss=1.0)
 
 
@@ -82,8 +106,10 @@ CUT = Spell(1.0, 3.0, loss=1.0)
         ((SensorFault("speed", "zero", 0.0, 9.0),), 5.0, ""),
         (
             (SensorFault("speed", "zero", 0.0, 9.0), SensorFault("tilt", "gone", 0.0, 9.0)),
-            *(5.0, "sensor speed was wrong; sensor tilt was wrong"),
+            *(5.0, "sensors speed, tilt were wrong"),
         ),
+        # One after the other leaves time enough.
+        ((SensorFault("speed", "zero", 0.0, 2.0), SensorFault("tilt", "gone", 4.0, 9.0)), 5.0, ""),
     ],
 )
 def test_what_hid_the_fall(faults, end: float, cause: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import statistics
 
 import pytest
 
@@ -28,7 +29,15 @@ def reading(how: str, *times: float) -> list[float]:
     ],
 )
 def test_a_sensor_lies_in_its_time_only(how: str, told: list[float]) -> None:
-    assert reading(how, 0.5, 1.0, 2.0, 3.0) == pytest.approx(told, nan_ok=True)
+    assert reading(how, 0.5, 1.0, 2.0, 3.0) == pytest.approx(told, abs=0.7, nan_ok=True)
+
+
+def test_a_sensor_that_is_whole_has_the_noise_of_one() -> None:
+    told = reading("gone", *(0.001 * n for n in range(500)))
+    errors = [one - (100.0 + 0.001 * n) for n, one in enumerate(told)]
+    assert len(set(told)) == len(told), "never the same to the last bit"
+    assert statistics.fmean(errors) == pytest.approx(0.0, abs=0.03)
+    assert statistics.pstdev(errors) == pytest.approx(0.15, rel=0.2)
 
 
 def test_noise_is_around_what_is_so() -> None:
@@ -40,6 +49,6 @@ def test_noise_is_around_what_is_so() -> None:
 def test_another_sensor_tells_what_is_so() -> None:
     sensors = Sensors(random.Random(1))
     sensors.faults.append(SensorFault("landed", "lies", 1.0, 3.0))
-    assert sensors.read("speed", 4.0, 2.0) == 4.0
+    assert sensors.read("speed", 4.0, 2.0) == pytest.approx(4.0, abs=0.4)
     assert [sensors.lies("landed", now) for now in (0.9, 1.0, 3.0)] == [False, True, False]
     assert not sensors.lies("fix", 2.0)

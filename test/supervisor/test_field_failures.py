@@ -78,7 +78,7 @@ def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> No
     start = story.t
     for n in range(80):
         speed = -11.0 if n % 5 == 4 else -14.0
-        story.fly(story.t + 0.05, vertical_speed=speed, acceleration=6.5)
+        story.fly(story.t + 0.05, vertical_speed=speed, acceleration=4.5)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(K) - start < 2.5
 
@@ -88,7 +88,7 @@ def test_dropped_messages_do_not_reset_the_count() -> None:
     start = story.t
     for n in range(40):
         # Two samples out of three never arrive.
-        told = story.told(vertical_speed=-14.0, acceleration=6.5)
+        told = story.told(vertical_speed=-14.0, acceleration=4.5)
         story.at(start + 0.15 * (n + 1), story.heartbeat(), told)
         if story.fired():
             break

@@ -271,6 +271,6 @@ def test_one_that_falls_in_flight_is_killed_and_deployed_whatever_came_before(
     run(watch, [("told", FLYING_WELL, 20)])
     if watch.state.stage is not Stage.IN_FLIGHT:
         return
-    moving = {"vertical_speed": -14.0, "acceleration": 6.5, **sign, **lie}
+    moving = {"vertical_speed": -14.0, "acceleration": 4.5, **sign, **lie}
     run(watch, [("told", {**FLYING_WELL, **moving}, 25)])
     assert watch.state.stage in (Stage.DEPLOYING, Stage.DEPLOYED, Stage.FAULT)
