@@ -1,6 +1,7 @@
 """The one gate before a deploy: who wants it, in which state, and every reason against it.
 
-What must hold whatever the profile says: silence alone never deploys; nothing deploys on the
+What must hold whatever the profile says: silence alone never deploys (that of a vehicle whose
+motors we have stopped high up is not alone: AutopilotFact.KILLED_ALOFT); nothing deploys on the
 ground or disarmed, unless a person forces it; below the minimum height only what the profile
 allows.
 """
