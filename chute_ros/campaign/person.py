@@ -1,4 +1,5 @@
-"""A person at the services of the supervisor that leads; who gets no answer calls again."""
+"""A person at the services of the supervisor that leads; who gets no answer, or is told that
+another leads, calls again."""
 
 from __future__ import annotations
 
@@ -33,5 +34,10 @@ class Call:
         self._rig.world.post(now + (_AGAIN if leader is None else _PATIENCE), self.begin)
 
     def _answered(self, answer: i.Finish) -> None:
-        if self.answer is None:
-            self.answer, self.answered_at = answer, self._rig.world.now
+        if self.answer is not None:
+            return
+        now = self._rig.world.now
+        if i.CALL_AGAIN in answer.message and not answer.accepted:
+            self._rig.world.post(now + _AGAIN, self.begin)
+        else:
+            self.answer, self.answered_at = answer, now

@@ -118,7 +118,7 @@ class _Update(Deploying):
     def take(self, one: i.Input) -> None:
         """One input, in the order in which it came. One that follows does nothing for people."""
         if not self.state.leading and isinstance(one, _PERSONS):
-            self.finish(one.token, False, False, "refused: another supervisor decides")
+            self.finish(one.token, False, False, f"refused: {i.CALL_AGAIN}")
             return
         if isinstance(one, i.LinkHeartbeat):
             self.heartbeat(one)
@@ -143,7 +143,7 @@ class _Update(Deploying):
         elif isinstance(one, i.TakeOver):
             self._take_over(one)
         elif isinstance(one, i.StepDown):
-            self.answer_all(f"another supervisor decides now: {one.why}")
+            self.answer_all(f"{i.CALL_AGAIN}: {one.why}")
             self.state = replace(self.state, leading=False)
         else:
             self.mode_request(one)

@@ -171,6 +171,10 @@ class ArmDevices:
     links: tuple[str, ...]
 
 
+#: What one that does not decide tells a person: only the one that does offers the services.
+CALL_AGAIN = "another supervisor decides, call again"
+
+
 @dataclass(frozen=True)
 class Finish:
     """Answer the request with this token."""

@@ -49,7 +49,7 @@ class Requests(Orders):
             self._device_asks(one)
             return
         if not self.state.leading:
-            self.finish(one.token, False, False, "refused: another supervisor decides")
+            self.finish(one.token, False, False, f"refused: {i.CALL_AGAIN}")
             return
         self.order_kill(one.by, (reason,), one.token)
         if self.state.mode is not i.Mode.ACTIVE:

@@ -140,7 +140,7 @@ def test_whoever_waits_at_one_that_steps_down_is_told() -> None:
     state, outputs = update(CONFIG, story.state, (i.StepDown("it was stopped"),), START + 1.1)
     (answer,) = (o for o in outputs if isinstance(o, i.Finish))
     assert answer.token == 5
-    assert "another supervisor decides now: it was stopped" in answer.message
+    assert "another supervisor decides, call again: it was stopped" in answer.message
     assert not state.leading
 
 

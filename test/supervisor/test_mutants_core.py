@@ -163,6 +163,9 @@ def test_one_that_is_as_late_as_allowed_is_not_late() -> None:
 # -- one that follows ----------------------------------------------------------------------------
 
 
+CALL_AGAIN = "another supervisor decides, call again"
+
+
 @pytest.mark.parametrize(
     "one",
     [
@@ -176,14 +179,14 @@ def test_one_that_follows_refuses_what_people_ask_in_these_words(one: i.Input) -
     story = Story().flying()
     story.state = replace(story.state, leading=False)
     story.at(0.1, one)
-    assert story.answers(5) == [i.Finish(5, False, False, "refused: another supervisor decides")]
+    assert story.answers(5) == [i.Finish(5, False, False, f"refused: {CALL_AGAIN}")]
 
 
 def test_who_waits_at_one_that_steps_down_is_told_why() -> None:
     story = Story().flying()
     story.at(0.1, i.KillRequest(5, "operator", "stop"))
     story.at(0.2, i.StepDown("it was stopped"))
-    text = "another supervisor decides now: it was stopped"
+    text = f"{CALL_AGAIN}: it was stopped"
     assert story.answers(5) == [i.Finish(5, False, False, text)]
     assert story.state.leading is False
 

@@ -118,7 +118,7 @@ def test_a_vehicle_that_takes_off_while_it_is_armed_is_in_flight() -> None:
 def test_one_that_follows_refuses_a_persons_kill_and_says_who_decides() -> None:
     story = followed(Story().flying())
     story.at(0.1, i.KillRequest(1, "operator", "stop"))
-    assert story.answer(1) == refused(1, "another supervisor decides")
+    assert story.answer(1) == refused(1, "another supervisor decides, call again")
     assert story.fired() == []
 
 
