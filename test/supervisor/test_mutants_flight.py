@@ -11,6 +11,7 @@ from story import Story, with_rules
 from chute_ros.model import Armed, LandedState, VehicleState
 from chute_ros.supervisor import flight, gate
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.measurements import Measured
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.supervisor.state import State
@@ -136,3 +137,115 @@ def test_one_without_a_height_is_taken_to_be_high_enough_just_so_long_after_its_
     assert why == "it was never seen at the minimum height, 10 m"
     story.fly(5.05, height=math.nan)
     assert gate.too_low(story.config, story.state, story.state.updated_at) == ""
+
+
+# -- what the heights tell -----------------------------------------------------------------------
+
+
+def every_tenth(*values: float) -> State:
+    """These heights, 0.1 s apart, the last of them at 0.1 s x (their number - 1)."""
+    return told_by_heights(*((n / 10, value) for n, value in enumerate(values)))
+
+
+def told_rate(*values: float) -> tuple[float, str]:
+    return flight.reading(CONFIG, every_tenth(*values), "climb_rate", (len(values) - 1) / 10)
+
+
+def test_too_few_heights_say_so() -> None:
+    assert told_rate(50.0, 50.0, 50.0)[1] == "too few heights that can be used"
+
+
+def test_where_the_middle_and_the_whole_tell_opposite_ways_it_neither_climbs_nor_sinks() -> None:
+    """It creeps up, by 1 m/s, but for one step down."""
+    value, why = told_rate(0.0, 0.1, 0.2, 0.3, 0.4, -2.0, -1.9, -1.8, -1.7, -1.6)
+    assert (value, why) == (0.0, "")
+
+
+def test_a_slow_climb_is_one() -> None:
+    assert told_rate(*[0.05 * n for n in range(9)])[0] == pytest.approx(0.5)
+
+
+def test_the_heights_may_scatter_by_just_so_much() -> None:
+    assert told_rate(0.0, 0.0, 0.0, 3.0, 3.0, 3.0) == (0.0, "")
+    value, why = told_rate(0.0, 0.0, 0.0, 3.01, 3.01, 3.01)
+    assert math.isnan(value)
+    assert why == "the heights scatter by 1.5 m (limit 1.5 m)"
+
+
+@pytest.mark.parametrize(("jumped_at", "height"), [(NOW - 9.99, 8.0), (NOW - 10.0, 60.0)])
+def test_how_long_the_lower_height_counts_after_a_jump(jumped_at: float, height: float) -> None:
+    jumped = Measured(60.0, NOW, NOW, 9, jumped_at=jumped_at, before_jump=8.0)
+    state = replace(known(), measurements=MappingProxyType({"height": jumped}))
+    assert flight.height_not_jumped_to(CONFIG, state, NOW) == height
+
+
+# -- since a kill --------------------------------------------------------------------------------
+
+
+def killed(speed: float = math.nan, force: float = math.nan, at: float = NOW) -> State:
+    """Killed at NOW - 2.0, 100 m high, sinking by 1 m/s; at that time this was told last."""
+    told = {"vertical_speed": speed, "acceleration": force}
+    measurements = {name: Measured(value, at, at, 1) for name, value in told.items()}
+    return replace(
+        known(),
+        killed_in_flight=True,
+        killed_at=NOW - 2.0,
+        killed_height=100.0,
+        killed_sinking=1.0,
+        measurements=MappingProxyType(
+            {name: one for name, one in measurements.items() if not math.isnan(one.value)}
+        ),
+    )
+
+
+LEFT = pytest.approx(100.0 - 2.0 - 9.81 * 2.0)
+
+
+def test_the_height_that_is_left_since_a_kill() -> None:
+    assert flight.height_since_kill(CONFIG, killed(), NOW) == LEFT
+    for ground in ({"killed_in_flight": False}, {"killed_standing": True}):
+        assert math.isnan(flight.height_since_kill(CONFIG, replace(killed(), **ground), NOW))
+
+
+@pytest.mark.parametrize(
+    ("told", "falls"),
+    [
+        ({"speed": -2.1}, True),
+        ({"speed": -2.0}, False),
+        ({"force": 4.8}, True),
+        ({"force": 4.9}, False),
+        ({"speed": -2.1, "force": 9.8}, True),
+        ({"speed": 0.0, "force": 1.0}, True),
+        # Just after the kill it need not fall yet.
+        ({"speed": 0.0, "force": 9.8, "at": NOW - 1.0}, True),
+        ({"speed": 0.0, "force": 9.8, "at": NOW - 0.9}, False),
+    ],
+)
+def test_what_was_seen_since_the_kill(told: dict[str, float], falls: bool) -> None:
+    left = flight.height_since_kill(CONFIG, killed(**told), NOW)
+    assert left == LEFT if falls else math.isnan(left)
+
+
+@pytest.mark.parametrize(("before", "silent"), [(1.0, True), (1.01, False), (-0.5, True)])
+def test_one_that_was_not_heard_until_its_kill_is_not_silent_since(
+    before: float, silent: bool
+) -> None:
+    heard = LinkEvidence(heard=NOW - 0.1)
+    links = MappingProxyType(dict.fromkeys(CONFIG.kill_links, heard))
+    state = replace(killed(), vehicle_received=NOW - 2.0 - before, links=links)
+    assert flight.silent_since_kill(CONFIG, state, NOW) is silent
+    assert not flight.silent_since_kill(CONFIG, replace(state, links=MappingProxyType({})), NOW)
+
+
+@pytest.mark.parametrize(
+    ("height", "armed_height", "hold"),
+    [(10.1, 0.0, 5.0), (10.0, 0.0, 1.0), (35.0, 30.0, 1.0), (40.1, 30.0, 5.0)],
+)
+def test_how_high_above_where_it_was_armed_a_landing_takes_longer(
+    height: float, armed_height: float, hold: float
+) -> None:
+    config = SupervisorConfig(profile=Profile("tested", (), minimum_height=10.0, landed_hold=1.0))
+    state = replace(known(height=height), armed_height=armed_height)
+    assert flight.landed_hold(config, state) == hold
+    off = replace(state, vehicle=replace(state.vehicle, armed=Armed.DISARMED))
+    assert flight.landed_hold(config, off) == 1.0

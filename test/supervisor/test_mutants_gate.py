@@ -12,7 +12,8 @@ from chute_ros.supervisor import gate
 from chute_ros.supervisor.conditions import Finding
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, BelowMinimum
+from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, BelowMinimum, Profile
 from chute_ros.supervisor.state import Pending, State
 
 HOLDS = Finding(True, lambda: "it sinks")
@@ -194,3 +195,21 @@ def test_too_low_to_the_last_bit(height: float, minimum: float, was_high: bool, 
     assert gate.too_low(config, state, state.updated_at) == why
     anywhere = replace(profile, below_minimum=BelowMinimum.DEPLOY)
     assert gate.too_low(replace(config, profile=anywhere), state, state.updated_at) == ""
+
+
+# -- a height that has jumped --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("passed", "before", "held_back"),
+    [(9.99, 60.0, False), (10.0, 60.0, True), (9.99, 5.0, True), (9.99, 4.0, True)],
+)
+def test_a_height_that_jumped_down_holds_nothing_back_for_its_time(
+    passed: float, before: float, held_back: bool
+) -> None:
+    now = 1000.0
+    profile = Profile("tested", (), minimum_height=10.0, below_minimum=BelowMinimum.KILL)
+    config = SupervisorConfig(profile=profile)
+    height = Measured(5.0, now, now, 9, jumped_at=now - passed, before_jump=before)
+    state = State(7, 0.0, was_high=True, measurements=MappingProxyType({"height": height}))
+    assert bool(gate.too_low(config, state, now)) is held_back

@@ -140,3 +140,48 @@ def test_a_place_may_lie_at_a_pole_and_be_counted_once_around() -> None:
         assert on_earth(*place)
     for nowhere in ((90.5, 0.0), (-90.5, 0.0), (0.0, 360.5), (0.0, -360.5)):
         assert not on_earth(*nowhere)
+
+
+# -- jumps ---------------------------------------------------------------------------------------
+
+#: A height that may change by 60 m/s and by 10 m besides.
+HEIGHT = Limits(-500.0, 500.0, rate=60.0, jump=10.0, max_age=1.0, stuck_after=5.0)
+
+
+def heights(*samples: tuple[float, float]) -> Measured:
+    return after(*samples, limits=HEIGHT)
+
+
+def test_a_jump_that_is_confirmed_is_remembered_with_what_was_before() -> None:
+    known = heights((100.0, 0.0), (60.0, 0.1), (60.1, 0.15), (60.2, 0.2))
+    assert (known.jumped_at, known.before_jump, known.doubted_at) == (0.2, 100.0, 0.15)
+
+
+def test_so_is_one_that_time_made_possible_meanwhile() -> None:
+    known = heights((100.0, 0.0), (70.0, 0.1), (70.1, 0.2), (70.2, 0.4))
+    assert known.rejected == ""
+    assert (known.jumped_at, known.before_jump) == (0.4, 100.0)
+
+
+@pytest.mark.parametrize("then", [99.9, 85.0])
+def test_one_that_goes_back_or_half_way_has_not_jumped(then: float) -> None:
+    known = heights((100.0, 0.0), (70.0, 0.1), (then, 0.2))
+    assert known.value == then
+    assert math.isnan(known.jumped_at)
+    assert known.doubted_at == 0.1
+
+
+@pytest.mark.parametrize(("back_to", "over"), [(90.0, True), (89.9, False)])
+def test_a_jump_back_ends_the_doubt(back_to: float, over: bool) -> None:
+    down = [(100.0, 0.0), (60.0, 0.1), (60.1, 0.15), (60.2, 0.2)]
+    known = heights(*down, (back_to + 0.2, 0.3), (back_to + 0.1, 0.35), (back_to, 0.4))
+    assert known.value == back_to
+    assert math.isnan(known.jumped_at) is over
+    assert math.isnan(known.before_jump) is over
+
+
+def test_what_cannot_be_at_all_forgets_what_was_doubted() -> None:
+    known = heights((100.0, 0.0), (60.0, 0.1), (9999.0, 0.15))
+    assert known.candidates == 0
+    again = known.with_sample(Sample(60.0, 0.16), HEIGHT)
+    assert (again.candidates, again.candidate_at) == (1, 0.16)
