@@ -202,3 +202,22 @@ def test_measurements_from_the_future_are_judged_the_same() -> None:
         story.at(story.t + 0.05, story.heartbeat(), i.VehicleReport(ahead))
         heartbeats(story, story.t + 0.06)
     heartbeats(story, 8.0)
+
+
+def test_at_the_very_moment_at_which_something_turns_too_old_it_is_looked_at() -> None:
+    story = Story(with_rules()).flying().fly(1.0)
+    known = story.state.measured("tilt_deg")
+    turns = known.measured_at + story.config.profile.limits["tilt_deg"].max_age
+    assert rests_until(story.config, story.state, turns) < turns
+
+
+def test_what_may_come_to_hold_by_silence_wakes_beside_what_others_wait_for() -> None:
+    counts = rule(TILTS, name="counts", hold=0.7)
+    unknown = MeasurementCondition("acceleration", below=1.0, if_unknown=True)
+    silent = rule(unknown, MeasurementCondition("tilt_deg", above=80.0), name="silent")
+    story = Story(with_rules(counts, silent)).flying().fly(1.0).fly(1.1, tilt=70.0)
+    deadlines = policy.rule_deadlines(story.config, story.state, START + 1.1)
+    acceleration = story.state.measured("acceleration").measured_at
+    assert any(one == pytest.approx(acceleration + 0.5) for one in deadlines)
+    level = story.state.rule("counts").level
+    assert any(one == pytest.approx(START + 1.1 + 0.7 - level) for one in deadlines)
