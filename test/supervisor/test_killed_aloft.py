@@ -92,6 +92,13 @@ def test_one_that_comes_down_on_a_hill_and_is_unplugged_is_not_deployed(height: 
     assert silence(story, 15.0).fired() == ["KILL"]
 
 
+def test_one_that_has_come_down_stays_down_though_nothing_but_its_word_said_so() -> None:
+    story = killed("multirotor", 600.0)
+    story.fly(4.0, **{**DOWN, **SILENT, "height": 600.0})
+    assert math.isnan(story.state.killed_height)
+    assert silence(story, 15.0).fired() == ["KILL"], "its word is old by then"
+
+
 def test_one_whose_kill_failed_and_that_flew_on_is_not_deployed() -> None:
     story = killed("multirotor", 80.0)
     story.at(2.1, story.report(Action.KILL, Outcome.FAILED))
@@ -156,6 +163,7 @@ def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed() -
     story.at(8.0, i.KillRequest(1, "operator", "a person saw it"))
     story.fall(12.0, 80.0, landed_state=GROUND, armed=Armed.DISARMED)
     assert story.fired() == ["KILL", "DEPLOY"]
+    assert START + 8.0 < story.state.airborne_since < START + 9.0
     assert "it falls since the kill, although it said that it stood" in story.alarms()
 
 
