@@ -1,5 +1,6 @@
 """Conditions word for word and at their limits: what mutants showed that no story looked at."""
 
+import math
 from types import MappingProxyType
 from typing import Any
 
@@ -19,6 +20,7 @@ from chute_ros.supervisor.rules import (
     DeviceFact,
     LinkCondition,
     MeasurementCondition,
+    Profile,
 )
 from chute_ros.supervisor.state import ASK_LASTS, Ask, State
 
@@ -122,3 +124,30 @@ def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
     )
     found = told(CONFIG, known, MeasurementCondition("vertical_speed", below=-12.0), NOW)
     assert (found.holds, found.samples) == (True, 7)
+
+
+@pytest.mark.parametrize(
+    ("minimum", "speed", "holds", "words"),
+    [
+        (50.0, math.nan, True, "(minimum 50 m), and nothing tells whether it falls"),
+        (50.1, math.nan, False, "(minimum 50.1 m), and nothing tells whether it falls"),
+        (50.0, -4.0, False, "(minimum 50 m), and something tells whether it falls"),
+    ],
+)
+def test_a_kill_aloft_is_told_with_what_is_left_of_the_height(
+    minimum: float, speed: float, holds: bool, words: str
+) -> None:
+    config = SupervisorConfig(profile=Profile("tested", (), minimum_height=minimum))
+    told_speed = {} if math.isnan(speed) else {"vertical_speed": Measured(speed, NOW, NOW, 1)}
+    known = state(
+        killed_in_flight=True,
+        killed_at=NOW - 2.0,
+        # What a body loses in 2 s.
+        killed_height=50.0 + 9.81 / 2.0 * 4.0,
+        killed_sinking=0.0,
+        vehicle_received=NOW - 1.0,
+        measurements=MappingProxyType(told_speed),
+        links=MappingProxyType({one: LinkEvidence(heard=NOW) for one in config.kill_links}),
+    )
+    found = told(config, known, AutopilotCondition(AutopilotFact.KILLED_ALOFT), NOW)
+    assert found == Told(holds, f"killed aloft 2.00 s ago, at least 50.0 m are left {words}")
