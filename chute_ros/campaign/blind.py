@@ -82,15 +82,15 @@ def misled(scenario: Scenario, up: float, at: float, reasons: str) -> str:
         and up + one.begin <= at <= up + one.end + _LASTS
         and any(name in reasons for name in _TOLD_BY.get(one.sensor, ()))
     ]
-    names = sorted(
-        {one.sensor for one, other in itertools.permutations(lied, 2) if _both(one, other)}
-    )
-    return f"sensors {', '.join(names)} were wrong at once" if len(names) > 1 else ""
+    names = {one.sensor for one, other in itertools.permutations(lied, 2) if _together(one, other)}
+    return f"sensors {', '.join(sorted(names))} were wrong at once" if names else ""
 
 
-def _both(one: SensorFault, other: SensorFault) -> bool:
-    """They lie at the same time, or what one told last still counts as the other begins."""
-    return one.begin < other.end + _LASTS and other.begin < one.end + _LASTS
+def _together(one: SensorFault, other: SensorFault) -> tuple[float, float] | None:
+    """From when until when what both of them tell is wrong, s; None: it never is, or they are one.
+    What a sensor told last still counts for a while."""
+    begin, end = max(one.begin, other.begin), min(one.end, other.end) + _LASTS
+    return (begin, end) if one.sensor != other.sensor and begin < end else None
 
 
 def _all_hidden(scenario: Scenario) -> list[_Hidden]:
@@ -107,10 +107,9 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
         elif isinstance(fault, WayFault) and fault.spell.loss > _MOST_LOSS:
             hidden.append(_cut(fault, scenario.standby))
     for one, other in itertools.combinations(sensors, 2):
-        begin, end = max(one.begin, other.begin), min(one.end, other.end) + _LASTS
-        if one.sensor != other.sensor and begin < end:
+        if wrong := _together(one, other):
             both = ", ".join(sorted((one.sensor, other.sensor)))
-            hidden.append(_Hidden(begin, end, f"sensors {both} were wrong"))
+            hidden.append(_Hidden(*wrong, f"sensors {both} were wrong"))
     return [one for one in hidden if not _is_idle(one.cause, scenario)]
 
 

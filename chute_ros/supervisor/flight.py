@@ -13,7 +13,7 @@ from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.measurements import CLIMB_RATE
+from chute_ros.supervisor.measurements import CLIMB_RATE, FALL_SIGNS
 from chute_ros.supervisor.state import State
 
 #: m/s^2.
@@ -29,10 +29,6 @@ _LANDED_HOLD_ALOFT = 5.0
 _FLIGHT_JUST_BEFORE = 60.0
 #: A climb rate needs heights this far apart at least, s.
 _CLIMB_OVER = 0.4
-#: A height that has jumped is doubted for so long, s: as long as a fall may last.
-JUMP_DOUBTED = 10.0
-#: What tells of a fall whichever way up it is.
-_SIGNS = ("vertical_speed", "acceleration")
 #: A vehicle whose motors were stopped is seen to fall so long after it, s.
 _FALLS_AFTER = 1.0
 #: A vehicle was heard until a kill if it was at most so long before it, s.
@@ -110,9 +106,7 @@ def _slope(heights: tuple[tuple[float, float], ...]) -> float:
 def height_not_jumped_to(config: SupervisorConfig, state: State, now: float) -> float:
     """The height, m; of one that has just jumped the lower one. NaN: it cannot be used."""
     height, known = measured(config, state, "height", now), state.measured("height")
-    if now < known.jumped_at + JUMP_DOUBTED:
-        return min(height, known.before_jump)
-    return height
+    return min(height, known.before_jump) if known.has_jumped(now) else height
 
 
 def silent_since_kill(config: SupervisorConfig, state: State, now: float) -> bool:
@@ -122,7 +116,7 @@ def silent_since_kill(config: SupervisorConfig, state: State, now: float) -> boo
         return False
     links = [(state.evidence(link), config.limits(link)) for link in config.kill_links]
     heard = any(not evidence.silent(limits.stale_after, now) for evidence, limits in links)
-    return heard and all(unusable(config, state, name, now) for name in _SIGNS)
+    return heard and all(unusable(config, state, name, now) for name in FALL_SIGNS)
 
 
 def height_since_kill(config: SupervisorConfig, state: State, now: float) -> float:
@@ -137,7 +131,7 @@ def height_since_kill(config: SupervisorConfig, state: State, now: float) -> flo
 
 def _seen_not_to_fall(config: SupervisorConfig, state: State) -> bool:
     """What was told last, at a time at which it had to fall since the kill, was no fall."""
-    known = {name: state.measured(name) for name in _SIGNS}
+    known = {name: state.measured(name) for name in FALL_SIGNS}
     told = [n for n, one in known.items() if one.measured_at > state.killed_at + _FALLS_AFTER]
     sinks = known["vertical_speed"].value < -config.profile.moving_speed
     falls = {"vertical_speed": sinks, "acceleration": known["acceleration"].value < FREE_FALL}

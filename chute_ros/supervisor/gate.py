@@ -83,7 +83,7 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
         return ""
     height = flight.lowest_height(config, state, now)
     known = state.measured("height")
-    if now < known.jumped_at + flight.JUMP_DOUBTED and known.value < known.before_jump:
+    if known.has_jumped(now) and known.value < known.before_jump:
         height = math.nan  # it has jumped down: that it is low may be as wrong as before
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
     if -profile.minimum_height <= height < profile.minimum_height:

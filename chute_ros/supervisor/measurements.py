@@ -66,6 +66,10 @@ STANDARD_LIMITS: dict[str, Limits] = {
 }
 
 HEIGHT = "height"
+#: What tells of a fall whichever way up it is.
+FALL_SIGNS = ("vertical_speed", "acceleration")
+#: A jump that was believed is doubted for so long, s: as long as a fall may last.
+JUMP_DOUBTED = 10.0
 #: From the heights of the last second; on it conditions can rest as on the measurements.
 CLIMB_RATE = "climb_rate"
 
@@ -132,6 +136,10 @@ class Measured:
         """When time alone makes it usable, or too old; infinity: it does not."""
         turns = (self.measured_at - _JITTER, self.measured_at + limits.max_age)
         return min([turn for turn in turns if turn >= now], default=math.inf)
+
+    def has_jumped(self, now: float) -> bool:
+        """A moment ago it was another, and which of the two is right nobody knows."""
+        return now < self.jumped_at + JUMP_DOUBTED
 
     def usable(self, limits: Limits, now: float) -> float:
         """The value, or NaN where it cannot be used."""

@@ -56,11 +56,10 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
         deadlines.append(evidence.deadline(rule, now))
         if rule.asks_the_autopilot:
             deadlines.append(state.vehicle_received + config.vehicle_state_age)
-        if rule.turns_by_silence:
-            deadlines += [
-                state.measured(name).turns_at(limits, now)
-                for name, limits in config.profile.limits.items()
-            ]
+        deadlines += [
+            state.measured(name).turns_at(config.profile.limits[name], now)
+            for name in rule.silences
+        ]
         if evidence.holds:
             deadlines += [
                 state.measured(name).measured_at + config.profile.limits[name].max_age

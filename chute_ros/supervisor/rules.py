@@ -15,7 +15,13 @@ from types import MappingProxyType
 from chute_ros.model import Action
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import CLIMB_RATE, HEIGHT, STANDARD_LIMITS, Limits
+from chute_ros.supervisor.measurements import (
+    CLIMB_RATE,
+    FALL_SIGNS,
+    HEIGHT,
+    STANDARD_LIMITS,
+    Limits,
+)
 
 #: Instead of a link's name: it is enough if one is so, or all must be.
 ANY, ALL = "any", "all"
@@ -146,11 +152,18 @@ class Rule:
         return any(isinstance(one, AutopilotCondition) for one in self.conditions)
 
     @cached_property
-    def turns_by_silence(self) -> bool:
-        """It may come to hold as something is told no more."""
-        return self.asks_for_a_kill_aloft or any(
-            isinstance(one, MeasurementCondition) and one.if_unknown for one in self.conditions
-        )
+    def silences(self) -> frozenset[str]:
+        """The measurements of which it may come to hold as they are told no more."""
+        names = {
+            one.measurement
+            for one in self.conditions
+            if isinstance(one, MeasurementCondition) and one.if_unknown
+        }
+        if self.asks_for_a_kill_aloft:
+            names |= set(FALL_SIGNS)
+        # These are told by the heights as well.
+        by_height = names & {CLIMB_RATE, "vertical_speed"}
+        return frozenset(names - {CLIMB_RATE} | ({HEIGHT} if by_height else set()))
 
     @cached_property
     def rests_on_the_vehicle(self) -> bool:
