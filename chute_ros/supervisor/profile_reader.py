@@ -124,7 +124,7 @@ def _limits(reader: _ProfileLines, where: Where) -> MappingProxyType[str, Limits
 
 
 def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
-    what = f"rule '{name}'"
+    what, before = f"rule '{name}'", len(reader.mistakes)
     entries = reader.mapping(where, _RULE_KEYS, what)
     if name == OPERATOR:
         reader.wrong(
@@ -158,7 +158,8 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
     if rule.samples > 1 and rule.hold <= 0.0:
         text = f"{what} needs {rule.samples} samples at once: add `for`, in which they may come"
         reader.wrong(entries["samples"].line, text)
-    if action is Action.DEPLOY and conditions:
+    # What was written wrong stands for something else until it is put right.
+    if action is Action.DEPLOY and conditions and len(reader.mistakes) == before:
         _check_deploy(reader, what, where.line, rule)
     return rule
 

@@ -209,6 +209,16 @@ def test_without_any_link_only_any_can_be_named() -> None:
     assert "mine.yaml, line 19: link in rule 'falls' is 'x': need any" in str(caught.value)
 
 
+def test_what_a_mistake_stands_for_meanwhile_is_no_second_mistake() -> None:
+    """A word that is not known is no silence; the deploy is looked at once it is put right."""
+    text = (
+        "profile: p\nrules:\n  a:\n    states: KILLING\n    action: DEPLOY\n"
+        "    conditions: {autopilot: killed_aloof}\n"
+    )
+    (only,) = mistakes(text)
+    assert "(did you mean killed_aloft?)" in only
+
+
 FACTS = "lost or rebooted or disarmed or emergency or killed_aloft"
 MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate")
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED"
