@@ -14,6 +14,9 @@ from chute_ros.campaign.sensors import SensorFault
 _ENOUGH_TIME, _ENOUGH_FOR_ROCKET = 2.0, 6.5
 #: A way that loses more than this for a while is no way meanwhile; so are stalls as long as that.
 _MOST_LOSS, _MOST_STALL = 0.6, 0.3
+#: Where a message is more than one packet, it comes whole only if each of them does: a line of
+#: $TELEM (300 bytes) is 5 USB packets.
+_PACKETS = {"flight_computer": 5, "umbilical": 5}
 #: A standby has taken over from a supervisor that stopped or whose ways are cut by then, s:
 #: `lease_timeout` (twice, by rank) after the last claim, or after the links have become LOST.
 _TAKEN_OVER, _TAKEN_OVER_DEAF = 1.5, 2.5
@@ -104,13 +107,19 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
             hidden.append(_Hidden(fault.at, end, f"{fault.who} stopped"))
         elif isinstance(fault, Stalls) and fault.longest > _MOST_STALL:
             hidden.append(_Hidden(fault.begin, fault.end, f"{fault.who} stalled"))
-        elif isinstance(fault, WayFault) and fault.spell.loss > _MOST_LOSS:
+        elif isinstance(fault, WayFault) and _lost(fault) > _MOST_LOSS:
             hidden.append(_cut(fault, scenario.standby))
     for one, other in itertools.combinations(sensors, 2):
         if wrong := _together(one, other):
             both = ", ".join(sorted((one.sensor, other.sensor)))
             hidden.append(_Hidden(*wrong, f"sensors {both} were wrong"))
     return [one for one in hidden if not _is_idle(one.cause, scenario)]
+
+
+def _lost(fault: WayFault) -> float:
+    """Share of the messages that do not come whole."""
+    whole = (1.0 - fault.spell.loss) * (1.0 - fault.spell.corrupt)
+    return 1.0 - whole ** _PACKETS.get(fault.way, 1)
 
 
 def _cut(fault: WayFault, standby: bool) -> _Hidden:

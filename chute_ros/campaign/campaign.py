@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 import math
 import multiprocessing
 import signal
@@ -124,6 +125,9 @@ def _all(folder: Path, seeds: range, jobs: int) -> Iterator[Line]:
     # Read before the processes part, so that they share it.
     shipped = _shipped(folder)
     shipped.read_all()
+    # No collection of garbage looks through it again (4 % of a flight).
+    gc.freeze()
     # Ctrl-C reaches every process of a terminal: ours ends them.
-    with multiprocessing.Pool(jobs, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+    ignores = (signal.SIGINT, signal.SIG_IGN)
+    with multiprocessing.get_context("fork").Pool(jobs, signal.signal, ignores) as pool:
         yield from pool.imap(one, seeds, _BATCH)

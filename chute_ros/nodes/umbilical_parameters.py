@@ -64,7 +64,7 @@ PARAMETERS = (
     ),
     Parameter(
         "effect_timeout",
-        1.5,
+        0.5,
         "from sending to effect, then a command that may be repeated is sent again, s",
         0.05,
         60.0,

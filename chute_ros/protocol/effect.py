@@ -198,6 +198,7 @@ class EffectLoop(Generic[CommandT]):
             return
         shown = self.goal.shown
         if self.goal.unacknowledged and not self._sends:
+            self._shown_by_another(now)
             return
         alone = shown is not None and not self.goal.needs_acknowledgement
         if not alone and math.isnan(self._accepted_after):
@@ -217,6 +218,14 @@ class EffectLoop(Generic[CommandT]):
             self._end(True, f"{self.goal.name} {acknowledged}")
         else:
             self._end(True, f"{self.goal.effect} after {seconds:.2f} s; {acknowledged}")
+
+    def _shown_by_another(self, now: float) -> None:
+        """The effect came while this one waited for its turn: it is not sent a second time."""
+        if self.goal.even_if_shown or self.goal.shown is None or not self.goal.shown():
+            return
+        self._take(Happening.EFFECT_SHOWN)
+        waited = now - self._started
+        self._end(True, f"{self.goal.effect} after {waited:.2f} s; nothing was sent")
 
     def abandon(self, why: str, now: float) -> None:
         """It is not wanted any more."""

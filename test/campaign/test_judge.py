@@ -116,6 +116,21 @@ def test_what_hid_the_fall(faults, end: float, cause: str) -> None:
     assert blinded(scenario(Failure.MOTOR, *faults), 0.0, Need(1.0, end)) == cause
 
 
+def test_of_a_line_in_five_packets_little_is_left_where_each_may_be_damaged() -> None:
+    need = Need(1.0, 8.0)
+    for spell, cause in (
+        (Spell(1.0, 8.0, corrupt=0.3), "the way flight_computer was cut"),
+        (Spell(1.0, 8.0, loss=0.1, corrupt=0.1), "the way flight_computer was cut"),
+        (Spell(1.0, 8.0, corrupt=0.1), ""),
+        (Spell(1.0, 8.0, loss=0.16), ""),
+    ):
+        flight = scenario(Failure.MOTOR, WayFault("flight_computer", spell))
+        assert blinded(flight, 0.0, need) == cause
+    # A datagram is whole or it is not.
+    damaged = WayFault("autopilot", Spell(1.0, 8.0, corrupt=0.5))
+    assert blinded(scenario(Failure.MOTOR, damaged), 0.0, need) == ""
+
+
 def test_where_another_stands_by_a_stop_hides_nothing_for_long() -> None:
     stop = Stop("supervisor", 1.0, 8.0)
     need = Need(1.0, 5.0)

@@ -133,6 +133,13 @@ def test_the_effect_does_not_count_before_it_left():
     assert bench.end.sent
 
 
+def test_what_another_did_while_this_one_waited_is_not_done_again():
+    bench = Bench(sends_at_once=False).at(0.5).shows()
+    assert (bench.end.success, bench.end.sent, bench.end.shown) == (True, False, True)
+    assert bench.end.message == f"{SHOWN} after 0.50 s; nothing was sent"
+    assert bench.reports == [Outcome.CONFIRMED]
+
+
 def test_what_never_left_says_so():
     end = Bench(sends_at_once=False).at(9.0).end
     assert (end.success, end.sent, end.shown) == (False, False, False)

@@ -14,7 +14,7 @@ from umbilical_link_bench import (
 )
 
 from chute_ros.protocol.events import ParachuteChanged
-from chute_ros.protocol.umbilical.config import DeployStage
+from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.events import DumpStarted
 from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
 
@@ -146,6 +146,13 @@ def test_it_fires_again_until_telemetry_shows_it():
     )
 
 
+def test_by_the_standard_settings_a_lost_one_costs_half_a_second():
+    bench = ready(ASCENT, effect=UmbilicalConfig().effect)
+    bench.deploy()
+    bench.after(1.2).talk(ssa_drogue_deployed=1).after(6.0)
+    assert bench.times("<D>") == [1.05, 1.55, 2.05]
+
+
 def test_it_ends_when_the_time_is_up_and_says_so():
     bench = ready(ASCENT)
     number = bench.deploy()
@@ -172,6 +179,17 @@ def test_it_leaves_before_all_that_waits():
         bench.order("flash_info")
     bench.deploy()
     assert bench.after(1.0).tokens == ["<I>", "<D>", *["<I>"] * 4]
+
+
+def test_a_second_one_that_waits_is_not_fired_once_the_first_shows():
+    bench = ready(ASCENT, scheduler=SchedulerLimits(0.5, 1.0, 0.5))
+    bench.deploy()
+    bench.after(0.1)
+    second = bench.deploy()
+    bench.after(0.1).talk(ssa_drogue_deployed=1).after(6.0)
+    assert len(bench.times("<D>")) == 1
+    assert bench.end(second).success
+    assert bench.end(second).message.endswith("; nothing was sent")
 
 
 def test_it_finds_a_place_though_the_queue_is_full():

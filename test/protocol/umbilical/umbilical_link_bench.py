@@ -7,6 +7,7 @@ from typing import Any
 
 from umbilical_lines import BY_NAME, LAYOUTS, STATE, as_rust_prints
 
+from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Notice,
@@ -43,6 +44,10 @@ def zeros(layout: Any, **values: Any) -> bytes:
     return f"$TELEM,{','.join(texts)}\n".encode()
 
 
+#: Of the stories: longer than the standard, so that their other times fit in between.
+EFFECT = EffectLimits(1.5, 0.25, 5.0)
+
+
 class Bench:
     """One link and the flight computer at its other end; t: seconds since the story began.
 
@@ -57,7 +62,8 @@ class Bench:
         always_alive: bool = False,
         **config: Any,
     ) -> None:
-        self.link = UmbilicalLink(UmbilicalConfig(layout_setting, **config), LAYOUTS)
+        settings = {"effect": EFFECT, **config}
+        self.link = UmbilicalLink(UmbilicalConfig(layout_setting, **settings), LAYOUTS)
         self.layout = BY_NAME[layout]
         self.t = 0.0
         self.talks = False
