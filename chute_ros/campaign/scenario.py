@@ -93,6 +93,8 @@ _ROCKET_SENSORS = {
     "force": ("sticks", "noise", "zero"),
     "fix": ("lies",),
 }
+#: Heights are looked at for a second, of which the flight has settled for 0.3 s.
+_CARRIED_UNTIL = 0.7
 
 
 @dataclass(frozen=True)
@@ -221,6 +223,10 @@ def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool
     supervisors = ("supervisor", "standby") if standby else ("supervisor",)
     kind = chance.choices(("way", "stop", "stalls", "clock", "sensor"), (9, 3, 1, 1, 4))[0]
     if kind == "sensor":
+        if vehicle is not Vehicle.ROCKET:
+            # Being carried up, as no vehicle climbs, is out of all that is known of it by then.
+            begin = max(begin, _CARRIED_UNTIL)
+            end = round(begin + lasts, 3)
         sensors = _ROCKET_SENSORS if vehicle is Vehicle.ROCKET else _SENSORS
         sensor = chance.choice(list(sensors))
         return SensorFault(sensor, chance.choice(sensors[sensor]), begin, end)

@@ -17,7 +17,9 @@ def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> floa
     """When the newest step of the ladder is given up, monotonic s."""
     if len(state.deploys) >= len(state.ladder(config)):
         return step.decided_at + config.deploy_timeout
-    return step.decided_at + config.ladder_step_timeout
+    if step.reached(Outcome.ACCEPTED):
+        return step.decided_at + config.ladder_step_timeout
+    return step.decided_at + min(config.ladder_accept_timeout, config.ladder_step_timeout)
 
 
 class Deploying(Policy):

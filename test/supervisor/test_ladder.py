@@ -42,19 +42,42 @@ def test_the_primary_comes_first_and_alone() -> None:
     story = deploying()
     decision = story.newest(D)
     assert (decision.targets, decision.device) == ((LINK,), "")
-    story.alive(2.9, LINK, UPF)
+    story.alive(1.9, LINK, UPF)
     assert steps(story) == ALL[:1]
 
 
 def test_a_step_that_is_not_confirmed_in_its_time_is_followed_by_the_next_and_says_why() -> None:
     story = deploying()
-    story.at(1.1, story.report(D, Outcome.SENT))
+    story.at(1.1, story.report(D, Outcome.ACCEPTED))
+    story.alive(2.95, LINK, UPF)
+    assert steps(story) == ALL[:1]
     story.alive(3.05, LINK, UPF)
     assert steps(story) == ALL[:2]
     assert (
         "step 1 of 4, mavlink_parachute: not confirmed: mavlink_parachute: told (2.00 s)"
         in (story.newest(D).reasons[-1])
     )
+
+
+def test_a_step_that_no_device_acknowledges_is_followed_sooner() -> None:
+    # It does not answer, or refuses as long as it thinks that it stands.
+    story = deploying()
+    story.at(1.1, story.report(D, Outcome.SENT, detail="release sent"))
+    story.alive(1.95, LINK, UPF)
+    assert steps(story) == ALL[:1]
+    story.alive(2.05, LINK, UPF)
+    assert steps(story) == ALL[:2]
+    assert (
+        "not confirmed: mavlink_parachute: release sent (1.00 s)" in (story.newest(D).reasons[-1])
+    )
+
+
+def test_no_step_takes_longer_unacknowledged_than_acknowledged() -> None:
+    story = deploying(ladder_step_timeout=0.5)
+    story.alive(1.45, LINK, UPF)
+    assert steps(story) == ALL[:1]
+    story.alive(1.55, LINK, UPF)
+    assert steps(story) == ALL[:2]
 
 
 def test_a_step_that_failed_is_followed_at_once() -> None:
@@ -64,11 +87,10 @@ def test_a_step_that_failed_is_followed_at_once() -> None:
     assert "not confirmed: mavlink_parachute: denied (0.30 s)" in story.newest(D).reasons[-1]
 
 
-@pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED])
-def test_an_ack_is_no_confirmation(outcome: Outcome) -> None:
+def test_an_ack_is_no_confirmation() -> None:
     story = deploying()
     for n in range(19):
-        story.at(1.05 + n * 0.1, story.heartbeat(), story.report(D, outcome))
+        story.at(1.05 + n * 0.1, story.heartbeat(), story.report(D, Outcome.ACCEPTED))
     assert steps(story) == ALL[:1]
     assert story.state.stage is Stage.DEPLOYING
     story.alive(3.05, LINK, UPF)
@@ -83,7 +105,7 @@ def test_the_whole_ladder_ends_at_the_triggers_themselves() -> None:
     assert (last.targets, last.device) == ((UPF,), "trigger")
     new = [(t, o) for t, o in story.outputs if isinstance(o, i.Decide) and not o.again]
     times = [t for t, o in new if o.decision.action is D]
-    assert times == pytest.approx([1.0, 3.0, 5.0, 7.0])
+    assert times == pytest.approx([1.0, 2.0, 3.0, 4.0])
 
 
 @pytest.mark.parametrize("number", range(4))
@@ -102,8 +124,8 @@ def test_the_step_that_is_confirmed_is_the_last(number: int) -> None:
 def test_a_step_that_confirms_late_ends_the_climb() -> None:
     story = deploying()
     first = story.newest(D)
-    story.alive(3.05, LINK, UPF)
-    story.at(3.1, i.ActionReport(first.epoch, first.id, LINK, Outcome.CONFIRMED, "out"))
+    story.alive(2.05, LINK, UPF)
+    story.at(2.1, i.ActionReport(first.epoch, first.id, LINK, Outcome.CONFIRMED, "out"))
     assert story.state.stage is Stage.DEPLOYED
     story.at(60.0)
     assert steps(story) == ALL[:2]
@@ -111,8 +133,8 @@ def test_a_step_that_confirms_late_ends_the_climb() -> None:
 
 def test_the_status_of_any_parachute_ends_the_climb() -> None:
     story = deploying()
-    story.alive(3.05, LINK, UPF)
-    story.at(3.1, parachute(UPF, "33", deployed=True))
+    story.alive(2.05, LINK, UPF)
+    story.at(2.1, parachute(UPF, "33", deployed=True))
     assert story.state.stage is Stage.DEPLOYED
     story.at(60.0)
     assert steps(story) == ALL[:2]

@@ -14,6 +14,7 @@ TIMES = (
     "resend_interval",
     "vehicle_state_age",
     "ladder_step_timeout",
+    "ladder_accept_timeout",
     "alarm_interval",
     "late_after",
 )

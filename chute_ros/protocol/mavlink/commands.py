@@ -22,8 +22,8 @@ from chute_ros.protocol.mavlink.unanswered import UnansweredSends
 class CommandLimits:
     """Times (s) and tries of a command."""
 
-    ack_timeout: float = 0.5
-    tries: int = 3
+    ack_timeout: float = 0.2
+    tries: int = 5
     in_progress_timeout: float = 5.0
     late_ack_window: float = 5.0
 

@@ -1,0 +1,52 @@
+"""What a campaign flies with is what the nodes start with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from campaign_bench import SHIPPED
+
+from chute_ros.campaign.scenario import Vehicle
+from chute_ros.nodes import (
+    mavlink_parameters,
+    supervisor_parameters,
+    umbilical_parameters,
+    upf_parameters,
+)
+from chute_ros.nodes.parameters import Parameter
+from chute_ros.protocol.mavlink.config import MavlinkConfig
+from chute_ros.protocol.umbilical.config import UmbilicalConfig
+from chute_ros.protocol.upf.config import UpfConfig
+
+
+def standard(parameters: tuple[Parameter, ...]) -> dict[str, Any]:
+    return {one.name: one.default for one in parameters}
+
+
+def test_the_links_have_the_standard_settings_of_their_nodes() -> None:
+    mavlink = mavlink_parameters.config_from(standard(mavlink_parameters.PARAMETERS))
+    assert mavlink == MavlinkConfig()
+    umbilical = umbilical_parameters.config_from(standard(umbilical_parameters.PARAMETERS))
+    assert umbilical == UmbilicalConfig()
+    upf = upf_parameters.config_from(standard(upf_parameters.PARAMETERS), {}, "upf_can", 0.0)
+    # Which is another on each machine.
+    assert replace(upf, unique_id=UpfConfig().unique_id) == UpfConfig()
+
+
+@pytest.mark.parametrize("vehicle", Vehicle)
+def test_so_has_the_supervisor(vehicle: Vehicle) -> None:
+    profile = "rocket" if vehicle is Vehicle.ROCKET else "multirotor"
+    flies = SHIPPED.config(vehicle, profile, False, 0)
+    told = {
+        "profile": profile,
+        "required_links": list(flies.required_links),
+        "kill_links": list(flies.kill_links),
+        "deploy_links": list(flies.deploy_links),
+        "deploy_ladder": [str(rung) for rung in flies.deploy_ladder] or [""],
+    }
+    values = {**standard(supervisor_parameters.PARAMETERS), **told}
+    config = supervisor_parameters.config_from(values)
+    assert all(config.limits(link) == flies.limits(link) for link in flies.links)
+    assert replace(config, link_limits=flies.link_limits) == flies
