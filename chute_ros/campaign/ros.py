@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import random
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from chute_ros.campaign.channel import Channel, Nature, Way
 from chute_ros.campaign.world import World
+from chute_ros.model import Decision
+from chute_ros.supervisor.decision_gate import number
 
 #: From a publisher to a subscription on one host, s.
 _NATURE = Nature(0.0005, in_order=True)
-#: What a queue keeps of what nobody reads.
-_QUEUE = 10
+#: What a queue keeps of what nobody reads, and one of decisions (nodes/qos.py).
+_QUEUE, _DECISIONS = 10, 50
 
 #: Gets a message, the wall clock here less its stamp (s), and the time.
 Take = Callable[[Any, float, float], None]
@@ -55,7 +57,8 @@ class Process:
     def deliver(self, message: Any, stamp: float, take: Take, now: float) -> None:
         """A message came."""
         if not self.runs(now):
-            queue = self._queues.setdefault(take, deque(maxlen=_QUEUE))
+            depth = _DECISIONS if isinstance(message, Decision) else _QUEUE
+            queue = self._queues.setdefault(take, deque(maxlen=depth))
             queue.append((message, stamp, take))
         else:
             take(message, now + self.clock - stamp, now)
@@ -65,8 +68,15 @@ class Process:
             return
         queues, self._queues = self._queues, {}
         for queue in queues.values():
-            for message, stamp, take in queue:
+            for message, stamp, take in _as_looked_at(queue):
                 take(message, now + self.clock - stamp, now)
+
+
+def _as_looked_at(queue: deque[tuple[Any, float, Take]]) -> Sequence[tuple[Any, float, Take]]:
+    """In the order in which they came; decisions in the one in which they were made."""
+    if isinstance(queue[0][0], Decision):
+        return sorted(queue, key=lambda one: number(one[0]))
+    return queue
 
 
 class Ros:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import ActionReport, SafetyDecision
@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.nodes import messages, qos
-from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
+from chute_ros.supervisor.decision_gate import DecisionGate, Verdict, number
 
 #: So many decisions are remembered with how far they got, to be reported once more.
 MOST_REPORTS = 50
@@ -39,8 +39,8 @@ class DecisionCarrier:
 
     def begin(self) -> None:
         """Listen to the supervisor from now on."""
-        self._node.create_subscription(
-            SafetyDecision, "safety/decision", self._decision, qos.newest(qos.DECISION)
+        self._subscription = self._node.create_subscription(
+            SafetyDecision, "safety/decision", self._woken, qos.newest(qos.DECISION)
         )
 
     def report(self, decision: model.Decision, outcome: model.Outcome, detail: str) -> None:
@@ -66,6 +66,19 @@ class DecisionCarrier:
         }
         counts["newest decision"] = f"{self._gate.newest_epoch}.{self._gate.newest_id}"
         return counts
+
+    def _woken(self, first: SafetyDecision) -> None:
+        for message in sorted((first, *self._waiting()), key=number):
+            self._decision(message)
+
+    def _waiting(self) -> Iterator[SafetyDecision]:
+        """What else has come."""
+        with self._subscription.handle:
+            for _ in range(qos.DECISION.depth):
+                taken = self._subscription.handle.take_message(SafetyDecision, False)
+                if taken is None:
+                    return
+                yield taken[0]
 
     def _decision(self, message: SafetyDecision) -> None:
         decision, log = messages.decision_from(message), self._node.get_logger()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections import deque
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from chute_ros.model import Action, Decision
 
@@ -18,6 +19,24 @@ class Verdict(enum.Enum):
     REPEATED = "the same as one already acted on"
     OLDER = "older than one already seen"
     TOO_LATE = "came too late"
+
+
+class Numbered(Protocol):
+    """A decision, whatever carries it."""
+
+    @property
+    def epoch(self) -> int:
+        """Of the supervisor's term."""
+
+    @property
+    def id(self) -> int:
+        """Within it."""
+
+
+def number(decision: Numbered) -> tuple[int, int]:
+    """The order in which decisions are made. A node that hung looks at what waits in this order:
+    decisions are said again and again, and the deploy may be the first that is young enough."""
+    return decision.epoch, decision.id
 
 
 @dataclass
@@ -42,7 +61,7 @@ class DecisionGate:
             return Verdict.NOT_ADDRESSED
         if decision.shadow:
             return Verdict.SHADOW
-        order = (decision.epoch, decision.id)
+        order = number(decision)
         newer = order > (self.newest_epoch, self.newest_id)
         if order in self.acted:
             return Verdict.REPEATED

@@ -1,0 +1,63 @@
+"""A node that hung finds decisions that were said again and again."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from chute_msgs.msg import SafetyDecision
+from node_bench import Bench, stamped
+from rclpy.node import Node
+
+from chute_ros.model import Action, Decision
+from chute_ros.nodes import qos
+from chute_ros.nodes.decision_carrier import DecisionCarrier
+
+
+class Hung:
+    """A node that does not look at what comes, until it does."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self.done: list[tuple[int, Action]] = []
+        self.node = Node("hung", namespace=bench.namespace)
+        bench.nodes.append(self.node)
+        self.carrier = DecisionCarrier(self.node, 0.5, self._age, self._carry_out)
+        self.carrier.begin()
+        # After it: what this one has heard, it has been given as well.
+        self._heard = bench.follow(SafetyDecision, "safety/decision", qos.newest(qos.DECISION))
+        self._publisher = bench.client.create_publisher(
+            SafetyDecision, "safety/decision", qos.DECISION
+        )
+        bench.until(lambda: self._publisher.get_subscription_count() == 2, "both listen")
+
+    def _age(self, stamp: Time) -> float:
+        return 0.0
+
+    def _carry_out(self, decision: Decision) -> None:
+        self.done.append((decision.id, decision.action))
+
+    def told(self, *decisions: tuple[int, Action]) -> None:
+        for number, action in decisions:
+            message = SafetyDecision(epoch=1, id=number, action=int(action), targets=["hung"])
+            self._publisher.publish(stamped(self.bench.client, message))
+        last = decisions[-1][0]
+        self.bench.until(lambda: self._heard and self._heard[-1].id == last, "it was given them")
+
+    def goes_on(self) -> None:
+        self.bench.executor.add_node(self.node)
+        self.bench.until(lambda: self.done, "it acts")
+
+
+def test_the_kill_comes_before_the_deploy_whichever_was_said_again_first(bench: Bench) -> None:
+    hung = Hung(bench)
+    again = ((8, Action.DEPLOY), (7, Action.KILL))
+    hung.told(*again * 3, (9, Action.FLIGHT_BLOCK))
+    hung.goes_on()
+    assert hung.done == [(7, Action.KILL), (8, Action.DEPLOY), (9, Action.FLIGHT_BLOCK)]
+    assert hung.carrier.counts()["decisions: the same as one already acted on"] == 4
+
+
+def test_of_more_than_the_queue_holds_the_newest_are_left(bench: Bench) -> None:
+    hung = Hung(bench)
+    hung.told(*((number, Action.FLIGHT_BLOCK) for number in range(1, 61)))
+    hung.goes_on()
+    assert [number for number, _ in hung.done] == list(range(11, 61))
