@@ -16,6 +16,7 @@ from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.sim.upf_aps import Motion
@@ -53,11 +54,26 @@ def _is_for(node: UpfDevice) -> Callable[[bytes], bool]:
 
 
 class ReleasedParachute(ParachuteDevice):
-    """Its release acts on the vehicle, whoever hears of it."""
+    """Its release acts on the vehicle, whoever hears of it. true_height: m."""
 
-    def __init__(self, settings: ParachuteSettings, out: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        settings: ParachuteSettings,
+        out: Callable[[], None],
+        true_height: Callable[[], float],
+    ) -> None:
         super().__init__(settings, [])
-        self._out = out
+        self._out, self._true_height = out, true_height
+        #: When it first refused a release because the height that it is told is wrong, virtual s.
+        self.misled_at = math.nan
+
+    def _release(self) -> int:
+        result = super()._release()
+        refused = result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
+        first = refused and math.isnan(self.misled_at)
+        if first and self._true_height() >= self.settings.clear_height:
+            self.misled_at = self.now
+        return result
 
     def _deploy(self, trigger: DeploymentTrigger) -> None:
         super()._deploy(trigger)
@@ -73,6 +89,7 @@ class Aircraft(Rig):
             fall_speed=scenario.fall_speed, gusts=scenario.gusts, chance=self.chance("wind")
         )
         self.controller: UpfController | None = None
+        self.only_parachute: ReleasedParachute | None = None
         bus = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
         self.autopilot = CampaignAutopilot(self.model, self.sensors)
         plug = Plug(bus, "autopilot", self.autopilot, _is_for_devices)
@@ -80,8 +97,10 @@ class Aircraft(Rig):
         on_mavlink = scenario.vehicle is not Vehicle.UPF
         if on_mavlink:
             settings = ParachuteSettings(armed_triggers=0 if scenario.arms else _ARMED_TRIGGERS)
-            parachute = ReleasedParachute(settings, self._out)
+            parachute = ReleasedParachute(settings, self._out, lambda: self.model.height)
             self.add_device(Plug(bus, "parachute", parachute, _is_for_devices), parachute.reboot)
+            if scenario.vehicle is Vehicle.MAVLINK:
+                self.only_parachute = parachute
         self.add_node(MavlinkNode(bus, self.process(MAVLINK_NODE), self.ros, on_mavlink))
         if scenario.vehicle is not Vehicle.MAVLINK:
             self._add_upf()
@@ -112,6 +131,9 @@ class Aircraft(Rig):
 
     def is_up(self) -> bool:
         return self._flew and not self.nature.lifts
+
+    def refused_at(self) -> float:
+        return math.nan if self.only_parachute is None else self.only_parachute.misled_at
 
     def fail(self, now: float) -> None:
         failure, plug = self.scenario.failure, self.plugs["autopilot"]

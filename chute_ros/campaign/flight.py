@@ -51,6 +51,8 @@ class Flown:
     decided: tuple[tuple[float, Decision], ...]
     acted: tuple[Acted, ...]
     said: tuple[tuple[float, str], ...]
+    #: When the only parachute refused its release, as by the height that it is told it stands.
+    refused: float = math.nan
     #: What the person was answered; empty: nothing.
     answer: str = ""
 
@@ -180,6 +182,7 @@ class Flight:
             tuple(decided),
             tuple(acted),
             tuple(said),
+            rig.refused_at(),
             "" if answer is None else f"{answer.success}: {answer.message}",
         )
 

@@ -12,6 +12,7 @@ from chute_ros.campaign.scenario import Vehicle
 from chute_ros.campaign.truth import SOFT, SOFT_UNDER_DROGUE
 from chute_ros.model import Action
 
+_REFUSED = "the only parachute refused: by the wrong height that it was told, it stood"
 #: What a person orders has happened by then, s.
 _PERSON_WAITS = 6.0
 
@@ -106,6 +107,8 @@ def _fallen(flown: Flown) -> Judged | None:
         return Judged(Count.NO_TIME, f"{truth.leeway:.2f} s were left (need {enough:g} s)")
     if blind := blinded(scenario, flown.up, Need(truth.at, truth.latest)):
         return Judged(Count.NOT_TOLD, blind)
+    if flown.refused <= truth.latest:
+        return Judged(Count.NOT_TOLD, _REFUSED)
     if math.isnan(flown.released):
         return Judged(Count.MISSED, f"{truth.leeway:.2f} s were left")
     return Judged(Count.LATE, f"{flown.released - truth.latest:.2f} s after the last moment")
@@ -126,4 +129,6 @@ def _ordered(flown: Flown) -> Judged | None:
         return None
     if blind := blinded(scenario, flown.up, Need(due, latest)):
         return Judged(Count.NOT_TOLD, blind)
+    if person.does == "deploy" and flown.refused <= latest:
+        return Judged(Count.NOT_TOLD, _REFUSED)
     return Judged(Count.MISSED, f"a person's {person.does}: {flown.answer or 'no answer'}")

@@ -88,6 +88,10 @@ class Rig(ABC):
     def fail(self, now: float) -> None:
         """What fails, fails."""
 
+    def refused_at(self) -> float:
+        """When the only parachute refused its release by a wrong height, virtual s; NaN: never."""
+        return math.nan
+
     # -- faults ----------------------------------------------------------------------------------
 
     def plan(self, up: float) -> None:

@@ -12,7 +12,7 @@ from chute_ros.campaign.blind import Need, blinded
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.flight import Flown
 from chute_ros.campaign.judge import WRONG, Count, judge
-from chute_ros.campaign.scenario import Failure, Person, Stop, WayFault
+from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import Truth
 
@@ -47,6 +47,30 @@ def test_what_a_person_orders_is_never_false(good: Flown) -> None:
     assert judge(replace(good, acted=early)).count is Count.FALSE
     wanted = replace(good.scenario, person=Person("kill", 0.4))
     assert judge(replace(good, acted=early, scenario=wanted)).count is Count.RIGHT
+
+
+def test_what_the_only_parachute_refuses_in_time_is_not_missed(good: Flown) -> None:
+    truth = good.truth
+    hard = replace(good, released=math.nan, landed=truth.latest + 1.0, landing_speed=20.0)
+    judged = judge(replace(hard, refused=truth.latest - 0.1))
+    assert judged.count is Count.NOT_TOLD
+    assert judged.why.startswith("the only parachute refused")
+    assert judge(replace(hard, refused=truth.latest + 0.1)).count is Count.MISSED
+    wanted = replace(good.scenario, person=Person("deploy", 0.4), failure=Failure.NOTHING)
+    quiet = replace(good, scenario=wanted, truth=Truth(), acted=(), released=math.nan)
+    for refused, count in ((good.up + 0.5, Count.NOT_TOLD), (good.up + 9.0, Count.MISSED)):
+        assert judge(replace(quiet, landed=math.nan, refused=refused)).count is count
+
+
+def test_a_parachute_that_is_told_a_wrong_height_refuses_and_another_does_not() -> None:
+    wrong = SensorFault("height", "jumps", 0.8, 9.0)
+    alone = flown(Failure.MOTOR, wrong, height=38.0)
+    assert alone.truth.at < alone.refused < alone.truth.latest
+    assert judge(alone).count is Count.NOT_TOLD
+    two = flown(Failure.MOTOR, wrong, height=38.0, vehicle=Vehicle.BOTH)
+    assert math.isnan(two.refused)
+    assert judge(two).count is Count.RIGHT
+    assert math.isnan(flown(Failure.MOTOR, height=38.0).refused)
 
 
 @pytest.mark.parametrize("does", ["deploy", "kill"])
