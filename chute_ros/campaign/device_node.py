@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count, zip_longest
@@ -11,7 +12,7 @@ from typing import Any
 
 from chute_ros.campaign.bus import Bus, Plug, Spoil
 from chute_ros.campaign.ros import Process, Ros
-from chute_ros.campaign.supervisor_host import SupervisorBeat
+from chute_ros.campaign.supervisor_host import SafetyPicture, SupervisorBeat
 from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.protocol.events import (
     ParachuteChanged,
@@ -27,6 +28,8 @@ _HEARTBEAT_INTERVAL = 0.1  # s
 _MAX_DECISION_AGE = 0.5  # s
 _SUPERVISOR_LOST_AFTER = 1.0  # s
 _GIVE_UP_AFTER = 5.0  # s
+#: Two floats that are the same stamp may differ by this, s.
+_SAME_STAMP = 1e-5
 #: Our own heartbeat on the wire stops when the node has not beaten for so long, s.
 _OWNER_SILENCE = 1.0
 
@@ -73,6 +76,7 @@ class DeviceNode(Plug):
         self._begin(0.0)
         ros.subscribe(Decision, process, self._decide)
         ros.subscribe(SupervisorBeat, process, self._supervisor)
+        ros.subscribe(SafetyPicture, process, self._safety)
 
     def _begin(self, now: float) -> None:
         self._gate = DecisionGate(self.name, _MAX_DECISION_AGE)
@@ -85,6 +89,8 @@ class DeviceNode(Plug):
         #: Of each supervisor, and of the one that leads: its clock, and when it was heard.
         self._clocks: dict[str, ClockSteps] = {}
         self._clock = ClockSteps(_MAX_DECISION_AGE / 2)
+        #: Stamps of its newest heartbeats, and when they left.
+        self._sent: deque[tuple[float, float]] = deque(maxlen=50)
         self._heard, self._lost = math.nan, False
         #: Why flight is blocked by decision; empty: it is not.
         self.decided_block = ""
@@ -115,6 +121,9 @@ class DeviceNode(Plug):
 
     def event(self, event: Any) -> None:
         """One that only this kind of link has."""
+
+    def safety_state(self, one: SafetyPicture, now: float) -> None:
+        """The supervisor's picture came."""
 
     def flight_block(self, reason: str, now: float) -> None:
         """Keep a vehicle that stands on the ground for reason, or no longer (empty)."""
@@ -249,6 +258,13 @@ class DeviceNode(Plug):
         if beat.leading:
             self._heard, self._clock = now, clock
 
+    def _safety(self, one: SafetyPicture, difference: float, now: float) -> None:
+        clock, heard = self._clocks.get(one.supervisor), one.stamps.get(self.name, math.nan)
+        left = [at for stamp, at in self._sent if abs(stamp - heard) < _SAME_STAMP]
+        if clock is not None and left:
+            clock.answered(difference, now - left[0])
+        self.safety_state(one, now)
+
     def _beat(self, now: float) -> None:
         self.link.owner_alive(now + _OWNER_SILENCE)
         held, self._held = self._held, []
@@ -257,6 +273,7 @@ class DeviceNode(Plug):
                 begin(token, now)
             else:
                 self._held.append((token, begin, ready, until))
+        self._sent.append((now + self.process.clock, now))
         self.publish(i.LinkHeartbeat(self.name, *self.summary(now), next(self._seq)))
         if (lost := now - self._heard > _SUPERVISOR_LOST_AFTER) is not self._lost:
             self._lost = lost

@@ -77,7 +77,6 @@ class UpfNode(DeviceNode):
         self._launch = types.message(names.TRIGGER_LAUNCH).id
         ros.subscribe(i.VehicleReport, process, self._vehicle)
         ros.subscribe(ActionTold, process, self._action)
-        ros.subscribe(SafetyPicture, process, self._safety)
 
     def _begin(self, now: float) -> None:
         super()._begin(now)
@@ -141,7 +140,7 @@ class UpfNode(DeviceNode):
             self.link.kill_confirmed(now)
             self._after(now)
 
-    def _safety(self, one: SafetyPicture, difference: float, now: float) -> None:
+    def safety_state(self, one: SafetyPicture, now: float) -> None:
         prefix = f"{self.name} "
         standing = [
             block.removeprefix(prefix) for block in one.device_blocks if block.startswith(prefix)

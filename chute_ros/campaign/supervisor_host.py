@@ -46,6 +46,9 @@ class SafetyPicture:
 
     blocked: bool
     device_blocks: frozenset[str]
+    #: Whose it is, and the stamp of the newest heartbeat of each link.
+    supervisor: str
+    stamps: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ class SupervisorHost:
         self._beat_at = self._state_at = now
         self._published: tuple[object, ...] = ()
         self._deadline = now
+        self._stamps: dict[str, float] = {}
         self._callers.clear()
 
     @property
@@ -147,6 +151,7 @@ class SupervisorHost:
         self._turn((one,), now)
 
     def _heartbeat(self, one: i.LinkHeartbeat, difference: float, now: float) -> None:
+        self._stamps[one.link] = now + self.process.clock - difference
         self._turn(
             (i.LinkHeartbeat(one.link, one.link_state, one.device_healthy, one.seq, difference),),
             now,
@@ -210,7 +215,9 @@ class SupervisorHost:
         self._kept = state
         block = state.block.decision if state.block is not None else None
         blocked = block is not None and block.action is Action.FLIGHT_BLOCK and not block.shadow
-        self._ros.publish(self.process, SafetyPicture(blocked, frozenset(state.device_blocks)))
+        blocks = frozenset(state.device_blocks)
+        picture = SafetyPicture(blocked, blocks, self.process.name, dict(self._stamps))
+        self._ros.publish(self.process, picture)
 
     # -- the lease -------------------------------------------------------------------------------
 

@@ -18,6 +18,7 @@ from chute_msgs.msg import (
     LinkHeartbeat,
     ParachuteStatus,
     SafetyRequest,
+    SafetyState,
 )
 from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -142,6 +143,7 @@ class DeviceNode(Node, ABC):
         self.create_subscription(
             LinkHeartbeat, "safety/heartbeat", self._supervisor.heartbeat, qos.newest(qos.STATUS)
         )
+        self.create_subscription(SafetyState, "safety/state", self._safety_state, qos.LATCHED)
         self.serve(Arm, "~/arm", self._arm)
         self.serve(Deploy, "~/deploy", self._deploy)
         period = 1.0 / self.values["heartbeat_rate"]
@@ -189,6 +191,9 @@ class DeviceNode(Node, ABC):
     @abstractmethod
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         """The tasks of the device."""
+
+    def safety_state(self, message: SafetyState) -> None:
+        """The supervisor's picture came."""
 
     def parameter_changed(self, name: str, value: Any) -> None:
         """A changeable parameter has a new value."""
@@ -338,7 +343,12 @@ class DeviceNode(Node, ABC):
             age=summary.age,
         )
         message.header.stamp = self.stamp()
+        self._supervisor.beat(message.header.stamp)
         self._heartbeat_publisher.publish(message)
+
+    def _safety_state(self, message: SafetyState) -> None:
+        self._supervisor.picture(message, self.get_name())
+        self.safety_state(message)
 
     async def _arm(self, request: Arm.Request, response: Arm.Response) -> Arm.Response:
         end = await self.request(lambda link, token, now: self.arm_link(link, token, request, now))

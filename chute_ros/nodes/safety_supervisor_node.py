@@ -16,6 +16,7 @@ from itertools import count
 from operator import attrgetter
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from chute_msgs.msg import (
     ActionReport,
     LinkHeartbeat,
@@ -81,6 +82,8 @@ class SafetySupervisorNode(Node):
             if not lease.standby:
                 first = (inputs.TakeOver(epoch_above(max(epoch, before.epoch), lease.rank)),)
         self._misasked: set[str] = set()
+        #: Of the newest heartbeat of each link.
+        self._stamps: dict[str, Time] = {}
         self._recorder = FlightRecorder(self, self.values)
         self._health = Health()
         self.services_offered = SupervisorServices(self, self.wall, self._turn)
@@ -237,6 +240,8 @@ class SafetySupervisorNode(Node):
         self._recorder.message("safety/heartbeat", message)
         if message.supervisor:
             return
+        if message.link in self.config.links:
+            self._stamps[message.link] = message.header.stamp
         sent = messages.seconds(message.header.stamp)
         difference = messages.seconds(self.wall.now().to_msg()) - sent if sent else math.nan
         self._turn(
@@ -313,6 +318,8 @@ class SafetySupervisorNode(Node):
         self._memory.keep(self.state)
         stamp = self.wall.now().to_msg()
         message = state_message(self.config, self.state, now, stamp)
+        message.supervisor = self.get_name()
+        message.link_stamps = [self._stamps.get(link, Time()) for link in self.config.links]
         self._state_publisher.publish(message)
         self._recorder.message("safety/state", message)
 

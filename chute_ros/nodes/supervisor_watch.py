@@ -11,7 +11,7 @@ import time
 from collections.abc import Mapping
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import LinkHeartbeat
+from chute_msgs.msg import LinkHeartbeat, SafetyState
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock
 
@@ -37,6 +37,8 @@ WATCH_PARAMETERS = (
         choices=(HOLD, BLOCK_FLIGHT),
     ),
 )
+#: Of our heartbeats so many are remembered: those of 5 s at the standard rate.
+_MOST_SENT = 50
 
 
 class SupervisorWatch:
@@ -51,6 +53,26 @@ class SupervisorWatch:
         #: Of each supervisor, also of one that only looks on: it may lead next.
         self._clocks: dict[str, ClockSteps] = {}
         self._clock = ClockSteps(limit / 2)
+        #: When each of our newest heartbeats left, by its stamp (s, ns).
+        self._sent: dict[tuple[int, int], float] = {}
+
+    def beat(self, stamp: Time) -> None:
+        """Our own heartbeat leaves, with this stamp."""
+        self._sent[stamp.sec, stamp.nanosec] = time.monotonic()
+        while len(self._sent) > _MOST_SENT:
+            del self._sent[next(iter(self._sent))]
+
+    def picture(self, message: SafetyState, link: str) -> None:
+        """safety/state came. It says which heartbeat of ours (link) was the newest, and answers
+        that one. A picture from before our start, or of a recording, answers none."""
+        clock = self._clocks.get(message.supervisor)
+        heard = dict(zip(message.links, message.link_stamps, strict=False)).get(link)
+        if clock is None or heard is None:
+            return
+        left = self._sent.get((heard.sec, heard.nanosec))
+        if left is not None:
+            difference = self._difference(message.header.stamp)
+            clock.answered(difference, time.monotonic() - left)
 
     def heartbeat(self, message: LinkHeartbeat) -> None:
         """Anybody's heartbeat came. A supervisor that only looks on does not say healthy."""

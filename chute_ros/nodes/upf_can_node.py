@@ -78,7 +78,6 @@ class UpfCanNode(DeviceNode):
             VehicleState, "vehicle/state", self._vehicle, qos.newest(qos.STATUS)
         )
         self.create_subscription(ActionReport, "safety/action", self._action, qos.DECISION)
-        self.create_subscription(SafetyState, "safety/state", self._safety, qos.LATCHED)
         UpfServices(self)
         self.begin()
 
@@ -182,7 +181,7 @@ class UpfCanNode(DeviceNode):
             self._kills.append(report)
             self.in_link(lambda link, now: link.kill_confirmed(now))
 
-    def _safety(self, message: SafetyState) -> None:
+    def safety_state(self, message: SafetyState) -> None:
         prefix = f"{self.get_name()} "
         standing = [
             one.removeprefix(prefix) for one in message.device_blocks if one.startswith(prefix)

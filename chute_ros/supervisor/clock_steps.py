@@ -4,7 +4,8 @@ A message's way can become slower by no more than the time that has passed, and 
 than it took before. A difference between stamp and arrival that changes by more is a clock that
 was set, which makes no message older than it is. Nothing arrives before it was sent either: a
 first heartbeat from the future was stamped by a clock that is ahead, as that of another host may
-be when one of the two is started anew.
+be when one of the two is started anew. One that is behind looks like a way that is slow, until an
+answer to what we have sent comes, which cannot be older than that.
 """
 
 from __future__ import annotations
@@ -37,6 +38,16 @@ class ClockSteps:
             self.offset += change
             return change
         return 0.0
+
+    def answered(self, difference: float, passed: float) -> float:
+        """An answer came to what left here passed s ago. Returns the step that it shows; 0: none.
+
+        The age is then taken to be what it is at most: nothing becomes younger than it is."""
+        step = self.age(difference) - passed
+        if not step > self.margin:
+            return 0.0
+        self.offset += step
+        return step
 
     def age(self, difference: float) -> float:
         """How old a message is whose stamp differs so much from the wall clock here."""

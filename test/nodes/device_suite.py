@@ -6,10 +6,18 @@ device is plugged in. The names and texts below are the contract of all links.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
-from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyDecision
+from builtin_interfaces.msg import Time
+from chute_msgs.msg import (
+    ActionReport,
+    LinkHeartbeat,
+    ParachuteStatus,
+    SafetyDecision,
+    SafetyState,
+)
 from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticArray
 from node_bench import Bench, stamped
@@ -83,6 +91,28 @@ class DeviceSuite:
         message = LinkHeartbeat(link="safety_supervisor", supervisor=True, device_healthy=True)
         stamped(self.bench.client, message, age)
         self.bench.publish(message, "safety/heartbeat")
+
+    def picture(self, age: float, heard: Time) -> None:
+        """Publish its picture, in which this was the stamp of the node's newest heartbeat."""
+        message = SafetyState(
+            supervisor="safety_supervisor", links=[self.name], link_stamps=[heard]
+        )
+        stamped(self.bench.client, message, age)
+        self.bench.publish(message, "safety/state", qos.LATCHED)
+
+    def told_in_diagnostics(self) -> Callable[[str, float], None]:
+        """Waits until diagnostics tell this value under this key."""
+        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
+
+        def await_told(key: str, value: float) -> None:
+            def told() -> bool:
+                every = [status for array in diagnostics for status in array.status]
+                values = [p.value for s in every for p in s.values if p.key == key]
+                return bool(values) and abs(float(values[-1]) - value) < 0.5
+
+            self.bench.until(told, f"diagnostics tell {key!r}: {value}")
+
+        return await_told
 
     def await_report(self, outcome: Outcome, decision: SafetyDecision) -> ActionReport:
         order = (decision.epoch, decision.id)
@@ -261,16 +291,7 @@ class DeviceSuite:
         self, device: SimulatedDevice, step: float
     ) -> None:
         self.ready_to_deploy(device)
-        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
-
-        def await_told(key: str, value: float) -> None:
-            def told() -> bool:
-                every = [status for array in diagnostics for status in array.status]
-                values = [p.value for s in every for p in s.values if p.key == key]
-                return bool(values) and abs(float(values[-1]) - value) < 0.5
-
-            self.bench.until(told, f"diagnostics tell {key!r}: {value}")
-
+        await_told = self.told_in_diagnostics()
         ages = [0.0]
         self.beat(ages[0])
         self.bench.client.create_timer(0.1, lambda: self.beat(ages[0]))
@@ -281,6 +302,27 @@ class DeviceSuite:
         ages[0] = step
         await_told("clock set by (s)", step)
         self.await_report(Outcome.CONFIRMED, self.decide(Action.DEPLOY, age=step))
+        assert device.commands_to_deploy() == 1
+
+    def test_an_answer_of_the_supervisor_shows_that_its_clock_is_behind(
+        self, device: SimulatedDevice
+    ) -> None:
+        """Given a node that was started anew on a host whose clock is an hour ahead."""
+        behind = 3600.0
+        self.ready_to_deploy(device)
+        await_told = self.told_in_diagnostics()
+        self.beat(behind)
+        self.bench.client.create_timer(0.1, lambda: self.beat(behind))
+        await_told("heartbeat age (s)", 0.0)
+        self.picture(behind, Time(sec=17, nanosec=4))
+        self.decide(Action.DEPLOY, age=behind)
+        await_told("decisions: came too late", 1)
+        assert device.commands_to_deploy() == 0, "that picture answers nothing of this node"
+        self.picture(behind, self.beats[-1].header.stamp)
+        await_told("clock set by (s)", behind)
+        self.decide(Action.DEPLOY, age=behind + 30.0)
+        await_told("decisions: came too late", 2)
+        self.await_report(Outcome.CONFIRMED, self.decide(Action.DEPLOY, age=behind))
         assert device.commands_to_deploy() == 1
 
     def test_a_repeated_decision_is_reported_again_and_not_fired_twice(
