@@ -128,6 +128,8 @@ class Outcome(enum.IntEnum):
     ACCEPTED = 2
     CONFIRMED = 3
     FAILED = 4
+    #: For now: the node goes on trying.
+    REFUSED = 5
 
 
 class Armed(enum.IntEnum):

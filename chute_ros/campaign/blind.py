@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
@@ -14,9 +15,8 @@ from chute_ros.campaign.sensors import SensorFault
 _ENOUGH_TIME, _ENOUGH_FOR_ROCKET = 2.0, 6.5
 #: A way that loses more than this for a while is no way meanwhile; so are stalls as long as that.
 _MOST_LOSS, _MOST_STALL = 0.6, 0.3
-#: Where a message is more than one packet, it comes whole only if each of them does: a line of
-#: $TELEM (300 bytes) is 5 USB packets.
-_PACKETS = {"flight_computer": 5, "umbilical": 5}
+#: A flight computer of which no line comes whole for longer than this tells nothing, s.
+_LONGEST_GAP = 1.0
 #: A standby has taken over from a supervisor that stopped or whose ways are cut by then, s:
 #: `lease_timeout` (twice, by rank) after the last claim, or after the links have become LOST.
 _TAKEN_OVER, _TAKEN_OVER_DEAF = 1.5, 2.5
@@ -58,20 +58,24 @@ def enough_time(scenario: Scenario) -> float:
     return _ENOUGH_FOR_ROCKET if scenario.vehicle is Vehicle.ROCKET else _ENOUGH_TIME
 
 
-def blinded(scenario: Scenario, up: float, need: Need) -> str:
-    """Which faults left no time in a row that is enough; empty: there was."""
+def blinded(scenario: Scenario, up: float, need: Need, told: Sequence[float] = ()) -> str:
+    """Which faults left no time in a row that is enough; empty: there was. told: when lines of a
+    rocket's flight computer came whole, virtual s."""
     failed_at = up + scenario.failure_at
     if scenario.failure in _NO_POWER and failed_at < need.end:
         return _NO_POWER[scenario.failure]
-    hidden = [one for one in _all_hidden(scenario) if up + one.begin < need.end]
+    drawn = [replace(one, begin=up + one.begin, end=up + one.end) for one in _all_hidden(scenario)]
+    if scenario.vehicle is Vehicle.ROCKET:
+        drawn += _gaps(told, need)
+    hidden = [one for one in drawn if one.begin < need.end]
     free, best = need.begin, 0.0
     for one in sorted(hidden, key=lambda one: one.begin):
-        best = max(best, up + one.begin - free)
-        free = max(free, up + one.end)
+        best = max(best, one.begin - free)
+        free = max(free, one.end)
     best = max(best, need.end - free)
     if best >= enough_time(scenario):
         return ""
-    return "; ".join(sorted(one.cause for one in hidden if up + one.end > need.begin))
+    return "; ".join(sorted({one.cause for one in hidden if one.end > need.begin}))
 
 
 def misled(scenario: Scenario, up: float, at: float, reasons: str) -> str:
@@ -107,7 +111,7 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
             hidden.append(_Hidden(fault.at, end, f"{fault.who} stopped"))
         elif isinstance(fault, Stalls) and fault.longest > _MOST_STALL:
             hidden.append(_Hidden(fault.begin, fault.end, f"{fault.who} stalled"))
-        elif isinstance(fault, WayFault) and _lost(fault) > _MOST_LOSS:
+        elif isinstance(fault, WayFault) and fault.spell.loss > _MOST_LOSS:
             hidden.append(_cut(fault, scenario.standby))
     for one, other in itertools.combinations(sensors, 2):
         if wrong := _together(one, other):
@@ -116,10 +120,14 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
     return [one for one in hidden if not _is_idle(one.cause, scenario)]
 
 
-def _lost(fault: WayFault) -> float:
-    """Share of the messages that do not come whole."""
-    whole = (1.0 - fault.spell.loss) * (1.0 - fault.spell.corrupt)
-    return 1.0 - whole ** _PACKETS.get(fault.way, 1)
+def _gaps(told: Sequence[float], need: Need) -> list[_Hidden]:
+    """Where no line came whole, virtual s."""
+    times = [one for one in told if need.begin < one < need.end]
+    return [
+        _Hidden(before, after, "no line of the flight computer came whole")
+        for before, after in itertools.pairwise((need.begin, *times, need.end))
+        if after - before > _LONGEST_GAP
+    ]
 
 
 def _cut(fault: WayFault, standby: bool) -> _Hidden:

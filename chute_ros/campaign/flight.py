@@ -51,6 +51,8 @@ class Flown:
     decided: tuple[tuple[float, Decision], ...]
     acted: tuple[Acted, ...]
     said: tuple[tuple[float, str], ...]
+    #: When lines of a rocket's flight computer came whole.
+    told: tuple[float, ...] = ()
     #: When the only parachute refused its release, as by the height that it is told it stands.
     refused: float = math.nan
     #: What the person was answered; empty: nothing.
@@ -182,6 +184,7 @@ class Flight:
             tuple(decided),
             tuple(acted),
             tuple(said),
+            tuple(rig.told()),
             rig.refused_at(),
             "" if answer is None else f"{answer.success}: {answer.message}",
         )

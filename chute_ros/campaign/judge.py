@@ -105,7 +105,7 @@ def _fallen(flown: Flown) -> Judged | None:
     enough = enough_time(scenario)
     if not truth.leeway >= enough:
         return Judged(Count.NO_TIME, f"{truth.leeway:.2f} s were left (need {enough:g} s)")
-    if blind := blinded(scenario, flown.up, Need(truth.at, truth.latest)):
+    if blind := blinded(scenario, flown.up, Need(truth.at, truth.latest), flown.told):
         return Judged(Count.NOT_TOLD, blind)
     if flown.refused <= truth.latest:
         return Judged(Count.NOT_TOLD, _REFUSED)
@@ -127,7 +127,7 @@ def _ordered(flown: Flown) -> Judged | None:
         done |= bool(kills) and kills[0] <= latest
     if done or latest - due < enough_time(scenario):
         return None
-    if blind := blinded(scenario, flown.up, Need(due, latest)):
+    if blind := blinded(scenario, flown.up, Need(due, latest), flown.told):
         return Judged(Count.NOT_TOLD, blind)
     if person.does == "deploy" and flown.refused <= latest:
         return Judged(Count.NOT_TOLD, _REFUSED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from chute_ros.campaign.bus import Plug
@@ -87,6 +87,10 @@ class Rig(ABC):
     @abstractmethod
     def fail(self, now: float) -> None:
         """What fails, fails."""
+
+    def told(self) -> Sequence[float]:
+        """When lines of a rocket's flight computer came whole, virtual s."""
+        return ()
 
     def refused_at(self) -> float:
         """When the only parachute refused its release by a wrong height, virtual s; NaN: never."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from chute_ros.campaign.bus import SERIAL, Bus, Plug
@@ -43,6 +44,46 @@ class CampaignFlightComputer(FlightComputer):
         super()._telemetry()
 
 
+class Lines:
+    """Lines on the cable: which of them came whole, and when."""
+
+    def __init__(self) -> None:
+        self._said: set[bytes] = set()
+        self._saying = self._hearing = b""
+        #: Virtual s.
+        self.whole: list[float] = []
+
+    def said(self, frames: Sequence[bytes]) -> None:
+        """By the flight computer."""
+        *lines, self._saying = (self._saying + b"".join(frames)).split(b"\n")
+        self._said.update(lines)
+
+    def heard(self, frames: Sequence[bytes], now: float) -> None:
+        """By the node."""
+        *lines, self._hearing = (self._hearing + b"".join(frames)).split(b"\n")
+        self.whole += [now for line in lines if line in self._said]
+
+
+class ListeningNode(UmbilicalNode):
+    """Notes which lines came."""
+
+    lines: Lines
+
+    def hear(self, frames: Sequence[bytes], now: float) -> None:
+        self.lines.heard(frames, now)
+        super().hear(frames, now)
+
+
+class SpeakingPlug(Plug):
+    """Notes which lines left."""
+
+    lines: Lines
+
+    def send(self, frames: Sequence[bytes]) -> None:
+        self.lines.said(frames)
+        super().send(frames)
+
+
 class RocketRig(Rig):
     """The flight computer fires the drogue at the apogee; the supervisor, if that does not."""
 
@@ -54,13 +95,19 @@ class RocketRig(Rig):
         self.computer = CampaignFlightComputer(settings, shipped.layouts[0], self.sensors)
         self.rocket = self.computer.flight.rocket
         self.rocket.burn_time = scenario.burn
-        self.add_device(Plug(bus, "flight_computer", self.computer), self.computer.reboot)
+        plug = SpeakingPlug(bus, "flight_computer", self.computer)
+        self.add_device(plug, self.computer.reboot)
         process = self.process(UMBILICAL_NODE)
-        self.add_node(UmbilicalNode(bus, process, self.ros, shipped.layouts))
+        node = ListeningNode(bus, process, self.ros, shipped.layouts)
+        self.add_node(node)
+        self._lines = plug.lines = node.lines = Lines()
         self._look_at = 0.0
         self._failed = fails
         self._speed = 0.0
         self.world.add(self)
+
+    def told(self) -> Sequence[float]:
+        return self._lines.whole
 
     # -- the flight ------------------------------------------------------------------------------
 

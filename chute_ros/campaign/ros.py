@@ -11,7 +11,7 @@ from typing import Any
 from chute_ros.campaign.channel import Channel, Nature, Way
 from chute_ros.campaign.world import World
 from chute_ros.model import Decision
-from chute_ros.supervisor.decision_gate import number
+from chute_ros.supervisor.decision_gate import in_order
 
 #: From a publisher to a subscription on one host, s.
 _NATURE = Nature(0.0005, in_order=True)
@@ -75,7 +75,7 @@ class Process:
 def _as_looked_at(queue: deque[tuple[Any, float, Take]]) -> Sequence[tuple[Any, float, Take]]:
     """In the order in which they came; decisions in the one in which they were made."""
     if isinstance(queue[0][0], Decision):
-        return sorted(queue, key=lambda one: number(one[0]))
+        return in_order(queue, lambda one: one[0])
     return queue
 
 

@@ -223,13 +223,14 @@ def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool
     supervisors = ("supervisor", "standby") if standby else ("supervisor",)
     kind = chance.choices(("way", "stop", "stalls", "clock", "sensor"), (9, 3, 1, 1, 4))[0]
     if kind == "sensor":
-        if vehicle is not Vehicle.ROCKET:
-            # Being carried up, as no vehicle climbs, is out of all that is known of it by then.
-            begin = max(begin, _CARRIED_UNTIL)
-            end = round(begin + lasts, 3)
         sensors = _ROCKET_SENSORS if vehicle is Vehicle.ROCKET else _SENSORS
         sensor = chance.choice(list(sensors))
-        return SensorFault(sensor, chance.choice(sensors[sensor]), begin, end)
+        how = chance.choice(sensors[sensor])
+        if vehicle is not Vehicle.ROCKET and sensor in ("height", "speed"):
+            # Being carried up, as no vehicle climbs, makes the heights tell nothing until then.
+            begin = max(begin, _CARRIED_UNTIL)
+            end = round(begin + lasts, 3)
+        return SensorFault(sensor, how, begin, end)
     if kind == "stalls":
         return Stalls(chance.choice(supervisors), begin, end, round(chance.uniform(0.05, 0.6), 3))
     nodes = tuple(one for one in STOPPING[vehicle] if one in NODES)

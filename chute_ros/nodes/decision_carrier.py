@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import ActionReport, SafetyDecision
@@ -11,7 +12,7 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.nodes import messages, qos
-from chute_ros.supervisor.decision_gate import DecisionGate, Verdict, number
+from chute_ros.supervisor.decision_gate import DecisionGate, Verdict, in_order
 
 #: So many decisions are remembered with how far they got, to be reported once more.
 MOST_REPORTS = 50
@@ -68,8 +69,11 @@ class DecisionCarrier:
         return counts
 
     def _woken(self, first: SafetyDecision) -> None:
-        for message in sorted((first, *self._waiting()), key=number):
-            self._decision(message)
+        with ExitStack() as each:
+            # What one of them does must not keep the others from being looked at.
+            waiting = in_order((first, *self._waiting()), lambda message: message)
+            for message in reversed(waiting):
+                each.callback(self._decision, message)
 
     def _waiting(self) -> Iterator[SafetyDecision]:
         """What else has come."""

@@ -56,13 +56,6 @@ PARAMETERS = (
         60.0,
     ),
     Parameter(
-        "ladder_accept_timeout",
-        1.0,
-        "the same of a step that no device has acknowledged: it does not answer, or refuses, s",
-        0.1,
-        60.0,
-    ),
-    Parameter(
         "heartbeat_stale_after", 0.5, "a node silent for this long is STALE, s", 0.05, 600.0
     ),
     Parameter("heartbeat_lost_after", 1.0, "a node silent for this long is LOST, s", 0.05, 600.0),
@@ -207,7 +200,6 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         deploy_links=tuple(values["deploy_links"]),
         deploy_ladder=tuple(Rung.parse(text) for text in _given(values["deploy_ladder"])),
         ladder_step_timeout=values["ladder_step_timeout"],
-        ladder_accept_timeout=values["ladder_accept_timeout"],
         kill_to_deploy_delay=values["kill_to_deploy_delay"],
         deploy_timeout=values["deploy_timeout"],
         kill_timeout=values["kill_timeout"],

@@ -75,6 +75,7 @@ class Goal(Generic[CommandT]):
     unacknowledged: the protocol acknowledges nothing; the effect counts once it was sent.
     once: never sent a second time, though the effect does not show.
     even_if_shown: sent although the status shows the effect already.
+    sent_by_another: the same has left for another request, and may have had the effect.
     hint: what may be the cause of a refusal, by what the device says of itself; empty: unknown.
     """
 
@@ -90,6 +91,7 @@ class Goal(Generic[CommandT]):
     unacknowledged: bool = False
     once: bool = False
     even_if_shown: bool = False
+    sent_by_another: Callable[[], bool] = bool
     hint: Callable[[], str] = str
 
 
@@ -134,7 +136,7 @@ class EffectLoop(Generic[CommandT]):
         self._sends = 0
         self._result = NO_ANSWER
         self._answer = ""
-        self._newest_accepted = False
+        self._newest_accepted = self._refused = False
         self._commands: list[CommandT] = []
         self._refreshes: list[CommandT] = []
         self._reports: list[Report] = []
@@ -191,6 +193,10 @@ class EffectLoop(Generic[CommandT]):
         else:
             self._take(Happening.NOT_NOW)
             self._deadline = now + self._limits.retry_interval
+            if answer.result != NO_ANSWER and not answer.superseded and not self._refused:
+                self._refused = True
+                detail = f"{self.goal.name} {self._answer}; tried again"
+                self._reports.append(Report(self.token, Outcome.REFUSED, detail))
 
     def effect_may_show(self, now: float) -> None:
         """The device said something: look whether it shows the effect."""
@@ -221,7 +227,8 @@ class EffectLoop(Generic[CommandT]):
 
     def _shown_by_another(self, now: float) -> None:
         """The effect came while this one waited for its turn: it is not sent a second time."""
-        if self.goal.even_if_shown or self.goal.shown is None or not self.goal.shown():
+        shown = self.goal.shown is not None and self.goal.shown()
+        if self.goal.even_if_shown or not shown or not self.goal.sent_by_another():
             return
         self._take(Happening.EFFECT_SHOWN)
         waited = now - self._started

@@ -75,10 +75,8 @@ class SupervisorConfig:
     deploy_links: tuple[str, ...] = ("mavlink_parachute",)
     #: The steps of a deploy, first to last; empty: the deploy_links in their order.
     deploy_ladder: tuple[Rung, ...] = ()
-    #: A step that has not been confirmed after this is followed by the next; so is one that no
-    #: device has acknowledged after the other: it does not answer, or refuses.
+    #: A step that has not been confirmed after this is followed by the next.
     ladder_step_timeout: float = 2.0
-    ladder_accept_timeout: float = 1.0
     #: Limits of each link, where they are not the standard ones.
     link_limits: Mapping[str, LinkLimits] = field(default_factory=lambda: _NO_LIMITS)
     #: The parachute is released this long after the kill, confirmed or not (as ArduPilot does).
@@ -121,7 +119,6 @@ class SupervisorConfig:
             "resend_interval",
             "vehicle_state_age",
             "ladder_step_timeout",
-            "ladder_accept_timeout",
             "alarm_interval",
             "late_after",
         ):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import enum
 from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from chute_ros.model import Action, Decision
 
@@ -33,10 +34,18 @@ class Numbered(Protocol):
         """Within it."""
 
 
-def number(decision: Numbered) -> tuple[int, int]:
-    """The order in which decisions are made. A node that hung looks at what waits in this order:
-    decisions are said again and again, and the deploy may be the first that is young enough."""
-    return decision.epoch, decision.id
+KeptT = TypeVar("KeptT")
+
+
+def in_order(waiting: Iterable[KeptT], decision: Callable[[KeptT], Numbered]) -> list[KeptT]:
+    """What waits for a node that hung, as it is to be looked at: the decisions of an epoch in the
+    order in which they were made. They are said again and again, and a deploy may be the first
+    that is young enough. An epoch that came before another in what waits stays before it."""
+    by_epoch: dict[int, list[KeptT]] = {}
+    for one in waiting:
+        by_epoch.setdefault(decision(one).epoch, []).append(one)
+    groups = by_epoch.values()
+    return [one for group in groups for one in sorted(group, key=lambda one: decision(one).id)]
 
 
 @dataclass
@@ -61,7 +70,7 @@ class DecisionGate:
             return Verdict.NOT_ADDRESSED
         if decision.shadow:
             return Verdict.SHADOW
-        order = number(decision)
+        order = (decision.epoch, decision.id)
         newer = order > (self.newest_epoch, self.newest_id)
         if order in self.acted:
             return Verdict.REPEATED

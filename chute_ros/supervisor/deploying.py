@@ -17,9 +17,7 @@ def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> floa
     """When the newest step of the ladder is given up, monotonic s."""
     if len(state.deploys) >= len(state.ladder(config)):
         return step.decided_at + config.deploy_timeout
-    if step.reached(Outcome.ACCEPTED):
-        return step.decided_at + config.ladder_step_timeout
-    return step.decided_at + min(config.ladder_accept_timeout, config.ladder_step_timeout)
+    return step.decided_at + config.ladder_step_timeout
 
 
 class Deploying(Policy):
@@ -98,6 +96,8 @@ class Deploying(Policy):
                 for link in step.targets
             )
             over = step.all_failed() or self.now >= step_deadline(self.config, self.state, step)
+            # What refuses may yet do it, and the next step need not wait for that.
+            over |= not last and step.all_refused()
             if not over and (last or not silent):
                 return
             if last:

@@ -151,7 +151,8 @@ class Reports(Requests):
             number, failed = (one.epoch, one.id), one.outcome is Outcome.FAILED
             if number != pending.number:
                 asked_again = one.link in pending.decision.targets
-                if number not in pending.earlier or (asked_again and failed):
+                refused = failed or one.outcome is Outcome.REFUSED
+                if number not in pending.earlier or (asked_again and refused):
                     continue
             elif (
                 failed

@@ -15,6 +15,9 @@ from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import Measured
 
+#: Forward, and not.
+_STEPS = frozenset({Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED})
+_NOT_NOW = frozenset({Outcome.FAILED, Outcome.REFUSED})
 #: A flight block that nobody reports on is sent at least so often, s.
 _RAREST_RESEND = 1.0
 #: A device that asks for a kill is taken to want it for so long, s.
@@ -59,8 +62,8 @@ class Pending:
 
     def reached(self, outcome: Outcome) -> bool:
         """A link has got this far, or further: one parachute that is out is enough."""
-        good = [o for outcomes in self.outcomes.values() for o in outcomes]
-        return any(o >= outcome for o in good if o is not Outcome.FAILED)
+        every = [o for outcomes in self.outcomes.values() for o in outcomes]
+        return any(o >= outcome for o in every if o in _STEPS)
 
     @property
     def confirmed(self) -> bool:
@@ -72,14 +75,18 @@ class Pending:
         failed = all(Outcome.FAILED in self.of(target) for target in self.targets)
         return failed and not self.confirmed
 
+    def all_refused(self) -> bool:
+        """Every target has failed, or its device refuses for now, and none was confirmed."""
+        refused = all(self.of(target) & _NOT_NOW for target in self.targets)
+        return refused and not self.confirmed
+
     def unreported(self) -> tuple[str, ...]:
         """The targets that have not even said that they have sent it."""
         return tuple(target for target in self.targets if not self.of(target))
 
     def not_begun(self) -> tuple[str, ...]:
         """The targets that have not reported, or only that they failed."""
-        good = {Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED}
-        return tuple(t for t in self.targets if not self.of(t) & good)
+        return tuple(t for t in self.targets if not self.of(t) & _STEPS)
 
     def resend_at(self, config: SupervisorConfig) -> float:
         """When to send it again. A flight block that stays without a report: ever more rarely."""

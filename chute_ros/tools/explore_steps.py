@@ -81,7 +81,8 @@ def steps() -> list[Step]:
         ]
     found += [
         Step(f"deploy {outcome.name}", _report("deploy", outcome))
-        for outcome in (Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED, Outcome.FAILED)
+        for outcome in Outcome
+        if outcome is not Outcome.NONE
     ]
     found.append(Step("a node has seen a newer epoch", _report("kill", Outcome.FAILED, FIRST, 1)))
     found += [

@@ -36,4 +36,5 @@ OUTCOME_TONES = {
     Outcome.ACCEPTED: "plain",
     Outcome.CONFIRMED: "good",
     Outcome.FAILED: "bad",
+    Outcome.REFUSED: "warn",
 }

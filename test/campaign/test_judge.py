@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 
 import pytest
-from campaign_bench import fired, flown, scenario
+from campaign_bench import SHIPPED, fired, flown, rocket, scenario
 
 from chute_ros.campaign.blind import Need, blinded
 from chute_ros.campaign.channel import Spell
-from chute_ros.campaign.flight import Flown
+from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, judge
 from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
@@ -140,19 +140,29 @@ def test_what_hid_the_fall(faults, end: float, cause: str) -> None:
     assert blinded(scenario(Failure.MOTOR, *faults), 0.0, Need(1.0, end)) == cause
 
 
-def test_of_a_line_in_five_packets_little_is_left_where_each_may_be_damaged() -> None:
-    need = Need(1.0, 8.0)
-    for spell, cause in (
-        (Spell(1.0, 8.0, corrupt=0.3), "the way flight_computer was cut"),
-        (Spell(1.0, 8.0, loss=0.1, corrupt=0.1), "the way flight_computer was cut"),
-        (Spell(1.0, 8.0, corrupt=0.1), ""),
-        (Spell(1.0, 8.0, loss=0.16), ""),
-    ):
-        flight = scenario(Failure.MOTOR, WayFault("flight_computer", spell))
-        assert blinded(flight, 0.0, need) == cause
-    # A datagram is whole or it is not.
-    damaged = WayFault("autopilot", Spell(1.0, 8.0, corrupt=0.5))
-    assert blinded(scenario(Failure.MOTOR, damaged), 0.0, need) == ""
+def test_where_no_line_of_a_flight_computer_came_whole_nothing_was_told() -> None:
+    need, cause = Need(1.0, 8.0), "no line of the flight computer came whole"
+    falls = rocket(Failure.NO_DROGUE)
+    often = [n * 0.9 for n in range(-10, 10)]
+    rests = [at for at in often if not 2.0 < at < 5.0]
+    assert blinded(falls, 0.0, need, often) == ""
+    assert blinded(falls, 0.0, need, rests) == cause
+    assert blinded(falls, 0.0, need) == cause
+    # Before it there was time enough.
+    assert blinded(falls, 0.0, Need(-6.0, 8.0), rests) == ""
+    # Of an aircraft nobody asks for lines.
+    assert blinded(scenario(Failure.MOTOR), 0.0, need) == ""
+
+
+@pytest.mark.parametrize(("loss", "fewest", "most"), [(0.0, 9.0, 11.0), (0.3, 0.8, 3.0)])
+def test_lines_come_whole_as_often_as_all_their_packets_do(
+    loss: float, fewest: float, most: float
+) -> None:
+    """Given five packets a line: 0.7 to the power of 5 is a sixth of the lines."""
+    loses = WayFault("flight_computer", Spell(2.0, 12.0, loss=loss))
+    end = fly(rocket(Failure.NOTHING, loses), SHIPPED)
+    came = sum(end.up + 2.0 < at < end.up + 12.0 for at in end.told)
+    assert fewest <= came / 10.0 <= most
 
 
 def test_where_another_stands_by_a_stop_hides_nothing_for_long() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import SafetyDecision
 from node_bench import Bench, stamped
@@ -33,11 +34,17 @@ class Hung:
         return 0.0
 
     def _carry_out(self, decision: Decision) -> None:
+        if decision.action is Action.NONE:
+            raise ZeroDivisionError
         self.done.append((decision.id, decision.action))
 
-    def told(self, *decisions: tuple[int, Action]) -> None:
-        for number, action in decisions:
-            message = SafetyDecision(epoch=1, id=number, action=int(action), targets=["hung"])
+    def told(
+        self, *decisions: tuple[int, Action] | tuple[int, Action, int], epoch: int = 1
+    ) -> None:
+        """Each with its number, what it wants, and its epoch where that is another."""
+        for number, action, *other in decisions:
+            message = SafetyDecision(id=number, action=int(action), targets=["hung"])
+            message.epoch = other[0] if other else epoch
             self._publisher.publish(stamped(self.bench.client, message))
         last = decisions[-1][0]
         self.bench.until(lambda: self._heard and self._heard[-1].id == last, "it was given them")
@@ -54,6 +61,24 @@ def test_the_kill_comes_before_the_deploy_whichever_was_said_again_first(bench: 
     hung.goes_on()
     assert hung.done == [(7, Action.KILL), (8, Action.DEPLOY), (9, Action.FLIGHT_BLOCK)]
     assert hung.carrier.counts()["decisions: the same as one already acted on"] == 4
+
+
+def test_those_of_a_supervisor_that_is_deposed_do_not_get_before_its_successors(
+    bench: Bench,
+) -> None:
+    hung = Hung(bench)
+    hung.told((1, Action.FLIGHT_BLOCK_RELEASE), (9, Action.DEPLOY, 1), epoch=2)
+    hung.goes_on()
+    assert hung.done == [(1, Action.FLIGHT_BLOCK_RELEASE)]
+    assert hung.carrier.counts()["decisions: older than one already seen"] == 1
+
+
+def test_one_that_fails_keeps_no_other_back(bench: Bench) -> None:
+    hung = Hung(bench)
+    hung.told((1, Action.NONE), (2, Action.KILL), (3, Action.DEPLOY))
+    with pytest.raises(ZeroDivisionError):
+        hung.goes_on()
+    assert hung.done == [(2, Action.KILL), (3, Action.DEPLOY)]
 
 
 def test_of_more_than_the_queue_holds_the_newest_are_left(bench: Bench) -> None:

@@ -42,42 +42,19 @@ def test_the_primary_comes_first_and_alone() -> None:
     story = deploying()
     decision = story.newest(D)
     assert (decision.targets, decision.device) == ((LINK,), "")
-    story.alive(1.9, LINK, UPF)
+    story.alive(2.9, LINK, UPF)
     assert steps(story) == ALL[:1]
 
 
 def test_a_step_that_is_not_confirmed_in_its_time_is_followed_by_the_next_and_says_why() -> None:
     story = deploying()
-    story.at(1.1, story.report(D, Outcome.ACCEPTED))
-    story.alive(2.95, LINK, UPF)
-    assert steps(story) == ALL[:1]
+    story.at(1.1, story.report(D, Outcome.SENT))
     story.alive(3.05, LINK, UPF)
     assert steps(story) == ALL[:2]
     assert (
         "step 1 of 4, mavlink_parachute: not confirmed: mavlink_parachute: told (2.00 s)"
         in (story.newest(D).reasons[-1])
     )
-
-
-def test_a_step_that_no_device_acknowledges_is_followed_sooner() -> None:
-    # It does not answer, or refuses as long as it thinks that it stands.
-    story = deploying()
-    story.at(1.1, story.report(D, Outcome.SENT, detail="release sent"))
-    story.alive(1.95, LINK, UPF)
-    assert steps(story) == ALL[:1]
-    story.alive(2.05, LINK, UPF)
-    assert steps(story) == ALL[:2]
-    assert (
-        "not confirmed: mavlink_parachute: release sent (1.00 s)" in (story.newest(D).reasons[-1])
-    )
-
-
-def test_no_step_takes_longer_unacknowledged_than_acknowledged() -> None:
-    story = deploying(ladder_step_timeout=0.5)
-    story.alive(1.45, LINK, UPF)
-    assert steps(story) == ALL[:1]
-    story.alive(1.55, LINK, UPF)
-    assert steps(story) == ALL[:2]
 
 
 def test_a_step_that_failed_is_followed_at_once() -> None:
@@ -87,10 +64,44 @@ def test_a_step_that_failed_is_followed_at_once() -> None:
     assert "not confirmed: mavlink_parachute: denied (0.30 s)" in story.newest(D).reasons[-1]
 
 
-def test_an_ack_is_no_confirmation() -> None:
+def test_a_step_whose_device_refuses_for_now_is_followed_at_once_and_may_still_confirm() -> None:
+    story = deploying()
+    first = story.newest(D)
+    story.at(1.1, story.report(D, Outcome.SENT))
+    story.at(1.3, story.report(D, Outcome.REFUSED, detail="temporarily rejected"))
+    assert steps(story) == ALL[:2]
+    why = (
+        "not confirmed: mavlink_parachute: told; mavlink_parachute: temporarily rejected (0.30 s)"
+    )
+    assert why in story.newest(D).reasons[-1]
+    story.at(1.4, i.ActionReport(first.epoch, first.id, LINK, Outcome.CONFIRMED, "out"))
+    assert story.state.stage is Stage.DEPLOYED
+    story.at(60.0)
+    assert steps(story) == ALL[:2]
+
+
+def test_the_last_step_goes_on_though_its_device_refuses_for_now() -> None:
+    story = deploying(Rung(LINK))
+    story.at(1.1, story.report(D, Outcome.REFUSED, detail="temporarily rejected"))
+    story.alive(8.9, LINK, UPF)
+    assert story.state.stage is Stage.DEPLOYING
+    assert not any(one.token == 5 for _, one in story.outputs if isinstance(one, i.Finish))
+    story.at(8.9, story.report(D, Outcome.ACCEPTED), story.report(D, Outcome.CONFIRMED))
+    assert story.answer(5).success
+
+
+def test_a_refusal_is_no_step_forward() -> None:
+    story = deploying(Rung(LINK))
+    story.at(1.1, story.report(D, Outcome.REFUSED))
+    assert not story.state.deploys[0].reached(Outcome.SENT)
+    assert not story.state.deploys[0].all_failed()
+
+
+@pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED])
+def test_an_ack_is_no_confirmation(outcome: Outcome) -> None:
     story = deploying()
     for n in range(19):
-        story.at(1.05 + n * 0.1, story.heartbeat(), story.report(D, Outcome.ACCEPTED))
+        story.at(1.05 + n * 0.1, story.heartbeat(), story.report(D, outcome))
     assert steps(story) == ALL[:1]
     assert story.state.stage is Stage.DEPLOYING
     story.alive(3.05, LINK, UPF)
@@ -105,7 +116,7 @@ def test_the_whole_ladder_ends_at_the_triggers_themselves() -> None:
     assert (last.targets, last.device) == ((UPF,), "trigger")
     new = [(t, o) for t, o in story.outputs if isinstance(o, i.Decide) and not o.again]
     times = [t for t, o in new if o.decision.action is D]
-    assert times == pytest.approx([1.0, 2.0, 3.0, 4.0])
+    assert times == pytest.approx([1.0, 3.0, 5.0, 7.0])
 
 
 @pytest.mark.parametrize("number", range(4))
@@ -124,8 +135,8 @@ def test_the_step_that_is_confirmed_is_the_last(number: int) -> None:
 def test_a_step_that_confirms_late_ends_the_climb() -> None:
     story = deploying()
     first = story.newest(D)
-    story.alive(2.05, LINK, UPF)
-    story.at(2.1, i.ActionReport(first.epoch, first.id, LINK, Outcome.CONFIRMED, "out"))
+    story.alive(3.05, LINK, UPF)
+    story.at(3.1, i.ActionReport(first.epoch, first.id, LINK, Outcome.CONFIRMED, "out"))
     assert story.state.stage is Stage.DEPLOYED
     story.at(60.0)
     assert steps(story) == ALL[:2]
@@ -133,8 +144,8 @@ def test_a_step_that_confirms_late_ends_the_climb() -> None:
 
 def test_the_status_of_any_parachute_ends_the_climb() -> None:
     story = deploying()
-    story.alive(2.05, LINK, UPF)
-    story.at(2.1, parachute(UPF, "33", deployed=True))
+    story.alive(3.05, LINK, UPF)
+    story.at(3.1, parachute(UPF, "33", deployed=True))
     assert story.state.stage is Stage.DEPLOYED
     story.at(60.0)
     assert steps(story) == ALL[:2]

@@ -14,7 +14,6 @@ TIMES = (
     "resend_interval",
     "vehicle_state_age",
     "ladder_step_timeout",
-    "ladder_accept_timeout",
     "alarm_interval",
     "late_after",
 )

@@ -46,7 +46,6 @@ SETTINGS = SupervisorConfig(
     kill_timeout=6.0,
     deploy_timeout=8.0,
     ladder_step_timeout=2.0,
-    ladder_accept_timeout=1.5,
     report_wait=0.5,
     resend_interval=0.1,
     vehicle_state_age=2.5,
@@ -54,11 +53,9 @@ SETTINGS = SupervisorConfig(
 )
 
 
-def sent(
-    action: Action, decided_at: float, sent_at: float, *reported: str, as_: Outcome = Outcome.SENT
-) -> Pending:
+def sent(action: Action, decided_at: float, sent_at: float, *reported: str) -> Pending:
     decision = Decision(7, 1, action, "r", (), (LINK,))
-    outcomes = MappingProxyType(dict.fromkeys(reported, frozenset({as_})))
+    outcomes = MappingProxyType(dict.fromkeys(reported, frozenset({Outcome.SENT})))
     return Pending(decision, (LINK,), decided_at, sent_at, outcomes)
 
 
@@ -84,8 +81,7 @@ def heard(at: float, **parts: float) -> MappingProxyType[str, LinkEvidence]:
         ({"block": sent(BLOCK, 90.0, 99.95, LINK)}, math.inf),
         ({"kill": sent(K, 99.0, 99.95)}, 100.05),
         ({"kill": sent(K, 99.0, 99.95, LINK)}, 105.0),
-        ({"deploys": (sent(D, 99.0, 99.95, LINK),)}, 100.5),
-        ({"deploys": (sent(D, 99.0, 99.95, LINK, as_=Outcome.ACCEPTED),)}, 101.0),
+        ({"deploys": (sent(D, 99.0, 99.95, LINK),)}, 101.0),
         ({"deploys": (sent(D, 99.0, 99.95, LINK),) * 2}, 107.0),
         ({"deploys": (sent(D, 99.0, 99.95), sent(D, 99.0, 99.98, LINK))}, 100.05),
         ({"deploys": (sent(D, 99.0, 99.95, LINK), sent(D, 99.0, 99.98))}, 100.08),

@@ -112,11 +112,11 @@ def test_a_person_deploys_also_below_the_minimum_height() -> None:
 
 def test_a_step_says_why_it_was_taken() -> None:
     story = deploying(deploy_links=BOTH)
-    story.alive(2.05, *BOTH)
+    story.alive(3.05, *BOTH)
     assert story.newest(D).rule == "operator"
     assert story.newest(D).reasons == (
         "operator: it falls",
-        "step 1 of 2, mavlink_parachute: not confirmed: no device node reported (1.00 s)",
+        "step 1 of 2, mavlink_parachute: not confirmed: no device node reported (2.00 s)",
     )
 
 
@@ -131,7 +131,7 @@ def test_a_step_whose_node_is_silent_says_so() -> None:
 
 def test_each_link_may_be_silent_for_its_own_time_and_its_step_ends_all_the_same() -> None:
     patient = MappingProxyType({LINK: LinkLimits(lost_after=2.0)})
-    story = deploying(deploy_links=BOTH, link_limits=patient, ladder_accept_timeout=2.0)
+    story = deploying(deploy_links=BOTH, link_limits=patient)
     story.at(1.0, story.heartbeat())
     story.alive(2.9, UPF)
     assert len(story.decisions(D)) == 1

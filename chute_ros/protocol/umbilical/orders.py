@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.events import Notice, Severity
@@ -191,7 +192,12 @@ class Orders:
                 self._to_leave[token] = (kind, force)
             return
         shown, text = self._shown(kind, even_if_shown, now)
-        goal = commands.goal_of(kind, shown, text, even_if_shown)
+        # One damaged line must not make up for a command that never left.
+        lately = now - self._config.effect.give_up_after
+        goal = replace(
+            commands.goal_of(kind, shown, text, even_if_shown),
+            sent_by_another=lambda: self._sent_at.get(name, -math.inf) > lately,
+        )
         self._requests.begin(token, goal, now)
         self._to_leave[token] = (kind, force)
 
@@ -230,8 +236,14 @@ class Orders:
         or what is fresh where that keeps a command from being sent again."""
         name, computer = kind.command.name, self._computer
 
+        first_sent = math.inf
+
         def since() -> float:
-            return max(now, self._sent_at.get(name, now))
+            # From the first time on: what is said again all the time would never settle.
+            nonlocal first_sent
+            if self._sent_at.get(name, -math.inf) >= now:
+                first_sent = min(first_sent, self._sent_at[name])
+            return now if math.isinf(first_sent) else first_sent
 
         if name == "reboot":
             before = computer.restarts

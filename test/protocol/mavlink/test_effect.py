@@ -135,6 +135,25 @@ def test_temporarily_rejected_is_tried_again():
     assert bench.end.success
 
 
+def test_a_refusal_for_now_is_told_once_and_at_once():
+    bench = Bench().at(0.1).answer(results.TEMPORARILY_REJECTED)
+    assert bench.reports == [Outcome.SENT, Outcome.REFUSED]
+    bench.at(0.4).answer(results.TEMPORARILY_REJECTED).at(0.7).answer().shows()
+    assert bench.reports[2:] == [Outcome.ACCEPTED, Outcome.CONFIRMED]
+
+
+def test_no_answer_and_a_newer_command_are_no_refusals():
+    bench = Bench(urgent=True).at(1.0).answer(results.NO_ACKNOWLEDGEMENT)
+    bench.at(1.3).answer(results.TEMPORARILY_REJECTED, superseded=True)
+    assert Outcome.REFUSED not in bench.reports
+
+
+def test_a_refusal_for_good_that_is_insisted_on_is_told_as_well():
+    bench = Bench(insist=True).at(0.1).answer(results.DENIED)
+    assert bench.reports == [Outcome.SENT, Outcome.REFUSED]
+    assert not bench.loop.ended
+
+
 @pytest.mark.parametrize(
     "result", [results.DENIED, results.UNSUPPORTED, results.FAILED, results.CANCELLED, 9, 99]
 )

@@ -192,6 +192,15 @@ def test_a_second_one_that_waits_is_not_fired_once_the_first_shows():
     assert bench.end(second).message.endswith("; nothing was sent")
 
 
+def test_one_damaged_line_does_not_swallow_one_that_waits():
+    bench = ready(COAST, scheduler=SchedulerLimits(0.5, 1.0, 0.5))
+    bench.order("flash_info")
+    bench.after(0.05)
+    bench.deploy()
+    bench.talk(ssa_drogue_deployed=1).after(0.1).talk(ssa_drogue_deployed=0).after(0.5)
+    assert len(bench.times("<D>")) == 1
+
+
 def test_it_finds_a_place_though_the_queue_is_full():
     bench = ready(COAST, scheduler=SchedulerLimits(most_waiting=1))
     for _ in range(5):
