@@ -85,7 +85,9 @@ class Orders:
         """Fire the stage of the configuration. again: though telemetry says that it is out."""
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
-            stage = DeployStage.MAIN if self._computer.was_fired("drogue") else DeployStage.DROGUE
+            # The same deploy may be ordered once more, as by a supervisor that took over.
+            over = self._computer.was_fired("drogue") and not self._requests.under_way("drogue")
+            stage = DeployStage.MAIN if over else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 
     def set_target(self, token: int, values: tuple[float, ...], now: float) -> None:

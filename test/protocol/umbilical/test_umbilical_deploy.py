@@ -153,6 +153,18 @@ def test_by_the_standard_settings_a_lost_one_costs_half_a_second():
     assert bench.times("<D>") == [1.05, 1.55, 2.05]
 
 
+def test_the_next_stage_is_the_same_one_while_its_order_is_under_way():
+    bench = ready(COAST, deploy=DeployStage.NEXT)
+    bench.deploy()
+    bench.after(0.7)
+    bench.deploy()
+    bench.after(0.7)
+    assert set(bench.tokens) == {"<D>"}, "nothing shows yet"
+    bench.talk(ssa_drogue_deployed=1, flight_mode=DROGUE).after(0.5)
+    bench.deploy()
+    assert bench.after(0.5).tokens[-1] == "<d>"
+
+
 def test_it_ends_when_the_time_is_up_and_says_so():
     bench = ready(ASCENT)
     number = bench.deploy()
