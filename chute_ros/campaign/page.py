@@ -27,10 +27,10 @@ The truth comes from the flight models: since when only a parachute helps (a roc
 comes down and no drogue will come by itself), and until when its release still lands it softly.
 Flights that left less time than the chain takes (2 s, a rocket 6.5 s), or in which no such time in
 a row was free of cuts, stops, second wrong sensors and (rocket) of seconds without a whole line of
-telemetry, are named with the cause. So are those whose only parachute refused in time, as the wrong
-height that it was told put it on the ground, and those that were ended while two sensors told what
-was not so: every rule rests on two signs, and no more can be known than they tell; one sensor that
-is wrong must neither end a flight nor hide a fall."""
+telemetry, are named with the cause. So are those whose only parachute refused in time, as by the
+wrong height that it was told it stood, and those that were ended while two sensors told what was
+not so: every rule rests on two signs, and no more can be known than they tell; one sensor that is
+wrong must neither end a flight nor hide a fall."""
 
 
 def page(tally: Tally, seed: int, pictures: Mapping[str, str]) -> str:
