@@ -262,7 +262,7 @@ class DeviceNode(Plug):
         clock, heard = self._clocks.get(one.supervisor), one.stamps.get(self.name, math.nan)
         left = [at for stamp, at in self._sent if abs(stamp - heard) < _SAME_STAMP]
         if clock is not None and left:
-            clock.answered(difference, now - left[0])
+            clock.answered(difference, now - left[0], now)
         self.safety_state(one, now)
 
     def _beat(self, now: float) -> None:

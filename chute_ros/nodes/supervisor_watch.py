@@ -71,8 +71,8 @@ class SupervisorWatch:
             return
         left = self._sent.get((heard.sec, heard.nanosec))
         if left is not None:
-            difference = self._difference(message.header.stamp)
-            clock.answered(difference, time.monotonic() - left)
+            now, difference = time.monotonic(), self._difference(message.header.stamp)
+            clock.answered(difference, now - left, now)
 
     def heartbeat(self, message: LinkHeartbeat) -> None:
         """Anybody's heartbeat came. A supervisor that only looks on does not say healthy."""

@@ -39,14 +39,15 @@ class ClockSteps:
             return change
         return 0.0
 
-    def answered(self, difference: float, passed: float) -> float:
-        """An answer came to what left here passed s ago. Returns the step that it shows; 0: none.
+    def answered(self, difference: float, passed: float, now: float) -> float:
+        """The same of an answer to what left here passed s ago.
 
         The age is then taken to be what it is at most: nothing becomes younger than it is."""
-        step = self.age(difference) - passed
-        if not step > self.margin:
-            return 0.0
-        self.offset += step
+        step = self.heard(difference, now)
+        late = self.age(difference) - passed
+        if late > self.margin:
+            self.offset += late
+            step += late
         return step
 
     def age(self, difference: float) -> float:

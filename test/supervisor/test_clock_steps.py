@@ -59,7 +59,7 @@ def test_an_answer_tells_of_a_clock_that_is_behind(behind: float) -> None:
     """Its way took 0.02 s; it answers what left 0.05 s ago."""
     clocks = ClockSteps(MARGIN)
     clocks.heard(behind + 0.002, 5.0)
-    assert clocks.answered(behind + 0.02, 0.05) == pytest.approx(behind - 0.03)
+    assert clocks.answered(behind + 0.02, 0.05, 5.05) == pytest.approx(behind - 0.03)
     assert clocks.age(behind + 0.002) == pytest.approx(0.032), "a decision sent now is young"
     assert clocks.age(behind + 0.702) == pytest.approx(0.732), "one that comes late is late"
     assert clocks.heard(behind + 0.002, 5.1) == 0.0
@@ -68,18 +68,32 @@ def test_an_answer_tells_of_a_clock_that_is_behind(behind: float) -> None:
 def test_an_answer_that_was_long_on_its_way_makes_nothing_younger() -> None:
     clocks = ClockSteps(MARGIN)
     clocks.heard(3.0, 5.0)
-    assert clocks.answered(3.0, 3.01) == 0.0, "a way that takes 3 s each time"
+    assert clocks.answered(3.0, 3.01, 5.1) == 0.0, "a way that takes 3 s each time"
     assert clocks.age(3.0) == 3.0
-    assert clocks.answered(3600.0, 3.0) == pytest.approx(3597.0)
+    clocks = ClockSteps(MARGIN)
+    clocks.heard(3600.0, 5.0)
+    assert clocks.answered(3600.0, 3.0, 5.1) == pytest.approx(3597.0)
     assert clocks.age(3600.0) == pytest.approx(3.0), "it may be that old"
-    assert clocks.answered(3600.0, 0.1) == pytest.approx(2.9), "a quicker one tells more"
+    assert clocks.answered(3600.0, 0.1, 5.2) == pytest.approx(2.9), "a quicker one tells more"
 
 
 def test_an_answer_within_the_margin_shows_nothing() -> None:
     clocks = ClockSteps(MARGIN)
-    assert clocks.answered(0.1 + MARGIN, 0.1) == 0.0
-    assert clocks.answered(-9.0, 0.1) == 0.0
+    assert clocks.answered(0.1 + MARGIN, 0.1, 5.0) == 0.0
     assert clocks.offset == 0.0
+
+
+@pytest.mark.parametrize("step", [26.4, -26.4])
+@pytest.mark.parametrize("answer_first", [False, True])
+def test_a_step_counts_once_whichever_message_shows_it(step: float, answer_first: bool) -> None:
+    clocks, now = heard_so_far()
+    shows = [
+        lambda at: clocks.answered(0.002 + step, 0.01, at),
+        lambda at: clocks.heard(0.002 + step, at),
+    ]
+    for number, show in enumerate(shows if answer_first else reversed(shows)):
+        show(now + 0.05 + number * 0.05)
+    assert clocks.age(0.002 + step) == pytest.approx(0.002, abs=0.01)
 
 
 def test_clocks_that_differ_by_the_margin_are_left_as_they_are() -> None:
