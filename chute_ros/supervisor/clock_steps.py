@@ -40,14 +40,16 @@ class ClockSteps:
         return 0.0
 
     def answered(self, difference: float, passed: float, now: float) -> float:
-        """The same of an answer to what left here passed s ago.
+        """An answer came to what left here passed s ago. Returns the step that it shows; 0: none.
 
-        The age is then taken to be what it is at most: nothing becomes younger than it is."""
-        step = self.heard(difference, now)
-        late = self.age(difference) - passed
-        if late > self.margin:
-            self.offset += late
-            step += late
+        The age is then taken to be what it is at most: nothing becomes younger than it is. Answers
+        come on another way than heartbeats, and may be overtaken by them."""
+        step = self.age(difference) - passed
+        if not step > self.margin:
+            return 0.0
+        self.offset += step
+        # The next heartbeat shows the same step.
+        self._heard, self._difference = now, difference
         return step
 
     def age(self, difference: float) -> float:

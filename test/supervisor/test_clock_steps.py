@@ -83,6 +83,32 @@ def test_an_answer_within_the_margin_shows_nothing() -> None:
     assert clocks.offset == 0.0
 
 
+def test_an_answer_that_heartbeats_have_overtaken_shows_nothing() -> None:
+    clocks, now = heard_so_far()
+    assert clocks.answered(1.5, 1.6, now + 0.01) == 0.0
+    assert clocks.heard(0.002, now + BEAT) == 0.0
+    assert clocks.offset == 0.0
+
+
+@given(
+    st.floats(-1e5, 1e5),
+    st.lists(st.tuples(st.booleans(), st.floats(0.0, 2.0), st.floats(0.0, 1.0)), min_size=1),
+)
+def test_no_answer_makes_anything_younger_than_it_is(
+    behind: float, told: list[tuple[bool, float, float]]
+) -> None:
+    """Heartbeats on a way that takes no time, answers on one that takes up to 2 s; the clock of
+    who sends them is behind from the start, or ahead."""
+    clocks, now = ClockSteps(MARGIN), 0.0
+    for is_answer, took, before in told:
+        now += BEAT
+        if is_answer:
+            clocks.answered(behind + took, took + before, now)
+        else:
+            clocks.heard(behind, now)
+        assert clocks.age(behind + 0.7) >= 0.7 - 1e-6 or behind < 0.0
+
+
 @pytest.mark.parametrize("step", [26.4, -26.4])
 @pytest.mark.parametrize("answer_first", [False, True])
 def test_a_step_counts_once_whichever_message_shows_it(step: float, answer_first: bool) -> None:
