@@ -50,10 +50,12 @@ SUBSCRIBED = {
     "mavlink_parachute": {
         "safety/decision": ("SafetyDecision", DECISION),
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
+        "safety/state": ("SafetyState", (1, LATCHED)),
     },
     "umbilical": {
         "safety/decision": ("SafetyDecision", DECISION),
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
+        "safety/state": ("SafetyState", (1, LATCHED)),
     },
     "safety_supervisor": {
         "parachute/status": ("ParachuteStatus", STATUS),
