@@ -87,4 +87,5 @@ class Pair:
         return [(epoch, number) for epoch, number, one in self.link.acted if one is action]
 
     def epoch(self, name):
+        self.bench.until(lambda: name in self.claims, f"{name} is heard")
         return self.claims[name][1].epoch
