@@ -58,6 +58,12 @@ class Pair:
     def leads(self, name):
         return name in self.claims and self.claims[name][1].leading
 
+    def offers(self, name):
+        """Its services are seen. A call to one that is just closing is lost."""
+        client, namespace = self.bench.client, self.bench.namespace
+        offered = client.get_service_names_and_types_by_node(name, namespace)
+        return f"{namespace}/safety/kill" in dict(offered)
+
     def await_leader(self, name):
         self.bench.until(lambda: self.leads(name), f"{name} leads")
 

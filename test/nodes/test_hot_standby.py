@@ -70,8 +70,7 @@ def test_one_that_was_stopped_comes_back_as_a_follower_and_orders_nothing(pair):
     seen = len(pair.decisions)
     pair.send_signal("a", signal.SIGCONT)
     pair.bench.until(lambda: "a" in pair.claims and not pair.claims["a"][1].leading, "a looks on")
-    kill = f"{pair.bench.namespace}/safety/kill"
-    pair.bench.until(lambda: pair.bench.client.count_services(kill) == 1, "a's is gone")
+    pair.bench.until(lambda: pair.offers("b") and not pair.offers("a"), "b's services are there")
     answer = pair.bench.call(Kill, "safety/kill", reason="stop")
     assert answer.success, answer.message
     assert {d.epoch for d in pair.decisions[seen:] if d.action == Action.KILL} == {pair.epoch("b")}
