@@ -37,8 +37,8 @@ WATCH_PARAMETERS = (
         choices=(HOLD, BLOCK_FLIGHT),
     ),
 )
-#: Of our heartbeats so many are remembered: those of 5 s at the standard rate.
-_MOST_SENT = 50
+#: Of our heartbeats so many are remembered: those of 5 s at the highest rate.
+_MOST_SENT = 500
 
 
 class SupervisorWatch:

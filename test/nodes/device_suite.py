@@ -318,7 +318,13 @@ class DeviceSuite:
         self.decide(Action.DEPLOY, age=behind)
         await_told("decisions: came too late", 1)
         assert device.commands_to_deploy() == 0, "that picture answers nothing of this node"
-        self.picture(behind, self.beats[-1].header.stamp)
+        # Again and again, as the supervisor does: one that a busy machine is slow with tells less.
+        self.bench.client.create_timer(
+            0.1,
+            lambda: self.picture(
+                behind, [one for one in self.beats if not one.supervisor][-1].header.stamp
+            ),
+        )
         await_told("clock set by (s)", behind)
         self.decide(Action.DEPLOY, age=behind + 30.0)
         await_told("decisions: came too late", 2)
