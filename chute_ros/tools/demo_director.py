@@ -14,7 +14,7 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.errors import ChuteError
-from chute_ros.nodes import qos
+from chute_ros.nodes import messages, qos
 from chute_ros.nodes.middleware import set_up_middleware
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.processes import Processes
@@ -30,6 +30,7 @@ class Director:
     def __init__(self, namespace: str, processes: Processes) -> None:
         self._processes = processes
         self._started = time.monotonic()
+        self._wall_ahead = time.time() - self._started
         self._failure_at: float | None = None
         self.vehicle = VehicleState()
         #: The newest status of each link's parachute.
@@ -82,6 +83,10 @@ class Director:
         """One line of the story."""
         print(f"{self.clock()}  {who:<17} {text}", flush=True)
 
+    def _told(self, message: SafetyDecision | ActionReport | ParachuteStatus) -> float:
+        """When its node told it. Messages of two topics reach us in either order."""
+        return messages.seconds(message.header.stamp) - self._wall_ahead
+
     # -- awaiting -------------------------------------------------------------------------------
 
     def until(self, what: str, seconds: float, condition: Callable[[], bool]) -> None:
@@ -126,7 +131,7 @@ class Director:
         return None
 
     def when(self, action: model.Action, outcome: model.Outcome) -> float:
-        """When that report came."""
+        """When that was reported."""
         return next(
             when
             for when, report in self.reports
@@ -159,7 +164,7 @@ class Director:
         self._statuses += 1
         self.parachutes[message.link] = message
         if message.deployed and not self.deployed_at:
-            self.deployed_at = time.monotonic()
+            self.deployed_at = self._told(message)
 
     def _safety(self, message: SafetyState) -> None:
         self.safety = message
@@ -167,7 +172,7 @@ class Director:
     def _decision(self, message: SafetyDecision) -> None:
         if any((message.epoch, message.id) == (d.epoch, d.id) for _, d in self.decisions):
             return
-        self.decisions.append((time.monotonic(), message))
+        self.decisions.append((self._told(message), message))
         action = model.Action(message.action)
         self.say("supervisor", f"{action.name} ({'; '.join(message.reasons)})")
 
@@ -175,6 +180,6 @@ class Director:
         said = (message.epoch, message.id, message.link, message.outcome)
         if any(said == (r.epoch, r.id, r.link, r.outcome) for _, r in self.reports):
             return  # said again, in case that nobody was there to hear it
-        self.reports.append((time.monotonic(), message))
+        self.reports.append((self._told(message), message))
         action, outcome = model.Action(message.action), model.Outcome(message.outcome)
         self.say(message.link, f"{action.name} {outcome.name}: {message.detail}")
