@@ -1,8 +1,9 @@
 """What every device node does: its link's thread, heartbeats, decisions, reports, diagnostics.
 
-The link's thread hands its events to the executor through an inbox and a guard condition. The
-heartbeat makes one round: the executor's timer asks the link's thread, which answers with a
-summary, which the executor publishes. A hang of either is silence.
+One thread at a time has the link, its own or the executor's: the link's turn (transport/loop.py).
+Events go to the executor through an inbox and a guard condition. The heartbeat makes one round:
+the executor's timer asks the link, whose answer, a summary, is an event that the executor
+publishes. A hang of either thread is silence.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ OWNER_SILENCE = 1.0
 
 @dataclass(frozen=True)
 class Summary:
-    """The answer of the link's thread to the executor's heartbeat."""
+    """The answer of the link to the executor's heartbeat."""
 
     link_state: model.LinkState
     device_healthy: bool
@@ -77,7 +78,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class CarriedOut:
-    """The link's thread has done what a decision wants."""
+    """The link has done what a decision wants."""
 
     decision: model.Decision
     text: str
@@ -166,7 +167,7 @@ class DeviceNode(Node, ABC):
 
     @abstractmethod
     def summarise(self, link: Any, now: float) -> Summary:
-        """In the link's thread: how the device is."""
+        """In the link's turn: how the device is."""
 
     @abstractmethod
     def link_event(self, event: Any) -> None:
@@ -182,11 +183,11 @@ class DeviceNode(Node, ABC):
 
     @abstractmethod
     def arm_link(self, link: Any, token: int, request: Arm.Request, now: float) -> None:
-        """In the link's thread: begin the arm request."""
+        """In the link's turn: begin the arm request."""
 
     @abstractmethod
     def deploy_link(self, link: Any, token: int, request: Deploy.Request, now: float) -> None:
-        """In the link's thread: begin the deploy request."""
+        """In the link's turn: begin the deploy request."""
 
     @abstractmethod
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
@@ -201,13 +202,13 @@ class DeviceNode(Node, ABC):
     # -- what the subclass may use ---------------------------------------------------------------
 
     def request(self, begin: Callable[[Any, int, float], None]) -> Future:
-        """Have begin(link, token, now) called in the link's thread; the future is its end."""
+        """Have begin(link, token, now) called in the link's turn; the future is its end."""
         return self.desk.request(begin)
 
     def carry_out_at_once(
         self, decision: model.Decision, function: Callable[[Any, float], None], text: str
     ) -> None:
-        """Have function(link, now) called in the link's thread, and report text once it was."""
+        """Have function(link, now) called in the link's turn, and report text once it was."""
 
         def run(link: Any, now: float) -> None:
             function(link, now)
@@ -236,7 +237,7 @@ class DeviceNode(Node, ABC):
         self.desk.request_once(decision, begin, lambda link: link.has_parachute(), wait)
 
     def in_link(self, function: Callable[[Any, float], None]) -> None:
-        """Have function(link, now) called in the link's thread."""
+        """Have function(link, now) called in the link's turn."""
         assert self.loop is not None
         self.loop.call(function)
 
@@ -273,7 +274,7 @@ class DeviceNode(Node, ABC):
     # -- inside ---------------------------------------------------------------------------------
 
     def deliver(self, events: list[Any]) -> None:
-        """In the link's thread: hand events to the executor."""
+        """In the link's turn: hand events to the executor."""
         self._inbox.put(events)
 
     def _drain(self) -> None:

@@ -1,4 +1,4 @@
-"""Events on their way from a link's thread to the executor."""
+"""Events on their way from a link to the executor."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Inbox:
         self.left_out = 0
 
     def put(self, events: list[Any]) -> None:
-        """In the link's thread: hand events to the executor."""
+        """In the link's turn: hand events to the executor."""
         if len(self._waiting) > MOST_WAITING:
             kept = [event for event in events if not isinstance(event, self._pictures)]
             self.left_out += len(events) - len(kept)

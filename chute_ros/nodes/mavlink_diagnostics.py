@@ -38,7 +38,7 @@ class Details:
 
 
 def details_of(link: MavlinkLink, now: float) -> Details:
-    """In the link's thread: all that the tasks below say."""
+    """In the link's turn: all that the tasks below say."""
 
     def parachute(one: ParachuteTracker) -> ParachuteDetails:
         values = diagnostics.liveness_values(one.liveness, now)

@@ -1,4 +1,4 @@
-"""Requests to a link's thread: each has a token, and whoever waits for it gets its end."""
+"""Requests to a link: each has a token, and whoever waits for it gets its end."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class CallFailed:
 
 
 class RequestDesk:
-    """call: has a function called in the link's thread; deliver: hands events to the executor;
+    """call: has a function called in the link's turn; deliver: hands events to the executor;
     report: tells the supervisor how far a decision got."""
 
     def __init__(
@@ -38,11 +38,11 @@ class RequestDesk:
         self._tokens = count(1)
         self._waiting: dict[int, Future] = {}
         self._decisions: dict[int, model.Decision] = {}
-        #: Those that wait for their device: (token, begin, ready, until). Of the link's thread.
+        #: Those that wait for their device: (token, begin, ready, until). Of the link's turn.
         self._held: list[tuple[int, Begin, Ready, float]] = []
 
     def request(self, begin: Begin) -> Future:
-        """Have begin(link, token, now) called in the link's thread; the future is its end."""
+        """Have begin(link, token, now) called in the link's turn; the future is its end."""
         token = next(self._tokens)
         self._waiting[token] = future = Future()
         self._call(token, begin)
@@ -72,7 +72,7 @@ class RequestDesk:
         self._in_link(begin_or_hold)
 
     def try_held(self, link: Any, now: float) -> None:
-        """In the link's thread: begin those that waited for their device, or for too long."""
+        """In the link's turn: begin those that waited for their device, or for too long."""
         held, self._held = self._held, []
         for token, begin, ready, until in held:
             if ready(link) or now >= until:

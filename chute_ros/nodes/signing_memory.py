@@ -54,7 +54,7 @@ class SigningMemory:
         self._file = KeptFile(path, text_of, "signing times")
 
     def keep(self, now: float) -> None:
-        """In the link's thread, often: the times as they are now."""
+        """In the link's turn, often: the times as they are now."""
         if now >= self._due:
             self._due = now + INTERVAL
             self._keep()

@@ -37,7 +37,7 @@ class Details:
 
 
 def details_of(link: UmbilicalLink, now: float) -> Details:
-    """In the link's thread: all that the tasks below say."""
+    """In the link's turn: all that the tasks below say."""
     computer, scheduler = link.computer, link.scheduler
     record, layout = computer.record, link.decoder.layout
     mode = computer.mode

@@ -98,8 +98,6 @@ class UpfCanNode(DeviceNode):
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):
-            # Told afterwards: the supervisor comes first.
-            self.ask_supervisor(int(event.ask), event.device, event.reason)
             text = f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
             if event.ask is Ask.FLIGHT_BLOCK_RELEASE:
                 self.get_logger().info(text)
@@ -166,6 +164,15 @@ class UpfCanNode(DeviceNode):
             vehicle_service_task(name, details),
             allocation_task(name, details, str(self._file.path)),
         ]
+
+    def deliver(self, events: list[Any]) -> None:
+        """What a device asks for leaves at once: a kill does not wait for the executor."""
+        try:
+            for event in events:
+                if isinstance(event, AskSupervisor):
+                    self.ask_supervisor(int(event.ask), event.device, event.reason)
+        finally:
+            super().deliver(events)
 
     # -- from the rest of the vehicle -----------------------------------------------------------
 

@@ -47,7 +47,7 @@ class Details:
 
 
 def details_of(link: UpfLink, now: float) -> Details:
-    """In the link's thread: all that the tasks below say."""
+    """In the link's turn: all that the tasks below say."""
     bus = link.bus
     return Details(
         devices=(

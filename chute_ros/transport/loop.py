@@ -1,6 +1,7 @@
 """The loop between a wire and a protocol: one thread, one descriptor to wake it, no polling.
 
-The protocol (a ProtocolLink) is touched by this thread alone; others hand in calls.
+The protocol (a ProtocolLink) and its wire are touched by one thread at a time: the loop's own, or,
+while that one waits, another that has a call for it.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -20,8 +22,8 @@ from chute_ros.transport.wire import Wire
 REOPEN_INTERVAL = 0.5  # s
 #: The loop runs at least this often (s), so that a hung one can be told from an idle one.
 LONGEST_WAIT = 0.2
-#: A caller waits at most so long (s) for its call; a thread that hangs must not hang the caller.
-HAND_OVER = 0.002
+#: A caller waits at most so long (s) for its turn; a thread that hangs must not hang the caller.
+TURN_WITHIN = 0.002
 
 
 class ProtocolLink(Protocol):
@@ -65,7 +67,8 @@ class LoopFault:
 
 
 class WireLoop(Generic[LinkT]):
-    """Runs link over wire. deliver gets the events in this loop's thread and must not block.
+    """Runs link over wire. deliver gets the events, in the loop's thread or a caller's, and must
+    not block.
 
     opened: for a protocol that wants to know from when on (monotonic s) it can send.
     """
@@ -83,7 +86,10 @@ class WireLoop(Generic[LinkT]):
         self.last_run = time.monotonic()
         self._deliver = deliver
         self._opened = opened
-        self._calls: deque[tuple[Callable[[LinkT, float], None], threading.Event]] = deque()
+        self._calls: deque[Callable[[LinkT, float], None]] = deque()
+        self._touching = threading.Lock()
+        #: The thread that holds it; 0: none does.
+        self._toucher = 0
         self._wake_in, self._wake_out = socket.socketpair()
         self._wake_in.setblocking(False)
         self._wake_out.setblocking(False)
@@ -108,16 +114,19 @@ class WireLoop(Generic[LinkT]):
         self._wake_out.close()
 
     def call(self, function: Callable[[LinkT, float], None]) -> None:
-        """Have function(link, now) called in the loop's thread, soon, in order.
+        """Have function(link, now) called, soon, in order, with what it sends on the wire.
 
-        The caller rests until that is done and on the wire, at most HAND_OVER: two threads that
-        both want the interpreter take turns, and the wire would wait for half of them.
+        The caller's own thread does it where the loop's waits for something to happen: to wake
+        another one first is most of what a call costs. Else the loop does it in this turn or the
+        next, and the caller waits for its own at most TURN_WITHIN.
         """
-        done = threading.Event()
-        self._calls.append((function, done))
+        self._calls.append(function)
+        within = self._toucher == threading.get_ident()
+        if not within and self._thread.is_alive() and self._touching.acquire(timeout=TURN_WITHIN):
+            with self._touched():
+                self._guarded(self._make_calls, time.monotonic())
+        # A deadline may be nearer now.
         self._wake()
-        if self._thread.is_alive() and threading.current_thread() is not self._thread:
-            done.wait(HAND_OVER)
 
     def _wake(self) -> None:
         try:
@@ -136,24 +145,46 @@ class WireLoop(Generic[LinkT]):
                 time.sleep(0.01)
 
     def _turn(self) -> None:
-        now = time.monotonic()
-        self.last_run = now
-        if not self.wire.is_open and now >= self._reopen_at:
-            self._reopen(now)
-        ready = self._wait(now)
-        now = time.monotonic()
-        for file in ready:
-            if file == self._wake_in.fileno():
-                self._wake_in.recv(4096)
-            else:
-                self._read(file, now)
-        while self._calls:
-            function, done = self._calls.popleft()
-            self._guarded(function, self.link, now)
+        self._touching.acquire()
+        with self._touched():
+            now = time.monotonic()
+            self.last_run = now
+            if not self.wire.is_open and now >= self._reopen_at:
+                self._reopen(now)
+            poll, wait = self._watched(now)
+        ready = poll.poll(wait)
+        self._touching.acquire()
+        with self._touched():
+            now = time.monotonic()
+            for file, _ in ready:
+                if file == self._wake_in.fileno():
+                    self._wake_in.recv(4096)
+                elif file in self.wire.files():  # a call may have closed it meanwhile
+                    self._read(file, now)
+            # What this brings about leaves before the link looks at its clock.
             self._send()
-            done.set()
-        self.link.update(now)
-        self._send()
+            self._make_calls(now)
+            self.link.update(now)
+            self._send()
+            self._hand_over()
+
+    @contextmanager
+    def _touched(self) -> Iterator[None]:
+        """With the lock, which the caller has taken: whose it is is known until it is free."""
+        self._toucher = threading.get_ident()
+        try:
+            yield
+        finally:
+            self._toucher = 0
+            self._touching.release()
+
+    def _make_calls(self, now: float) -> None:
+        while self._calls:
+            self._guarded(self._calls.popleft(), self.link, now)
+            self._send()
+        self._hand_over()
+
+    def _hand_over(self) -> None:
         events = self.link.take_events()
         if events:
             self._deliver(events)
@@ -165,14 +196,15 @@ class WireLoop(Generic[LinkT]):
         except Exception:  # noqa: BLE001
             self._deliver([LoopFault(traceback.format_exc())])
 
-    def _wait(self, now: float) -> list[int]:
+    def _watched(self, now: float) -> tuple[select.poll, int]:
+        """What to wait for, and at most how long, ms."""
         poll = select.poll()
         poll.register(self._wake_in, select.POLLIN)
         for file in self.wire.files():
             poll.register(file, select.POLLIN)
         wait = min(self.link.next_deadline() - now, LONGEST_WAIT)
         # Rounded up: a wait that ends before its deadline would only have to be repeated.
-        return [file for file, _ in poll.poll(max(0, int(wait * 1000.0 + 0.999)))]
+        return poll, max(0, int(wait * 1000.0 + 0.999))
 
     def _read(self, file: int, now: float) -> None:
         try:

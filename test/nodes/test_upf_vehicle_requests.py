@@ -6,10 +6,12 @@ import pytest
 from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyRequest, SafetyState
 from chute_msgs.srv import Deploy
 from node_bench import stamped
+from rclpy.node import Node
 from upf_bench import Network, follow_log
 
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
 from chute_ros.nodes import qos
+from chute_ros.nodes.node_executor import NodeExecutor
 from chute_ros.protocol.upf.definitions import VEHICLE_SERVICE
 
 KILL, BLOCK, RELEASE = "TYPE_KILLSWITCH", "TYPE_FLIGHT_BLOCK", "TYPE_FLIGHT_BLOCK_RELEASE"
@@ -85,6 +87,27 @@ def test_the_kill_switch_is_answered_once_the_motors_are_seen_to_stop(bench):
     assert asking.answers() == [], "none of these stops a motor"
     asking.report(Action.KILL, Outcome.CONFIRMED)
     asking.await_answer("SUCCESS")
+
+
+def test_the_supervisor_is_asked_although_the_executor_is_busy(bench, await_until):
+    asking = Asking(bench, **LONG)
+    listener, executor, heard = Node("listener", namespace=bench.namespace), NodeExecutor(), []
+    listener.create_subscription(SafetyRequest, "safety/request", heard.append, qos.STATUS)
+    executor.add_node(listener)
+    publisher = asking.network.node._request_publisher
+    await_until(lambda: publisher.get_subscription_count() == 2, "it is known who listens")
+    asking.ask(KILL)
+
+    def asked():
+        executor.spin_once(timeout_sec=0.01)
+        return heard
+
+    # The executor of the node itself does not turn meanwhile.
+    await_until(asked, "the supervisor is asked")
+    assert heard[0].request == SafetyRequest.KILL
+    executor.remove_node(listener)
+    listener.destroy_node()
+    executor.shutdown()
 
 
 def test_a_kill_that_does_not_happen_in_time_is_told_as_failed(bench):

@@ -35,15 +35,119 @@ def test_calls_from_other_threads_are_made_in_the_order_of_each(await_until):
             assert [n for who, n in made if who == name] == list(range(200))
 
 
-def test_calls_run_in_the_loops_own_thread_with_the_protocol(await_until):
+def test_a_call_is_made_with_the_protocol_and_what_it_sends_is_sent(await_until):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as device:
+        node.link.answer = lambda data: data
+        device.sendto(b"hello", (LOCAL, node.port))
+        assert device.recv(100) == b"hello"
+        for number in range(50):
+            seen = []
+
+            def say(link, now, number=number, seen=seen):
+                seen.append((link, now))
+                link.output.append(b"%d" % number)
+                link.events.append(number)
+
+            node.loop.call(say)
+            assert device.recv(100) == b"%d" % number
+            ((link, now),) = seen
+            assert link is node.link
+            assert abs(now - time.monotonic()) < 20.0
+            await_until(lambda number=number: node.delivered[-1] == number, "its event is told")
+
+
+def test_no_two_threads_touch_the_protocol_at_once(await_until):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as device:
+        touching, clashes, times = [], [], []
+
+        def touch(now=None):
+            touching.append(threading.get_ident())
+            if now is not None:
+                times.append(now)
+            # Others get the interpreter here, if they are let.
+            time.sleep(0.0)
+            if len(touching) > 1:
+                clashes.append(list(touching))
+            touching.pop()
+
+        node.link.answer = lambda data: touch()
+        node.link.update = touch
+
+        def caller():
+            for _ in range(200):
+                node.loop.call(lambda link, now: touch(now))
+
+        callers = [threading.Thread(target=caller) for _ in range(3)]
+        for one in callers:
+            one.start()
+        while any(one.is_alive() for one in callers):
+            device.sendto(b"x", (LOCAL, node.port))
+        for one in callers:
+            one.join()
+        await_until(lambda: len(times) >= 600, "all calls are made")
+        assert clashes == []
+        assert times == sorted(times), "time never goes back for the protocol"
+
+
+def test_a_call_that_makes_another_has_it_made_after_itself(await_until):
     with running(f"udpin:{LOCAL}:0") as node:
-        seen = []
-        node.loop.call(lambda link, now: seen.append((link, threading.current_thread().name, now)))
-        await_until(lambda: seen, "the call is made")
-        link, thread, now = seen[0]
-        assert link is node.link
-        assert [thread] == loop_threads()
-        assert abs(now - time.monotonic()) < 20.0
+        made = []
+
+        def first(link, now):
+            node.loop.call(lambda link, now: made.append("second"))
+            made.append("first")
+
+        node.loop.call(first)
+        await_until(lambda: len(made) == 2, "both are made")
+        assert made == ["first", "second"]
+
+
+def test_a_loop_that_hangs_does_not_hang_who_calls(await_until):
+    with running(f"udpin:{LOCAL}:0") as node:
+        hung, go_on, made = threading.Event(), threading.Event(), []
+
+        def hang(now):
+            hung.set()
+            go_on.wait()
+
+        node.link.update = hang
+        node.loop.call(lambda link, now: None)
+        assert hung.wait(10.0)
+        began = time.monotonic()
+        for number in range(5):
+            node.loop.call(lambda link, now, number=number: made.append(number))
+        assert time.monotonic() - began < 5.0
+        assert made == []
+        go_on.set()
+        await_until(lambda: made == [0, 1, 2, 3, 4], "they are made in order once it goes on")
+
+
+def test_a_wire_that_a_call_loses_is_opened_again(await_until):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as device:
+
+        def broken(data):
+            raise ConnectionResetError("pulled")
+
+        node.link.answer = lambda data: data
+        node.wire.write = broken
+        node.send(b"lost")
+        await_until(lambda: not node.wire.is_open, "it is closed")
+        del node.wire.write
+        await_until(lambda: node.wire.is_open, "it is opened again")
+        device.sendto(b"back", (LOCAL, node.port))
+        assert device.recv(100) == b"back"
+
+
+def test_a_mistake_in_a_wire_is_not_the_callers(await_until):
+    with running(f"udpin:{LOCAL}:0") as node:
+
+        def broken(data):
+            raise RuntimeError("a mistake of ours")
+
+        node.wire.write = broken
+        node.send(b"lost")
+        await_until(lambda: len(node.delivered) > 1, "it is reported")
+        assert "RuntimeError: a mistake of ours" in node.delivered[1].text
 
 
 def test_a_deadline_is_kept_and_never_early(await_until):
