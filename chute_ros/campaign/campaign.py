@@ -101,14 +101,20 @@ def _line(folder: Path, seed: int) -> Line:
 
 
 def run(
-    folder: Path, flights: int, seed: int, jobs: int, progress: Callable[[Tally], None]
+    folder: Path,
+    flights: int,
+    seed: int,
+    jobs: int,
+    progress: Callable[[Tally], None],
+    tally: Tally,
 ) -> Tally:
-    """Flights with the seeds from seed on, in their order. folder: of the profiles.
+    """Flights with the seeds from seed on, in their order, added to tally, which has the first of
+    them already. folder: of the profiles.
 
     Ended by Ctrl-C, it returns those until then: hours of flights are not lost."""
-    tally, begun = Tally(), time.monotonic()
+    begun = time.monotonic() - tally.took
     try:
-        for line in _all(folder, range(seed, seed + flights), jobs):
+        for line in _all(folder, range(seed + tally.flights, seed + flights), jobs):
             tally.add(line)
             tally.took = time.monotonic() - begun
             progress(tally)

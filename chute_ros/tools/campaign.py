@@ -1,7 +1,7 @@
 """Executable campaign: many flights in virtual time with faults at every layer, counted.
 
 A flight that must not be is saved as a scenario, as text: --replay SEED or FILE tells it step by
-step. Ctrl-C ends it: what was flown until then is counted and written.
+step. Ctrl-C ends it: what was flown until then is counted and written; --resume FILE goes on.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import sys
 import time
 from pathlib import Path
 
-from chute_ros.campaign import campaign
+from chute_ros.campaign import campaign, kept_tally
 from chute_ros.campaign.judge import Count
+from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.scenario import Scenario, draw
@@ -25,6 +26,7 @@ from chute_ros.nodes.config_folder import config_folder
 from chute_ros.nodes.ros_home import ros_home
 
 _TELL_EVERY = 5.0  # s
+_KEEP_EVERY = 60.0  # s
 #: So many of those that must not be are told; all are saved.
 _MOST_TOLD = 20
 
@@ -43,6 +45,12 @@ def main() -> None:
         help="folder for the flights that must not be (default: %(default)s)",
     )
     options.add_argument(
+        "--resume",
+        type=writable,
+        metavar="FILE",
+        help="keep there what was flown, each minute; go on from it if it is there",
+    )
+    options.add_argument(
         "--replay", type=scenario, metavar="SEED|FILE", help="tell one flight step by step"
     )
     # `ros2 run` adds arguments for nodes, which this is none of.
@@ -51,8 +59,15 @@ def main() -> None:
     if chosen.replay is not None:
         _replay(profiles, chosen.replay)
         return
-    progress = _Progress(chosen.flights, chosen.failures)
-    tally = campaign.run(profiles, chosen.flights, chosen.seed, chosen.jobs, progress.look)
+    kept = _Kept(chosen.resume, chosen.seed, profiles)
+    try:
+        tally = kept.tally()
+    except RecordError as error:
+        options.error(f"argument --resume: {error}")
+    progress = _Progress(chosen.flights, chosen.failures, kept)
+    how = (chosen.flights, chosen.seed, chosen.jobs)
+    tally = campaign.run(profiles, *how, progress.look, tally)
+    kept.keep(tally)
     for count in Count:
         print(f"{tally.counts[count]:8d}  {count.value}")
     for line in tally.wrong[:_MOST_TOLD]:
@@ -75,12 +90,47 @@ def _told(line: campaign.Line) -> str:
     return f"seed {line.seed}, {what}: {line.count.name}: {line.why}"
 
 
+class _Kept:
+    """What was flown so far, in a file; None: nowhere."""
+
+    def __init__(self, path: Path | None, seed: int, profiles: Path) -> None:
+        self._path, self._seed = path, seed
+        self._code = "" if path is None else code_that_flies(profiles)
+        self._at = time.monotonic()
+
+    def tally(self) -> campaign.Tally:
+        """The flights of the last time; RecordError: they are not of this campaign."""
+        if self._path is None or not self._path.exists():
+            return campaign.Tally()
+        text = self._path.read_text(encoding="utf-8", errors="replace")
+        tally = kept_tally.tally_of(text, self._seed, self._code, str(self._path))
+        print(f"goes on after {tally.flights} flights of {self._path}", file=sys.stderr)
+        return tally
+
+    def look(self, tally: campaign.Tally) -> None:
+        """Keep it from time to time."""
+        if time.monotonic() - self._at >= _KEEP_EVERY:
+            self.keep(tally)
+
+    def keep(self, tally: campaign.Tally) -> None:
+        """Now: whole, or as it was."""
+        self._at = time.monotonic()
+        if self._path is None:
+            return
+        new = self._path.with_name(f".{self._path.name}.new")
+        try:
+            new.write_text(kept_tally.text_of(tally, self._seed, self._code), encoding="utf-8")
+            new.replace(self._path)
+        except OSError as error:
+            print(f"not kept: {error}; trying again", file=sys.stderr, flush=True)
+
+
 class _Progress:
     """A line each few seconds, on the terminal's second channel, and one for each flight that must
     not be, which is saved at once: others may take hours."""
 
-    def __init__(self, flights: int, failures: Path) -> None:
-        self._flights, self._failures = flights, failures
+    def __init__(self, flights: int, failures: Path, kept: _Kept) -> None:
+        self._flights, self._failures, self._kept = flights, failures, kept
         self._told_at = time.monotonic()
         self._wrong = 0
         #: Why a flight that must not be could not be saved; empty: all were.
@@ -93,6 +143,7 @@ class _Progress:
             if self._wrong <= _MOST_TOLD:
                 print(_told(line), file=sys.stderr, flush=True)
             self._save(line)
+        self._kept.look(tally)
         if time.monotonic() - self._told_at < _TELL_EVERY:
             return
         self._told_at = time.monotonic()

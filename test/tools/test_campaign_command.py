@@ -11,6 +11,7 @@ import pytest
 
 from chute_ros.campaign import campaign as flights
 from chute_ros.campaign.judge import Count, Judged
+from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.scenario import draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign
@@ -56,6 +57,91 @@ def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
         assert f"]({page.with_suffix(suffix).name})" in text
         assert page.with_suffix(suffix).read_text().startswith("<svg")
     assert not (tmp_path / "failures").exists()
+
+
+def fly_on(monkeypatch, tmp_path, flights, seed=40):
+    """Fly until so many are flown, two files beside each other; what the page says."""
+    page = tmp_path / "campaign.md"
+    run(
+        *(monkeypatch, "--flights", str(flights), "--seed", str(seed), "--jobs", "1"),
+        *("--page", str(page), "--resume", str(tmp_path / "kept.json")),
+        *("--failures", str(tmp_path / "failures")),
+    )
+    pictures = [page.with_suffix(suffix).read_text() for suffix in (".svg", ".heights.svg")]
+    return [re.sub(r"\d+ s\b|\d+ (flights )?a minute", "", page.read_text()), *pictures]
+
+
+def test_one_that_was_interrupted_goes_on_and_counts_the_same(monkeypatch, tmp_path, capsys):
+    for part in ("apart", "whole"):
+        (tmp_path / part).mkdir()
+    fly_on(monkeypatch, tmp_path / "apart", 3)
+    assert "goes on" not in capsys.readouterr().err
+    in_two = fly_on(monkeypatch, tmp_path / "apart", 8)
+    told = capsys.readouterr()
+    assert f"goes on after 3 flights of {tmp_path}" in told.err
+    assert "8 of 8 flights in" in told.out
+    assert in_two == fly_on(monkeypatch, tmp_path / "whole", 8)
+
+
+def test_nothing_is_flown_twice(monkeypatch, tmp_path, capsys):
+    fly_on(monkeypatch, tmp_path, 3)
+    monkeypatch.setattr(flights, "fly_here", None)  # what flies now raises
+    fly_on(monkeypatch, tmp_path, 3)
+    assert "3 of 3 flights in" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda text: text.replace('"seed": 40', '"seed": 41'),
+            "kept with seed 41, this campaign",
+        ),
+        (lambda text: re.sub('"code": "[0-9a-f]{64}"', '"code": "x"', text), "kept with code x, "),
+        (lambda text: text.replace('"format": 1', '"format": 9'), "kept with format 9, "),
+        (lambda text: text.replace('"took"', '"t"'), "is no kept campaign: KeyError: 'took'"),
+        (lambda text: text[:100], "is no kept campaign: JSONDecodeError"),
+        (lambda text: "\x00\ufffd", "is no kept campaign: JSONDecodeError"),
+        (lambda text: "[]", "is no kept campaign: TypeError"),
+    ],
+)
+def test_flights_of_another_campaign_are_not_gone_on_with(
+    change, words, monkeypatch, tmp_path, capsys
+):
+    fly_on(monkeypatch, tmp_path, 1)
+    kept = tmp_path / "kept.json"
+    changed = change(kept.read_text())
+    kept.write_text(changed)
+    with pytest.raises(SystemExit) as ended:
+        fly_on(monkeypatch, tmp_path, 2)
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert "argument --resume: " in told
+    assert words in told
+    assert kept.read_text() == changed, "it is left as it is"
+
+
+def test_a_full_disk_does_not_end_the_flights(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(campaign.kept_tally, "text_of", full_disk)
+    fly_on(monkeypatch, tmp_path, 2)
+    told = capsys.readouterr()
+    assert "2 of 2 flights in" in told.out
+    assert "not kept: [Errno 28] No space left on device" in told.err
+
+
+def full_disk(*_):
+    """As writing does then."""
+    raise OSError(28, "No space left on device")
+
+
+def test_the_code_that_flies_is_told_apart(tmp_path):
+    profiles = tmp_path / "profiles"
+    profiles.mkdir()
+    (profiles / "one.yaml").write_text("a")
+    before = code_that_flies(profiles)
+    assert code_that_flies(profiles) == before
+    (profiles / "one.yaml").write_text("b")
+    assert code_that_flies(profiles) != before
 
 
 @pytest.fixture

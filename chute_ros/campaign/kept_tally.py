@@ -1,0 +1,94 @@
+"""What was flown so far as a file, so that a campaign of hours may be interrupted and go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections import Counter
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+import chute_ros
+from chute_ros.campaign.campaign import Line, Tally
+from chute_ros.campaign.judge import Count
+from chute_ros.errors import RecordError
+
+#: Rises when what is written means something else.
+FORMAT = 1
+#: Of the package: what becomes of a flight hangs on these.
+_FLYING = ("campaign", "model.py", "protocol", "sim", "supervisor", "transport")
+
+
+def code_that_flies(profiles: Path) -> str:
+    """A sum of it and of the profiles: flights of two sums cannot be counted together."""
+    package = Path(chute_ros.__file__).parent
+    files = [package / name for name in _FLYING if name.endswith(".py")]
+    for name in _FLYING:
+        files += (package / name).rglob("*.py")
+    files += profiles.glob("*.yaml")
+    total = hashlib.sha256()
+    for file in sorted(files, key=lambda one: (one.name, str(one))):
+        total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()
+
+
+def text_of(tally: Tally, seed: int, code: str) -> str:
+    """As JSON. seed: of the first flight; code: what flew."""
+    values = {
+        "format": FORMAT,
+        "code": code,
+        "seed": seed,
+        "flights": tally.flights,
+        "took": tally.took,
+        "counts": {count.name: n for count, n in tally.counts.items()},
+        "reasons": tally.reasons,
+        "faults": tally.faults,
+        "by_vehicle": [
+            [vehicle, profile, count.name, n]
+            for (vehicle, profile, count), n in tally.by_vehicle.items()
+        ],
+        "wrong": [_written(line) for line in tally.wrong],
+        "lines": [_written(line) for line in tally.lines],
+    }
+    return json.dumps(values) + "\n"
+
+
+def tally_of(text: str, seed: int, code: str, named: str) -> Tally:
+    """The tally again. RecordError, with the file's name: it is none, or one of other flights."""
+    try:
+        values = json.loads(text)
+        found = {"format": values["format"], "seed": values["seed"], "code": values["code"]}
+        for what, wanted in (("format", FORMAT), ("seed", seed), ("code", code)):
+            if found[what] != wanted:
+                raise RecordError(
+                    f"{named} was kept with {what} {found[what]}, this campaign has {wanted}: "
+                    "name another file, or remove it"
+                )
+        return Tally(
+            flights=int(values["flights"]),
+            took=float(values["took"]),
+            counts=Counter({Count[name]: n for name, n in values["counts"].items()}),
+            reasons=Counter(values["reasons"]),
+            faults=Counter(values["faults"]),
+            by_vehicle=Counter(
+                {
+                    (vehicle, profile, Count[name]): n
+                    for vehicle, profile, name, n in values["by_vehicle"]
+                }
+            ),
+            wrong=[_read(line) for line in values["wrong"]],
+            lines=[_read(line) for line in values["lines"]],
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        kind = type(error).__name__
+        raise RecordError(f"{named} is no kept campaign: {kind}: {error}") from None
+
+
+def _written(line: Line) -> list[Any]:
+    return [one.name if isinstance(one, Count) else one for one in astuple(line)]
+
+
+def _read(values: list[Any]) -> Line:
+    *who, count, why, kill, release, lost, faults = values
+    return Line(*who, Count[count], why, kill, release, lost, tuple(faults))
