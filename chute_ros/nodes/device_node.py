@@ -2,8 +2,8 @@
 
 One thread at a time has the link, its own or the executor's: the link's turn (transport/loop.py).
 Events go to the executor through an inbox and a guard condition. The heartbeat makes one round:
-the executor's timer asks the link, whose answer, a summary, is an event that the executor
-publishes. A hang of either thread is silence.
+the executor's timer asks the link's own thread, whose answer, a summary, is an event that the
+executor publishes. A hang of either is silence.
 """
 
 from __future__ import annotations
@@ -315,10 +315,12 @@ class DeviceNode(Node, ABC):
     def _beat(self) -> None:
         def answer(link: Any, now: float) -> None:
             link.owner_alive(now + OWNER_SILENCE)
-            self.desk.try_held(link, now)
             self.deliver([self.summarise(link, now)])
 
-        self.in_link(answer)
+        assert self.loop is not None
+        self.loop.call_at_turns_end(answer)
+        if self.desk.holds:
+            self.in_link(self.desk.try_held)
         lost = self._supervisor.look()
         if lost is not None:
             self._supervisor_lost(lost)

@@ -41,6 +41,11 @@ class RequestDesk:
         #: Those that wait for their device: (token, begin, ready, until). Of the link's turn.
         self._held: list[tuple[int, Begin, Ready, float]] = []
 
+    @property
+    def holds(self) -> bool:
+        """A request waits for its device."""
+        return bool(self._held)
+
     def request(self, begin: Begin) -> Future:
         """Have begin(link, token, now) called in the link's turn; the future is its end."""
         token = next(self._tokens)

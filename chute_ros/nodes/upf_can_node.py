@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -167,12 +168,12 @@ class UpfCanNode(DeviceNode):
 
     def deliver(self, events: list[Any]) -> None:
         """What a device asks for leaves at once: a kill does not wait for the executor."""
-        try:
-            for event in events:
+        with ExitStack() as each:  # from the last to the first, each whatever the others raise
+            each.callback(super().deliver, events)
+            for event in reversed(events):
                 if isinstance(event, AskSupervisor):
-                    self.ask_supervisor(int(event.ask), event.device, event.reason)
-        finally:
-            super().deliver(events)
+                    ask = (int(event.ask), event.device, event.reason)
+                    each.callback(self.ask_supervisor, *ask)
 
     # -- from the rest of the vehicle -----------------------------------------------------------
 

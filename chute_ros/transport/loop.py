@@ -87,6 +87,7 @@ class WireLoop(Generic[LinkT]):
         self._deliver = deliver
         self._opened = opened
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
+        self._at_turns_end: Callable[[LinkT, float], None] | None = None
         self._touching = threading.Lock()
         #: The thread that holds it; 0: none does.
         self._toucher = 0
@@ -96,6 +97,8 @@ class WireLoop(Generic[LinkT]):
         self._stopping = False
         self._reopen_at = 0.0
         self._last_failure = ""
+        #: What a call found wrong with the wire, for the loop's thread.
+        self._found_lost = ""
         self._thread = threading.Thread(target=self._run, name=f"link {wire.describe()}")
 
     def start(self) -> None:
@@ -118,7 +121,8 @@ class WireLoop(Generic[LinkT]):
 
         The caller's own thread does it where the loop's waits for something to happen: to wake
         another one first is most of what a call costs. Else the loop does it in this turn or the
-        next, and the caller waits for its own at most TURN_WITHIN.
+        next. The caller waits for its turn at most TURN_WITHIN, and for the wire as long as a
+        write takes.
         """
         self._calls.append(function)
         within = self._toucher == threading.get_ident()
@@ -126,6 +130,12 @@ class WireLoop(Generic[LinkT]):
             with self._touched():
                 self._guarded(self._make_calls, time.monotonic())
         # A deadline may be nearer now.
+        self._wake()
+
+    def call_at_turns_end(self, function: Callable[[LinkT, float], None]) -> None:
+        """Have function(link, now) called by the loop's own thread, after a turn in which nothing
+        failed: that it is called shows that the loop turns. One that still waits is left out."""
+        self._at_turns_end = function
         self._wake()
 
     def _wake(self) -> None:
@@ -145,21 +155,24 @@ class WireLoop(Generic[LinkT]):
                 time.sleep(0.01)
 
     def _turn(self) -> None:
-        self._touching.acquire()
+        if not self._take_turn():
+            return
         with self._touched():
             now = time.monotonic()
-            self.last_run = now
+            if self._found_lost:
+                self._lost(self._found_lost, now)
             if not self.wire.is_open and now >= self._reopen_at:
                 self._reopen(now)
             poll, wait = self._watched(now)
         ready = poll.poll(wait)
-        self._touching.acquire()
+        if not self._take_turn():
+            return
         with self._touched():
             now = time.monotonic()
             for file, _ in ready:
                 if file == self._wake_in.fileno():
                     self._wake_in.recv(4096)
-                elif file in self.wire.files():  # a call may have closed it meanwhile
+                elif file in self.wire.files():  # the one before it may have ended the wire
                     self._read(file, now)
             # What this brings about leaves before the link looks at its clock.
             self._send()
@@ -167,6 +180,20 @@ class WireLoop(Generic[LinkT]):
             self.link.update(now)
             self._send()
             self._hand_over()
+            self.last_run = now
+            function, self._at_turns_end = self._at_turns_end, None
+            if function is not None:
+                self._guarded(function, self.link, now)
+                self._send()
+                self._hand_over()
+
+    def _take_turn(self) -> bool:
+        """The lock; False: it ends. A Ctrl-C may have taken it from under the caller who had it,
+        who then never gives it back."""
+        while not self._touching.acquire(timeout=LONGEST_WAIT):
+            if self._stopping:
+                return False
+        return True
 
     @contextmanager
     def _touched(self) -> Iterator[None]:
@@ -202,9 +229,12 @@ class WireLoop(Generic[LinkT]):
         poll.register(self._wake_in, select.POLLIN)
         for file in self.wire.files():
             poll.register(file, select.POLLIN)
-        wait = min(self.link.next_deadline() - now, LONGEST_WAIT)
+        # A call may have left a deadline that is long over, as minus infinity.
+        wait = max(0.0, min(self.link.next_deadline() - now, LONGEST_WAIT))
+        if self._calls:
+            wait = 0.0  # a mistake in the last turn has left them over
         # Rounded up: a wait that ends before its deadline would only have to be repeated.
-        return poll, max(0, int(wait * 1000.0 + 0.999))
+        return poll, int(wait * 1000.0 + 0.999)
 
     def _read(self, file: int, now: float) -> None:
         try:
@@ -249,6 +279,11 @@ class WireLoop(Generic[LinkT]):
         self._deliver([WireChange(True, f"{self.wire.describe()} is open")])
 
     def _lost(self, text: str, now: float) -> None:
+        if self._thread.is_alive() and threading.current_thread() is not self._thread:
+            # To close may take long, which nobody who calls must wait for.
+            self._found_lost = text
+            return
+        self._found_lost = ""
         self.wire.close()
         self.link.stream_ended(None)
         self._reopen_at = now + REOPEN_INTERVAL

@@ -152,6 +152,26 @@ class DeviceSuite:
         assert {beat.link for beat in self.beats} == {self.name}
         assert not any(beat.supervisor for beat in self.beats)
 
+    @pytest.mark.parametrize("what", ["update", "next_deadline"])
+    def test_a_node_whose_link_fails_inside_gives_no_sign_of_life(
+        self, device: SimulatedDevice, what: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.plugged(device)
+        node = next(one for one in self.bench.nodes if one.get_name() == self.name)
+
+        def broken(*_: Any) -> None:
+            raise RuntimeError("a mistake of ours")
+
+        monkeypatch.setattr(node.loop.link, what, broken)
+        self.bench.until(lambda: node._loop_faults > 0, "it fails")
+        self.bench.turns(0.2)  # what was under way has come
+        told, faults = len(self.beats), node._loop_faults
+        self.bench.until(lambda: node._loop_faults > faults + 2, "it goes on failing")
+        assert len(self.beats) == told
+        monkeypatch.undo()
+        self.bench.until(lambda: len(self.beats) > told, "it is heard again")
+        self.await_link(LinkState.OK)
+
     def test_a_device_that_breaks_down_is_not_healthy(self, device: SimulatedDevice) -> None:
         self.plugged(device)
         fault = device.break_down()

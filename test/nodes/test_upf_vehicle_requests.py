@@ -13,6 +13,7 @@ from chute_ros.model import Action, LinkState, Outcome, ParachuteState
 from chute_ros.nodes import qos
 from chute_ros.nodes.node_executor import NodeExecutor
 from chute_ros.protocol.upf.definitions import VEHICLE_SERVICE
+from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
 
 KILL, BLOCK, RELEASE = "TYPE_KILLSWITCH", "TYPE_FLIGHT_BLOCK", "TYPE_FLIGHT_BLOCK_RELEASE"
 LONG = {"vehicle_service_timeout": 60.0}
@@ -104,10 +105,33 @@ def test_the_supervisor_is_asked_although_the_executor_is_busy(bench, await_unti
 
     # The executor of the node itself does not turn meanwhile.
     await_until(asked, "the supervisor is asked")
-    assert heard[0].request == SafetyRequest.KILL
+    asking.report(Action.KILL, Outcome.CONFIRMED)
+    asking.await_answer("SUCCESS")
+    asked()
+    assert [one.request for one in heard] == [SafetyRequest.KILL], "once"
     executor.remove_node(listener)
     listener.destroy_node()
     executor.shutdown()
+
+
+def test_one_request_that_cannot_be_published_keeps_no_other_back(bench):
+    asking = Asking(bench)
+    node = asking.network.node
+    asks = [
+        AskSupervisor(ask, "33", "a test")
+        for ask in (Ask.FLIGHT_BLOCK, Ask.KILL, Ask.FLIGHT_BLOCK_RELEASE)
+    ]
+    published = node.ask_supervisor
+
+    def broken(request, device, reason):
+        if request != SafetyRequest.KILL:
+            raise RuntimeError("the middleware takes none")
+        published(request, device, reason)
+
+    node.ask_supervisor = broken
+    with pytest.raises(RuntimeError):
+        node.deliver(asks)
+    asking.await_request(SafetyRequest.KILL)
 
 
 def test_a_kill_that_does_not_happen_in_time_is_told_as_failed(bench):

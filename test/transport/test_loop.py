@@ -1,10 +1,13 @@
 """The loop between a wire and a protocol: prompt, in order, and not to be killed by a mistake."""
 
+import math
 import threading
 import time
 
+import pytest
 from loop_bench import LOCAL, Running, descriptors, loop_threads, running, udp
 
+from chute_ros.transport import loop
 from chute_ros.transport.loop import LoopFault, WireChange
 
 
@@ -89,6 +92,102 @@ def test_no_two_threads_touch_the_protocol_at_once(await_until):
         assert times == sorted(times), "time never goes back for the protocol"
 
 
+@pytest.fixture
+def forever(monkeypatch):
+    """A loop turns only for what happens."""
+    monkeypatch.setattr(loop, "LONGEST_WAIT", 1000.0)
+
+
+def test_while_the_loop_waits_its_caller_makes_the_call(forever):
+    with running(f"udpin:{LOCAL}:0") as node, udp() as device:
+        node.link.answer = lambda data: data
+        device.sendto(b"hello", (LOCAL, node.port))
+        assert device.recv(100) == b"hello"
+        callers = []
+
+        def say(link, now):
+            callers.append(threading.current_thread())
+            link.output.append(b"at once")
+
+        # Now and then the loop is still in the turn of the call before.
+        for _ in range(50):
+            node.loop.call(say)
+            assert device.recv(100) == b"at once"
+        assert threading.current_thread() in callers
+
+
+def test_a_deadline_that_a_call_sets_is_kept(forever, await_until):
+    with running(f"udpin:{LOCAL}:0") as node:
+        due = time.monotonic() + 0.05
+        node.loop.call(lambda link, now: setattr(link, "deadline", due))
+        await_until(lambda: any(type(one) is tuple for one in node.delivered), "the deadline")
+
+
+@pytest.mark.parametrize("deadline", [-math.inf, 0.0])
+def test_a_deadline_that_is_long_over_is_kept_at_once(deadline, forever, await_until):
+    with running(f"udpin:{LOCAL}:0") as node:
+        # As a call leaves it that is made between two turns of the loop.
+        node.link.deadline = deadline
+        assert node.loop._watched(time.monotonic())[1] == 0
+        node.loop._wake()
+        await_until(lambda: any(type(one) is tuple for one in node.delivered), "the deadline")
+
+
+def test_a_call_before_the_start_is_made_after_it(await_until):
+    node, made = Running(f"udpin:{LOCAL}:0"), []
+    node.loop.call(lambda link, now: made.append(node.wire.is_open))
+    assert made == []
+    node.loop.start()
+    try:
+        await_until(lambda: made, "it is made")
+        assert made == [True]
+    finally:
+        node.loop.stop()
+
+
+def test_what_is_called_at_a_turns_end_is_called_by_the_loop(await_until):
+    with running(f"udpin:{LOCAL}:0") as node:
+        seen = []
+        node.loop.call_at_turns_end(
+            lambda link, now: seen.append((link, threading.current_thread().name, now))
+        )
+        await_until(lambda: seen, "it is called")
+        ((link, thread, now),) = seen
+        assert link is node.link
+        assert [thread] == loop_threads()
+        assert now == node.link.updates[-1], "after the update of this turn"
+
+
+@pytest.mark.parametrize("what", ["update", "next_deadline", "take_events"])
+def test_a_loop_that_fails_or_hangs_does_not_reach_a_turns_end(what, await_until):
+    with running(f"udpin:{LOCAL}:0") as node:
+        seen = []
+
+        def broken(*_):
+            raise RuntimeError("each time")
+
+        setattr(node.link, what, broken)
+        await_until(lambda: len(node.delivered) > 1, "it fails")
+        run = node.loop.last_run
+        for _ in range(2):
+            before = len(node.delivered)
+            node.loop.call_at_turns_end(lambda link, now: seen.append(now))
+            await_until(lambda before=before: len(node.delivered) > before + 1, "it fails again")
+        assert seen == []
+        assert node.loop.last_run == run
+        delattr(node.link, what)
+        await_until(lambda: seen, "it turns again")
+        assert len(seen) == 1, "what nobody awaits any more is left out"
+
+
+def test_a_lock_that_nobody_gives_back_does_not_keep_it_from_ending():
+    node = Running(f"udpin:{LOCAL}:0")
+    node.loop.start()
+    assert node.loop._touching.acquire(timeout=10.0)  # by one that a Ctrl-C has ended
+    node.loop.stop()
+    assert loop_threads() == []
+
+
 def test_a_call_that_makes_another_has_it_made_after_itself(await_until):
     with running(f"udpin:{LOCAL}:0") as node:
         made = []
@@ -111,31 +210,42 @@ def test_a_loop_that_hangs_does_not_hang_who_calls(await_until):
             go_on.wait()
 
         node.link.update = hang
-        node.loop.call(lambda link, now: None)
-        assert hung.wait(10.0)
-        began = time.monotonic()
-        for number in range(5):
-            node.loop.call(lambda link, now, number=number: made.append(number))
-        assert time.monotonic() - began < 5.0
-        assert made == []
-        go_on.set()
+        try:
+            node.loop.call(lambda link, now: None)
+            assert hung.wait(10.0)
+            began = time.monotonic()
+            for number in range(5):
+                node.loop.call(lambda link, now, number=number: made.append(number))
+            assert time.monotonic() - began < 5.0
+            assert made == []
+        finally:
+            go_on.set()
         await_until(lambda: made == [0, 1, 2, 3, 4], "they are made in order once it goes on")
 
 
-def test_a_wire_that_a_call_loses_is_opened_again(await_until):
+def test_a_wire_that_a_call_loses_is_closed_by_the_loop_and_opened_again(await_until):
     with running(f"udpin:{LOCAL}:0") as node, udp() as device:
 
         def broken(data):
             raise ConnectionResetError("pulled")
 
+        closers, close = [], node.wire.close
+
+        def closing():
+            closers.append(threading.current_thread().name)
+            close()
+
         node.link.answer = lambda data: data
-        node.wire.write = broken
+        node.wire.write, node.wire.close = broken, closing
         node.send(b"lost")
-        await_until(lambda: not node.wire.is_open, "it is closed")
+        await_until(lambda: len(node.changes) > 1, "it is told")
+        assert [change.is_open for change in node.changes[:2]] == [True, False]
+        assert closers == loop_threads()
         del node.wire.write
         await_until(lambda: node.wire.is_open, "it is opened again")
         device.sendto(b"back", (LOCAL, node.port))
         assert device.recv(100) == b"back"
+        assert node.loop.send_errors == 1
 
 
 def test_a_mistake_in_a_wire_is_not_the_callers(await_until):
