@@ -3,9 +3,10 @@
 A message's way can become slower by no more than the time that has passed, and faster by no more
 than it took before. A difference between stamp and arrival that changes by more is a clock that
 was set, which makes no message older than it is. Nothing arrives before it was sent either: a
-first heartbeat from the future was stamped by a clock that is ahead, as that of another host may
-be when one of the two is started anew. One that is behind looks like a way that is slow, until an
-answer to what we have sent comes, which cannot be older than that.
+heartbeat from the future was stamped by a clock that is ahead, as that of another host may be when
+one of the two is started anew; or the one that showed a step had waited for us, as all do that
+come while this host hangs. A clock that is behind looks like a way that is slow, until an answer
+to what we have sent comes, which cannot be older than that.
 """
 
 from __future__ import annotations
@@ -30,13 +31,13 @@ class ClockSteps:
         change, passed = difference - self._difference, now - self._heard
         took = max(0.0, self.age(self._difference))
         self._heard, self._difference = now, difference
-        if math.isnan(change) and difference < -self.margin:
-            self.offset = difference
-            return difference
         # NaN, for the first, is within no bounds and beyond none.
         if change > passed + self.margin or change < -took - self.margin:
             self.offset += change
             return change
+        if (early := self.age(difference)) < -self.margin:
+            self.offset = difference
+            return early
         return 0.0
 
     def answered(self, difference: float, passed: float, now: float) -> float:

@@ -13,7 +13,7 @@ from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.measurements import CLIMB_RATE, FALL_SIGNS
+from chute_ros.supervisor.measurements import CLIMB_RATE, FALL_SIGNS, HEIGHT
 from chute_ros.supervisor.state import State
 
 #: m/s^2.
@@ -42,7 +42,7 @@ HIGH_AFTER = 5.0
 
 def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
     """A measurement and "", or NaN and why it cannot be used."""
-    if name == "height" and state.rebooted:
+    if name in (HEIGHT, CLIMB_RATE) and state.rebooted:
         return math.nan, "the autopilot started anew in flight, and its height with it"
     if name == CLIMB_RATE:
         return _climb_rate(config, state, now)
@@ -63,14 +63,15 @@ def measured(config: SupervisorConfig, state: State, name: str, now: float) -> f
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
     """Vertical speed from the heights of the last second, m/s, for sources that tell none (a
-    receiver without a fix, a barometer alone). NaN: not known."""
+    receiver without a fix, a barometer alone). NaN: not known. What they are
+    above is the same for all of them, also where the autopilot has started anew."""
     return _climb_rate(config, state, now)[0]
 
 
 def _climb_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
     heights, limits = state.heights, config.profile.limits["height"]
     height = state.measured("height")
-    if height.unusable(limits, now) or state.rebooted or not _enough(heights, height.measured_at):
+    if height.unusable(limits, now) or not _enough(heights, height.measured_at):
         return math.nan, "too few heights that can be used"
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rates = [

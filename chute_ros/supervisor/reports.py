@@ -124,7 +124,9 @@ class Reports(Requests):
             self.outputs.append(i.Say("the autopilot started anew in flight", alarm=True))
         rebooted = state.rebooted or (again and state.airborne)
         if (before, rebooted) != (state.reboots_before, state.rebooted):
-            self.state = replace(state, reboots_before=before, rebooted=rebooted)
+            # Heights from before it may be above another ground.
+            heights = state.heights if rebooted == state.rebooted else ()
+            self.state = replace(state, reboots_before=before, rebooted=rebooted, heights=heights)
 
     def action_report(self, one: i.ActionReport) -> None:
         """How far a node got with a decision, and which is the newest that it knows."""

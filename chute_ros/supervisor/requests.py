@@ -13,7 +13,6 @@ from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.orders import ON_GROUND, Orders
 from chute_ros.supervisor.preflight import arm_reasons
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.rules import DeviceCondition, DeviceFact
 from chute_ros.supervisor.state import ASK_LASTS, Ask
 
 #: Devices whose wish to block flight is remembered: made-up names must not grow us.
@@ -62,7 +61,7 @@ class Requests(Orders):
         rules = dict(self.state.rules)
         for rule in self.config.profile.rules:
             # Asked anew is a new occasion, whatever became of the last.
-            if any(c == DeviceCondition(DeviceFact.ASKS_FOR_KILL) for c in rule.conditions):
+            if rule.asks_for_a_kill:
                 rules[rule.name] = replace(self.state.rule(rule.name), latched=False)
         self.state = replace(
             self.state, asks=MappingProxyType(asks), rules=MappingProxyType(rules)

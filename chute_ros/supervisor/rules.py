@@ -152,6 +152,11 @@ class Rule:
         return any(isinstance(one, AutopilotCondition) for one in self.conditions)
 
     @cached_property
+    def asks_for_a_kill(self) -> bool:
+        """One of its conditions is that any device asks for one."""
+        return DeviceCondition(DeviceFact.ASKS_FOR_KILL) in self.conditions
+
+    @cached_property
     def silences(self) -> frozenset[str]:
         """The measurements of which it may come to hold as they are told no more."""
         names = {

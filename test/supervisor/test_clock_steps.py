@@ -48,6 +48,40 @@ def test_one_that_was_late_itself_is_put_right_by_the_next() -> None:
     assert clocks.age(-48.3) == pytest.approx(0.7)
 
 
+@pytest.mark.parametrize("step", [3.0, 5.999, -5.0, 3600.0])
+def test_of_what_waited_while_this_host_hung_the_first_was_not_sent_just_now(step: float) -> None:
+    """The clock was set while we hung for 3 s; the last ten heartbeats come at once."""
+    clocks, now = heard_so_far()
+    now += 3.0
+    for late in range(9, -1, -1):
+        clocks.heard(0.002 + step + late * BEAT, now)
+    assert clocks.age(0.003 + step) == pytest.approx(0.0, abs=MARGIN), "a decision sent now"
+    assert clocks.heard(0.002 + step, now + BEAT) == 0.0
+    assert clocks.age(0.703 + step) == pytest.approx(0.7, abs=MARGIN), "one that comes late"
+
+
+@given(
+    hangs=st.lists(
+        st.tuples(
+            st.floats(0.0, 20.0), st.floats(-100.0, 100.0), st.integers(1, 10), st.floats(0.0, 1.0)
+        ),
+        max_size=6,
+    )
+)
+def test_nothing_seems_to_come_from_the_future(
+    hangs: list[tuple[float, float, int, float]],
+) -> None:
+    """Hangs, steps of the clock meanwhile, and heartbeats that waited, on ways of any length."""
+    clocks, now = heard_so_far()
+    clock = 0.0
+    for hang, step, waited, way in hangs:
+        now += hang
+        clock += step
+        for late in range(waited - 1, -1, -1):
+            clocks.heard(clock + way + late * BEAT, now)
+        assert clocks.age(clock + way) >= -MARGIN - 1e-6
+
+
 def test_a_first_heartbeat_that_is_old_is_old() -> None:
     clocks = ClockSteps(MARGIN)
     assert clocks.heard(49.4, 5.0) == 0.0

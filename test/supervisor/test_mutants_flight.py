@@ -99,8 +99,20 @@ def test_a_climb_rate_needs_heights_just_so_far_apart() -> None:
 def test_a_climb_rate_is_not_known_where_the_height_is_not() -> None:
     falls = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
     assert math.isnan(flight.climb_rate(CONFIG, falls, 9.0)), "the newest is old"
-    assert math.isnan(flight.climb_rate(CONFIG, replace(falls, rebooted=True), 0.4))
     assert math.isnan(flight.climb_rate(CONFIG, replace(falls, heights=()), 0.4))
+
+
+def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own() -> None:
+    falls = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
+    anew = replace(falls, rebooted=True)
+    rate = flight.climb_rate(CONFIG, falls, 0.4)
+    assert flight.climb_rate(CONFIG, anew, 0.4) == rate == pytest.approx(-15.0)
+    assert flight.measured(CONFIG, anew, "vertical_speed", 0.4) == rate
+    assert flight.measured(CONFIG, falls, "climb_rate", 0.4) == rate
+    for name in ("climb_rate", "height"):
+        value, why = flight.reading(CONFIG, anew, name, 0.4)
+        assert math.isnan(value)
+        assert why == "the autopilot started anew in flight, and its height with it"
 
 
 @pytest.mark.parametrize(("height", "in_air"), [(40.0, False), (40.1, True)])

@@ -3,6 +3,7 @@ it, or for just too short, it does not."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from random import Random
 from typing import Any
@@ -411,6 +412,31 @@ def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
     story.fly(6.6, vertical_speed=-20.1)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.newest(D).rule == "flight computer in fault"
+
+
+@pytest.mark.parametrize("ground", [0.0, -280.0])
+def test_a_rocket_whose_computer_started_anew_without_a_fix_is_seen_to_fall(ground: float) -> None:
+    """By its heights alone, whatever they are above since then."""
+    story = Story(shipped("rocket")).ready().fly(1.0, height=300.0, vertical_speed=1.0)
+    unfixed = {**REBOOTED, "vertical_speed": math.nan}
+    story.fly(1.05, height=300.0 + ground, **unfixed)
+    assert [height for _, height in story.state.heights] in ([], [300.0 + ground])
+    for step in range(1, 60):
+        story.fly(story.t + 0.05, height=300.0 + ground - 40.0 * step * 0.05, **unfixed)
+        if story.fired():
+            break
+    assert story.fired() == ["KILL"]
+    assert story.newest(K).rule == "critical sink"
+    assert "vertical_speed -40.00 (below -30)" in story.newest(K).reasons
+    assert story.t == pytest.approx(1.05 + 0.4 + 2.0, abs=0.3)
+
+
+def test_a_rocket_whose_computer_starts_anew_with_another_height_does_not_fall() -> None:
+    story = Story(shipped("rocket")).ready().fly(1.0, height=300.0, vertical_speed=1.0)
+    unfixed = {**REBOOTED, "vertical_speed": math.nan}
+    for height in (300.0, 250.0, 0.0):
+        story.fly(story.t + 4.0, height=height, **unfixed)
+    assert story.fired() == []
 
 
 def test_a_rocket_coasts_in_free_fall_and_turns_over_without_a_deploy() -> None:
