@@ -87,7 +87,7 @@ class WireLoop(Generic[LinkT]):
         self._deliver = deliver
         self._opened = opened
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
-        self._at_turns_end: Callable[[LinkT, float], None] | None = None
+        self._at_turns_end: deque[Callable[[LinkT, float], None]] = deque(maxlen=1)
         self._touching = threading.Lock()
         #: The thread that holds it; 0: none does.
         self._toucher = 0
@@ -135,7 +135,7 @@ class WireLoop(Generic[LinkT]):
     def call_at_turns_end(self, function: Callable[[LinkT, float], None]) -> None:
         """Have function(link, now) called by the loop's own thread, after a turn in which nothing
         failed: that it is called shows that the loop turns. One that still waits is left out."""
-        self._at_turns_end = function
+        self._at_turns_end.append(function)
         self._wake()
 
     def _wake(self) -> None:
@@ -181,9 +181,8 @@ class WireLoop(Generic[LinkT]):
             self._send()
             self._hand_over()
             self.last_run = now
-            function, self._at_turns_end = self._at_turns_end, None
-            if function is not None:
-                self._guarded(function, self.link, now)
+            if self._at_turns_end:
+                self._guarded(self._at_turns_end.popleft(), self.link, now)
                 self._send()
                 self._hand_over()
 
