@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -35,6 +36,10 @@ def main() -> None:
     chosen = _options().parse_args()
     if reason := why_not():
         sys.exit(f"soak: {reason}")
+    # Ended from outside it must leave neither hosts nor processes behind; a shell's background has
+    # the interrupt ignored.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("soak: ended from outside"))
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     shares = _share(chosen)
     before, started = load(), time.monotonic()
     results: list[Result] = []
