@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from faults import ground_station_flight, two_supervisors
 from faults import ground_station_stories as ground
+from faults.ending import take_down_when_ended
 from faults.fleet_discovery import search_all
 from faults.fleet_discovery import table as discovery_table
 from faults.fleet_stories import fly_all as fly_fleets
@@ -77,8 +77,7 @@ def main() -> None:
         # Shared memory does not care about a network that is cut.
         "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     }
-    # Ended from outside it must leave neither hosts nor processes behind.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("hosts: ended from outside"))
+    take_down_when_ended("hosts")
     wrong = []
     for part in chosen.parts or PARTS:
         before = os.getloadavg()[0]

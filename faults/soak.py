@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import signal
 import sys
 import tempfile
 import time
@@ -19,6 +18,7 @@ from pathlib import Path
 from bench.report import load, machine
 from chute_ros.tools.isolation import isolated_ros
 from faults import soak_picture, soak_report
+from faults.ending import take_down_when_ended
 from faults.network import Network, why_not
 from faults.soak_judge import ANSWER_WITHIN, WHOLE_WITHIN
 from faults.soak_measure import LIMITS
@@ -36,10 +36,7 @@ def main() -> None:
     chosen = _options().parse_args()
     if reason := why_not():
         sys.exit(f"soak: {reason}")
-    # Ended from outside it must leave neither hosts nor processes behind; a shell's background has
-    # the interrupt ignored.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("soak: ended from outside"))
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    take_down_when_ended("soak")
     shares = _share(chosen)
     before, started = load(), time.monotonic()
     results: list[Result] = []

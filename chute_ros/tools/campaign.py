@@ -16,13 +16,13 @@ from pathlib import Path
 
 from chute_ros.campaign import campaign, kept_tally
 from chute_ros.campaign.judge import Count
-from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.scenario import Scenario, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.errors import RecordError
 from chute_ros.nodes.config_folder import config_folder
+from chute_ros.nodes.private_files import replace_text
 from chute_ros.nodes.ros_home import ros_home
 
 _TELL_EVERY = 5.0  # s
@@ -95,7 +95,7 @@ class _Kept:
 
     def __init__(self, path: Path | None, seed: int, profiles: Path) -> None:
         self._path, self._seed = path, seed
-        self._code = "" if path is None else code_that_flies(profiles)
+        self._code = "" if path is None else kept_tally.code_that_flies(profiles)
         self._at = time.monotonic()
 
     def tally(self) -> campaign.Tally:
@@ -117,10 +117,8 @@ class _Kept:
         self._at = time.monotonic()
         if self._path is None:
             return
-        new = self._path.with_name(f".{self._path.name}.new")
         try:
-            new.write_text(kept_tally.text_of(tally, self._seed, self._code), encoding="utf-8")
-            new.replace(self._path)
+            replace_text(self._path, kept_tally.text_of(tally, self._seed, self._code))
         except OSError as error:
             print(f"not kept: {error}; trying again", file=sys.stderr, flush=True)
 
