@@ -1,6 +1,8 @@
 """What holds for any bytes: nothing raises, nothing is mixed up, all is accounted for."""
 
+import math
 from collections import Counter
+from decimal import Context, Decimal
 
 import pytest
 from hypothesis import assume, given
@@ -249,6 +251,29 @@ def test_what_a_flight_computer_prints_is_read_as_exactly_what_it_has(name, data
     ]
     assert repr(as_held) == repr(values)
     assert by_decode(layout, ",".join(texts)) == by_problem_of(layout, ",".join(texts))
+
+
+EXACT = Context(prec=1100)
+
+
+def halfway(value):
+    """The middle of this float and the next one, in all its digits."""
+    both = EXACT.add(Decimal(value), Decimal(math.nextafter(value, math.inf)))
+    return f"{EXACT.divide(both, 2):f}"
+
+
+#: Longer than any device prints.
+LONG = st.one_of(
+    st.from_regex(r"-?(0|[1-9][0-9]{0,306})(\.[0-9]{1,400})?", fullmatch=True),
+    st.floats(0, 1e300).map(halfway),
+)
+
+
+@given(LONG, st.sampled_from(["pressure", "vel_n"]))
+def test_a_number_of_any_length_is_read_exactly(text, name):
+    assert LAYOUT.fields[LAYOUT.index["vel_n"]].kind.name == "f64"
+    texts = body(**{name: text})
+    assert by_decode(LAYOUT, texts) == by_problem_of(LAYOUT, texts)
 
 
 TEXTS = st.one_of(
