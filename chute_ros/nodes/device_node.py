@@ -96,6 +96,8 @@ class DeviceNode(Node, ABC):
 
     #: Events that may be left out where the executor does not keep up.
     PICTURES: tuple[type, ...] = (ParachuteChanged, VehicleChanged)
+    #: Events that need only be told of, within a heartbeat's interval.
+    UNHURRIED: tuple[type, ...] = ()
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
         super().__init__(name, **options)
@@ -116,7 +118,9 @@ class DeviceNode(Node, ABC):
         self._service_group = ReentrantCallbackGroup()
         guard = self.create_guard_condition(self._drain)
         # An autopilot tells its measurements one right after the other; each picture has all.
-        self._inbox = Inbox(self._take, guard.trigger, self.PICTURES, (VehicleChanged,))
+        self._inbox = Inbox(
+            self._take, guard.trigger, self.PICTURES, (VehicleChanged,), self.UNHURRIED
+        )
         self.desk = RequestDesk(self.in_link, self.deliver, self.decisions.report)
         #: The newest picture of each device.
         self.statuses: dict[str, model.ParachuteStatus] = {}

@@ -17,7 +17,8 @@ MOST_AT_ONCE = 100
 class Inbox:
     """take: gets each event, in the executor; wake: has drain called there; pictures: the types of
     events that may be left out where the executor does not keep up; replaced: those of them that
-    tell all that one before them told, which is left out if it still waits just ahead."""
+    tell all that one before them told, which is left out if it still waits just ahead; unhurried:
+    those that wake nobody, and wait for the next one that does."""
 
     def __init__(
         self,
@@ -25,9 +26,10 @@ class Inbox:
         wake: Callable[[], None],
         pictures: tuple[type, ...],
         replaced: tuple[type, ...] = (),
+        unhurried: tuple[type, ...] = (),
     ) -> None:
         self._take, self._wake, self._pictures = take, wake, pictures
-        self._replaced = replaced
+        self._replaced, self._unhurried = replaced, unhurried
         self._waiting: deque[Any] = deque()
         # Between the look at the last one that waits and its replacement nobody may take it.
         self._lock = threading.Lock()
@@ -47,7 +49,8 @@ class Inbox:
                     self._waiting[-1] = event
                 else:
                     self._waiting.append(event)
-        self._wake()
+        if not all(isinstance(event, self._unhurried) for event in events):
+            self._wake()
 
     def drain(self) -> None:
         """In the executor: take what is there. What comes meanwhile waits for its turn: a flood

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from itertools import count
 from operator import attrgetter
 from typing import Any
@@ -30,6 +31,7 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes.afterwards import Afterwards
 from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.parameters import declare
@@ -86,6 +88,7 @@ class SafetySupervisorNode(Node):
         self._stamps: dict[str, Time] = {}
         self._recorder = FlightRecorder(self, self.values)
         self._health = Health()
+        self._afterwards = Afterwards()
         self.services_offered = SupervisorServices(self, self.wall, self._turn)
         self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
         self._seq = count()
@@ -141,16 +144,19 @@ class SafetySupervisorNode(Node):
             outputs = self._update((), now)
         if outputs is None:
             # The core cannot even look at the clock: silence tells everybody.
+            self._afterwards.look(now)
             self._sleep(now + HEARTBEAT_INTERVAL)
             return
         self._carry_out(outputs, now)
         self._arming.give_up(now)
         if now >= self._beat_at:
             self._beat(now)
-        if self.lease.leading and (self._changed() or now >= self._state_at):
+        self._afterwards.look(now)
+        to_tell = self._changed() or now >= self._state_at
+        if self.lease.leading and to_tell and not self._afterwards.quiet:
             self._publish_state(now)
         deadline = next_deadline(self.config, self.state, now)
-        self._sleep(min(deadline, self.lease.deadline(now), self._beat_at))
+        self._sleep(min(deadline, self.lease.deadline(now), self._beat_at, self._afterwards.until))
 
     def _update(
         self, new: tuple[inputs.Input, ...], now: float
@@ -171,10 +177,11 @@ class SafetySupervisorNode(Node):
         # Before anything is kept or told of it: a device waits for this.
         sent = [self._publish_decision(one.decision) for one in decisions]
         self._recorder.turn(now, new, outputs, before, self.state, self.config)
-        for one, message in zip(decisions, sent, strict=True):
-            self._tell_decision(one, message)
+        for message in sent:
+            self._recorder.message("safety/decision", message)
         if decisions:
-            self._memory.keep(self.state)
+            self._afterwards.decided(now)
+            self._afterwards.tell(partial(self._tell_decisions, decisions))
         return outputs
 
     def _sleep(self, wake: float) -> None:
@@ -195,18 +202,23 @@ class SafetySupervisorNode(Node):
         elif isinstance(output, inputs.Refused):
             self.lease.refused(output.newest_epoch, now)
         else:
-            log = self.get_logger()
-            log.error(output.text) if output.alarm else log.info(output.text)
+            self._afterwards.tell(partial(self._log, output))
+
+    def _log(self, output: inputs.Log) -> None:
+        log = self.get_logger()
+        log.error(output.text) if output.alarm else log.info(output.text)
 
     def _publish_decision(self, decision: model.Decision) -> SafetyDecision:
         message = messages.decision(decision, self.wall.now().to_msg())
         self._decision_publisher.publish(message)
         return message
 
-    def _tell_decision(self, output: inputs.Decide, message: SafetyDecision) -> None:
-        decision = output.decision
-        self._recorder.message("safety/decision", message)
-        if not output.again:
+    def _tell_decisions(self, decided: list[inputs.Decide]) -> None:
+        self._memory.keep(self.state)
+        for output in decided:
+            if output.again:
+                continue
+            decision = output.decision
             shadow = " (SHADOW, not sent)" if decision.shadow else ""
             device = f" device {decision.device}" if decision.device else ""
             self.get_logger().warning(
@@ -335,6 +347,7 @@ class SafetySupervisorNode(Node):
 
     def destroy_node(self) -> None:
         """The black box ends its file, the memory is written."""
+        self._afterwards.look(math.inf)
         self._memory.close()
         self._recorder.close()
         super().destroy_node()

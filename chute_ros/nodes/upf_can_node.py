@@ -60,6 +60,9 @@ class _FailedEnd:
 class UpfCanNode(DeviceNode):
     """The node upf_can."""
 
+    # Has left by then, and the supervisor needs the processor now.
+    UNHURRIED = (AskSupervisor,)
+
     def __init__(self, **options: Any) -> None:
         super().__init__("upf_can", PARAMETERS, **options)
         name = self.get_fully_qualified_name()

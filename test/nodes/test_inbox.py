@@ -38,6 +38,24 @@ def test_what_comes_while_it_is_drained_waits_for_its_turn():
     assert executor.wakes == 3, "put, put meanwhile, and once more for what is left"
 
 
+class Remark:
+    """Nobody waits for it."""
+
+
+def test_what_nobody_waits_for_wakes_nobody_and_comes_with_the_next_that_does():
+    executor = Executor()
+    inbox = Inbox(executor.taken.append, executor._wake, (), unhurried=(Remark,))
+    remark = Remark()
+    inbox.put([remark])
+    assert executor.wakes == 0
+    inbox.put(["a report"])
+    assert executor.wakes == 1
+    inbox.put([Remark(), "another report"])
+    assert executor.wakes == 2
+    inbox.drain()
+    assert executor.taken[:2] == [remark, "a report"]
+
+
 class Whole(Picture):
     """Each tells all that the one before told."""
 
