@@ -16,23 +16,13 @@ from chute_ros.model import Armed, LandedState, Reading, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR, StreamWatch
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
-#: Ask for the stream when a part is older than this (s), and again after the interval (s).
+#: What was said longer ago (s) proves nothing about now.
 STREAM_SILENCE = 2.5
-STREAM_ASK_INTERVAL = 5.0
 
 _NEVER = Reading()
-
-#: The messages to ask for, and read here.
-STREAMED_MESSAGES: tuple[int, ...] = (
-    dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
-    dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-    dialect.MAVLINK_MSG_ID_ATTITUDE,
-    dialect.MAVLINK_MSG_ID_SCALED_IMU,
-    dialect.MAVLINK_MSG_ID_SYS_STATUS,
-)
-
 
 #: Types that never fly the vehicle, whatever their heartbeat says in its field autopilot.
 _NOT_FLYING = frozenset(
@@ -75,7 +65,7 @@ class AutopilotTracker:
         self.rebooted_in_flight = False
         self._readings: dict[str, Reading] = {}
         self._system_status = 0
-        self._asked_at = -math.inf
+        self._streams = StreamWatch()
         self._clock = BootClock()
         self._in_flight_before = False
         self._readers: dict[str, Callable[[Any, float], None]] = {
@@ -123,18 +113,14 @@ class AutopilotTracker:
         armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
         self._set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
         self._system_status = message.system_status
-        return self.liveness.heard(now)
+        changes = self.liveness.heard(now)
+        if changes:
+            self._streams.begin(now)
+        return changes
 
-    def wants_stream(self, now: float) -> bool:
-        """A part of the picture is missing or old, and asking for it is not just done."""
-        parts = ("landed_state", "height", "tilt", "acceleration", "battery_voltage")
-        readings = [self._readings.get(part, _NEVER) for part in parts]
-        if all(reading.age(now) < STREAM_SILENCE for reading in readings):
-            return False
-        if now - self._asked_at < STREAM_ASK_INTERVAL:
-            return False
-        self._asked_at = now
-        return True
+    def messages_due(self, interval: float, now: float) -> tuple[int, ...]:
+        """The messages to ask for now, so that each comes each interval (s)."""
+        return self._streams.due(interval, now)
 
     def message(self, message: Any, now: float) -> bool:
         """Any other message of the autopilot; True: the vehicle's picture changed."""
@@ -142,7 +128,7 @@ class AutopilotTracker:
         reader = self._readers.get(kind)
         # Others (NAMED_VALUE_FLOAT, ...) carry times that a user's script may have filled in.
         if reader is not None or kind == "SYSTEM_TIME":
-            self._watch_clock(getattr(message, "time_boot_ms", 0))
+            self._watch_clock(getattr(message, "time_boot_ms", 0), now)
         if reader is None:
             return False
         reader(message, now)
@@ -190,8 +176,10 @@ class AutopilotTracker:
     def _set(self, name: str, value: float, now: float) -> None:
         if math.isfinite(value):
             self._readings[name] = Reading(float(value), now)
+            if name in ASKED_FOR:
+                self._streams.heard(name, now)
 
-    def _watch_clock(self, boot_ms: int) -> None:
+    def _watch_clock(self, boot_ms: int, now: float) -> None:
         age = self._clock.observe(boot_ms)
         if age is Age.DOUBTFUL:
             known = self.landed_state is not LandedState.UNKNOWN
@@ -203,7 +191,7 @@ class AutopilotTracker:
             return
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
-        self._asked_at = -math.inf
+        self._streams.begin(now)
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         for name in ("armed", "landed_state"):
             self._readings.pop(name, None)

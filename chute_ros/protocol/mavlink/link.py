@@ -14,7 +14,7 @@ from dataclasses import replace
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event, Severity
 from chute_ros.protocol.mavlink import goals
-from chute_ros.protocol.mavlink.autopilot import STREAMED_MESSAGES, AutopilotTracker
+from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.devices import Devices
@@ -23,6 +23,7 @@ from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
+from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
 from chute_ros.protocol.requests import Requests
 
@@ -172,7 +173,7 @@ class MavlinkLink:
         self.config = replace(self.config, autopilot_message_rate=rate)
         autopilot = self._devices.chosen_autopilot()
         if autopilot is not None and rate > 0:
-            self._ask_for_stream(autopilot, now)
+            self._ask_for(tuple(ASKED_FOR.values()), autopilot, now)
             self._drive(now)
 
     # -- what the node may look at -------------------------------------------------------------
@@ -263,8 +264,8 @@ class MavlinkLink:
         autopilot = self._devices.chosen_autopilot()
         if autopilot is None or autopilot.liveness.state is not LinkState.OK:
             return
-        if self.config.autopilot_message_rate > 0 and autopilot.wants_stream(now):
-            self._ask_for_stream(autopilot, now)
+        if (rate := self.config.autopilot_message_rate) > 0:
+            self._ask_for(autopilot.messages_due(1.0 / rate, now), autopilot, now)
         if self._disarming in self.requests:
             if not self._block.stands(autopilot, now):
                 why = (
@@ -285,9 +286,11 @@ class MavlinkLink:
         self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
         self._begin(self._disarming, goals.disarm_on_ground(autopilot, now), now)
 
-    def _ask_for_stream(self, autopilot: AutopilotTracker, now: float) -> None:
+    def _ask_for(
+        self, message_ids: tuple[int, ...], autopilot: AutopilotTracker, now: float
+    ) -> None:
         interval_us = 1e6 / self.config.autopilot_message_rate
-        for message_id in STREAMED_MESSAGES:
+        for message_id in message_ids:
             self.requests.commands.send_once(
                 goals.command(
                     autopilot, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(message_id), interval_us

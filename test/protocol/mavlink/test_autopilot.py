@@ -8,13 +8,12 @@ from link_bench import copter, heartbeat, landed
 from chute_ros.model import Armed, LandedState, LinkState
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.protocol.mavlink.autopilot import (
-    STREAM_ASK_INTERVAL,
-    STREAM_SILENCE,
     AutopilotTracker,
     is_autopilot,
 )
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR
 
 NAN, INF = math.nan, math.inf
 
@@ -51,8 +50,8 @@ def quaternion(w, x, y, z):
     return d.MAVLink_attitude_quaternion_message(1000, w, x, y, z, 0.0, 0.0, 0.0)
 
 
-def imu(x, y, z):
-    return d.MAVLink_scaled_imu_message(1000, x, y, z, 0, 0, 0, 0, 0, 0)
+def imu(x, y, z, boot_ms=1000):
+    return d.MAVLink_scaled_imu_message(boot_ms, x, y, z, 0, 0, 0, 0, 0, 0)
 
 
 def highres(x, y, z):
@@ -261,18 +260,46 @@ def test_is_autopilot(kind, autopilot, expected):
     assert is_autopilot(heartbeat(kind, autopilot)) is expected
 
 
-# -- the stream -----------------------------------------------------------------------------------
+# -- its messages -------------------------------------------------------------------------------
 
 
-def test_missing_stream_is_asked_for_now_and_then():
-    told = Told()
-    assert told.tracker.wants_stream(0.0)
-    assert not told.tracker.wants_stream(STREAM_ASK_INTERVAL - 0.1)
-    assert told.tracker.wants_stream(STREAM_ASK_INTERVAL)
+def whole_picture(boot_ms=1000):
+    at = {"boot_ms": boot_ms}
+    return landed(), position(**at), attitude(**at), imu(0, 0, 0, **at), power(1, 1)
 
 
-def test_whole_and_fresh_picture_is_not_asked_for_until_a_part_stops():
-    told = Told().hear(landed(), position(), attitude(), imu(0, 0, 0), power(1, 1), now=1.0)
-    assert not told.tracker.wants_stream(1.0 + STREAM_SILENCE - 0.01)
-    told.hear(position(), attitude(), imu(0, 0, 0), power(1, 1), now=3.0)
-    assert told.tracker.wants_stream(1.0 + STREAM_SILENCE)
+ALL = tuple(ASKED_FOR.values())
+
+
+def test_all_messages_are_asked_for_until_they_come():
+    told = Told().hear(heartbeat())
+    assert told.tracker.messages_due(0.1, 0.0) == ALL
+    told.hear(*whole_picture(), now=0.4)
+    assert told.tracker.messages_due(0.1, 0.5) == ()
+
+
+@pytest.mark.parametrize("lacking", range(5))
+def test_the_message_that_did_not_come_is_asked_for_alone(lacking):
+    told = Told().hear(heartbeat())
+    told.tracker.messages_due(0.1, 0.0)
+    came = [one for number, one in enumerate(whole_picture()) if number != lacking]
+    told.hear(*came, now=0.4)
+    assert told.tracker.messages_due(0.1, 0.5) == (ALL[lacking],)
+
+
+def test_one_that_starts_anew_is_asked_for_all_that_does_not_come_by_itself():
+    told = Told().hear(heartbeat())
+    for tenth in range(100):
+        told.hear(*whole_picture(60_000 + 100 * tenth), now=tenth / 10)
+    assert told.tracker.messages_due(0.1, 9.9) == ()
+    for tenth in range(3):
+        told.hear(attitude(boot_ms=100 * tenth), now=10.0 + tenth / 10)
+    assert told.tracker.reboot_count == 1
+    assert set(told.tracker.messages_due(0.1, 10.2)) == set(ALL) - {ASKED_FOR["tilt"]}
+
+
+def test_one_that_is_heard_again_may_have_started_anew():
+    told = Told().hear(heartbeat(), *whole_picture())
+    told.tracker.liveness.update(60.0)
+    told.hear(heartbeat(), now=60.0)
+    assert told.tracker.messages_due(0.1, 60.0) == ALL

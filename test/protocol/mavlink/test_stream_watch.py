@@ -1,0 +1,123 @@
+"""Which messages are asked for: given what comes and how often, at t+..., then."""
+
+from __future__ import annotations
+
+import itertools
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chute_ros.protocol.mavlink.stream_watch import (
+    ASK_AGAIN,
+    ASK_OFTEN_FOR,
+    ASK_SELDOM,
+    ASKED_FOR,
+    StreamWatch,
+)
+
+ALL = tuple(ASKED_FOR.values())
+#: What the node asks for: 10 Hz.
+INTERVAL = 0.1
+
+
+def watched(rate, seconds, loss=0.0, seed=1):
+    """All parts came at this rate since t = 0, but for those that were lost; and the time."""
+    watch, chance = StreamWatch(), random.Random(seed)
+    watch.begin(0.0)
+    count = round(rate * seconds)
+    for number in range(1, count + 1):
+        for part in ASKED_FOR:
+            if chance.random() >= loss:
+                watch.heard(part, number / rate)
+    return watch, count / rate
+
+
+def test_an_autopilot_that_says_nothing_is_asked_often_for_a_while_and_then_now_and_then():
+    watch = StreamWatch()
+    watch.begin(100.0)
+    asked = [t for t in (100.0 + n * 0.1 for n in range(400)) if watch.due(INTERVAL, t)]
+    often = [t for t in asked if t < 100.0 + ASK_OFTEN_FOR]
+    assert len(often) == pytest.approx(ASK_OFTEN_FOR / ASK_AGAIN, abs=2)
+    seldom = [t for t in asked if t >= 100.0 + ASK_OFTEN_FOR]
+    gaps = [after - before for before, after in itertools.pairwise(seldom)]
+    assert gaps
+    assert min(gaps) >= ASK_SELDOM - 1e-6
+
+
+def test_what_comes_at_its_rate_is_not_asked_for():
+    watch, now = watched(10.0, 3.0)
+    assert watch.due(INTERVAL, now) == ()
+
+
+@pytest.mark.parametrize("rate", [0.5, 1.0, 2.0, 4.0])
+def test_what_an_autopilot_sends_by_itself_more_slowly_is_asked_for(rate):
+    watch, now = watched(rate, 20.0)
+    assert watch.due(INTERVAL, now) == ALL
+
+
+@pytest.mark.parametrize("rate", [5.0, 8.0, 10.0, 50.0])
+def test_half_of_the_rate_is_enough(rate):
+    watch, now = watched(rate, 20.0)
+    assert watch.due(INTERVAL, now) == ()
+
+
+def test_a_message_that_stops_is_asked_for_after_five_of_its_intervals():
+    watch, now = watched(10.0, 20.0)
+    for number in range(1, 10):
+        for part in ASKED_FOR:
+            if part != "acceleration":
+                watch.heard(part, now + number / 10)
+        due = watch.due(INTERVAL, now + number / 10)
+        assert due == ((ASKED_FOR["acceleration"],) if number == 5 else ())
+
+
+def test_a_network_that_loses_a_third_has_nothing_asked_for_again_and_again():
+    watch, now = watched(10.0, 10.0, loss=0.3)
+    asked = 0
+    for number in range(1, 601):
+        for part in ASKED_FOR:
+            if random.Random(f"{part} {number}").random() >= 0.3:
+                watch.heard(part, now + number / 10)
+        asked += len(watch.due(INTERVAL, now + number / 10))
+    assert asked <= 60 / ASK_SELDOM * len(ALL)
+
+
+def test_a_message_that_stops_does_not_wait_for_one_that_never_came():
+    watch = StreamWatch()
+    watch.begin(0.0)
+    asked = {}
+    for tenth in range(300):
+        now = tenth / 10
+        for part in ASKED_FOR:
+            if part != "battery_voltage" and (part != "tilt" or now < 20.0):
+                watch.heard(part, now)
+        asked.update({message: now for message in watch.due(INTERVAL, now) if now < 20.6})
+    assert asked[ASKED_FOR["tilt"]] == pytest.approx(20.4, abs=0.11)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 3.0), st.sampled_from([*ASKED_FOR, "begin", "due"]))),
+    st.sampled_from([0.02, 0.1, 1.0]),
+)
+def test_what_has_not_come_is_always_asked_for_in_time(steps, interval):
+    """Whatever comes in whichever order: nothing is left out for longer than it may."""
+    watch, now = StreamWatch(), 0.0
+    watch.begin(now)
+    for passed, what in steps:
+        now += passed
+        if what == "begin":
+            watch.begin(now)
+        elif what == "due":
+            watch.due(interval, now)
+        else:
+            watch.heard(what, now)
+    # Nothing comes any more.
+    end = now + ASK_SELDOM + 5.0 * interval + 0.01
+    asked = set()
+    while now < end:
+        asked |= set(watch.due(interval, now))
+        now += 0.05
+    asked |= set(watch.due(interval, end))
+    assert asked == set(ALL)
