@@ -13,6 +13,8 @@ import chute_ros
 from chute_ros.campaign.campaign import Line, Tally
 from chute_ros.campaign.judge import Count
 from chute_ros.errors import RecordError
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.transport.shared_folder import shared_folder
 
 #: Rises when what is written means something else.
 FORMAT = 1
@@ -21,12 +23,17 @@ _FLYING = ("campaign", "model.py", "protocol", "sim", "supervisor", "transport")
 
 
 def code_that_flies(profiles: Path) -> str:
-    """A sum of it and of the profiles: flights of two sums cannot be counted together."""
+    """A sum of it, of the profiles and of the wires' data types: flights of two sums cannot be
+    counted together."""
     package = Path(chute_ros.__file__).parent
     files = [package / name for name in _FLYING if name.endswith(".py")]
     for name in _FLYING:
         files += (package / name).rglob("*.py")
     files += profiles.glob("*.yaml")
+    files.append(Path(dialect.__file__))
+    for folder in ("dsdl", "telem"):
+        found = shared_folder(folder, "the wires' data types").rglob("*")
+        files += [one for one in found if one.is_file()]
     total = hashlib.sha256()
     for file in sorted(files, key=lambda one: (one.name, str(one))):
         total.update(hashlib.sha256(file.read_bytes()).digest())

@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 
 from chute_ros.campaign import campaign as flights
+from chute_ros.campaign import kept_tally
 from chute_ros.campaign.judge import Count, Judged
 from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.scenario import draw
@@ -134,14 +135,16 @@ def full_disk(*_):
     raise OSError(28, "No space left on device")
 
 
-def test_the_code_that_flies_is_told_apart(tmp_path):
-    profiles = tmp_path / "profiles"
-    profiles.mkdir()
-    (profiles / "one.yaml").write_text("a")
-    before = code_that_flies(profiles)
-    assert code_that_flies(profiles) == before
-    (profiles / "one.yaml").write_text("b")
-    assert code_that_flies(profiles) != before
+@pytest.mark.parametrize("changed", ["profiles/one.yaml", "dsdl/flyfire/163", "telem/57.yaml"])
+def test_the_code_that_flies_is_told_apart(tmp_path, monkeypatch, changed):
+    monkeypatch.setattr(kept_tally, "shared_folder", lambda name, what: tmp_path / name)
+    for name in ("profiles/one.yaml", "dsdl/flyfire/163", "telem/57.yaml"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("a")
+    before = code_that_flies(tmp_path / "profiles")
+    assert code_that_flies(tmp_path / "profiles") == before
+    (tmp_path / changed).write_text("b")
+    assert code_that_flies(tmp_path / "profiles") != before
 
 
 @pytest.fixture
