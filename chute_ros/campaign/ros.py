@@ -34,6 +34,8 @@ class Process:
         self.clock = 0.0
         #: It does not run until then, virtual s.
         self.stopped_until = 0.0
+        #: Since when it reads, virtual s.
+        self._started = -math.inf
         self._queues: dict[Any, deque[tuple[Any, float, Take]]] = {}
 
     def runs(self, now: float) -> bool:
@@ -51,11 +53,14 @@ class Process:
 
     def start(self, now: float) -> None:
         """Run, with empty queues: nobody has read what came."""
-        self.stopped_until = now
+        self.stopped_until = self._started = now
         self._queues.clear()
 
-    def deliver(self, message: Any, stamp: float, take: Take, now: float) -> None:
-        """A message came."""
+    def deliver(self, message: Any, stamp: float, take: Take, sent: float, now: float) -> None:
+        """A message came, which left then (virtual s): what was written before a reader was there
+        never reaches it."""
+        if sent < self._started:
+            return
         if not self.runs(now):
             depth = _DECISIONS if isinstance(message, Decision) else _QUEUE
             queue = self._queues.setdefault(take, deque(maxlen=depth))
@@ -103,10 +108,10 @@ class Ros:
     def _send(
         self, source: Process, to: Process, kind: type, message: Any, stamp: float, take: Take
     ) -> None:
-        key = (source.name, to.name, kind)
+        key, sent = (source.name, to.name, kind), self.world.now
         channel = self._channels.get(key)
         if channel is None:
             chance = random.Random(f"{self._seed} {source.name} {to.name} {kind.__name__}")
             ways = (source.outward, to.inward)
             channel = self._channels[key] = Channel(self.world, chance, _NATURE, ways)
-        channel.send((message,), lambda ones, now: to.deliver(ones[0], stamp, take, now))
+        channel.send((message,), lambda ones, now: to.deliver(ones[0], stamp, take, sent, now))

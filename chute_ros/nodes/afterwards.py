@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import ExitStack
 
 #: A decision is on its wire this long (s) after it left, on a computer with two cores.
 QUIET = 0.005
@@ -43,5 +44,6 @@ class Afterwards:
             return
         self.until = math.inf
         steps, self._steps = self._steps, []
-        for step in steps:
-            step()
+        with ExitStack() as each:  # whatever another one raises
+            for step in reversed(steps):
+                each.callback(step)

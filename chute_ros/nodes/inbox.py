@@ -38,6 +38,7 @@ class Inbox:
 
     def put(self, events: list[Any]) -> None:
         """In the link's turn: hand events to the executor."""
+        hurried = not all(isinstance(event, self._unhurried) for event in events)
         if len(self._waiting) > MOST_WAITING:
             kept = [event for event in events if not isinstance(event, self._pictures)]
             self.left_out += len(events) - len(kept)
@@ -49,7 +50,7 @@ class Inbox:
                     self._waiting[-1] = event
                 else:
                     self._waiting.append(event)
-        if not all(isinstance(event, self._unhurried) for event in events):
+        if hurried:
             self._wake()
 
     def drain(self) -> None:

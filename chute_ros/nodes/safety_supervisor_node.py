@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import ExitStack
 from functools import partial
 from itertools import count
 from operator import attrgetter
@@ -347,7 +348,8 @@ class SafetySupervisorNode(Node):
 
     def destroy_node(self) -> None:
         """The black box ends its file, the memory is written."""
-        self._afterwards.look(math.inf)
-        self._memory.close()
-        self._recorder.close()
-        super().destroy_node()
+        with ExitStack() as each:  # from the last to the first, each whatever the others raise
+            each.callback(super().destroy_node)
+            each.callback(self._recorder.close)
+            each.callback(self._memory.close)
+            each.callback(self._afterwards.look, math.inf)

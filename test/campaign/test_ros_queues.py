@@ -55,6 +55,15 @@ def test_one_that_dies_has_heard_nothing_when_it_starts() -> None:
     assert net.numbers == [11]
 
 
+def test_what_was_written_before_a_reader_was_there_never_reaches_it() -> None:
+    net = Network()
+    net.talker.outward.append(Spell(0.0, 0.95, delay=0.9))
+    net.listener.die()
+    net.world.post(0.55, net.listener.start)
+    net.say_each_tenth(12)
+    assert net.numbers == [6, 7, 8, 9, 10, 11]
+
+
 def test_a_clock_that_is_set_shows_in_the_difference() -> None:
     net = Network()
     net.listener.clock = 3600.0

@@ -50,6 +50,19 @@ def test_decisions_one_after_the_other_do_not_keep_it_quiet_for_ever(told):
     assert told == ["the first"]
 
 
+def test_what_raises_keeps_nothing_else_back(told):
+    later = Afterwards()
+    later.decided(10.0)
+    later.tell(lambda: told.append("the first"))
+    later.tell(lambda: 1 // 0)
+    later.tell(lambda: told.append("the last"))
+    with pytest.raises(ZeroDivisionError):
+        later.look(11.0)
+    assert told == ["the first", "the last"]
+    later.look(12.0)
+    assert told == ["the first", "the last"]
+
+
 def test_what_is_told_may_be_decided_upon(told):
     later = Afterwards()
     later.decided(10.0)

@@ -56,6 +56,16 @@ def test_what_nobody_waits_for_wakes_nobody_and_comes_with_the_next_that_does():
     assert executor.taken[:2] == [remark, "a report"]
 
 
+def test_a_picture_that_is_left_out_among_many_remarks_wakes_all_the_same():
+    executor = Executor()
+    inbox = Inbox(executor.taken.append, executor._wake, (Picture,), unhurried=(Remark,))
+    for _ in range(MOST_WAITING + 1):
+        inbox.put([Remark()])
+    assert executor.wakes == 0
+    inbox.put([Picture()])
+    assert (executor.wakes, inbox.left_out) == (1, 1)
+
+
 class Whole(Picture):
     """Each tells all that the one before told."""
 

@@ -194,6 +194,21 @@ def test_a_decision_is_sent_again_until_a_node_reports_and_with_the_same_number(
     assert not [o for _, o in story.outputs[count:] if isinstance(o, i.Decide)]
 
 
+@pytest.mark.parametrize("delay", [0.42, 0.5, 0.53, 0.57])
+def test_a_kill_that_is_not_reported_is_said_again_before_each_deploy(delay: float) -> None:
+    """The node is dead, and may be started again between any two of them."""
+    story = Story(SupervisorConfig(kill_to_deploy_delay=delay)).flying()
+    story.at(1.0, i.DeployRequest(5, False, "it falls"))
+    story.at(2.4)
+    decided = [(t, o) for t, o in story.outputs if isinstance(o, i.Decide) and o.again]
+    again = [(t, o.decision.action) for t, o in decided if t > story.when(D)]
+    deploys = [number for number, (_, action) in enumerate(again) if action is D]
+    assert len(deploys) >= 5
+    assert all(again[number - 1] == (again[number][0], K) for number in deploys)
+    kills = [t for t, action in again if action is K]
+    assert len(kills) <= len(deploys) + 1, "and not more often than that"
+
+
 def test_a_node_that_restarts_in_between_hears_of_it_under_a_new_number() -> None:
     story = deploying()
     story.at(1.2, story.report(D, Outcome.SENT))

@@ -115,8 +115,12 @@ class AutopilotTracker:
         self._system_status = message.system_status
         changes = self.liveness.heard(now)
         if changes:
-            self._streams.begin(now)
+            self._streams.begin()
         return changes
+
+    def ask_anew(self) -> None:
+        """It is to be asked for other intervals from now on."""
+        self._streams = StreamWatch()
 
     def messages_due(self, interval: float, now: float) -> tuple[int, ...]:
         """The messages to ask for now, so that each comes each interval (s)."""
@@ -128,7 +132,7 @@ class AutopilotTracker:
         reader = self._readers.get(kind)
         # Others (NAMED_VALUE_FLOAT, ...) carry times that a user's script may have filled in.
         if reader is not None or kind == "SYSTEM_TIME":
-            self._watch_clock(getattr(message, "time_boot_ms", 0), now)
+            self._watch_clock(getattr(message, "time_boot_ms", 0))
         if reader is None:
             return False
         reader(message, now)
@@ -179,7 +183,7 @@ class AutopilotTracker:
             if name in ASKED_FOR:
                 self._streams.heard(name, now)
 
-    def _watch_clock(self, boot_ms: int, now: float) -> None:
+    def _watch_clock(self, boot_ms: int) -> None:
         age = self._clock.observe(boot_ms)
         if age is Age.DOUBTFUL:
             known = self.landed_state is not LandedState.UNKNOWN
@@ -191,7 +195,7 @@ class AutopilotTracker:
             return
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
-        self._streams.begin(now)
+        self._streams.begin()
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         for name in ("armed", "landed_state"):
             self._readings.pop(name, None)

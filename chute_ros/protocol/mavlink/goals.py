@@ -67,10 +67,10 @@ def set_triggers(
 def release(parachute: ParachuteTracker, force: bool, now: float) -> MavlinkGoal:
     """Release the parachute; with force its flight-controller trigger is armed on the way.
 
-    A status from before the order is believed only while device and status stream are alive: what
-    a lost device said long ago must not keep us from sending.
+    A status from before the order is believed only while the status stream is alive and the device
+    not lost: what a lost device said long ago must not keep us from sending.
     """
-    alive = parachute.liveness.state is LinkState.OK and not parachute.status_overdue(now)
+    alive = parachute.liveness.state is not LinkState.LOST and not parachute.status_overdue(now)
 
     def shown() -> bool:
         return parachute.deployed and (alive or parachute.status_received > now)

@@ -23,9 +23,11 @@ from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
-from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
 from chute_ros.protocol.requests import Requests
+
+#: What a parameter of a command can hold; an hour.
+_LONGEST_INTERVAL_US = 3.6e9
 
 
 class MavlinkLink:
@@ -172,8 +174,9 @@ class MavlinkLink:
         """Ask the autopilot for its messages at this rate from now on, Hz; 0: do not ask."""
         self.config = replace(self.config, autopilot_message_rate=rate)
         autopilot = self._devices.chosen_autopilot()
-        if autopilot is not None and rate > 0:
-            self._ask_for(tuple(ASKED_FOR.values()), autopilot, now)
+        if autopilot is not None:
+            autopilot.ask_anew()
+            self._look_after_autopilot(now)
             self._drive(now)
 
     # -- what the node may look at -------------------------------------------------------------
@@ -289,7 +292,7 @@ class MavlinkLink:
     def _ask_for(
         self, message_ids: tuple[int, ...], autopilot: AutopilotTracker, now: float
     ) -> None:
-        interval_us = 1e6 / self.config.autopilot_message_rate
+        interval_us = min(1e6 / self.config.autopilot_message_rate, _LONGEST_INTERVAL_US)
         for message_id in message_ids:
             self.requests.commands.send_once(
                 goals.command(

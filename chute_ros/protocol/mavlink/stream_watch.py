@@ -1,7 +1,9 @@
 """Which messages an autopilot is to be asked for: those that do not come, or come too seldom.
 
 A request, its answer or both may be lost, and an autopilot that starts anew sends what it likes,
-just when the supervisor needs its measurements most: then it is asked often for a while.
+just when the supervisor needs its measurements most: then it is asked often for a while. What is
+asked for in vain again and again, or comes and goes, must not fill a slow link: requests are spent
+from a store that fills slowly.
 
 Source: MAVLink, MAV_CMD_SET_MESSAGE_INTERVAL.
 """
@@ -20,29 +22,47 @@ ASKED_FOR: dict[str, int] = {
     "acceleration": dialect.MAVLINK_MSG_ID_SCALED_IMU,
     "battery_voltage": dialect.MAVLINK_MSG_ID_SYS_STATUS,
 }
-#: Asked again after this (s), and after the longer one once it was asked often for so long.
-ASK_AGAIN, ASK_OFTEN_FOR, ASK_SELDOM = 0.5, 5.0, 5.0
+#: A message is asked for again after this at least, s.
+ASK_AGAIN = 0.5
+#: So many requests for it are in the store at most, and another one is after so long, s.
+STORE, STORE_FILLS = 10, 5.0
 #: What is not heard for so many of its intervals does not come. One that comes at less than half
 #: its rate, on average, comes too seldom: rules need half of it.
 _MISSING_AFTER, _TOO_SELDOM = 5.0, 2.2
+#: Where the intervals are long nobody waits for five: after so many of them, or this long, s.
+_MISSING_SOON, _MISSING_AT_LAST = 1.5, 2.5
 #: What the newest gap counts in the average.
 _WEIGHT = 0.2
+
+
+class _Store:
+    """Requests for one message that may still be made."""
+
+    def __init__(self) -> None:
+        self._left, self._at, self._asked = float(STORE), -math.inf, -math.inf
+
+    def take(self, now: float) -> bool:
+        """Take one, if there is one and the last was not just taken."""
+        self._left = min(float(STORE), self._left + (now - self._at) / STORE_FILLS)
+        self._at = now
+        if self._left < 1.0 or now - self._asked < ASK_AGAIN:
+            return False
+        self._left, self._asked = self._left - 1.0, now
+        return True
 
 
 class StreamWatch:
     """Follows how often the parts in ASKED_FOR come."""
 
     def __init__(self) -> None:
-        self._began = -math.inf
-        self._asked: dict[str, float] = {}
         self._heard: dict[str, float] = {}
         self._gaps: dict[str, float] = {}
+        self._stores = {part: _Store() for part in ASKED_FOR}
 
-    def begin(self, now: float) -> None:
-        """The autopilot is heard, or heard again, or started anew: all is to be asked for."""
-        self._began = now
-        for times in (self._asked, self._heard, self._gaps):
-            times.clear()
+    def begin(self) -> None:
+        """The autopilot is heard, or heard again, or started anew: nothing has come of it yet."""
+        self._heard.clear()
+        self._gaps.clear()
 
     def heard(self, part: str, now: float) -> None:
         """A part of the picture came, by whatever message."""
@@ -55,15 +75,13 @@ class StreamWatch:
 
     def due(self, interval: float, now: float) -> tuple[int, ...]:
         """The messages to ask for now, so that each comes each interval (s)."""
-        again = ASK_AGAIN if now < self._began + ASK_OFTEN_FOR else ASK_SELDOM
-        wanted = [
-            part
-            for part in ASKED_FOR
-            if now - self._asked.get(part, -math.inf) >= again and self._lacks(part, interval, now)
-        ]
-        self._asked.update(dict.fromkeys(wanted, now))
-        return tuple(ASKED_FOR[part] for part in wanted)
+        return tuple(
+            message
+            for part, message in ASKED_FOR.items()
+            if self._lacks(part, interval, now) and self._stores[part].take(now)
+        )
 
     def _lacks(self, part: str, interval: float, now: float) -> bool:
-        missing = now - self._heard.get(part, -math.inf) >= _MISSING_AFTER * interval
+        soon = max(_MISSING_SOON * interval, _MISSING_AT_LAST)
+        missing = now - self._heard.get(part, -math.inf) >= min(_MISSING_AFTER * interval, soon)
         return missing or self._gaps.get(part, 0.0) > _TOO_SELDOM * interval

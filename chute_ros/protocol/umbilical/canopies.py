@@ -37,5 +37,7 @@ class Canopies:
             if name in self.came_out and (record[flag] or mode is shown_by):
                 self._said.add(name)
         if mode is FlightMode.MAIN_DEPLOYED:
-            self.came_out.add("drogue")  # its mode comes after the drogue's
+            # Its mode comes after the drogue's.
+            self.came_out.add("drogue")
+            self._said.add("drogue")
         self.surely_out |= said_before & self._said

@@ -19,6 +19,9 @@ _WHOLE = r"(?:0|-?[1-9][0-9]{0,9})"
 _FLOAT = r"(?:-?(?:0|[1-9][0-9]*)(?:\.[0-9]+)?|-?inf|NaN)"
 #: All that a whole record is written with.
 NUMBERS = re.compile(r"[-0-9.,Nainf]*")
+#: Digits of a fraction that are surely read exactly, whoever reads them: of a number of more than
+#: 768 digits that lies between two floats, some readers take the wrong one.
+_MOST_FRACTION = 300
 _NOT_FINITE = ("NaN", "inf", "-inf")
 
 
@@ -41,7 +44,8 @@ class FieldType:
         """One for what is printed and so short that it is in range: most of what comes."""
         digits = len(str(int(self.highest))) - 1
         if not self.is_whole:
-            return _FLOAT.replace("[0-9]*", f"[0-9]{{0,{digits - 1}}}", 1)
+            whole = _FLOAT.replace("[0-9]*", f"[0-9]{{0,{digits - 1}}}", 1)
+            return whole.replace("[0-9]+", f"[0-9]{{1,{_MOST_FRACTION}}}", 1)
         if not digits:
             return f"[0-{self.highest}]"
         sign = "-?" if self.lowest < 0 else ""

@@ -32,6 +32,9 @@ _REST_HEIGHT, _REST_TIME = 3.0, 5.0
 _REST_SPEED = 1.0  # m/s
 #: A clock that falls behind ours by more, from one record to the next, may have started anew, s.
 _FALLS_BEHIND = 0.5
+#: So many records in a row must say that a canopy is out which nobody fired from here: text
+#: without a checksum may be damaged.
+_TO_BELIEVE = 2
 _FIX_3D = 3
 _MODES = {int(mode): mode for mode in FlightMode}
 _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
@@ -57,6 +60,8 @@ class FlightComputer:
         self._rest_since = NAN
         self._was_out = False
         self._canopies = Canopies()
+        #: Records in a row that say that the parachute is out.
+        self._out_in_a_row = 0
         self._clock_moved_at = NAN
         self._paused = False
         self._was_fresh = False
@@ -83,6 +88,9 @@ class FlightComputer:
         if before is None or before["ms_since_boot_cfc"] != record["ms_since_boot_cfc"]:
             self._clock_moved_at = now
         self.records += 1
+        # The first one tells what happened before it was heard.
+        row = self._out_in_a_row + 1 if before is not None else _TO_BELIEVE
+        self._out_in_a_row = row if self._says_out else 0
         self._watch_rest(before, record, now)
         self._watch_flight()
         self._canopies.watch(before, record, self.mode)
@@ -154,12 +162,21 @@ class FlightComputer:
 
     @property
     def deployed(self) -> bool:
-        """The parachute is out: drogue or main, or the main alone. By the newest record, or by
-        those of before a restart in this flight."""
+        """The parachute is out: drogue or main, or the main alone. By the newest record, and in
+        flight, where nobody fired, the one before it; or by those of before a restart in this
+        flight."""
+        fired_or_down = self._canopies.fired or not self._flying
+        believed = fired_or_down or self._out_in_a_row >= _TO_BELIEVE
+        counting = ("main",) if self._main_counts else CANOPIES
+        return (self._says_out and bool(believed)) or any(map(self.forgot, counting))
+
+    @property
+    def _says_out(self) -> bool:
+        """The newest record says that what counts as the parachute is out."""
         if not self._main_counts:
-            return self._is_out or any(self.forgot(name) for name in CANOPIES)
+            return self._is_out
         flag = self.record is not None and self.record["ssa_main_deployed"]
-        return bool(flag) or self.mode is FlightMode.MAIN_DEPLOYED or self.forgot("main")
+        return bool(flag) or self.mode is FlightMode.MAIN_DEPLOYED
 
     @property
     def _is_out(self) -> bool:
@@ -179,15 +196,18 @@ class FlightComputer:
         test on the ground, does not count, and a restart does not undo it."""
         return name in self._canopies.came_out
 
+    def surely_out(self, name: str) -> bool:
+        """Two records in a row said that it came out in this flight."""
+        return name in self._canopies.surely_out
+
     def forgot(self, name: str) -> bool:
         """The drogue or the main surely came out in this flight, and it has restarted since: that
         its records say so no more means nothing."""
-        surely_out = name in self._canopies.surely_out
-        return self._flying and self.restarted_in_flight and surely_out
+        return self._flying and self.restarted_in_flight and self.surely_out(name)
 
     def was_fired(self, name: str) -> bool:
-        """It came out in this flight, or was fired from here: not every firmware tells."""
-        return name in self._canopies.came_out or name in self._canopies.fired
+        """It surely came out in this flight, or was fired from here: not every firmware tells."""
+        return self.surely_out(name) or name in self._canopies.fired
 
     @property
     def armed(self) -> bool:

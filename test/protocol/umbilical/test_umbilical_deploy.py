@@ -64,8 +64,21 @@ def test_next_is_the_main_once_the_drogue_is_out(told, token):
     assert bench.tokens == [token]
 
 
+def test_next_stays_the_drogue_after_one_damaged_record():
+    bench = ready(COAST, deploy=DeployStage.NEXT).talk(ssa_drogue_deployed=1)
+    bench.talk(ssa_drogue_deployed=0).after(0.3)
+    bench.deploy()
+    assert bench.tokens == ["<D>"]
+
+
+def test_one_damaged_record_keeps_nothing_from_being_fired():
+    bench = ready(COAST, deploy=DeployStage.DROGUE).talk(ssa_drogue_deployed=1)
+    bench.deploy()
+    assert bench.after(0.2).tokens == ["<D>"]
+
+
 def test_next_is_nothing_once_both_are_out():
-    bench = ready(MAIN, deploy=DeployStage.NEXT)
+    bench = ready(MAIN, deploy=DeployStage.NEXT).talk().after(0.2)
     assert "already; nothing was sent" in bench.end(bench.deploy()).message
     assert bench.tokens == []
 

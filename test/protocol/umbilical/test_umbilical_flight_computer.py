@@ -97,6 +97,43 @@ def test_a_deployment_is_seen_by_its_flag_in_any_mode(mode, name, flag):
     assert (status(rocket, 0.0).deployed, status(rocket, 0.0).state) == (True, _LAUNCHED)
 
 
+@pytest.mark.parametrize("name", ["ssa_drogue_deployed", "ssa_main_deployed"])
+def test_in_flight_one_record_alone_may_be_damaged(name):
+    rocket = Rocket()
+    rocket.says(0.0, ASCENT)
+    rocket.says(0.1, COAST, **{name: "1"})
+    assert not status(rocket, 0.1).deployed
+    rocket.says(0.2, COAST)
+    rocket.says(0.3, COAST, **{name: "1"})
+    assert not status(rocket, 0.3).deployed
+    rocket.says(0.4, COAST, **{name: "1"})
+    assert status(rocket, 0.4).deployed
+
+
+@pytest.mark.parametrize("mode", [DROGUE, MAIN])
+def test_so_may_one_with_a_mode_of_a_deployment(mode):
+    rocket = Rocket()
+    rocket.says(0.0, COAST)
+    rocket.says(0.1, mode)
+    assert not status(rocket, 0.1).deployed
+    rocket.says(0.2, mode)
+    assert status(rocket, 0.2).deployed
+
+
+def test_where_it_was_fired_from_here_one_record_is_enough():
+    rocket = Rocket()
+    rocket.says(0.0, COAST)
+    rocket.computer.fired("drogue")
+    rocket.says(0.1, COAST, ssa_drogue_deployed="1")
+    assert status(rocket, 0.1).deployed
+
+
+def test_the_first_record_that_is_heard_tells_what_happened_before():
+    rocket = Rocket()
+    rocket.says(0.0, DROGUE, ssa_drogue_deployed="1")
+    assert status(rocket, 0.0).deployed
+
+
 def test_a_fault_that_follows_a_flight_is_one_in_flight():
     rocket = Rocket()
     rocket.says(0.0, ASCENT)

@@ -276,6 +276,11 @@ def test_a_number_of_any_length_is_read_exactly(text, name):
     assert by_decode(LAYOUT, texts) == by_problem_of(LAYOUT, texts)
 
 
+def test_a_number_between_two_floats_with_more_digits_than_any_reader_looks_at():
+    texts = body(vel_n=halfway(1.0) + "0" * 900)
+    assert LAYOUT.decode(texts)[LAYOUT.index["vel_n"]] == 1.0
+
+
 TEXTS = st.one_of(
     st.sampled_from(
         ["", "-0", "NaN", "inf", "-inf", "007", "1e5", " 1", "1 ", "+1", "1_0", "1.5"]
