@@ -13,7 +13,7 @@ from collections import Counter
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.events import Notice, Severity
-from chute_ros.protocol.umbilical.fields import NUMBERS
+from chute_ros.protocol.umbilical.fields import may_be_record
 from chute_ros.protocol.umbilical.layouts import Layout, Problem, Record
 
 #: So many lines in a row must fit a layout before it is believed, or another one is.
@@ -64,9 +64,9 @@ class TelemetryDecoder:
 
     def is_telemetry(self, body: bytes) -> bool:
         """A whole record of any layout that may come: not a part of a dump."""
-        text = body.decode("ascii", errors="replace")
-        if not NUMBERS.fullmatch(text):
+        if not may_be_record(body):
             return False
+        text = body.decode()
         known = [self.layout] if self._fixed and self.layout else self.layouts
         return any(not isinstance(one.decode(text), Problem) for one in known)
 

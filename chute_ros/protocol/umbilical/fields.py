@@ -18,10 +18,7 @@ _F64_LIMIT = 1.7976931348623157e308
 _WHOLE = r"(?:0|-?[1-9][0-9]{0,9})"
 _FLOAT = r"(?:-?(?:0|[1-9][0-9]*)(?:\.[0-9]+)?|-?inf|NaN)"
 #: All that a whole record is written with.
-NUMBERS = re.compile(r"[-0-9.,Nainf]*")
-#: Digits of a fraction that are surely read exactly, whoever reads them: of a number of more than
-#: 768 digits that lies between two floats, some readers take the wrong one.
-_MOST_FRACTION = 300
+_WRITTEN_WITH = b"-0123456789.,Nainf"
 _NOT_FINITE = ("NaN", "inf", "-inf")
 
 
@@ -30,6 +27,8 @@ class FieldType:
     """A type by its Rust name (bool01: 0 or 1), with its inclusive range."""
 
     name: str
+    #: As struct has it, which knows its range.
+    code: str
     is_whole: bool
     lowest: float
     highest: float
@@ -44,8 +43,7 @@ class FieldType:
         """One for what is printed and so short that it is in range: most of what comes."""
         digits = len(str(int(self.highest))) - 1
         if not self.is_whole:
-            whole = _FLOAT.replace("[0-9]*", f"[0-9]{{0,{digits - 1}}}", 1)
-            return whole.replace("[0-9]+", f"[0-9]{{1,{_MOST_FRACTION}}}", 1)
+            return _FLOAT.replace("[0-9]*", f"[0-9]{{0,{digits - 1}}}", 1)
         if not digits:
             return f"[0-{self.highest}]"
         sign = "-?" if self.lowest < 0 else ""
@@ -55,19 +53,24 @@ class FieldType:
 TYPES: dict[str, FieldType] = {
     one.name: one
     for one in (
-        FieldType("bool01", True, 0, 1),
-        FieldType("u8", True, 0, 2**8 - 1),
-        FieldType("u32", True, 0, 2**32 - 1),
-        FieldType("i8", True, -(2**7), 2**7 - 1),
-        FieldType("i32", True, -(2**31), 2**31 - 1),
-        FieldType("f32", False, -_F32_LIMIT, _F32_LIMIT),
-        FieldType("f64", False, -_F64_LIMIT, _F64_LIMIT),
+        FieldType("bool01", "B", True, 0, 1),
+        FieldType("u8", "B", True, 0, 2**8 - 1),
+        FieldType("u32", "I", True, 0, 2**32 - 1),
+        FieldType("i8", "b", True, -(2**7), 2**7 - 1),
+        FieldType("i32", "i", True, -(2**31), 2**31 - 1),
+        FieldType("f32", "f", False, -_F32_LIMIT, _F32_LIMIT),
+        FieldType("f64", "d", False, -_F64_LIMIT, _F64_LIMIT),
     )
 }
 
 _DIGITS = re.compile(r"-?[0-9]+")
 _DECIMAL = re.compile(r"-?[0-9]+(?:\.[0-9]+)?")
 _EXPONENT = re.compile(r"-?[0-9.]+[eE][+-]?[0-9]+")
+
+
+def may_be_record(body: bytes) -> bool:
+    """Nothing is in it but what a whole record is written with."""
+    return not body.translate(None, _WRITTEN_WITH)
 
 
 def problem_of(kind: FieldType, text: str) -> str:

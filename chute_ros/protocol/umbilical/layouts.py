@@ -6,9 +6,10 @@ Source: Umbilical Reference, section 3; the other layouts were found in the fiel
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from struct import Struct
+from operator import itemgetter
 from typing import Any
 
 import orjson
@@ -18,6 +19,12 @@ from chute_ros.protocol.umbilical.fields import TYPES, FieldType, Value, convert
 
 #: The layout of the reference, which is preferred where a line does not tell.
 REFERENCE_LAYOUT = "telem57_airbrake_state"
+
+#: What JSON's numbers are written with, but for exponents.
+_PLAIN = b"-0123456789.,"
+#: Characters of a line that is surely read exactly, whoever reads it: of a number of more than 768
+#: digits that lies between two floats, some readers take the wrong one.
+_MOST_AT_ONCE = 768
 
 #: Fields that every layout must have, because what is decided rests on them.
 NEEDED = (
@@ -67,7 +74,11 @@ class Layout:
         self.target_fields = target_fields
         self.index = {field.name: number for number, field in enumerate(fields)}
         self._sure = re.compile(",".join(field.kind.sure_pattern for field in fields))
-        self._as_typed = Struct("<" + "".join("q" if f.kind.is_whole else "d" for f in fields))
+        self._ranges = struct.Struct("<" + "".join(f.kind.code for f in fields))
+        self._typed = struct.Struct("<" + "".join(f.kind.code.replace("f", "d") for f in fields))
+        flags = [i for i, field in enumerate(fields) if field.kind.highest == 1]
+        # Twice, as of one alone itemgetter makes no tuple.
+        self._flags = itemgetter(*flags, *flags) if flags else None
         self._expected = [(i, f.expected) for i, f in enumerate(fields) if f.expected is not None]
 
     @property
@@ -78,11 +89,10 @@ class Layout:
     def decode(self, body: str) -> tuple[Value, ...] | Problem:
         """The values of a line (without "$TELEM," and its end), or why it is no record."""
         # First all at once, which is the usual case; only then field by field for the reason.
-        sure = self._sure.fullmatch(body)
-        if sure and (values := self._at_once(body)) is not None:
+        if (values := self._at_once(body)) is not None:
             return values
         texts = body.split(",")
-        if sure:
+        if self._sure.fullmatch(body):
             return self._converted(texts)
         if len(texts) != self.count:
             text = f"{len(texts)} fields where {self.name} has {self.count}"
@@ -99,20 +109,30 @@ class Layout:
         return all(low <= values[i] <= high for i, (low, high) in self._expected)
 
     def _at_once(self, body: str) -> tuple[Value, ...] | None:
-        """The values of a sure line, by compiled code; None: not all are numbers of JSON."""
-        text = f"[{body}]"
-        if "N" in text or "i" in text or "-0," in text or "-0]" in text:
-            return None  # NaN, infinities; and a zero loses its sign there
+        """The values, by compiled code; None: not all are JSON's numbers within their ranges."""
+        if len(body) > _MOST_AT_ONCE or not body.isascii():
+            return None
+        raw = body.encode()
+        # JSON has exponents, blanks and lists, too; and a zero loses its sign there.
+        if raw.translate(None, _PLAIN) or b"-0," in raw or raw.endswith(b"-0"):
+            return None
+        try:
+            values = orjson.loads(b"[%b]" % raw)
+            self._ranges.pack(*values)
+        except (ValueError, OverflowError, struct.error):
+            return None
+        if self._flags is not None and max(self._flags(values)) > 1:
+            return None
         # A float without a fraction is an int in JSON: through the structure each gets its type.
-        return self._as_typed.unpack(self._as_typed.pack(*orjson.loads(text)))
+        return self._typed.unpack(self._typed.pack(*values))
 
     def _converted(self, texts: list[str]) -> tuple[Value, ...]:
         return tuple(convert(f.kind, text) for f, text in zip(self.fields, texts, strict=True))
 
 
-@dataclass(frozen=True)
+@dataclass
 class Record:
-    """One $TELEM line. received: monotonic s."""
+    """One $TELEM line, which nobody changes. received: monotonic s."""
 
     layout: Layout
     values: tuple[Value, ...]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from chute_ros.protocol.events import Severity
-from chute_ros.protocol.umbilical.fields import NUMBERS
+from chute_ros.protocol.umbilical.fields import may_be_record
 from chute_ros.protocol.umbilical.stream import CUT_LINE
 
 UNKNOWN_LINE = "unknown line"
@@ -124,24 +124,30 @@ _KNOWN: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Saying]], ...] = 
     (re.compile(r"Arming blocked: .*$"), lambda m: ArmingBlocked(m[0])),
     (re.compile(r"--- (?:BEGIN|END) FLASH (?:CSV|BINARY) DUMP ---$"), lambda m: StrayMark()),
 )
-_TELEM = "$TELEM,"
+_TELEM = b"$TELEM,"
 
 
 def recognise(line: bytes) -> tuple[Saying | None, str]:
     """What a line says (None: nothing known), and the reason to count a part under, or empty."""
-    text = line.decode("utf-8", errors="replace")
-    start = text.rfind(_TELEM)
-    if start >= 0:
-        rest = text[start + len(_TELEM) :]
-        # A cut record with another line on its heels is that line.
-        whole = NUMBERS.fullmatch(rest)
-        said = None if whole else _known(rest)[0]
-        if said is not None:
-            return said, CUT_LINE
-        if not whole and _LOG.match(text):
-            return _known(text)  # it only speaks of telemetry
-        return Telemetry(rest), CUT_LINE if start else ""
-    return _known(text)
+    start = line.rfind(_TELEM)
+    if start < 0:
+        return _known(_text(line))
+    body = line[start + len(_TELEM) :]
+    cut = CUT_LINE if start else ""
+    if may_be_record(body):
+        return Telemetry(body.decode()), cut
+    # A cut record with another line on its heels is that line.
+    said = _known(_text(body))[0]
+    if said is not None:
+        return said, CUT_LINE
+    text = _text(line)
+    if _LOG.match(text):
+        return _known(text)  # it only speaks of telemetry
+    return Telemetry(_text(body)), cut
+
+
+def _text(line: bytes) -> str:
+    return line.decode("utf-8", errors="replace")
 
 
 def _known(text: str) -> tuple[Saying | None, str]:
