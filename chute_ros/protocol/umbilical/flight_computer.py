@@ -200,6 +200,11 @@ class FlightComputer:
         """Two records in a row said that it came out in this flight."""
         return name in self._canopies.surely_out
 
+    def seen_out(self, name: str) -> bool:
+        """It surely came out in this flight, or was fired from here and one record showed it."""
+        canopies = self._canopies
+        return self.surely_out(name) or name in canopies.came_out & canopies.fired
+
     def forgot(self, name: str) -> bool:
         """The drogue or the main surely came out in this flight, and it has restarted since: that
         its records say so no more means nothing."""

@@ -255,7 +255,7 @@ class Orders:
         effect = self._effect(kind)
         if effect is None:
             return None, _NOTHING_SHOWS
-        known = name not in CANOPIES or computer.surely_out(name)
+        known = name not in CANOPIES or computer.seen_out(name)
         believed = not even_if_shown and computer.fresh(now) and known
         # Where it shows already, only what is said once the command has been taken counts.
         settles = _SETTLES if computer.record and effect.shown(computer.record) else 0.0
