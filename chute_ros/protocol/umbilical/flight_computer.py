@@ -6,6 +6,7 @@ Source: Umbilical Reference, sections 1 and 3.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from chute_ros.model import (
     NAN,
@@ -52,7 +53,8 @@ class FlightComputer:
         self.restarted_in_flight = False
         self._clock = BootClock()
         self._limits = limits
-        self._main_counts = main_counts
+        #: Those of them that are the parachute.
+        self._counting = ("main",) if main_counts else tuple(CANOPIES)
         self._cable_pulled = False
         #: In the air, as far as its records have told.
         self._flying = False
@@ -90,7 +92,7 @@ class FlightComputer:
         self.records += 1
         # The first one tells what happened before it was heard.
         row = self._out_in_a_row + 1 if before is not None else _TO_BELIEVE
-        self._out_in_a_row = row if self._says_out else 0
+        self._out_in_a_row = row if self._says_out(self._counting) else 0
         self._watch_rest(before, record, now)
         self._watch_flight()
         self._canopies.watch(before, record, self.mode)
@@ -167,24 +169,19 @@ class FlightComputer:
         flight."""
         fired_or_down = self._canopies.fired or not self._flying
         believed = fired_or_down or self._out_in_a_row >= _TO_BELIEVE
-        counting = ("main",) if self._main_counts else CANOPIES
-        return (self._says_out and bool(believed)) or any(map(self.forgot, counting))
+        says_so = self._says_out(self._counting) and bool(believed)
+        return says_so or any(map(self.forgot, self._counting))
 
-    @property
-    def _says_out(self) -> bool:
-        """The newest record says that what counts as the parachute is out."""
-        if not self._main_counts:
-            return self._is_out
-        flag = self.record is not None and self.record["ssa_main_deployed"]
-        return bool(flag) or self.mode is FlightMode.MAIN_DEPLOYED
+    def _says_out(self, names: Iterable[str]) -> bool:
+        """The newest record says that one of them is out."""
+        record, mode = self.record, self.mode
+        shown_by = [CANOPIES[name] for name in names]
+        return record is not None and any(bool(record[f]) or mode is m for f, m in shown_by)
 
     @property
     def _is_out(self) -> bool:
         """Drogue or main are out."""
-        if self.record is None:
-            return False
-        flags = self.record["ssa_drogue_deployed"] or self.record["ssa_main_deployed"]
-        return bool(flags) or self.mode in (FlightMode.DROGUE_DEPLOYED, FlightMode.MAIN_DEPLOYED)
+        return self._says_out(CANOPIES)
 
     @property
     def flying(self) -> bool:
