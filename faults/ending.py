@@ -7,7 +7,7 @@ import sys
 
 
 def take_down_when_ended(program: str) -> None:
-    """SIGTERM takes down what was set up, as Ctrl-C does; so does an interrupt of one that a shell
-    runs in its background, where it is ignored otherwise."""
+    """SIGTERM and Ctrl-C take down what was set up; so does an interrupt of one that a shell runs
+    in its background, where it is ignored otherwise."""
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(f"{program}: ended from outside"))
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGINT, lambda *_: sys.exit(f"{program}: interrupted"))

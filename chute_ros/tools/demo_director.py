@@ -57,9 +57,9 @@ class Director:
         self._deploy = self.node.create_client(Deploy, "safety/deploy")
 
     def close(self) -> None:
-        """Leave ROS."""
+        """Leave ROS, which a Ctrl-C has already done."""
         self.node.destroy_node()
-        rclpy.shutdown()
+        rclpy.try_shutdown()
 
     # -- telling --------------------------------------------------------------------------------
 

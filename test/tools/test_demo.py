@@ -5,6 +5,7 @@ Two run at a time, which also shows that runs side by side do not meet.
 
 import os
 import re
+import signal
 import subprocess
 import sys
 
@@ -179,6 +180,15 @@ def test_where_a_step_cannot_happen_it_fails_loudly(runs):
     assert "DEMO PASSED" not in out
     assert "take off" not in out
     assert "Traceback" not in err
+
+
+def test_ctrl_c_in_the_middle_ends_it_in_one_line():
+    child = start()
+    assert child.stdout is not None
+    assert any("READY" in line for line in child.stdout)
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=30.0)
+    assert (child.returncode, err.strip()) == (1, "demo: interrupted"), out + err
 
 
 def test_a_fault_that_is_none_is_refused():
