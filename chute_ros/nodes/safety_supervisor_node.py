@@ -4,15 +4,16 @@ One loop does it all: every message and request becomes an input of the core; on
 core's next deadline, wakes it when nothing comes. Its heartbeat comes from that loop alone.
 
 What goes wrong inside: an input that the core cannot take is left out, reported, and the loop goes
-on. If the core fails without any input, the supervisor falls silent: a standby takes over, and the
-device nodes do what on_supervisor_lost says.
+on. If the core fails without any input, or what a turn does with its outputs, the supervisor falls
+silent: a standby takes over, and the device nodes do what on_supervisor_lost says.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import count
 from operator import attrgetter
@@ -139,6 +140,25 @@ class SafetySupervisorNode(Node):
     def _turn(self, *new: inputs.Input) -> None:
         """Give the core what came, do what it says, sleep until its next deadline."""
         now = time.monotonic()
+        with self._guarded():
+            self._look(new, now)
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """What fails inside is reported; the process goes on, and the next turn tries anew."""
+        try:
+            yield
+        except Exception as error:
+            if not self.context.ok():
+                raise  # nothing can be told any more
+            self._health.failed(error, "a turn was not done to its end")
+            self._tell_mistake()
+
+    def _tell_mistake(self) -> None:
+        self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
+        self._sleep(time.monotonic() + HEARTBEAT_INTERVAL)
+
+    def _look(self, new: tuple[inputs.Input, ...], now: float) -> None:
         self.lease.look(now)
         outputs = self._update(new, now)
         if outputs is None and new:
@@ -146,7 +166,6 @@ class SafetySupervisorNode(Node):
         if outputs is None:
             # The core cannot even look at the clock: silence tells everybody.
             self._afterwards.look(now)
-            self._sleep(now + HEARTBEAT_INTERVAL)
             return
         self._carry_out(outputs, now)
         self._arming.give_up(now)
@@ -168,8 +187,8 @@ class SafetySupervisorNode(Node):
         try:
             self.state, outputs = update(self.config, before, new, now)
         except Exception as error:  # noqa: BLE001 - the loop must go on, and say so
-            self._health.failed(error, new)
-            self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
+            self._health.refused(error, new)
+            self._tell_mistake()
             return None
         decisions = [output for output in outputs if isinstance(output, inputs.Decide)]
         if decisions and self.lease.config.standby:
@@ -231,7 +250,10 @@ class SafetySupervisorNode(Node):
     # -- the lease ------------------------------------------------------------------------------
 
     def _lease_event(self, event: Event) -> None:
-        now = time.monotonic()
+        with self._guarded():
+            self._follow_lease(event, time.monotonic())
+
+    def _follow_lease(self, event: Event, now: float) -> None:
         if self.lease.leading:
             epoch = self.lease.next_epoch()
             self.get_logger().warning(f"leads from now on, epoch {epoch}: {event.value}")

@@ -17,7 +17,7 @@ from chute_ros.nodes import diagnostics
 from chute_ros.nodes.kept_file import KeptFile
 from chute_ros.nodes.private_files import read_own_text
 from chute_ros.nodes.ros_home import ros_home
-from chute_ros.protocol.mavlink.signing import Signer, Times, Verifier, times_of
+from chute_ros.protocol.mavlink.signing import LAST_TIME, Signer, Times, Verifier, times_of
 from chute_ros.transport.signing_key import signing_from_file
 
 #: Between two writes, s: so old a frame may be that is replayed into a node after it crashed.
@@ -98,7 +98,9 @@ def times_from(text: str) -> Times:
         told = json.loads(text)
         newest, streams = told["newest"], told["streams"]
         times = Times(newest, {_stream(name): time for name, time in streams.items()})
-        if all(type(time) is int and 0 <= time < 2**48 for time in (newest, *streams.values())):
+        if all(
+            type(time) is int and 0 <= time <= LAST_TIME for time in (newest, *streams.values())
+        ):
             return times
     except (AttributeError, LookupError, TypeError, ValueError, RecursionError):
         pass  # said below

@@ -39,11 +39,15 @@ class Health:
 
         return SubscriptionEventCallbacks(message_lost=lost)
 
-    def failed(self, error: Exception, new: tuple[inputs.Input, ...]) -> None:
+    def refused(self, error: Exception, new: tuple[inputs.Input, ...]) -> None:
         """The core could not take this."""
-        self._failures += 1
         what = ", ".join(type(one).__name__ for one in new) or "a look at the clock"
-        self.newest = f"left out {what}: {type(error).__name__}: {error}"
+        self.failed(error, f"left out {what}")
+
+    def failed(self, error: Exception, what: str) -> None:
+        """Something of a turn could not be done."""
+        self._failures += 1
+        self.newest = f"{what}: {type(error).__name__}: {error}"
 
     def task(self, name: str, state: State, lease: LeaseKeeper, now: float) -> DiagnosticStatus:
         """For diagnostics."""

@@ -142,11 +142,14 @@ class LeaseKeeper:
 
     def _follow_claim(self, message: SupervisorLease, now: float) -> None:
         try:
-            self._follow(handover.followed(self._state(), message.state, now))
+            state = handover.followed(self._state(), message.state, now)
+            if state.epoch != message.epoch:
+                raise RecordError(f"it claims epoch {message.epoch} and tells of {state.epoch}")
         except RecordError as error:
             self._complain(f"cannot follow {message.name}: {error}")
-        else:
-            self._experienced, self._followed = True, message.name
+            return
+        self._follow(state)
+        self._experienced, self._followed = True, message.name
 
     def _complain(self, text: str) -> None:
         if text not in self._complained and len(self._complained) < 16:

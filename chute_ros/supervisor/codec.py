@@ -79,6 +79,8 @@ class Codec:
     def value(self, plain: Any, kind: Any) -> Any:
         """The value of this type that plain stands for."""
         if type(plain) is kind and kind in _SIMPLE:
+            if kind is str:
+                plain.encode()  # JSON can write what is no text, and cannot be told on
             return plain
         if isinstance(plain, dict):
             made = self._object(plain)

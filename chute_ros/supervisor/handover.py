@@ -10,10 +10,13 @@ from types import MappingProxyType
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
+from chute_ros.supervisor.epochs import LARGEST_EPOCH
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending, State
 
 _CODEC = Codec(State)
+#: What an id of chute_msgs/SafetyDecision can hold.
+_LARGEST_ID = 2**64 - 1
 
 
 def told(state: State, now: float) -> str:
@@ -60,10 +63,11 @@ def told(state: State, now: float) -> str:
 
 def followed(state: State, text: str, now: float) -> State:
     """state with what the leader told just now (monotonic s of this host). RecordError: another
-    version wrote it."""
+    version wrote it, or none of ours did."""
     leader = _CODEC.from_json(text)
     if not isinstance(leader, State):
         raise RecordError(f"not a state: {text[:80]!r}")
+    check_numbers(leader)
     return replace(
         _moved(leader, now),
         leading=False,
@@ -75,6 +79,15 @@ def followed(state: State, text: str, now: float) -> State:
         measurements=state.measurements,
         heights=state.heights,
     )
+
+
+def check_numbers(state: State) -> None:
+    """RecordError for numbers under which nothing can be decided nor told."""
+    pending = [one for one in (state.block, state.kill, *state.deploys) if one is not None]
+    numbers = [(state.epoch, state.next_id), *(one.number for one in pending)]
+    for epoch, number in numbers:
+        if not (1 <= epoch <= LARGEST_EPOCH and 1 <= number <= _LARGEST_ID):
+            raise RecordError(f"no decision has the number {epoch}.{number}")
 
 
 def _moved(state: State, by: float) -> State:

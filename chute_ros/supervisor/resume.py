@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
+from chute_ros.supervisor.handover import check_numbers
 from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.state import State
 
@@ -50,5 +51,6 @@ def resumed(text: str, boot: str, settings: str, within: float, now: float) -> S
     age = now - left.state.updated_at
     if not 0.0 <= age <= within:
         raise RecordError(f"it is {age:.1f} s old (limit {within:g} s)")
+    check_numbers(left.state)
     # Who waited for an outcome waits no more.
     return replace(left.state, leading=False, kill_tokens=(), deploy_tokens=())

@@ -60,7 +60,8 @@ def good_frame(program: Program, clock: SigningClock | None, now: float) -> tupl
     raw = b"\xfd" + body + _crc(body + extra)
     if clock is not None:
         stamp = clock.at(now) + program.whole(2)
-        stamp = program.whole(6) & (1 << 48) - 1 if how & 64 else max(stamp, 0)
+        stamp = program.whole(6) if how & 64 else max(stamp, 0)
+        stamp &= (1 << 48) - 1
         raw += bytes((program.byte(),)) + stamp.to_bytes(6, "little")
         raw += hashlib.sha256(KEY + raw).digest()[:6]
     return raw, kind is not None and flags == 0 and clock is None

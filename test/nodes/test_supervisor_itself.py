@@ -68,6 +68,19 @@ def test_an_input_that_the_core_cannot_take_is_left_out_and_reported(bench, monk
     bench.until(lambda: len(scene.own_beats()) > seen + 3, "the loop goes on")
 
 
+def test_what_fails_beside_the_core_is_reported_and_does_not_end_the_process(bench, monkeypatch):
+    scene = Watched(bench)
+    monkeypatch.setattr(scene.supervisor, "_beat", lambda now: 1 / 0)
+    values = scene.await_itself(DiagnosticStatus.ERROR, "mistakes inside")
+    told = "a turn was not done to its end: ZeroDivisionError: division by zero"
+    assert values["newest mistake"] == told
+    seen = len(scene.own_beats())
+    bench.turns(0.5)
+    assert len(scene.own_beats()) == seen, "it falls silent"
+    monkeypatch.undo()
+    bench.until(lambda: len(scene.own_beats()) > seen + 3, "the loop goes on")
+
+
 def test_a_core_that_fails_without_any_input_falls_silent(bench, monkeypatch):
     scene = Watched(bench)
     monkeypatch.setattr(safety_supervisor_node, "update", failing(lambda new: True))
@@ -103,7 +116,7 @@ def test_messages_that_a_queue_lost_are_counted_by_topic(bench):
     task = health.task("x", scene.supervisor.state, scene.supervisor.lease, time.monotonic())
     assert task.level == DiagnosticStatus.WARN
     assert {p.key: p.value for p in task.values}["messages lost on safety/action"] == "6"
-    health.failed(ValueError("no number"), ())
+    health.refused(ValueError("no number"), ())
     for _ in range(60):
         task = health.task("x", scene.supervisor.state, scene.supervisor.lease, time.monotonic())
         assert task.level == DiagnosticStatus.ERROR, "a mistake inside is worse"

@@ -1,4 +1,4 @@
-"""Somebody on the ROS network without SROS 2: what the gates stop all the same, and what not."""
+"""Somebody speaks to a device node without SROS 2: what its gate stops, and what not."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ from chute_msgs.msg import (
     ActionReport,
     LinkHeartbeat,
     SafetyDecision,
-    SafetyState,
-    SupervisorLease,
-    VehicleState,
 )
 from mavlink_bench import Module, Network
 from node_bench import stamped
-from supervisor_bench import Scene
 
-from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.supervisor.epochs import LARGEST_EPOCH
 
@@ -80,36 +76,3 @@ def test_without_sros_a_decision_that_is_forged_well_is_carried_out(bench, heard
     """What SROS 2 is for: the limit of an open ROS network, written down."""
     say(epoch=LARGEST_EPOCH, id=1)
     bench.until(lambda: heard.deployment, "the parachute is out")
-
-
-def test_a_lease_claimed_with_a_huge_epoch_takes_nothing_over(bench):
-    scene = Scene(bench, profile="by_hand", hot_standby=True, rank=0, lease_listen=0.3)
-    scene.await_stage(SafetyState.READY)
-    epoch = scene.supervisor.state.epoch
-    for rank in (0, 1, 2, 3, 9):
-        claim = SupervisorLease(name="liar", rank=rank, epoch=LARGEST_EPOCH, leading=True)
-        for _ in range(3):
-            bench.publish(stamped(bench.client, claim), "safety/lease")
-    bench.turns(1.0)
-    assert scene.supervisor.lease.leading
-    assert scene.supervisor.state.epoch == epoch
-
-
-def test_requests_and_pictures_alone_fire_no_parachute_on_the_ground(bench):
-    scene = Scene(bench, profile="multirotor")
-    scene.await_stage(SafetyState.READY)
-    falling = VehicleState(
-        source="9/9",
-        link_state=int(LinkState.OK),
-        armed=VehicleState.DISARMED,
-        armed_age=0.0,
-        landed_state=VehicleState.ON_GROUND,
-        landed_state_age=0.0,
-        height=100.0,
-        vertical_speed=-40.0,
-    )
-    for _ in range(100):
-        bench.publish(stamped(bench.client, falling), "vehicle/state")
-        bench.turns(0.02)
-    assert scene.decided(Action.DEPLOY) == []
-    assert scene.decided(Action.KILL) == []

@@ -1,5 +1,6 @@
 """What a leader tells those that follow, and how one goes on where it stopped."""
 
+import json
 import math
 
 import pytest
@@ -171,3 +172,36 @@ def test_a_parachute_that_the_follower_has_heard_to_be_out_is_not_ordered_once_m
     state, outputs = take_over(handed(story, heard), 1.2)
     assert state.stage is Stage.DEPLOYED
     assert not decided(outputs, D)
+
+
+def spoilt(**fields: object) -> str:
+    """What a leader in flight tells, with other values in these fields."""
+    told = json.loads(handover.told(falling().state, START))
+    return json.dumps(told | fields)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"epoch": 2**70},
+        {"epoch": 2**32},
+        {"epoch": 0},
+        {"epoch": -5},
+        {"next_id": 2**64},
+        {"next_id": 0},
+        {"alarms": ["\ud800"]},
+        {"device_blocks": [["\udfff", "why"]]},
+    ],
+    ids=str,
+)
+def test_what_cannot_be_decided_nor_told_is_not_followed(fields: dict[str, object]) -> None:
+    assert handover.followed(follower(), spoilt(), START).stage is Stage.KILLING
+    with pytest.raises(RecordError):
+        handover.followed(follower(), spoilt(**fields), START)
+
+
+def test_a_decision_under_way_whose_number_no_message_holds_is_not_followed() -> None:
+    kill = json.loads(spoilt())["kill"]
+    kill["decision"]["id"] = 2**64
+    with pytest.raises(RecordError, match="no decision has the number"):
+        handover.followed(follower(), spoilt(kill=kill), START)

@@ -24,10 +24,14 @@ EPOCH_2015 = 1420070400
 UNITS_PER_SECOND = 100_000
 #: So far a time stamp may lag behind our own.
 NEW_STREAM_LAG = 60 * UNITS_PER_SECOND
+#: The last that is listened to, in 2103: ours follow the highest that was heard, and must be able
+#: to rise for a year before their 48 bits end, and with them every order.
+LAST_TIME = 2**48 - 1 - 365 * 86400 * UNITS_PER_SECOND
 
 UNSIGNED = "frame without a signature"
 WRONG_SIGNATURE = "frame with a wrong signature"
 REPLAYED = "frame with an old signature time (replayed)"
+END_OF_TIME = "frame with a signature time at the end of its 48 bits"
 TOO_MANY_STREAMS = "frame of one signed stream too many"
 #: A device has one, or a few; who holds the key could make up 2^24.
 MOST_STREAMS = 256
@@ -128,6 +132,8 @@ class Verifier:
         stream = (raw[5], raw[6], raw[_LINK_ID])
         if timestamp <= max(self.streams.get(stream, 0), self._clock.at(now) - NEW_STREAM_LAG):
             return REPLAYED
+        if timestamp > LAST_TIME:
+            return END_OF_TIME
         if stream not in self.streams and len(self.streams) >= MOST_STREAMS:
             return TOO_MANY_STREAMS
         self.streams[stream] = timestamp

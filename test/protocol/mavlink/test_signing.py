@@ -106,6 +106,19 @@ def test_what_was_heard_before_a_restart_is_not_heard_after_it():
     assert before.streams[1, 161, 0] < signed_time(now=NOW + 0.1), "it is a picture of then"
 
 
+def test_a_device_whose_clock_is_at_its_end_is_not_followed_there():
+    """Our own times would begin at 0 again, and no device would take an order any more."""
+    ours = clock()
+    signer, decoder = Signer(KEY, ours), FrameDecoder(Verifier(KEY, ours))
+    ends_in = (2**48 - 1 - ours.at(NOW)) / signing.UNITS_PER_SECOND
+    assert decoder.feed_datagram(signed(now=NOW + ends_in - 10.0), NOW) == []
+    assert decoder.counts[signing.END_OF_TIME] == 1
+    assert len(decoder.feed_datagram(signed(), NOW)) == 1, "all others are heard"
+    year = 365 * 86400.0
+    assert len(decoder.feed_datagram(signed(now=NOW + ends_in - year - 10.0), NOW)) == 1
+    assert signer.next_timestamp(NOW + year) < 2**48
+
+
 def test_what_we_have_given_out_counts_among_the_newest():
     ours = clock()
     signer = Signer(KEY, ours)
