@@ -20,15 +20,15 @@ Written by `make soak LOOPS={loops} SEED={seed}`. The numbers belong to the mach
 {machine}. {load}
 
 One vehicle of real processes (`mavlink_parachute`, `upf_can`, `umbilical`, one supervisor, then
-two with `hot_standby`, black boxes on) lives through all loops; simulated autopilot, parachute and
-UPF are new with each flight. A simulated flight computer stands beside and talks: nothing is
-deployed through it. In each loop one fault is put on the vehicle at a random moment in flight (none
-while it arms or takes off), and in some a motor then fails or a person deploys. The autopilot is
-stopped, not killed: that one starts anew in flight is flown in [campaign.md](campaign.md). What is
-lost is lost on the devices' wires; a network between supervisors that loses is in
-[hosts.md](hosts.md). A valid flood is copies of frames on MAVLink, NodeStatus of a stranger on CAN,
-and sayings of the flight computer on the cable. Relays between nodes and devices see what is on the
-wires. In each loop it is asked:
+two with `hot_standby`, black boxes on) lives through all loops; simulated autopilot, parachute
+and UPF are new with each flight. A simulated flight computer stands beside and talks: nothing is
+deployed through it. In each loop one fault is put on the vehicle at a random moment in flight
+(none while it arms or takes off), and in some a motor then fails or a person deploys. The
+autopilot is stopped, not killed: that one starts anew in flight is flown in
+[campaign.md](campaign.md). What is lost is lost on the devices' wires; a network between
+supervisors that loses is in [hosts.md](hosts.md). A valid flood is copies of frames on MAVLink,
+NodeStatus of a stranger on CAN, and sayings of the flight computer on the cable. Relays between
+nodes and devices see what is on the wires. In each loop it is asked:
 
 - was nothing killed or deployed without a cause, by the wires and by the devices' own records;
 - after a cause: was the kill first, did each parachute come out once, within {answer} s;

@@ -20,14 +20,7 @@ from operator import attrgetter
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import (
-    ActionReport,
-    LinkHeartbeat,
-    ParachuteStatus,
-    SafetyDecision,
-    SafetyRequest,
-    SafetyState,
-)
+from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyState
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -38,6 +31,7 @@ from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.supervisor_health import Health
+from chute_ros.nodes.supervisor_inputs import SupervisorInputs
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
 from chute_ros.nodes.supervisor_memory import Memory
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
@@ -57,8 +51,6 @@ from chute_ros.supervisor.state import State
 
 HEARTBEAT_INTERVAL = 0.1  # s
 STATE_INTERVAL = 1.0  # s, at the latest
-#: Links of which it is said that they ask for what does not exist: made-up names must not grow us.
-MOST_MISASKED = 64
 
 
 class SafetySupervisorNode(Node):
@@ -85,9 +77,6 @@ class SafetySupervisorNode(Node):
             self.state = before
             if not lease.standby:
                 first = (inputs.TakeOver(epoch_above(max(epoch, before.epoch), lease.rank)),)
-        self._misasked: set[str] = set()
-        #: Of the newest heartbeat of each link.
-        self._stamps: dict[str, Time] = {}
         self._recorder = FlightRecorder(self, self.values)
         self._health = Health()
         self._afterwards = Afterwards()
@@ -114,16 +103,12 @@ class SafetySupervisorNode(Node):
             self._lease_event,
             self._follow,
         )
-        for kind, topic, callback, profile in (
-            (LinkHeartbeat, "safety/heartbeat", self._heartbeat, qos.newest(qos.STATUS)),
-            (ParachuteStatus, "parachute/status", self._parachute, qos.newest(qos.STATUS)),
-            (ActionReport, "safety/action", self._action, qos.DECISION),
-            (SafetyRequest, "safety/request", self._device_request, qos.STATUS),
-        ):
-            self.create_subscription(
-                kind, topic, callback, profile, event_callbacks=self._health.watch(topic)
-            )
-        self._vehicle_sources = VehicleSources(self, self.values, self._vehicle)
+        self._inputs = SupervisorInputs(
+            self, self.config, self.wall, self._recorder, self._health, self._turn
+        )
+        self._vehicle_sources = VehicleSources(
+            self, self.values, lambda state: self._turn(inputs.VehicleReport(state))
+        )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().warning(
                 f"rule '{rule}' can never be fulfilled: the autopilot is the only source of "
@@ -269,62 +254,6 @@ class SafetySupervisorNode(Node):
     def _follow(self, state: State) -> None:
         self.state = state
 
-    # -- inputs ---------------------------------------------------------------------------------
-
-    def _heartbeat(self, message: LinkHeartbeat) -> None:
-        self._recorder.message("safety/heartbeat", message)
-        if message.supervisor:
-            return
-        if message.link in self.config.links:
-            self._stamps[message.link] = message.header.stamp
-        sent = messages.seconds(message.header.stamp)
-        difference = messages.seconds(self.wall.now().to_msg()) - sent if sent else math.nan
-        self._turn(
-            inputs.LinkHeartbeat(
-                message.link,
-                messages.link_state(message),
-                message.device_healthy,
-                message.seq,
-                difference,
-            )
-        )
-
-    def _parachute(self, message: ParachuteStatus) -> None:
-        self._recorder.message("parachute/status", message)
-        self._turn(inputs.ParachuteReport(message.link, messages.parachute_from(message)))
-
-    def _vehicle(self, state: model.VehicleState) -> None:
-        self._turn(inputs.VehicleReport(state))
-
-    def _action(self, message: ActionReport) -> None:
-        self._recorder.message("safety/action", message)
-        self._turn(
-            inputs.ActionReport(
-                message.epoch,
-                message.id,
-                message.link,
-                messages.outcome(message),
-                message.detail,
-                message.newest_epoch,
-                message.newest_id,
-            )
-        )
-
-    def _device_request(self, message: SafetyRequest) -> None:
-        self._recorder.message("safety/request", message)
-        device, reason = f"{message.link} {message.device}".strip(), message.reason
-        if message.request == SafetyRequest.KILL:
-            self._turn(inputs.KillRequest(0, device, reason))
-        elif message.request in (SafetyRequest.FLIGHT_BLOCK, SafetyRequest.FLIGHT_BLOCK_RELEASE):
-            block = message.request == SafetyRequest.FLIGHT_BLOCK
-            self._turn(inputs.BlockRequest(message.link, message.device, block, reason))
-        elif message.link not in self._misasked and len(self._misasked) < MOST_MISASKED:
-            self._misasked.add(message.link)
-            self.get_logger().error(
-                f"{device} asks for {message.request}: need KILL 1, FLIGHT_BLOCK 2 or "
-                "FLIGHT_BLOCK_RELEASE 3 (said once for each link)"
-            )
-
     # -- outputs --------------------------------------------------------------------------------
 
     def _beat(self, now: float) -> None:
@@ -354,7 +283,7 @@ class SafetySupervisorNode(Node):
         stamp = self.wall.now().to_msg()
         message = state_message(self.config, self.state, now, stamp)
         message.supervisor = self.get_name()
-        message.link_stamps = [self._stamps.get(link, Time()) for link in self.config.links]
+        message.link_stamps = [self._inputs.stamps.get(link, Time()) for link in self.config.links]
         self._state_publisher.publish(message)
         self._recorder.message("safety/state", message)
 
