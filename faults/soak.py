@@ -115,6 +115,8 @@ def _share(chosen: argparse.Namespace) -> list[tuple[int, list[Plan]]]:
     numbers = {1: range(half), 2: range(half, chosen.loops)}
     if chosen.supervisors:
         numbers = {chosen.supervisors: range(chosen.loops)}
+    # In the second half of each supervisors live on.
+    spared = {count: (some.start + some.stop) // 2 for count, some in numbers.items()}
     if chosen.only is not None:
         numbers = {
             count: range(chosen.only, chosen.only + 1)
@@ -125,7 +127,7 @@ def _share(chosen: argparse.Namespace) -> list[tuple[int, list[Plan]]]:
     if kinds and not any(part in kind for part in kinds for kind in KINDS):
         sys.exit(f"soak: --kind {', '.join(kinds)}: need a part of one of {', '.join(KINDS)}")
     return [
-        (count, [draw(chosen.seed, number, count, kinds) for number in some])
+        (count, [draw(chosen.seed, one, count, kinds, one >= spared[count]) for one in some])
         for count, some in numbers.items()
         if some
     ]

@@ -10,11 +10,14 @@ from dataclasses import dataclass
 _WARM_UP = 5
 #: A line through fewer than this says nothing.
 ENOUGH = 15
+#: Through so many its slope alone is believed.
+_SURE = 40
 
 
 @dataclass(frozen=True)
 class Limit:
-    """A growth that is a finding: over the samples by more than both."""
+    """A growth that is a finding: by more than per_hundred, and where the samples are few by more
+    than total as well."""
 
     #: In the unit of the measure, over all the loops that were measured.
     total: float
@@ -43,7 +46,8 @@ class Growth:
     def too_much(self, limit: Limit) -> bool:
         """It does not stay flat."""
         grown = self.last - self.first
-        return grown > limit.total and self.per_hundred > limit.per_hundred
+        sure = self.samples >= _SURE or grown > limit.total
+        return sure and self.per_hundred > limit.per_hundred
 
 
 def slope(points: Sequence[tuple[float, float]]) -> float:

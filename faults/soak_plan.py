@@ -65,8 +65,11 @@ class Plan:
         return " ".join(parts)
 
 
-def draw(seed: int, number: int, supervisors: int, kinds: tuple[str, ...] = ()) -> Plan:
-    """Loop number of a run. kinds: parts of names; empty: all kinds."""
+def draw(
+    seed: int, number: int, supervisors: int, kinds: tuple[str, ...] = (), spared: bool = False
+) -> Plan:
+    """Loop number of a run. kinds: parts of names; empty: all kinds. spared: no supervisor is
+    killed, so that one lives for long enough to see what it holds."""
     chance = random.Random(f"{seed}/{number}")
     names = [one for one in KINDS if not kinds or any(part in one for part in kinds)]
     # Every kind has its turn; which comes when is still the seed's.
@@ -74,11 +77,14 @@ def draw(seed: int, number: int, supervisors: int, kinds: tuple[str, ...] = ()) 
     targets, (shortest, longest) = KINDS[kind]
     if supervisors == 1:
         targets = tuple(one for one in targets if one != "second")
+    if spared and kind == "kill -9":
+        targets = tuple(one for one in targets if one not in SUPERVISORS)
     target = chance.choice(targets)
     seconds = chance.uniform(shortest, longest)
     beside = ""
     if kind == "no descriptors left" and chance.random() < 0.5:
-        beside = chance.choice([one for one in (*NODES, "first") if one != target])
+        others = NODES if spared else (*NODES, "first")
+        beside = chance.choice([one for one in others if one != target])
     plan = Plan(
         number,
         kind,

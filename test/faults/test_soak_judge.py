@@ -91,6 +91,14 @@ def test_what_leaks_in_each_loop_is_too_much_and_what_settles_is_not():
     assert not settling.too_much(LIMITS["memory"])
 
 
+def test_a_slow_leak_needs_a_long_life_to_be_told_from_what_settles():
+    def leak(samples):
+        return growth([(float(n), 80.0 + 0.06 * n) for n in range(samples)])
+
+    assert not leak(40).too_much(LIMITS["memory"])
+    assert leak(45).too_much(LIMITS["memory"])
+
+
 def test_too_few_samples_say_nothing():
     assert growth([(float(n), float(n)) for n in range(ENOUGH)]) is None
 
@@ -108,6 +116,15 @@ def test_every_kind_has_its_turn_and_one_supervisor_is_never_asked_for_a_second(
     assert "second" not in {plan.target for plan in plans}
     killed = {plan.target for plan in plans if plan.kind == "kill -9"}
     assert killed >= {*NODES, "first"}
+
+
+def test_where_supervisors_are_spared_all_else_is_killed():
+    plans = [draw(1, number, 2, spared=True) for number in range(600)]
+    killed = {plan.target for plan in plans if plan.kind == "kill -9"}
+    assert killed >= set(NODES)
+    ended = killed | {plan.beside for plan in plans}
+    assert not ended & {"first", "second"}
+    assert "first" in {draw(1, number, 2).beside for number in range(600)}
 
 
 def test_only_the_kinds_that_are_asked_for_are_drawn():
