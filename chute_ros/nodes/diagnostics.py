@@ -54,6 +54,10 @@ def wire_task(
     level, text = (OK if wire.is_open else ERROR), wire.text
     if troubles:
         level, text = ERROR, "; ".join(troubles)
+    elif wire.is_open and not received and dropped:
+        # As with another baud rate, or where one side has a key and the other has not.
+        most = max(dropped, key=lambda reason: dropped[reason])
+        level, text = ERROR, f"{text}; what comes cannot be read, mostly: {most} ({dropped[most]})"
     elif wire.is_open and not received:
         level, text = WARN, f"{text}, nothing received yet"
     every = {**values, **{f"dropped: {reason}": n for reason, n in sorted(dropped.items())}}

@@ -51,6 +51,8 @@ class MavlinkParachuteNode(DeviceNode):
         address = parse_address(self.values["connection"])
         config = config_from(self.values)
         self._signing = SigningMemory(self, self.values)
+        #: Why take-off is forbidden, as it was last told.
+        self._doubts: set[str] = set()
         link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
         self.loop = WireLoop(link, make_wire(address), self.deliver)
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
@@ -121,6 +123,7 @@ class MavlinkParachuteNode(DeviceNode):
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         assert self.loop is not None
         name, details = self.diagnostic_name, summary.details
+        self._tell_doubts(details.doubts)
         traffic = {
             "frames received": details.received,
             "frames received per s": self.rate(details.received),
@@ -134,6 +137,11 @@ class MavlinkParachuteNode(DeviceNode):
             autopilot_task(name, details.vehicle),
             self._signing.task(name),
         ]
+
+    def _tell_doubts(self, doubts: tuple[str, ...]) -> None:
+        for doubt in set(doubts) - self._doubts:
+            self.get_logger().error(f"forbids take-off: {doubt}")
+        self._doubts = set(doubts)
 
     # -- services -------------------------------------------------------------------------------
 

@@ -6,6 +6,7 @@ allowed. Parameters are read-only unless a change in flight cannot be dangerous.
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -69,7 +70,8 @@ class Parameter:
 
 
 def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
-    """Declare all on node and return name -> value; ParameterError for a value not allowed."""
+    """Declare all that node has and return name -> value; ParameterError for a value not allowed.
+    A name that it does not have is told: ROS would pass over it without a word."""
     values: dict[str, Any] = {}
     for parameter in parameters:
         try:
@@ -87,7 +89,16 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
         if parameter.choices and value not in parameter.choices:
             raise _not_allowed(node, parameter, value)
         values[parameter.name] = value
+    _tell_unknown(node, [parameter.name for parameter in parameters])
     return values
+
+
+def _tell_unknown(node: Node, known: list[str]) -> None:
+    for name in node._parameter_overrides:
+        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f": did you mean {near[0]}?" if near else ""
+            node.get_logger().error(f"has no parameter {name}, its value is not used{hint}")
 
 
 def liveness_from(values: Mapping[str, Any], name: str) -> LivenessLimits:

@@ -34,7 +34,7 @@ from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_inputs import SupervisorInputs
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
 from chute_ros.nodes.supervisor_memory import Memory
-from chute_ros.nodes.supervisor_messages import decisions_task, state_message
+from chute_ros.nodes.supervisor_messages import MODES, decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import (
     PARAMETERS,
     blind_rules,
@@ -114,6 +114,8 @@ class SafetySupervisorNode(Node):
                 f"rule '{rule}' can never be fulfilled: the autopilot is the only source of "
                 "measurements; add imu or odometry to vehicle_sources"
             )
+        if self.state.mode in MODES:
+            self.get_logger().warning(f"mode is {MODES[self.state.mode]} (parameter mode)")
         if self.lease.leading:
             self.services_offered.open()
         self.create_timer(1.0, self._diagnose, clock=self._steady)

@@ -58,8 +58,8 @@ class Health:
         self._own_fault = bool(self._shown) and (self._own_fault or own_fault)
         self._seen = seen
         level, text = diagnostics.OK, "leads" if lease.leading else "looks on"
-        if lease.trouble():
-            level, text = diagnostics.ERROR, lease.trouble()
+        if trouble := lease.trouble(now):
+            level, text = diagnostics.ERROR, trouble
         elif self._shown:
             # What a network loses is said again soon; what the loop did not do is not.
             level = diagnostics.ERROR if self._own_fault else diagnostics.WARN

@@ -45,6 +45,8 @@ class LeaseKeeper:
         #: Who follows this one, and when that was last said, monotonic s.
         self._followers: dict[str, float] = {}
         self._complained: set[str] = set()
+        #: Who claimed something last, and when, monotonic s.
+        self._other = ("", -math.inf)
         self._publisher = node.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
         node.create_subscription(
             SupervisorLease, "safety/lease", self._claim, qos.newest(qos.STATUS)
@@ -99,8 +101,11 @@ class LeaseKeeper:
         limit = self.config.timeout * RANKS
         return sorted(name for name, when in self._followers.items() if now - when < limit)
 
-    def trouble(self) -> str:
+    def trouble(self, now: float) -> str:
         """What is wrong with the supervisors' settings; empty: nothing."""
+        name, heard = self._other
+        if not self.config.standby and now - heard < self.config.timeout * RANKS:
+            return f"{name} runs as well: set hot_standby and different ranks, or stop one"
         if self.lease.same_rank:
             name, rank = self.lease.same_rank, self.config.rank
             return f"{name} has rank {rank} as well: give each supervisor its own"
@@ -130,15 +135,14 @@ class LeaseKeeper:
         if wrong := other.implausible(self.config.rank):
             self._complain(f"{message.name} claims {wrong}: not listened to")
             return
+        self._other = (message.name, now)
         self.lease, event = self.lease.heard(self.config, self._own(now), other, now)
         if event is not None:
             self._happened(event)
         if message.leading and not self.leading and message.state:
             self._follow_claim(message, now)
-        elif message.leading and self.leading and not self.config.standby:
-            self._complain(
-                f"{message.name} leads as well: set hot_standby and different ranks, or stop one"
-            )
+        if trouble := self.trouble(now):
+            self._complain(trouble)
 
     def _follow_claim(self, message: SupervisorLease, now: float) -> None:
         try:

@@ -10,11 +10,18 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.flight import measured, unusable
+from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
+
+#: What the modes mean in which no vehicle is protected.
+MODES = {
+    Mode.SHADOW: "SHADOW: says what it would do, and does nothing",
+    Mode.INHIBITED: "INHIBITED: decides nothing",
+}
 
 
 def state_message(config: SupervisorConfig, state: State, now: float, stamp: Time) -> SafetyState:
@@ -64,7 +71,7 @@ def decisions_task(
     level = diagnostics.OK
     if state.alarms or state.stage is Stage.FAULT:
         level = diagnostics.ERROR
-    elif reasons:
+    elif reasons or state.mode is not Mode.ACTIVE:
         level = diagnostics.WARN
     values: dict[str, object] = {
         "state": state.stage.name,
@@ -117,6 +124,11 @@ def _flight_blocked(state: State) -> bool:
 
 
 def _text(state: State, reasons: tuple[str, ...]) -> str:
+    text = _stage_text(state, reasons)
+    return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
+
+
+def _stage_text(state: State, reasons: tuple[str, ...]) -> str:
     if state.stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
         return f"{state.stage.name}: {'; '.join(reasons)}"
     if state.alarms:

@@ -15,7 +15,7 @@ from chute_ros.model import (
     flag_names,
 )
 from chute_ros.supervisor import flight
-from chute_ros.supervisor.config import PreflightLimits, SupervisorConfig
+from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
 from chute_ros.supervisor.machine import Stage
@@ -67,6 +67,11 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
             against += links
     reasons = [problem[link] for link in dict.fromkeys(against)]
     reasons += [
+        text
+        for rung in config.deploy_ladder
+        if not problem[rung.link] and (text := _rung_problem(rung, state.evidence(rung.link)))
+    ]
+    reasons += [
         f"{device} asks to block flight: {why}" for device, why in state.device_blocks.items()
     ]
     reasons += [
@@ -79,6 +84,20 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):
         reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
     return tuple(reasons)
+
+
+def _rung_problem(rung: Rung, evidence: LinkEvidence) -> str:
+    """A step of the ladder that is for a device which is not there would stop the motors and
+    release nothing; empty: it is there, or the node chooses."""
+    if rung.device in ("", TRIGGER):
+        return ""
+    status = evidence.devices.get(rung.device)
+    if status is None:
+        heard = ", ".join(sorted(evidence.devices)) or "none"
+        return f"deploy_ladder names {rung}, which was never heard (heard: {heard})"
+    if status.link_state is not LinkState.OK:
+        return f"deploy_ladder names {rung}, which is {status.link_state.name}"
+    return ""
 
 
 def _vehicle_problem(config: SupervisorConfig, state: State, now: float) -> str:

@@ -5,6 +5,7 @@ import time
 
 from chute_msgs.msg import SafetyState, SupervisorLease
 from chute_msgs.srv import Deploy, Kill
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from chute_ros.model import Action, Outcome
 
@@ -85,6 +86,17 @@ def test_two_that_set_no_standby_do_not_both_decide(pair):
         lambda: {"a", "b"} <= set(pair.claims) and pair.leads("a") != pair.leads("b"),
         "one of them yields",
     )
+    said = pair.bench.follow(DiagnosticArray, "/diagnostics")
+
+    def both_say():
+        every = [one for array in said for one in array.status if one.name.endswith(": itself")]
+        wrong = [one for one in every if one.level == DiagnosticStatus.ERROR]
+        return {one.message.partition(":")[0] for one in wrong} >= {
+            "a runs as well",
+            "b runs as well",
+        }
+
+    pair.bench.until(both_say, "each says that the other is there")
 
 
 def test_a_claim_with_a_number_that_leaves_none_is_not_listened_to(pair):

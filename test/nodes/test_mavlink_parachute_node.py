@@ -189,13 +189,20 @@ def test_another_vehicle_on_the_network_is_neither_heard_nor_fired(bench):
     assert others.commands_heard == stranger.commands_heard == []
 
 
-def test_a_second_vehicle_where_none_was_named_forbids_take_off(bench, network):
+def test_a_second_vehicle_where_none_was_named_forbids_take_off(bench, network, capfd):
     beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
     network.plug(Module())
     bench.until(newest(beats, device_healthy=True), "one alone is ours")
     network.plug(Module(ParachuteSettings(system_id=2)))
     bench.until(newest(beats, device_healthy=False), "two make it doubtful")
     assert beats[-1].link_state == LinkState.OK
+    log = []
+
+    def told():
+        log.append(capfd.readouterr().err)
+        return "forbids take-off: " in "".join(log) and "set parachute_system_id" in "".join(log)
+
+    bench.until(told, "the log says why")
 
 
 # /diagnostics

@@ -7,7 +7,7 @@ import time
 import pytest
 from chute_msgs.msg import LinkHeartbeat
 from chute_msgs.srv import Arm
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Module, Network
 
 from chute_ros.errors import SigningKeyError
@@ -69,6 +69,9 @@ def test_who_does_not_sign_with_the_key_is_not_heard_but_counted(bench, key_file
         return any(pair.key == f"dropped: {reason}" and int(pair.value) > 5 for pair in pairs)
 
     bench.until(counted, "it is counted")
+    links = [s for array in diagnostics for s in array.status if s.name.endswith(": link")]
+    assert links[-1].level == DiagnosticStatus.ERROR
+    assert f"what comes cannot be read, mostly: {reason} (" in links[-1].message
     assert {beat.link_state for beat in beats} == {LinkState.NEVER_SEEN}
     assert not bench.call(Arm, "mavlink_parachute/arm", arm=True).success
 

@@ -204,6 +204,20 @@ def test_the_file_is_taken_at_the_root_and_in_a_namespace(
         node.destroy_node()
 
 
+def test_a_name_that_no_parameter_has_is_told_with_the_one_that_was_meant(bench, capfd):
+    bench.add(SafetySupervisorNode, requird_links=["mavlink_parachute"], nonsense=1)
+    told = capfd.readouterr().err
+    assert (
+        "has no parameter requird_links, its value is not used: did you mean required_links?"
+    ) in told
+    assert "has no parameter nonsense, its value is not used" in told
+
+
+def test_names_that_ros_itself_gives_meaning_are_not_told(bench, capfd):
+    bench.add(SafetySupervisorNode, use_sim_time=False)
+    assert "has no parameter" not in capfd.readouterr().err
+
+
 # While running
 
 

@@ -291,6 +291,27 @@ def test_inhibited_it_does_nothing(ready):
     assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
 
 
+@pytest.mark.parametrize(
+    ("mode", "meaning"),
+    [
+        ("SHADOW", "SHADOW: says what it would do, and does nothing"),
+        ("INHIBITED", "INHIBITED: decides nothing"),
+    ],
+)
+def test_a_mode_in_which_nobody_is_protected_does_not_look_well(bench, capfd, mode, meaning):
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    scene = Scene(bench, mode=mode)
+    assert scene.await_stage(SafetyState.READY).state_text == f"{meaning}; READY"
+    assert f"mode is {meaning} (parameter mode)" in capfd.readouterr().err
+
+    def decisions():
+        every = [one for array in diagnostics for one in array.status]
+        return [one for one in every if one.name.endswith("safety_supervisor: decisions")]
+
+    bench.until(lambda: decisions() and decisions()[-1].message == f"{meaning}; READY", "it says")
+    assert decisions()[-1].level == DiagnosticStatus.WARN
+
+
 def test_a_mode_that_is_none_is_refused_in_words(ready):
     answer = ready.call(SetMode, "set_mode", mode=9)
     assert not answer.success

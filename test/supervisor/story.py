@@ -19,7 +19,7 @@ from chute_ros.model import (
     VehicleState,
 )
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.config import TRIGGER, SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.profile_reader import read_profile
@@ -211,8 +211,10 @@ class Story:
         return "\n".join(o.text for _, o in self.outputs if isinstance(o, i.Say))
 
     def ready(self) -> Story:
-        """Links healthy, standing on the ground."""
-        self.at(self.t, self.heartbeat(), i.VehicleReport(STANDING))
+        """Links healthy, standing on the ground; the devices that the ladder names are there."""
+        named = [one for one in self.config.deploy_ladder if one.device not in ("", TRIGGER)]
+        devices = [parachute(link=one.link, device=one.device) for one in named]
+        self.at(self.t, self.heartbeat(), *devices, i.VehicleReport(STANDING))
         assert self.state.stage is Stage.READY
         return self
 

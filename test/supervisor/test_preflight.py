@@ -18,7 +18,7 @@ from chute_ros.model import (
     TriggerFlags,
 )
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import PreflightLimits, SupervisorConfig
+from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.preflight import arm_reasons, block_reasons
 from chute_ros.supervisor.rules import Clears, DeviceCondition, DeviceFact
@@ -47,6 +47,37 @@ def standing(limits: PreflightLimits = STRICT, **told: Any) -> Story:
     state = replace(STANDING, **{**battery, **told})
     story.at(0.0, story.heartbeat(), i.VehicleReport(state), i.ParachuteReport(LINK, GOOD))
     return story
+
+
+def after_hearing(*devices: ParachuteStatus) -> tuple[str, ...]:
+    """Why flight is blocked where the ladder names 1/162, and these devices are heard."""
+    ladder = (Rung(LINK), Rung(LINK, "1/162"), Rung(LINK, "trigger"))
+    story = Story(SupervisorConfig(deploy_ladder=ladder))
+    reports = [i.ParachuteReport(LINK, one) for one in devices]
+    story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING), *reports)
+    return block_reasons(story.config, story.state, START)
+
+
+def test_a_step_for_a_device_that_is_not_there_blocks_flight() -> None:
+    """It would stop the motors and release nothing."""
+    step = "deploy_ladder names mavlink_parachute:1/162, which"
+    second = replace(GOOD, device="1/162")
+    assert after_hearing() == (f"{step} was never heard (heard: none)",)
+    assert after_hearing(GOOD) == (f"{step} was never heard (heard: 1/161)",)
+    assert after_hearing(GOOD, replace(second, link_state=LinkState.LOST)) == (f"{step} is LOST",)
+    assert after_hearing(GOOD, second) == ()
+
+
+def test_a_step_on_a_link_that_may_be_missing_blocks_nothing_while_it_is() -> None:
+    other = "upf_can"
+    ladder = (Rung(LINK), Rung(other, "34"))
+    config = SupervisorConfig(deploy_links=(LINK, other), deploy_ladder=ladder)
+    story = Story(config)
+    story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
+    assert block_reasons(config, story.state, START) == ()
+    story.at(0.1, story.heartbeat(other))
+    (reason,) = block_reasons(config, story.state, START + 0.1)
+    assert reason == "deploy_ladder names upf_can:34, which was never heard (heard: none)"
 
 
 def reasons(story: Story, day: int = TODAY) -> tuple[str, ...]:
