@@ -360,6 +360,7 @@ class DeviceNode(Node, ABC):
     async def _arm(self, request: Arm.Request, response: Arm.Response) -> Arm.Response:
         end = await self.request(lambda link, token, now: self.arm_link(link, token, request, now))
         response.success, response.message = end.finished.success, end.finished.message
+        self.get_logger().info(messages.answered("~/arm", request, response))
         return response
 
     async def _deploy(self, request: Deploy.Request, response: Deploy.Response) -> Deploy.Response:
@@ -370,6 +371,7 @@ class DeviceNode(Node, ABC):
         finished = end.finished
         response.success, response.accepted = finished.success, finished.accepted
         response.message = finished.message
+        self.get_logger().info(messages.answered("~/deploy", request, response))
         return response
 
     def _parameters_set(self, parameters: list[Any]) -> Any:

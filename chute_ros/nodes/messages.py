@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import (
@@ -131,6 +132,14 @@ def json_value(value: object) -> object:
     if isinstance(value, (list, tuple)):
         return [json_value(one) for one in value]
     return value
+
+
+def answered(name: str, request: Any, response: Any) -> str:
+    """A service call with its answer, for a log."""
+    asked = [
+        f"{key}={getattr(request, key)!r:.200}" for key in request.get_fields_and_field_types()
+    ]
+    return f"{name}({', '.join(asked)}) answered: {response.message}"
 
 
 def _known(kind, number):  # type: ignore[no-untyped-def]

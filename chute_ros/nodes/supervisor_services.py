@@ -51,7 +51,7 @@ class SupervisorServices:
         leads must decide all the same."""
         self._open = True
         for kind, name, callback in self._offers[len(self._services) :]:
-            served = self._counted(callback)
+            served = self._counted(name, callback)
             try:
                 service = self._node.create_service(kind, name, served, callback_group=self._group)
             except Exception as error:  # noqa: BLE001 - the middleware names none
@@ -74,13 +74,20 @@ class SupervisorServices:
                 self._node.destroy_service(service)
             self._services.clear()
 
-    def _counted(self, callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def _counted(
+        self, name: str, callback: Callable[[Any, Any], Any]
+    ) -> Callable[[Any, Any], Any]:
         async def served(request: Any, response: Any) -> Any:
             self._calls += 1
             try:
-                return await callback(request, response)
+                answer = await callback(request, response)
             finally:
                 self._calls -= 1
+            # What a person did is told whatever came of it.
+            log = self._node.get_logger()
+            text = messages.answered(name, request, response)
+            log.info(text) if response.success else log.warning(text)
+            return answer
 
         return served
 
@@ -126,7 +133,6 @@ class SupervisorServices:
             response.message = f"mode {request.mode}: need ACTIVE 0, SHADOW 1 or INHIBITED 2"
             return response
         mode = inputs.Mode(request.mode)
-        self._node.get_logger().warning(f"set_mode {mode.name}: {request.reason!r}")
         end = await self._ask(lambda t: inputs.ModeRequest(t, mode, request.force))
         response.success, response.message = end.success, end.message
         return response

@@ -302,7 +302,7 @@ class EffectLoop(Generic[CommandT]):
             newest = "" if self._newest_accepted else f"; newest answer: {self._answer}"
             return text + (
                 f"acknowledged after {self._accepted_after:.2f} s, "
-                f"but the device's own status never showed: {self.goal.effect}{newest}"
+                f"but the device's own status never showed that {self.goal.effect}{newest}"
             )
         if not self._sends and self.goal.unacknowledged:
             return f"{text}never sent: its turn did not come, or the wire is closed"
@@ -311,12 +311,12 @@ class EffectLoop(Generic[CommandT]):
         if self.goal.unacknowledged:
             return (
                 f"{text}{self._sent_text()}, "
-                f"but the device's own status never showed: {self.goal.effect}"
+                f"but the device's own status never showed that {self.goal.effect}"
             )
         answer = self._answer or "no acknowledgement came"
         if self.goal.shown is None or self.goal.shown():
             return text + answer
-        return f"{text}{answer}, and the device's own status never showed: {self.goal.effect}"
+        return f"{text}{answer}, and the device's own status never showed that {self.goal.effect}"
 
     def _sent_text(self) -> str:
         return "sent once" if self._sends == 1 else f"sent {self._sends} times"

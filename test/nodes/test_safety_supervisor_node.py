@@ -291,6 +291,15 @@ def test_inhibited_it_does_nothing(ready):
     assert ready.decided(Action.KILL) == ready.decided(Action.DEPLOY) == []
 
 
+def test_what_a_person_asks_for_is_in_the_log_whatever_came_of_it(ready, capfd):
+    capfd.readouterr()
+    ready.call(Deploy, "deploy", reason="it looks odd")
+    ready.call(SetMode, "set_mode", mode=2, reason="a test")
+    log = capfd.readouterr().err
+    assert "safety/deploy(force=False, reason='it looks odd') answered: refused: " in log
+    assert "safety/set_mode(mode=2, force=False, reason='a test') answered: mode INHIBITED" in log
+
+
 @pytest.mark.parametrize(
     ("mode", "meaning"),
     [

@@ -152,7 +152,7 @@ def test_a_command_whose_effect_does_not_show_is_sent_but_not_confirmed(bench):
     cable.act("mute")
     answer = cable.command("open_mav")
     assert (answer.success, answer.sent, answer.confirmed) == (False, True, False)
-    assert "never showed: telemetry says mav_open 1" in answer.message
+    assert "never showed that telemetry says mav_open 1" in answer.message
     answer = cable.command("payload_n1")
     assert "sent once, but" in answer.message, "an event is never repeated"
 

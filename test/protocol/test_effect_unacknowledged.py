@@ -92,7 +92,7 @@ def test_sent_and_never_shown_is_sent_again_and_given_up_in_time():
     end = bench.end
     assert (end.success, end.sent, end.shown) == (False, True, False)
     assert end.message == (
-        "open given up after 5.0 s: sent 4 times, but the device's own status never showed: "
+        "open given up after 5.0 s: sent 4 times, but the device's own status never showed that "
         "telemetry says open"
     )
     assert bench.reports == [Outcome.SENT, Outcome.FAILED]

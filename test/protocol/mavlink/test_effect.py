@@ -109,7 +109,7 @@ def test_acknowledged_but_never_shown_says_which_did_not_come_and_when_it_gave_u
     assert (bench.end.success, bench.end.accepted) == (False, True)
     assert "given up after 5.0 s" in bench.end.message
     assert "acknowledged after 0.10 s" in bench.end.message
-    assert "never showed: PARACHUTE_STATUS says deployed" in bench.end.message
+    assert "never showed that PARACHUTE_STATUS says deployed" in bench.end.message
 
 
 def test_neither_says_both():

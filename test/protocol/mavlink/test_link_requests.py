@@ -66,7 +66,7 @@ def test_release_acknowledged_but_never_shown_is_a_failure_that_says_so():
     bench.at(0.6).hear(CHUTE, ack(RELEASE)).at(20.0)
     end = bench.end(1).finished
     assert (end.success, end.accepted) == (False, True)
-    assert "never showed: PARACHUTE_STATUS says deployed" in end.message
+    assert "never showed that PARACHUTE_STATUS says deployed" in end.message
 
 
 def test_release_without_ground_clearance_goes_on_until_it_is_accepted():

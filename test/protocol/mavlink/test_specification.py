@@ -162,7 +162,7 @@ def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: 
     bench.stream(5.5, 0.5, PARACHUTE, lambda: status(boot_ms=next(boot), armed=0))
     end = bench.end(3).finished
     assert (end.success, end.accepted) == (False, True)
-    assert "never showed: PARACHUTE_STATUS says FC armed" in end.message
+    assert "never showed that PARACHUTE_STATUS says FC armed" in end.message
 
 
 def test_SET_PARACHUTE_ARM_bit_beyond_128_is_the_devices_to_deny():  # noqa: N802

@@ -121,7 +121,7 @@ def test_what_else_telemetry_shows_does_not_confirm_it(name, before, shows, othe
     end = bench.end(number)
     assert (end.success, end.sent, end.shown) == (False, True, False)
     assert f"{name} given up after 5.0 s: sent " in end.message
-    assert "but the device's own status never showed: telemetry says" in end.message
+    assert "but the device's own status never showed that telemetry says" in end.message
     assert bench.steps(number) == ["SENT", "FAILED"]
 
 

@@ -186,7 +186,7 @@ def test_it_ends_when_the_time_is_up_and_says_so():
     end = bench.end(number)
     assert (end.success, end.sent, end.shown) == (False, True, False)
     assert end.message == (
-        "drogue given up after 5.0 s: sent 4 times, but the device's own status never showed: "
+        "drogue given up after 5.0 s: sent 4 times, but the device's own status never showed that "
         "telemetry says ssa_drogue_deployed 1, or flight mode DrogueDeployed"
     )
 

@@ -146,7 +146,7 @@ def test_acknowledged_deploy_that_is_never_shown_is_a_failure_that_says_so(bench
     story.trigger.stuck = True
     deploy(story).after(8.0)
     assert not story.end(1).success
-    assert "never showed: ParachuteStatus says LAUNCHED" in story.end(1).message
+    assert "never showed that ParachuteStatus says LAUNCHED" in story.end(1).message
 
 
 def test_answer_to_another_request_is_no_answer_to_a_deploy(bench):

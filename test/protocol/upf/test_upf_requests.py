@@ -135,7 +135,7 @@ def test_request_that_is_accepted_but_never_shown_fails_in_time(bench):
         story.heard.clear()
         story.after(0.1).status("READY")
     assert not story.end(1).success
-    assert "never showed: ParachuteStatus says TAKEOFF or ARMED" in story.end(1).message
+    assert "never showed that ParachuteStatus says TAKEOFF or ARMED" in story.end(1).message
 
 
 def test_request_that_nobody_answers_fails_in_time(bench):
