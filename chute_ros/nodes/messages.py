@@ -134,12 +134,12 @@ def json_value(value: object) -> object:
     return value
 
 
-def answered(name: str, request: Any, response: Any) -> str:
+def answered(service: str, request: Any, response: Any) -> str:
     """A service call with its answer, for a log."""
     asked = [
         f"{key}={getattr(request, key)!r:.200}" for key in request.get_fields_and_field_types()
     ]
-    return f"{name}({', '.join(asked)}) answered: {response.message}"
+    return f"{service}({', '.join(asked)}) answered: {response.message}"
 
 
 def _known(kind, number):  # type: ignore[no-untyped-def]

@@ -20,8 +20,8 @@ def test_an_effect_that_does_not_show_is_ordered_again_until_the_time_is_up():
     bench.after(9.0)
     assert bench.times("<M>") == [1.05, 2.55, 4.05, 5.55]
     assert bench.end(number).message == (
-        "open_mav given up after 5.0 s: sent 4 times, but the device's own status never showed that "
-        "telemetry says mav_open 1"
+        "open_mav given up after 5.0 s: sent 4 times, but the device's own status never showed "
+        "that telemetry says mav_open 1"
     )
 
 
