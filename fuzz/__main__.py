@@ -99,11 +99,11 @@ def _replay(name: str, path: Path) -> None:
     target = target_of(name)
     try:
         seconds = attempt(target, data)
-        size = live_long(target, data)
+        largest = live_long(target, data)
     except BaseException as error:
         print(f"fuzz: {name}: {told_error(error)}", file=sys.stderr, flush=True)
         raise
-    held = f"; after its variations {size} objects are held" if size else ""
+    held = f"; its variations leave {largest} entries in one store" if largest else ""
     print(f"{name}: read in {seconds * 1e3:.1f} ms{held}: nothing wrong")
 
 

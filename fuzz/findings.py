@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import time
 import traceback
 from pathlib import Path
 
 from fuzz.target import Target, attempt, live_long
-
-#: One input of so many is also repeated in variations within one instance.
-_LONG_LIVES_ONE_IN = 101
 
 
 class Findings:
@@ -21,19 +19,30 @@ class Findings:
         self._places: set[tuple[str, ...]] = set()
         self.slowest = 0.0
         self.largest = 0
+        #: What went into single inputs and into long lives, s of the processor: each half of it.
+        self._single = self._long = 0.0
 
     def try_input(self, data: bytes) -> str:
         """Try one; the file that replays it if it is a new finding, or empty."""
         try:
-            self.slowest = max(self.slowest, attempt(self._target, data))
-            if self._target.most and sum(data) % _LONG_LIVES_ONE_IN == 0:
-                self.largest = max(self.largest, live_long(self._target, data))
+            seconds = attempt(self._target, data)
+            self.slowest = max(self.slowest, seconds)
+            self._single += seconds
+            if self._target.most and self._long <= self._single:
+                self._live_long(data)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # noqa: BLE001
             # Whatever it is, it is the finding.
             return self._keep(data, error)
         return ""
+
+    def _live_long(self, data: bytes) -> None:
+        began = time.process_time()
+        try:
+            self.largest = max(self.largest, live_long(self._target, data))
+        finally:
+            self._long += time.process_time() - began
 
     def _keep(self, data: bytes, error: BaseException) -> str:
         place = place_of(error)

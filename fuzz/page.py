@@ -7,7 +7,6 @@ from pathlib import Path
 
 from bench.report import machine, table
 from fuzz.run import CORPUS, Outcome
-from fuzz.target import VARIATIONS
 from fuzz.targets import target_of
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "fuzz.md"
@@ -20,15 +19,16 @@ Written by `make fuzz MINUTES={minutes:g}`. The numbers belong to the machine th
 Every reader of foreign bytes, and the links with their transactions, are fed by libFuzzer
 (through atheris) with inputs that it changes until they reach new code. In the targets of links an
 input is a program: time that passes, frames with fuzzed fields, requests. Whatever is fed: nothing
-is raised but the named errors of files and settings; no input takes long; an instance that reads
-{variations} variations of an input holds few objects; what is dropped is counted; every request
-ends once; and nothing leaves that fires and was not ordered. `fuzz/targets/` says it for each.
+is raised but the named errors of files and settings; no input takes long; nothing in an instance
+that reads variations of an input grows with each of them; what is dropped is counted; every
+request ends once; and nothing leaves that fires and was not ordered. `fuzz/targets/` says it for
+each.
 
 {table}
 
 Edges and features as libFuzzer counts them; new: inputs that reached more than all before them;
-slowest: time of the processor; held: objects in one instance in the end, at most, where it is
-looked at; memory: of the process at its start and at most.
+slowest: time of the processor; held: entries of the largest store of an instance, where that
+is looked at; memory: of the process at its start and at most.
 
 {found}
 
@@ -60,7 +60,6 @@ def page(outcomes: Sequence[Outcome], minutes: float) -> str:
     return _PAGE.format(
         minutes=minutes,
         machine=machine(),
-        variations=VARIATIONS,
         table=table(head, rows),
         found=text,
         stored=len(files),

@@ -21,7 +21,7 @@ CORPUS = HERE / "corpus"
 GROWN, FOUND_FOLDER = HERE / "grown", HERE / "found"
 #: A process larger than this is a finding, MB; so is an input that takes longer than this, s, in
 #: code that is not Python's.
-MOST_MEMORY, HANGS_AFTER = 2048, 60
+MOST_MEMORY, HANGS_AFTER = 2048, 120
 #: Where files cost no disk.
 _MEMORY = Path("/dev/shm")
 #: How long it may take besides, on a busy machine, s.
@@ -34,8 +34,8 @@ _ARTIFACT = re.compile(r"Test unit written to (\S+)")
 
 @dataclass
 class Outcome:
-    """What became of one target. slowest: ms of the processor; largest: objects that one instance
-    held in the end, by size.py; memory: of the process at the start and at most, MB."""
+    """What became of one target. slowest: ms of the processor; largest: entries of the largest
+    store of one instance, by size.py; memory: of the process at the start and at most, MB."""
 
     name: str
     seconds: float
@@ -82,6 +82,8 @@ def fuzz(name: str, seconds: int) -> Outcome:
         name,
         f"-max_total_time={seconds}",
         f"-timeout={HANGS_AFTER}",
+        # Otherwise each that takes ten seconds is written as if it were a finding.
+        f"-report_slow_units={HANGS_AFTER}",
         f"-rss_limit_mb={MOST_MEMORY}",
         f"-artifact_prefix={FOUND_FOLDER / name}/",
         # Long inputs from the first: a program of few bytes gets nowhere.

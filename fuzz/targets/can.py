@@ -56,7 +56,7 @@ class Slcan:
         self._empty()
 
     def held(self) -> object:
-        return self._wire.counts
+        return self._wire
 
     def feed(self, data: bytes) -> None:
         piece = data[0] + 1 if data else 1
@@ -90,6 +90,8 @@ def _lines(data: bytes) -> int:
 
 
 TARGETS = (
-    Target("can.multicast", "packets of CAN over UDP multicast, CRC mended", Multicast, 500, 96),
-    Target("can.slcan", "lines of a serial CAN adapter", Slcan, 500, 512),
+    Target(
+        "can.multicast", "packets of CAN over UDP multicast, CRC mended", Multicast, longest=96
+    ),
+    Target("can.slcan", "lines of a serial CAN adapter", Slcan, longest=512),
 )

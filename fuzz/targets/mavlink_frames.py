@@ -156,9 +156,7 @@ class Mended(Account):
 
 
 TARGETS = (
-    Target("mavlink.raw", "any bytes, as a stream in pieces or a datagram", Raw, 500),
-    Target("mavlink.mended", "frames with the right checksum, noise between them", Mended, 500),
-    Target(
-        "mavlink.signed", "frames with the right signature", lambda: Mended(signed=True), 20_000
-    ),
+    Target("mavlink.raw", "any bytes, as a stream in pieces or a datagram", Raw),
+    Target("mavlink.mended", "frames with the right checksum, noise between them", Mended),
+    Target("mavlink.signed", "frames with the right signature", lambda: Mended(signed=True)),
 )

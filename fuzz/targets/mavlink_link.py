@@ -186,12 +186,11 @@ class MavlinkLinked(Linked):
 
 
 TARGETS = (
-    Target("mavlink.link", "the link with its transactions", MavlinkLinked, 30_000, 512),
+    Target("mavlink.link", "the link with its transactions", MavlinkLinked, longest=512),
     Target(
         "mavlink.link_signed",
         "the same with a key",
         lambda: MavlinkLinked(signed=True),
-        40_000,
-        512,
+        longest=512,
     ),
 )

@@ -139,6 +139,6 @@ class Lines:
 
 
 TARGETS = (
-    Target("umbilical.stream", "bytes to lines and dumps, in any pieces", Stream, 500, 2048),
-    Target("umbilical.lines", "lines to records and sayings", Lines, 500, 2048),
+    Target("umbilical.stream", "bytes to lines and dumps, in any pieces", Stream, longest=2048),
+    Target("umbilical.lines", "lines to records and sayings", Lines, longest=2048),
 )

@@ -106,5 +106,5 @@ class UmbilicalLinked(Linked):
 
 
 TARGETS = (
-    Target("umbilical.link", "the link with its commands and dumps", UmbilicalLinked, 20_000, 512),
+    Target("umbilical.link", "the link with its commands and dumps", UmbilicalLinked, longest=512),
 )

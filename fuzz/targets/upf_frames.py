@@ -8,7 +8,7 @@ from chute_ros.errors import MessageError
 from chute_ros.protocol.dronecan.can_frame import pack
 from chute_ros.protocol.dronecan.data_types import DataType, DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
+from chute_ros.protocol.dronecan.transfer import MOST_SESSIONS, Kind, Transfer, frames_of
 from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import errands
 from chute_ros.transport.data_types import load_data_types
@@ -16,6 +16,8 @@ from fuzz.program import Program
 from fuzz.target import Target, WrongError
 
 US, CONTROLLER, TRIGGER = 10, 33, 34
+#: The stores that may be larger than others.
+LARGER = {"Assembler._sessions": MOST_SESSIONS}
 _FRAME = 16
 #: Those that something is done with.
 NAMES = (
@@ -144,6 +146,6 @@ class Transfers:
 
 
 TARGETS = (
-    Target("upf.frames", "any CAN frames to transfers to values", Frames, 60_000),
-    Target("upf.transfers", "good transfers, and spoilt ones", Transfers, 60_000),
+    Target("upf.frames", "any CAN frames to transfers to values", Frames, larger=LARGER),
+    Target("upf.transfers", "good transfers, and spoilt ones", Transfers, larger=LARGER),
 )

@@ -9,7 +9,13 @@ from typing import Any
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
-from chute_ros.protocol.dronecan.transfer import Assembler, Kind, Transfer, frames_of
+from chute_ros.protocol.dronecan.transfer import (
+    TRANSFER_IDS,
+    Assembler,
+    Kind,
+    Transfer,
+    frames_of,
+)
 from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import errands, parameters
 from chute_ros.protocol.upf.config import UpfConfig
@@ -18,7 +24,7 @@ from chute_ros.protocol.upf.link import UpfLink
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 from fuzz.targets.linked import Linked
-from fuzz.targets.upf_frames import CONTROLLER, TRIGGER, US, data_types, transfer_of
+from fuzz.targets.upf_frames import CONTROLLER, LARGER, TRIGGER, US, data_types, transfer_of
 
 _NODES = (0, CONTROLLER, TRIGGER, 99)
 _TEXTS = ("true", "false", "50", "-1", "nan", "9" * 40, "", "x" * 200)
@@ -30,6 +36,8 @@ _CONSTANTLY = (
 )
 _DEPLOYS = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE")
 _REQUESTS = ("TYPE_TAKEOFF", "TYPE_ARM", "TYPE_DISARM", "TYPE_LAND", *_DEPLOYS)
+#: Any node is asked who it is, and a few for more.
+_LARGER = {**LARGER, "ServiceCalls._given_up": 2 * 128 * TRANSFER_IDS}
 
 
 class UpfLinked(Linked):
@@ -228,13 +236,17 @@ class UpfLinked(Linked):
 
 TARGETS = (
     Target(
-        "upf.link", "the link with its transactions, allocator and time", UpfLinked, 60_000, 256
+        "upf.link",
+        "the link with its transactions, allocator and time",
+        UpfLinked,
+        longest=256,
+        larger=_LARGER,
     ),
     Target(
         "upf.link_triggers",
         "the same where there is no controller",
         lambda: UpfLinked(without_controller=True),
-        60_000,
-        256,
+        longest=256,
+        larger=_LARGER,
     ),
 )

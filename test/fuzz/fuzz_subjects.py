@@ -13,12 +13,14 @@ from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.protocol.umbilical.stream import Item, StreamReader
 from chute_ros.protocol.upf import definitions as names
-from fuzz.target import Subject
+from fuzz.target import MOST_ENTRIES, Subject
 from fuzz.targets import mavlink_frames, mavlink_link, umbilical_lines, umbilical_link, upf_link
 from fuzz.targets.upf_frames import US, data_types
 
 #: Programs: half a second goes by; the motors are to be stopped.
 WAIT, KILL = b"\0\3", b"\7"
+#: One piece of bytes comes over MAVLink, DroneCAN, the umbilical.
+NOISE, FRAME, LINE = b"\5\0\0\3abc", b"\7" + bytes(16), b"\2\2\5[LOG]"
 
 
 class Reader:
@@ -26,11 +28,13 @@ class Reader:
 
     def __init__(self) -> None:
         self.kept: list[str] = []
+        self.inputs = 0
 
     def held(self) -> object:
         return self
 
     def feed(self, data: bytes) -> None:
+        self.inputs += 1
         data.decode("ascii", "replace")
 
 
@@ -58,6 +62,16 @@ class Grows(Reader):
     def feed(self, data: bytes) -> None:
         if data.hex() not in self.kept:
             self.kept.append(data.hex())
+
+
+class Fills(Grows):
+    """It keeps so many names and no more."""
+
+    MOST = 30
+
+    def feed(self, data: bytes) -> None:
+        if len(self.kept) < self.MOST:
+            super().feed(data)
 
 
 def loses_bytes() -> Subject:
@@ -101,18 +115,32 @@ def with_link(subject: Any, **methods: Callable[..., Any]) -> Subject:
     return done
 
 
+def keeps_pieces(subject: Any) -> Subject:
+    """A link that keeps each piece of bytes that it hears, for ever."""
+    hears = subject._link.receive
+    kept = subject._link.kept = []
+
+    def keeps(data: bytes, *rest: Any) -> None:
+        kept.append(data)
+        hears(data, *rest)
+
+    return with_link(subject, receive=keeps)
+
+
 def _ended() -> list[Any]:
     return [RequestFinished(EffectFinished(1, True, True, NO_ANSWER, "it ended"))]
 
 
 @dataclass(frozen=True)
 class Broken:
-    """One of them, the same in good health, an input that tells them apart, and as what."""
+    """One of them, the same in good health, an input that tells them apart, and as what. most:
+    entries that a store may have, 0: that is not looked at."""
 
     make: Callable[[], Subject]
     healthy: Callable[[], Subject]
     data: bytes
     told: str
+    most: int = 0
 
 
 BROKEN = {
@@ -159,5 +187,26 @@ BROKEN = {
         mavlink_link.MavlinkLinked,
         WAIT,
         "spins: ",
+    ),
+    "grows over MAVLink": Broken(
+        lambda: keeps_pieces(mavlink_link.MavlinkLinked()),
+        mavlink_link.MavlinkLinked,
+        NOISE,
+        "grows: MavlinkLink.kept has ",
+        MOST_ENTRIES,
+    ),
+    "grows over DroneCAN": Broken(
+        lambda: keeps_pieces(upf_link.UpfLinked()),
+        upf_link.UpfLinked,
+        FRAME,
+        "grows: UpfLink.kept has ",
+        MOST_ENTRIES,
+    ),
+    "grows over the umbilical": Broken(
+        lambda: keeps_pieces(umbilical_link.UmbilicalLinked()),
+        umbilical_link.UmbilicalLinked,
+        LINE,
+        "grows: UmbilicalLink.kept has ",
+        MOST_ENTRIES,
     ),
 }
