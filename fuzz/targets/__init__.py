@@ -21,6 +21,7 @@ GROUPS = {
         *("files.record", "files.left", "files.profile", "files.address", "files.key"),
         *("files.layout", "files.node_ids", "files.mcap"),
     ),
+    "handover": ("supervisor.handover",),
     "recordings": ("recordings.turns", "recordings.box", "recordings.parameters"),
     "simulated": ("simulated.parachute", "simulated.upf", "simulated.flight_computer"),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from chute_ros.protocol.dronecan.endpoint import Endpoint
@@ -13,14 +13,24 @@ from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.protocol.umbilical.stream import Item, StreamReader
 from chute_ros.protocol.upf import definitions as names
+from chute_ros.supervisor.inputs import Input
 from fuzz.target import MOST_ENTRIES, Subject
-from fuzz.targets import mavlink_frames, mavlink_link, umbilical_lines, umbilical_link, upf_link
+from fuzz.targets import (
+    handover,
+    mavlink_frames,
+    mavlink_link,
+    umbilical_lines,
+    umbilical_link,
+    upf_link,
+)
 from fuzz.targets.upf_frames import US, data_types
 
 #: Programs: half a second goes by; the motors are to be stopped.
 WAIT, KILL = b"\0\3", b"\7"
 #: One piece of bytes comes over MAVLink, DroneCAN, the umbilical.
 NOISE, FRAME, LINE = b"\5\0\0\3abc", b"\7" + bytes(16), b"\2\2\5[LOG]"
+#: A leader tells of a deploy that waits for its kill.
+WAITS = b"\1\4"
 
 
 class Reader:
@@ -127,6 +137,14 @@ def keeps_pieces(subject: Any) -> Subject:
     return with_link(subject, receive=keeps)
 
 
+class Overflows(handover.Follower):
+    """A supervisor that counts its decisions further than a message can hold."""
+
+    def _update(self, new: tuple[Input, ...]) -> None:
+        self._state = replace(self._state, next_id=2**64)
+        super()._update(new)
+
+
 def _ended() -> list[Any]:
     return [RequestFinished(EffectFinished(1, True, True, NO_ANSWER, "it ended"))]
 
@@ -181,6 +199,12 @@ BROKEN = {
         mavlink_link.MavlinkLinked,
         KILL,
         "never ended: kill",
+    ),
+    "decides what cannot be told": Broken(
+        Overflows,
+        handover.Follower,
+        WAITS,
+        "no device can be told decision (9, 18446744073709551616)",
     ),
     "spins": Broken(
         lambda: with_link(mavlink_link.MavlinkLinked(), next_deadline=lambda: 0.0),
