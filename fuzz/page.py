@@ -16,13 +16,18 @@ _PAGE = """\
 Written by `make fuzz MINUTES={minutes:g}`. The numbers belong to the machine that made them:
 {machine}.
 
-Every reader of foreign bytes, and the links with their transactions, are fed by libFuzzer
-(through atheris) with inputs that it changes until they reach new code. In the targets of links an
-input is a program: time that passes, frames with fuzzed fields, requests. Whatever is fed: nothing
-is raised but the named errors of files and settings; no input takes long; nothing in an instance
-that reads variations of an input grows with each of them; what is dropped is counted; every
-request ends once; and nothing leaves that fires and was not ordered. `fuzz/targets/` says it for
-each.
+The readers of foreign bytes that the table names, and the links with their transactions, are fed
+by libFuzzer (through atheris) with inputs that it changes until they reach new code. In the
+targets of links an input is a program: time that passes, frames with fuzzed fields, requests.
+Whatever is fed: nothing is raised but the named errors of files and settings; no input takes
+long; nothing in an instance that reads variations of an input grows with each of them; what is
+dropped is counted; every request ends once; and nothing leaves that fires and was not ordered.
+`fuzz/targets/` says it for each.
+
+No target is there for ROS messages, which the middleware has given their types (only the state
+that a leading supervisor tells is fed); for the sockets and ports of the wires, whose bytes go
+to these readers; for DSDL files, which the DroneCAN library reads; and for what a node keeps of
+MAVLink signatures.
 
 {table}
 
@@ -32,8 +37,10 @@ is looked at; memory: of the process at its start and at most.
 
 {found}
 
-{stored} inputs ({size} kB) that together reach all that was ever reached are stored in
-`fuzz/corpus/`; `make test` feeds them again. One file: `python3 -m fuzz --replay TARGET FILE`.
+{stored} inputs ({size} kB) are stored in `fuzz/corpus/`: together they reached every edge that any
+had reached when they were last chosen among the stored and the new ones, which no run does by
+itself (`python3 -m fuzz --merge`). `make test` feeds them again. One file:
+`python3 -m fuzz --replay TARGET FILE`.
 """
 
 

@@ -1,4 +1,4 @@
-"""What the fuzzer ever reached is reached again, without the fuzzer; and it would be noticed."""
+"""What the fuzzer reached is reached again, without the fuzzer; and it would be noticed."""
 
 from __future__ import annotations
 
