@@ -52,7 +52,13 @@ class Tally:
     faults: Counter[str] = field(default_factory=Counter)
     wrong: list[Line] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
+    #: s, of all that flew at the same time.
     took: float = 0.0
+
+    @property
+    def a_minute(self) -> float:
+        """Flights."""
+        return self.flights / self.took * 60.0
 
     def add(self, line: Line) -> None:
         """One more."""

@@ -33,11 +33,13 @@ not so: every rule rests on two signs, and no more can be known than they tell; 
 wrong must neither end a flight nor hide a fall."""
 
 
-def page(tally: Tally, seed: int, pictures: Mapping[str, str]) -> str:
-    """As Markdown. pictures: the names of the files of "delays" and "heights"."""
+def page(tally: Tally, seed: int, how: str, pictures: Mapping[str, str]) -> str:
+    """As Markdown. how: what the speed depends on, in words; pictures: the names of the files of
+    "delays" and "heights"."""
+    flown = f"{tally.took:.0f} s, {tally.a_minute:.0f} flights a minute, {how}"
     lines = [
         *("# Fault campaign", ""),
-        *(f"Written by `make campaign FLIGHTS={tally.flights} SEED={seed}`.", ""),
+        *(f"Written by `make campaign FLIGHTS={tally.flights} SEED={seed}`: {flown}.", ""),
         *(_INTRODUCTION, ""),
         *_counts(tally),
         *_wrong(tally),

@@ -16,6 +16,7 @@ from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.scenario import draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign
+from chute_ros.tools.machine import machine
 
 
 def run(monkeypatch, *arguments):
@@ -52,7 +53,10 @@ def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
     run(monkeypatch, "--flights", "3", "--seed", "5", *with_page)
     assert "3 of 3 flights in" in capsys.readouterr().out
     text = page.read_text()
-    assert "`make campaign FLIGHTS=3 SEED=5`" in text
+    written = re.search(r"`make campaign FLIGHTS=3 SEED=5`: (\d+) s, (\d+) flights a minute", text)
+    took, rate = map(float, written.groups())
+    assert 3.0 / rate * 60.0 == pytest.approx(took, rel=0.1, abs=0.6)
+    assert f", 1 at a time on {machine()}." in text
     assert "| mavlink, " in text or "| upf, " in text or "| both, " in text
     for suffix in (".svg", ".heights.svg"):
         assert f"]({page.with_suffix(suffix).name})" in text
