@@ -148,8 +148,10 @@ class Person:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Times are s after the vehicle has reached its height, or the rocket was launched; negative:
-    before. height (m), gusts (m/s^2), fall_speed (m/s): of an aircraft; burn: of a rocket, s."""
+    """Times are s after an aircraft has stood at its height for 0.3 s, or a rocket was launched.
+    Nothing goes wrong before that height or launch: what was drawn earlier (a negative time)
+    begins there, and a stop then lasts as long from there. height (m), gusts (m/s^2), fall_speed
+    (m/s): of an aircraft; burn: of a rocket, s."""
 
     seed: int
     vehicle: Vehicle
