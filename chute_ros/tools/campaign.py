@@ -20,6 +20,7 @@ from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.scenario import Scenario, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.campaign.tellers import outlives
 from chute_ros.errors import RecordError
 from chute_ros.nodes.config_folder import config_folder
 from chute_ros.nodes.private_files import replace_text
@@ -210,7 +211,7 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     lines += [(act.at, f"{act.node} acts on {act.decision.action.name}") for act in flown.acted]
     for at, what in (
         (up, "is up"),
-        (up + scenario.failure_at, scenario.failure.value),
+        (up + scenario.failure_at, _failure(scenario)),
         (up + person.at if person else math.nan, f"a person wants: {person and person.does}"),
         (truth.at, "ONLY A PARACHUTE HELPS"),
         (truth.latest, "the last moment for its release"),
@@ -223,6 +224,13 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     for at, text in sorted(lines, key=lambda line: line[0]):
         print(f"  {at - begin:8.3f} s  {text}")
     print(f"  {judged.count.value}{': ' if judged.why else ''}{judged.why}")
+
+
+def _failure(scenario: Scenario) -> str:
+    """What fails, and who tells of the vehicle without its autopilot."""
+    if not outlives(scenario):
+        return scenario.failure.value
+    return f"{scenario.failure.value}, outlived by: {', '.join(scenario.second_sources)}"
 
 
 if __name__ == "__main__":

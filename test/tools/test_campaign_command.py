@@ -13,7 +13,7 @@ from chute_ros.campaign import campaign as flights
 from chute_ros.campaign import kept_tally
 from chute_ros.campaign.judge import Count, Judged
 from chute_ros.campaign.kept_tally import code_that_flies
-from chute_ros.campaign.scenario import draw
+from chute_ros.campaign.scenario import Failure, Vehicle, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign
 from chute_ros.tools.machine import machine
@@ -177,6 +177,17 @@ def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_p
     assert capsys.readouterr().out == from_file
     assert '"seed": 7' in from_file
     assert "   0.000 s  is up" in from_file
+
+
+def test_a_replay_says_who_outlives_the_autopilot(monkeypatch, tmp_path, capsys):
+    lost = replace(draw(7), faults=(), failure=Failure.POWER, vehicle=Vehicle.MAVLINK)
+    lost = replace(lost, profile="multirotor", vehicle_sources=("vehicle/state", "odometry"))
+    file = tmp_path / "lost.json"
+    file.write_text(text_of(lost, "made by hand"))
+    run(monkeypatch, "--replay", str(file))
+    told = capsys.readouterr().out
+    assert '"vehicle_sources": [' in told
+    assert "and with it the autopilot, outlived by: odometry" in told
 
 
 def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_path, capsys):
