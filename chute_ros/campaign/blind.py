@@ -118,7 +118,11 @@ def _name(one: SensorFault) -> str:
 def _all_hidden(scenario: Scenario) -> list[_Hidden]:
     hidden = []
     sensors = [
-        one for one in scenario.faults if isinstance(one, SensorFault) and may_count(scenario, one)
+        one
+        for one in scenario.faults
+        if isinstance(one, SensorFault)
+        and may_count(scenario, one)
+        and (one.source or not outlives(scenario))
     ]
     for fault in scenario.faults:
         if isinstance(fault, Stop):
@@ -158,7 +162,9 @@ def _cut(fault: WayFault, standby: bool) -> _Hidden:
 
 def _is_idle(cause: str, scenario: Scenario) -> bool:
     """What stands by may be away, as long as the one that leads is not; a second source may, as
-    long as there is another."""
+    long as there is another; an autopilot without power is away anyhow."""
+    if outlives(scenario) and cause.startswith("the way autopilot "):
+        return True
     if any(cause.startswith((f"{one} ", f"the way {one} ")) for one in scenario.second_sources):
         return not outlives(scenario) or len(scenario.second_sources) > 1
     names = [

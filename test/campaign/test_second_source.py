@@ -9,6 +9,7 @@ import pytest
 from campaign_bench import SHIPPED, fired, flown, scenario
 
 from chute_ros.campaign import scenario as drawing
+from chute_ros.campaign.blind import Need, blinded
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.flight import Flight
 from chute_ros.campaign.judge import Count, judge
@@ -75,6 +76,19 @@ def test_what_kept_the_last_one_that_tells_from_it_is_named(
     assert (judged.count, judged.why) == (Count.NOT_TOLD, cause)
     both = flown(Failure.POWER, fault, vehicle_sources=WITH_BOTH)
     assert judge(both).count is Count.RIGHT
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        (WayFault("autopilot", Spell(0.0, 30.0, loss=1.0)),),
+        (SensorFault("force", "zero", 0.0, 30.0), SensorFault("tilt", "noise", 0.0, 30.0)),
+    ],
+)
+def test_what_is_wrong_with_an_autopilot_without_power_is_no_excuse(faults: tuple) -> None:
+    need, how = Need(1.0, 6.0), {"vehicle_sources": WITH_ODOMETRY}
+    assert blinded(scenario(Failure.MOTOR, *faults, **how), 0.0, need)
+    assert not blinded(scenario(Failure.POWER, *faults, **how), 0.0, need)
 
 
 def test_a_second_source_that_was_killed_tells_again() -> None:
