@@ -1,35 +1,19 @@
-"""Tables of measurements, and the machine that they were made on."""
+"""Tables of measurements, and how busy the machine was that they were made on."""
 
 from __future__ import annotations
 
 import math
 import os
-import platform
 import statistics
-import sys
 from collections.abc import Sequence
+
+from chute_ros.tools.machine import machine
 
 
 def summary(values: Sequence[float]) -> tuple[float, float, float]:
     """Median, 99th percentile (nearest rank: of fewer than 100 the largest), largest."""
     ordered = sorted(values)
     return statistics.median(ordered), ordered[math.ceil(0.99 * len(ordered)) - 1], ordered[-1]
-
-
-def machine() -> str:
-    """What the numbers depend on, in one line."""
-    model = "unknown processor"
-    with open("/proc/cpuinfo") as file:
-        for line in file:
-            if line.startswith("model name"):
-                model = line.partition(":")[2].strip()
-                break
-    distribution = os.environ.get("ROS_DISTRO", "?")
-    return (
-        f"{model}, {os.cpu_count()} cores; Linux {platform.release()}; "
-        # Whose: one that was built without the compiler's profile is a fifth slower.
-        f"Python {platform.python_version()} of {sys.base_prefix}; ROS 2 {distribution}"
-    )
 
 
 def load() -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from bench.report import machine
+from chute_ros.tools.machine import machine
 
 _HEAD = """\
 # Several hosts

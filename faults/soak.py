@@ -15,8 +15,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from bench.report import load, machine
+from bench.report import load
 from chute_ros.tools.isolation import isolated_ros
+from chute_ros.tools.machine import machine
 from faults import soak_picture, soak_report
 from faults.ending import take_down_when_ended
 from faults.network import Network, why_not

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench.report import machine, table
+from bench.report import table
+from chute_ros.tools.machine import machine
 from fuzz.run import CORPUS, Outcome
 from fuzz.targets import target_of
 

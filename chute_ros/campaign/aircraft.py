@@ -1,5 +1,5 @@
-"""A multirotor or aeroplane with its autopilot on MAVLink, and its parachute on either bus or on
-both."""
+"""A multirotor or aeroplane with its autopilot on MAVLink, its parachute on either bus or on both,
+and some with an IMU or odometry besides."""
 
 from __future__ import annotations
 
@@ -106,6 +106,8 @@ class Aircraft(Rig):
             self._add_upf()
         self.nature = Nature(self.model, self._moved)
         self.world.add(self.nature)
+        for source in scenario.second_sources:
+            self.add_source(source, self.model)
         self._speed = 0.0
         self._flew = False
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.campaign.tellers import may_count, outlives
+from chute_ros.protocol.vehicle_merge import FRESH, IMU, VEHICLE_STATE
 
 #: What the chain may take where all goes well: to see the fall (the slowest rule that sees it),
 #: the kill's `kill_to_deploy_delay`, and the release, s. A rocket must fall for 3 s first, so that
@@ -55,14 +57,21 @@ class _Hidden:
 
 def enough_time(scenario: Scenario) -> float:
     """How long the chain may take, s."""
-    return _ENOUGH_FOR_ROCKET if scenario.vehicle is Vehicle.ROCKET else _ENOUGH_TIME
+    if scenario.vehicle is Vehicle.ROCKET:
+        return _ENOUGH_FOR_ROCKET
+    # Until it is old, the last word of an autopilot without power denies the sinking, unless
+    # another source that knows it is preferred.
+    sinking = next(one for one in scenario.vehicle_sources if one != IMU)
+    waits = outlives(scenario) and sinking == VEHICLE_STATE
+    return _ENOUGH_TIME + (FRESH if waits else 0.0)
 
 
 def blinded(scenario: Scenario, up: float, need: Need, told: Sequence[float] = ()) -> str:
     """Which faults left no time in a row that is enough; empty: there was. told: when lines of a
     rocket's flight computer came whole, virtual s."""
     failed_at = up + scenario.failure_at
-    if scenario.failure in _NO_POWER and failed_at < need.end:
+    silent = scenario.failure in _NO_POWER and not outlives(scenario)
+    if silent and failed_at < need.end:
         return _NO_POWER[scenario.failure]
     drawn = [replace(one, begin=up + one.begin, end=up + one.end) for one in _all_hidden(scenario)]
     if scenario.vehicle is Vehicle.ROCKET:
@@ -86,10 +95,12 @@ def misled(scenario: Scenario, up: float, at: float, reasons: str) -> str:
         for one in scenario.faults
         if isinstance(one, SensorFault)
         and one.how != "gone"
+        and may_count(scenario, one)
         and up + one.begin <= at <= up + one.end + _LASTS
         and any(name in reasons for name in _TOLD_BY.get(one.sensor, ()))
     ]
-    names = {one.sensor for one, other in itertools.permutations(lied, 2) if _together(one, other)}
+    pairs = itertools.permutations(lied, 2)
+    names = {_name(one) for one, other in pairs if _together(one, other)}
     return f"sensors {', '.join(sorted(names))} were wrong at once" if names else ""
 
 
@@ -100,9 +111,19 @@ def _together(one: SensorFault, other: SensorFault) -> tuple[float, float] | Non
     return (begin, end) if one.sensor != other.sensor and begin < end else None
 
 
+def _name(one: SensorFault) -> str:
+    return f"{one.source} {one.sensor}".strip()
+
+
 def _all_hidden(scenario: Scenario) -> list[_Hidden]:
     hidden = []
-    sensors = [one for one in scenario.faults if isinstance(one, SensorFault)]
+    sensors = [
+        one
+        for one in scenario.faults
+        if isinstance(one, SensorFault)
+        and may_count(scenario, one)
+        and (one.source or not outlives(scenario))
+    ]
     for fault in scenario.faults:
         if isinstance(fault, Stop):
             end = fault.at + fault.lasts
@@ -115,7 +136,7 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
             hidden.append(_cut(fault, scenario.standby))
     for one, other in itertools.combinations(sensors, 2):
         if wrong := _together(one, other):
-            both = ", ".join(sorted((one.sensor, other.sensor)))
+            both = ", ".join(sorted((_name(one), _name(other))))
             hidden.append(_Hidden(*wrong, f"sensors {both} were wrong"))
     return [one for one in hidden if not _is_idle(one.cause, scenario)]
 
@@ -140,7 +161,12 @@ def _cut(fault: WayFault, standby: bool) -> _Hidden:
 
 
 def _is_idle(cause: str, scenario: Scenario) -> bool:
-    """What stands by may be away, as long as the one that leads is not."""
+    """What stands by may be away, as long as the one that leads is not; a second source may, as
+    long as there is another; an autopilot without power is away anyhow."""
+    if outlives(scenario) and cause.startswith("the way autopilot "):
+        return True
+    if any(cause.startswith((f"{one} ", f"the way {one} ")) for one in scenario.second_sources):
+        return not outlives(scenario) or len(scenario.second_sources) > 1
     names = [
         one.way if isinstance(one, WayFault) else one.who
         for one in scenario.faults

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from chute_ros.campaign.flight import Flight, Flown
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
-from chute_ros.campaign.scenario import Scenario, draw
+from chute_ros.campaign.scenario import Failure, Scenario, draw
 from chute_ros.campaign.shipped import Shipped
 
 #: Flights that one process flies before it tells of them.
@@ -38,6 +38,8 @@ class Line:
     height_lost: float
     #: Faults that were drawn, by kind.
     faults: tuple[str, ...] = ()
+    #: Who tells of an aircraft besides its autopilot; empty: nobody.
+    second: str = ""
 
 
 @dataclass
@@ -50,9 +52,17 @@ class Tally:
     #: (vehicle, profile, count) -> flights.
     by_vehicle: Counter[tuple[str, str, Count]] = field(default_factory=Counter)
     faults: Counter[str] = field(default_factory=Counter)
+    #: Of aircraft whose autopilot lost its power: (who tells besides it, count) -> flights.
+    powerless: Counter[tuple[str, Count]] = field(default_factory=Counter)
     wrong: list[Line] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
+    #: s, of all that flew at the same time.
     took: float = 0.0
+
+    @property
+    def a_minute(self) -> float:
+        """Flights."""
+        return self.flights / self.took * 60.0
 
     def add(self, line: Line) -> None:
         """One more."""
@@ -60,6 +70,8 @@ class Tally:
         self.counts[line.count] += 1
         self.by_vehicle[line.vehicle, line.profile, line.count] += 1
         self.faults.update(line.faults)
+        if line.failure == Failure.POWER.value:
+            self.powerless[line.second, line.count] += 1
         if line.count is Count.NOT_TOLD:
             self.reasons[line.why] += 1
         if line.count in WRONG:
@@ -83,11 +95,12 @@ def _line(folder: Path, seed: int) -> Line:
     scenario = draw(seed)
     faults = tuple(type(one).__name__ for one in scenario.faults)
     who = (seed, scenario.vehicle.value, scenario.profile, scenario.failure.value)
+    drawn = (faults, ", ".join(sorted(scenario.second_sources)))
     try:
         _, flown, judged = fly_here(folder, scenario)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
-        return Line(*who, Count.BROKEN, why, math.nan, math.nan, math.nan, faults)
+        return Line(*who, Count.BROKEN, why, math.nan, math.nan, math.nan, *drawn)
     at = flown.truth.at
     return Line(
         *who,
@@ -96,7 +109,7 @@ def _line(folder: Path, seed: int) -> Line:
         flown.killed - at,
         flown.released - at,
         flown.truth.height - flown.release_height,
-        faults,
+        *drawn,
     )
 
 

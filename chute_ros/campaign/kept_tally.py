@@ -51,6 +51,7 @@ def text_of(tally: Tally, seed: int, code: str) -> str:
         "counts": {count.name: n for count, n in tally.counts.items()},
         "reasons": tally.reasons,
         "faults": tally.faults,
+        "powerless": [[second, count.name, n] for (second, count), n in tally.powerless.items()],
         "by_vehicle": [
             [vehicle, profile, count.name, n]
             for (vehicle, profile, count), n in tally.by_vehicle.items()
@@ -78,6 +79,9 @@ def tally_of(text: str, seed: int, code: str, named: str) -> Tally:
             counts=Counter({Count[name]: n for name, n in values["counts"].items()}),
             reasons=Counter(values["reasons"]),
             faults=Counter(values["faults"]),
+            powerless=Counter(
+                {(second, Count[name]): n for second, name, n in values["powerless"]}
+            ),
             by_vehicle=Counter(
                 {
                     (vehicle, profile, Count[name]): n
@@ -97,5 +101,5 @@ def _written(line: Line) -> list[Any]:
 
 
 def _read(values: list[Any]) -> Line:
-    *who, count, why, kill, release, lost, faults = values
-    return Line(*who, Count[count], why, kill, release, lost, tuple(faults))
+    *who, count, why, kill, release, lost, faults, second = values
+    return Line(*who, Count[count], why, kill, release, lost, tuple(faults), second)

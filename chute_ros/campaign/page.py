@@ -11,6 +11,7 @@ from chute_ros.campaign.campaign import Tally
 from chute_ros.campaign.judge import WRONG, Count
 from chute_ros.campaign.picture import groups_of
 from chute_ros.campaign.scenario import MOST_FAULTS
+from chute_ros.protocol.vehicle_merge import FRESH
 
 #: So many wrong flights are named, and so many causes.
 _MOST_NAMED = 50
@@ -22,26 +23,34 @@ Frames and messages are lost, doubled, delayed, overtaken, damaged; cables flap;
 stall, or die and start again; devices lose their power; wall clocks are set; sensors stick, drift,
 jump, are noisy or silent: up to {MOST_FAULTS} of these at a time, most of them around the failure.
 Some vehicles are armed by a person, some are killed or deployed by one.
+Three of ten aircraft have an IMU, odometry or both besides their autopilot (`vehicle_sources`): on
+power of its own, in a process and over a way of its own, and sometimes with one more fault there.
 
 The truth comes from the flight models: since when only a parachute helps (a rocket: since when it
 comes down and no drogue will come by itself), and until when its release still lands it softly.
-Flights that left less time than the chain takes (2 s, a rocket 6.5 s), or in which no such time in
-a row was free of cuts, stops, second wrong sensors and (rocket) of seconds without a whole line of
-telemetry, are named with the cause. So are those whose only parachute refused in time, as by the
-wrong height that it was told it stood, and those that were ended while two sensors told what was
-not so: every rule rests on two signs, and no more can be known than they tell; one sensor that is
-wrong must neither end a flight nor hide a fall."""
+Flights that left less time than the chain takes (2 s, and {FRESH:g} s more where the last word of
+an autopilot without power, that it does not sink, must get old first; a rocket 6.5 s), or in which
+no such time in a row was free of cuts, stops, second wrong sensors and (rocket) of seconds without
+a whole line of telemetry, are named with the cause. So are those whose autopilot lost its power
+and that nobody else told of, those whose only parachute refused in time, as by the wrong height
+that it was told it stood, and those that were ended while two sensors told what was not so: every
+rule rests on two signs, and no more can be known than they tell; one sensor that is wrong must
+neither end a flight nor hide a fall. A sensor counts where the supervisor may go by it: its source
+is the preferred one of those that know this, or a preferred one falls silent."""
 
 
-def page(tally: Tally, seed: int, pictures: Mapping[str, str]) -> str:
-    """As Markdown. pictures: the names of the files of "delays" and "heights"."""
+def page(tally: Tally, seed: int, how: str, pictures: Mapping[str, str]) -> str:
+    """As Markdown. how: what the speed depends on, in words; pictures: the names of the files of
+    "delays" and "heights"."""
+    flown = f"{tally.took:.0f} s, {tally.a_minute:.0f} flights a minute, {how}"
     lines = [
         *("# Fault campaign", ""),
-        *(f"Written by `make campaign FLIGHTS={tally.flights} SEED={seed}`.", ""),
+        *(f"Written by `make campaign FLIGHTS={tally.flights} SEED={seed}`: {flown}.", ""),
         *(_INTRODUCTION, ""),
         *_counts(tally),
         *_wrong(tally),
         *_not_told(tally),
+        *_powerless(tally),
         *("", "## Faults", "", "| fault | drawn |", "|---|---|"),
         *(f"| {kind} | {number} |" for kind, number in sorted(tally.faults.items())),
         *("", "## From the failure to the release", ""),
@@ -80,6 +89,20 @@ def _not_told(tally: Tally) -> list[str]:
     lines = ["", "## Not told", "", "| why | flights |", "|---|---|"]
     lines += [f"| {why} | {number} |" for why, number in causes[:_MOST_NAMED]]
     return [*lines, *([f"| other sets of the same causes | {rest} |"] if rest else [])]
+
+
+def _powerless(tally: Tally) -> list[str]:
+    """What becomes of those whose autopilot lost its power, by who tells of them besides it."""
+    if not tally.powerless:
+        return []
+    counts = [one for one in Count if any(key[1] is one for key in tally.powerless)]
+    names = [one.value.partition(":")[0] for one in counts]
+    lines = ["", "## Autopilot without power", ""]
+    lines += [f"| besides it | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
+    for second in sorted({key[0] for key in tally.powerless}):
+        numbers = [str(tally.powerless[second, one]) for one in counts]
+        lines.append(f"| {second or 'nothing'} | {' | '.join(numbers)} |")
+    return lines
 
 
 def _delays(tally: Tally) -> list[str]:

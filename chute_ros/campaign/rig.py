@@ -13,11 +13,13 @@ from chute_ros.campaign.channel import Way
 from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.scenario import ClockJump, Fault, Scenario, Stalls, Stop, WayFault
+from chute_ros.campaign.second_source import SecondSource
 from chute_ros.campaign.sensors import SensorFault, Sensors
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.truth import Truth
 from chute_ros.campaign.world import World
+from chute_ros.sim.flight import FlightModel
 from chute_ros.supervisor import inputs as i
 
 #: Between two stalls of an overloaded host, at most, s.
@@ -32,6 +34,8 @@ class Rig(ABC):
         self.world = World()
         self.ros = Ros(self.world, scenario.seed)
         self.sensors = Sensors(self.chance("sensors"))
+        #: By the source's name in a SensorFault.
+        self.sensors_of = {"": self.sensors}
         self.supervisors: list[SupervisorHost] = []
         self.nodes: dict[str, DeviceNode] = {}
         self.plugs: dict[str, Plug] = {}
@@ -42,7 +46,8 @@ class Rig(ABC):
         for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
             config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
             process = self.process(name)
-            host = SupervisorHost(config, process, self.ros, self._arm_devices)
+            sources = scenario.vehicle_sources
+            host = SupervisorHost(config, sources, process, self.ros, self._arm_devices)
             self.supervisors.append(host)
             self._restart[name] = host.start_again
             self.world.add(host)
@@ -61,6 +66,13 @@ class Rig(ABC):
         self.nodes[node.name] = self.plugs[node.name] = node
         self._restart[node.name] = node.start_again
         self.world.add(node)
+
+    def add_source(self, name: str, model: FlightModel) -> None:
+        """A source of the vehicle's picture besides the autopilot, which senses model."""
+        sensors = self.sensors_of[name] = Sensors(self.chance(f"sensors of {name}"))
+        source = SecondSource(self.process(name), self.ros, model, sensors)
+        self._restart[name] = source.start_again
+        self.world.add(source)
 
     def add_device(self, plug: Plug, reboot: Callable[[], None]) -> None:
         """A simulated device."""
@@ -109,7 +121,7 @@ class Rig(ABC):
         if isinstance(fault, WayFault):
             self._way(fault.way).append(fault.spell.later(up))
         elif isinstance(fault, SensorFault):
-            self.sensors.faults.append(fault.later(up))
+            self.sensors_of[fault.source].faults.append(fault.later(up))
         elif isinstance(fault, ClockJump):
             post(up + fault.at, lambda _: self._set_clock(fault))
         elif isinstance(fault, Stalls):
@@ -126,6 +138,8 @@ class Rig(ABC):
     def _way(self, name: str) -> Way:
         if name in self.plugs:
             return self.plugs[name].way
+        if name in self._processes:
+            return self._processes[name].outward
         process = self._processes["standby" if name.endswith("standby") else "supervisor"]
         return process.outward if name.startswith("from") else process.inward
 

@@ -9,14 +9,15 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from chute_ros.campaign.channel import Channel, Nature, Way
+from chute_ros.campaign.sensor_messages import Imu, Odometry
 from chute_ros.campaign.world import World
 from chute_ros.model import Decision
 from chute_ros.supervisor.decision_gate import in_order
 
 #: From a publisher to a subscription on one host, s.
 _NATURE = Nature(0.0005, in_order=True)
-#: What a queue keeps of what nobody reads, and one of decisions (nodes/qos.py).
-_QUEUE, _DECISIONS = 10, 50
+#: What a queue keeps of what nobody reads, one of decisions (nodes/qos.py), and one of sensors.
+_QUEUE, _DECISIONS, _SENSORS = 10, 50, 5
 
 #: Gets a message, the wall clock here less its stamp (s), and the time.
 Take = Callable[[Any, float, float], None]
@@ -62,8 +63,7 @@ class Process:
         if sent < self._started:
             return
         if not self.runs(now):
-            depth = _DECISIONS if isinstance(message, Decision) else _QUEUE
-            queue = self._queues.setdefault(take, deque(maxlen=depth))
+            queue = self._queues.setdefault(take, deque(maxlen=_depth(message)))
             queue.append((message, stamp, take))
         else:
             take(message, now + self.clock - stamp, now)
@@ -75,6 +75,12 @@ class Process:
         for queue in queues.values():
             for message, stamp, take in _as_looked_at(queue):
                 take(message, now + self.clock - stamp, now)
+
+
+def _depth(message: Any) -> int:
+    if isinstance(message, Decision):
+        return _DECISIONS
+    return _SENSORS if isinstance(message, Imu | Odometry) else _QUEUE
 
 
 def _as_looked_at(queue: deque[tuple[Any, float, Take]]) -> Sequence[tuple[Any, float, Take]]:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import enum
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 
 KindT = TypeVar("KindT")
 
-#: At most so many things go wrong besides the failure.
+#: At most so many things go wrong besides the failure, and one more of a second source.
 MOST_FAULTS = 3
 _GRAVITY = 9.81  # m/s^2
 #: About what the rocket's motor pushes it with, m/s^2.
@@ -63,12 +64,13 @@ PROFILES = ("multirotor", "fixed_wing", "rocket")
 
 _ROS_WAYS = ("to the supervisor", "from the supervisor")
 _STANDBY_WAYS = ("to the standby", "from the standby")
-_AUTOPILOT = ("autopilot", "mavlink_parachute")
+#: Over which an autopilot tells.
+AUTOPILOT_WAYS = ("autopilot", "mavlink_parachute")
 #: The ways that a spell can lie on, and the processes and devices that can stop.
 WAYS = {
-    Vehicle.MAVLINK: (*_AUTOPILOT, "parachute"),
-    Vehicle.UPF: (*_AUTOPILOT, "controller", "trigger", "upf_can"),
-    Vehicle.BOTH: (*_AUTOPILOT, "parachute", "controller", "trigger", "upf_can"),
+    Vehicle.MAVLINK: (*AUTOPILOT_WAYS, "parachute"),
+    Vehicle.UPF: (*AUTOPILOT_WAYS, "controller", "trigger", "upf_can"),
+    Vehicle.BOTH: (*AUTOPILOT_WAYS, "parachute", "controller", "trigger", "upf_can"),
     Vehicle.ROCKET: ("flight_computer", "umbilical"),
 }
 STOPPING = {
@@ -93,6 +95,14 @@ _ROCKET_SENSORS = {
     "force": ("sticks", "noise", "zero"),
     "fix": ("lies",),
 }
+#: Of each source besides the autopilot.
+_SECOND_SENSORS = {
+    IMU: {"tilt": _SENSORS["tilt"], "force": _SENSORS["force"]},
+    ODOMETRY: {name: _SENSORS[name] for name in ("height", "speed", "tilt")},
+}
+#: So many aircraft have one, of so many of these one goes wrong, and so many fly as high as this,
+#: m: from there even the slowest rule is in time.
+_WITH_SECOND, _SECOND_FAULT, _WITH_SECOND_HIGH, _HIGH = 0.3, 0.4, 0.3, (120.0, 300.0)
 #: Heights are looked at for a second, of which the flight has settled for 0.3 s.
 _CARRIED_UNTIL = 0.7
 
@@ -148,8 +158,10 @@ class Person:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Times are s after the vehicle has reached its height, or the rocket was launched; negative:
-    before. height (m), gusts (m/s^2), fall_speed (m/s): of an aircraft; burn: of a rocket, s."""
+    """Times are s after an aircraft has stood at its height for 0.3 s, or a rocket was launched.
+    Nothing goes wrong before that height or launch: what was drawn earlier (a negative time)
+    begins there, and a stop then lasts as long from there. height (m), gusts (m/s^2), fall_speed
+    (m/s): of an aircraft; burn: of a rocket, s."""
 
     seed: int
     vehicle: Vehicle
@@ -168,6 +180,13 @@ class Scenario:
     #: The parachute is armed by safety/arm; an aircraft's may be armed from the start.
     arms: bool = False
     person: Person | None = None
+    #: Where the supervisor learns of the vehicle, as its node's parameter: the preferred first.
+    vehicle_sources: tuple[str, ...] = (VEHICLE_STATE,)
+
+    @property
+    def second_sources(self) -> tuple[str, ...]:
+        """Those that outlive the autopilot."""
+        return tuple(one for one in self.vehicle_sources if one != VEHICLE_STATE)
 
     @property
     def apogee_at(self) -> float:
@@ -188,7 +207,7 @@ def draw(seed: int) -> Scenario:
     around = max(failure_at, apogee + 3.0) if is_rocket and chance.random() < 0.7 else failure_at
     standby = chance.random() < 0.25
     count = chance.choices((0, 1, 2, 3), (3, 4, 2, 1))[0]
-    return Scenario(
+    drawn = Scenario(
         seed,
         vehicle,
         "rocket" if is_rocket else chance.choice(PROFILES[:2]),
@@ -204,6 +223,8 @@ def draw(seed: int) -> Scenario:
         arms=is_rocket or chance.random() < 0.3,
         person=_person(chance, apogee + 1.0),
     )
+    # Drawn last: a flight without one stays as it was.
+    return drawn if is_rocket else _with_second_source(chance, drawn, around)
 
 
 def _one_of(chance: random.Random, likely: dict[KindT, int]) -> KindT:
@@ -242,6 +263,35 @@ def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool
         return Stop(who, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
     ways = (*WAYS[vehicle], *_ROS_WAYS, *(_STANDBY_WAYS if standby else ()))
     return WayFault(chance.choice(ways), _spell(chance, begin, end))
+
+
+def _with_second_source(chance: random.Random, drawn: Scenario, around: float) -> Scenario:
+    """The same, or with an IMU, odometry or both besides its autopilot."""
+    if chance.random() >= _WITH_SECOND:
+        return drawn
+    sources = chance.choice(((IMU,), (ODOMETRY,), (IMU, ODOMETRY)))
+    autopilot_first = chance.random() < 0.7
+    order = (VEHICLE_STATE, *sources) if autopilot_first else (*sources, VEHICLE_STATE)
+    faults = drawn.faults
+    if chance.random() < _SECOND_FAULT:
+        faults = (*faults, _second_fault(chance, chance.choice(sources), around))
+    high = chance.random() < _WITH_SECOND_HIGH
+    height = round(chance.uniform(*_HIGH), 1) if high else drawn.height
+    return replace(drawn, vehicle_sources=order, faults=faults, height=height)
+
+
+def _second_fault(chance: random.Random, source: str, around: float) -> Fault:
+    begin = round(around + chance.uniform(-2.0, 2.0), 3)
+    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
+    kind = chance.choices(("way", "stop", "sensor"), (2, 1, 3))[0]
+    if kind == "way":
+        return WayFault(source, _spell(chance, begin, round(begin + lasts, 3)))
+    if kind == "stop":
+        return Stop(source, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
+    sensor = chance.choice(list(_SECOND_SENSORS[source]))
+    how = chance.choice(_SECOND_SENSORS[source][sensor])
+    begin = max(begin, _CARRIED_UNTIL)
+    return SensorFault(sensor, how, begin, round(begin + lasts, 3), source)
 
 
 def _spell(chance: random.Random, begin: float, end: float) -> Spell:

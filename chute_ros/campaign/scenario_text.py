@@ -47,6 +47,8 @@ def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
         values["vehicle"] = Vehicle[values["vehicle"]]
         values["failure"] = Failure[values["failure"]]
         values["faults"] = tuple(map(_fault, values["faults"]))
+        if "vehicle_sources" in values:
+            values["vehicle_sources"] = tuple(values["vehicle_sources"])
         values["person"] = Person(**values["person"]) if values["person"] else None
         return Scenario(**values), str(whole["was"])
     except (KeyError, TypeError, ValueError) as error:

@@ -1,4 +1,5 @@
-"""Sensors that lie: what an autopilot or a flight computer tells in place of what is so."""
+"""Sensors that lie: what an autopilot, a flight computer or a second source tells in place of what
+is so."""
 
 from __future__ import annotations
 
@@ -17,12 +18,14 @@ class SensorFault:
     """From begin to end (virtual s) a part of what is told is wrong.
 
     how: sticks, drifts, jumps, noise, zero, gone (not a number); of what is no number: lies.
+    source: whose sensor, as in vehicle_sources; empty: the autopilot's or flight computer's.
     """
 
     sensor: str
     how: str
     begin: float
     end: float
+    source: str = ""
 
     def later(self, by: float) -> SensorFault:
         """The same at another time."""
@@ -30,7 +33,7 @@ class SensorFault:
 
 
 class Sensors:
-    """All of one vehicle."""
+    """All of one source."""
 
     def __init__(self, chance: random.Random) -> None:
         self._chance = chance

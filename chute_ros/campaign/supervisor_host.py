@@ -9,7 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.campaign.ros import Process, Ros
-from chute_ros.model import Action, Decision
+from chute_ros.campaign.sensor_messages import Imu, Odometry
+from chute_ros.campaign.vehicle_hearing import VehicleHearing
+from chute_ros.model import Action, Decision, VehicleState
+from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 from chute_ros.supervisor import handover
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
@@ -26,10 +29,12 @@ _HEARTBEAT_INTERVAL = 0.1  # s
 _STATE_INTERVAL = 1.0  # s, at the latest
 #: Finding each other takes no time here: one that starts looks so long for a leader, s.
 _LISTEN = 0.6
-#: What it hears of device nodes, besides their heartbeats.
+#: What it hears of device nodes, besides their heartbeats and the vehicle.
 _HEARD: tuple[type[i.Input], ...] = (
-    *(i.ParachuteReport, i.VehicleReport, i.ActionReport, i.KillRequest, i.BlockRequest),
+    *(i.ParachuteReport, i.ActionReport, i.KillRequest, i.BlockRequest),
 )
+#: What source of vehicle_sources says what.
+_SOURCES: dict[str, type] = {VEHICLE_STATE: i.VehicleReport, IMU: Imu, ODOMETRY: Odometry}
 
 
 @dataclass(frozen=True)
@@ -60,17 +65,19 @@ class LeaseClaim:
 
 
 class SupervisorHost:
-    """One of the supervisors. arm_devices: calls the arm services that an order names."""
+    """One of the supervisors. vehicle_sources: as its node's parameter; arm_devices: calls the arm
+    services that an order names."""
 
     def __init__(
         self,
         config: SupervisorConfig,
+        vehicle_sources: tuple[str, ...],
         process: Process,
         ros: Ros,
         arm_devices: Callable[[SupervisorHost, i.ArmDevices], None],
     ) -> None:
         self.config, self.process, self._ros = config, process, ros
-        self._arm_devices = arm_devices
+        self._arm_devices, self._vehicle_sources = arm_devices, vehicle_sources
         self._lease_config = LeaseConfig(process.name, config.rank, config.standby, listen=_LISTEN)
         self._tokens = itertools.count(1)
         self._callers: dict[int, Callable[[i.Finish], None]] = {}
@@ -83,6 +90,10 @@ class SupervisorHost:
         self._begin(State(epoch_above(8, config.rank), 0.0, leading=not config.standby), 0.0)
         for kind in _HEARD:
             ros.subscribe(kind, process, self._take)
+        alone = vehicle_sources == (VEHICLE_STATE,)
+        for source in vehicle_sources:
+            # One alone is passed on as it comes, as by the node.
+            ros.subscribe(_SOURCES[source], process, self._take if alone else self._vehicle)
         ros.subscribe(i.LinkHeartbeat, process, self._heartbeat)
         if config.standby:
             ros.subscribe(LeaseClaim, process, self._claim)
@@ -94,6 +105,9 @@ class SupervisorHost:
         self._beat_at = self._state_at = now
         self._published: tuple[object, ...] = ()
         self._deadline = now
+        self._hearing = VehicleHearing(
+            self._vehicle_sources, self.config.vehicle_state_age, self._vehicle_told
+        )
         self._stamps: dict[str, float] = {}
         self._callers.clear()
 
@@ -119,12 +133,18 @@ class SupervisorHost:
 
     def update(self, now: float) -> None:
         """Its deadline, or the end of its sleep."""
-        if self.process.runs(now):
+        if not self.process.runs(now):
+            return
+        if now >= self._hearing.due:
+            self._hearing.tell_now(now)
+        else:
             self._turn((), now)
 
     def next_deadline(self) -> float:
-        """Of the core, the lease and its heartbeat, but not before it runs again."""
-        deadline = min(self._deadline, self._beat_at, self.lease.deadline(self._lease_config))
+        """Of the core, the lease, its heartbeat and what is told of the vehicle, but not before it
+        runs again."""
+        lease = self.lease.deadline(self._lease_config)
+        deadline = min(self._deadline, self._beat_at, lease, self._hearing.due)
         return max(deadline, self.process.stopped_until)
 
     def start_again(self, now: float) -> None:
@@ -149,6 +169,15 @@ class SupervisorHost:
         if released and math.isnan(self.knew_release):
             self.knew_release = now
         self._turn((one,), now)
+
+    def _vehicle(
+        self, one: i.VehicleReport | Imu | Odometry, difference: float, now: float
+    ) -> None:
+        self._hearing.hear(one, now)
+        self._ros.world.stir(self)
+
+    def _vehicle_told(self, state: VehicleState, now: float) -> None:
+        self._turn((i.VehicleReport(state),), now)
 
     def _heartbeat(self, one: i.LinkHeartbeat, difference: float, now: float) -> None:
         self._stamps[one.link] = now + self.process.clock - difference

@@ -12,8 +12,8 @@ from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMET
 from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.nodes.profile_files import load_profile
 from chute_ros.nodes.supervisor_memory import MEMORY_PARAMETERS
-from chute_ros.nodes.vehicle_merge import MAVROS, VEHICLE_STATE
 from chute_ros.nodes.vehicle_sources import VEHICLE_PARAMETERS
+from chute_ros.protocol.vehicle_merge import MAVROS, VEHICLE_STATE
 from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.inputs import Mode

@@ -25,11 +25,17 @@ from std_msgs.msg import Float64
 from chute_ros import model
 from chute_ros.errors import ParameterError
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes import vehicle_readings as readings
 from chute_ros.nodes.parameters import Parameter
-from chute_ros.nodes.vehicle_merge import MAVROS, VEHICLE_STATE, VehicleMerge
+from chute_ros.protocol import vehicle_readings as readings
+from chute_ros.protocol.vehicle_merge import (
+    IMU,
+    MAVROS,
+    ODOMETRY,
+    TELL_INTERVAL,
+    VEHICLE_STATE,
+    VehicleMerge,
+)
 
-ODOMETRY, IMU = "odometry", "imu"
 SOURCES = (VEHICLE_STATE, ODOMETRY, IMU, MAVROS)
 
 VEHICLE_PARAMETERS = (
@@ -70,9 +76,6 @@ VEHICLE_PARAMETERS = (
         "std_msgs/Float64 of source mavros: height above home, m",
     ),
 )
-
-#: Sensors may send hundreds of messages a second: the picture is told no more often than this, s.
-TELL_INTERVAL = 0.02
 
 Reader = Callable[[Any], readings.Parts]
 

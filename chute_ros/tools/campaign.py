@@ -20,10 +20,12 @@ from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.scenario import Scenario, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.campaign.tellers import outlives
 from chute_ros.errors import RecordError
 from chute_ros.nodes.config_folder import config_folder
 from chute_ros.nodes.private_files import replace_text
 from chute_ros.nodes.ros_home import ros_home
+from chute_ros.tools.machine import machine
 
 _TELL_EVERY = 5.0  # s
 _KEEP_EVERY = 60.0  # s
@@ -78,7 +80,8 @@ def main() -> None:
     elif tally.wrong:
         print(f"saved in {chosen.failures}; --replay FILE tells one step by step")
     if chosen.page and tally.flights:
-        _write(tally, chosen.seed, chosen.page)
+        how = f"{chosen.jobs} at a time on {machine()}"
+        _write(tally, chosen.seed, how, chosen.page)
     if tally.wrong:
         sys.exit(1)
     if tally.flights < chosen.flights:
@@ -145,9 +148,8 @@ class _Progress:
         if time.monotonic() - self._told_at < _TELL_EVERY:
             return
         self._told_at = time.monotonic()
-        rate = tally.flights / tally.took * 60.0
         print(
-            f"{tally.flights} of {self._flights} flights, {rate:.0f} a minute, "
+            f"{tally.flights} of {self._flights} flights, {tally.a_minute:.0f} a minute, "
             f"{len(tally.wrong)} that must not be",
             file=sys.stderr,
             flush=True,
@@ -190,11 +192,11 @@ def scenario(text: str) -> Scenario:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _write(tally: campaign.Tally, seed: int, path: Path) -> None:
+def _write(tally: campaign.Tally, seed: int, how: str, path: Path) -> None:
     drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
     drawn["delays"].write_text(picture(tally.lines, "release_delay"))
     drawn["heights"].write_text(picture(tally.lines, "height_lost"))
-    path.write_text(page(tally, seed, {what: one.name for what, one in drawn.items()}))
+    path.write_text(page(tally, seed, how, {what: one.name for what, one in drawn.items()}))
 
 
 def _replay(profiles: Path, scenario: Scenario) -> None:
@@ -209,7 +211,7 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     lines += [(act.at, f"{act.node} acts on {act.decision.action.name}") for act in flown.acted]
     for at, what in (
         (up, "is up"),
-        (up + scenario.failure_at, scenario.failure.value),
+        (up + scenario.failure_at, _failure(scenario)),
         (up + person.at if person else math.nan, f"a person wants: {person and person.does}"),
         (truth.at, "ONLY A PARACHUTE HELPS"),
         (truth.latest, "the last moment for its release"),
@@ -222,6 +224,13 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     for at, text in sorted(lines, key=lambda line: line[0]):
         print(f"  {at - begin:8.3f} s  {text}")
     print(f"  {judged.count.value}{': ' if judged.why else ''}{judged.why}")
+
+
+def _failure(scenario: Scenario) -> str:
+    """What fails, and who tells of the vehicle without its autopilot."""
+    if not outlives(scenario):
+        return scenario.failure.value
+    return f"{scenario.failure.value}, outlived by: {', '.join(scenario.second_sources)}"
 
 
 if __name__ == "__main__":

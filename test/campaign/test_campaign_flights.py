@@ -185,11 +185,14 @@ def test_every_scenario_is_drawn_within_its_bounds() -> None:
     assert {one.vehicle for one in every} == set(Vehicle)
     assert {one.profile for one in every} == set(PROFILES)
     assert {one.failure for one in every} == set(Failure)
-    assert {len(one.faults) for one in every} == set(range(MOST_FAULTS + 1))
+    alone = [one for one in every if not one.second_sources]
+    assert {len(one.faults) for one in alone} == set(range(MOST_FAULTS + 1))
+    assert {len(one.faults) for one in every} == set(range(MOST_FAULTS + 2))
     assert {type(fault) for one in every for fault in one.faults} == {
         *(WayFault, Stop, Stalls, ClockJump, SensorFault)
     }
-    assert all(12.0 <= one.height <= 120.0 for one in every)
+    assert all(12.0 <= one.height <= 120.0 for one in alone)
+    assert all(12.0 <= one.height <= 300.0 for one in every)
     assert repr(every[7]) == repr(draw(7))
 
 

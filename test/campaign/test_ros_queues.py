@@ -6,6 +6,7 @@ import pytest
 
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.ros import Process, Ros
+from chute_ros.campaign.sensor_messages import Imu, Vector, rolled
 from chute_ros.campaign.world import World
 
 
@@ -45,6 +46,18 @@ def test_one_that_hangs_reads_the_newest_ten_when_it_goes_on() -> None:
     net.say_each_tenth(22)
     assert net.numbers == [*range(11, 21), 21]
     assert net.heard[0][1:] == pytest.approx((0.95, 2.05)), "its age is told as it is"
+
+
+def test_of_sensors_it_reads_the_newest_five() -> None:
+    net = Network()
+    heard: list[float] = []
+    net.ros.subscribe(Imu, net.listener, lambda one, *_: heard.append(one.linear_acceleration.z))
+    net.listener.hang(net.world, 2.05)
+    for number in range(12):
+        told = Imu(rolled(0.0), Vector(z=float(number)))
+        net.world.post(number / 10.0, lambda _, told=told: net.ros.publish(net.talker, told))
+    net.world.run(60.0, lambda: False)
+    assert heard == [7.0, 8.0, 9.0, 10.0, 11.0]
 
 
 def test_one_that_dies_has_heard_nothing_when_it_starts() -> None:

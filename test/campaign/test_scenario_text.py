@@ -10,6 +10,7 @@ from campaign_bench import scenario
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.scenario import Failure, Person, WayFault, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
 
 
@@ -28,6 +29,16 @@ def test_a_person_can_read_it() -> None:
     assert told["scenario"]["person"] == {"does": "kill", "at": 3.0}
     spell = {"begin": 0.5, "end": 2.0, "loss": 1.0}
     assert told["scenario"]["faults"] == [{"kind": "WayFault", "way": "autopilot", "spell": spell}]
+
+
+def test_one_of_before_second_sources_hears_the_autopilot_alone() -> None:
+    told = json.loads(text_of(scenario(Failure.MOTOR), ""))
+    del told["scenario"]["vehicle_sources"]
+    assert scenario_of(json.dumps(told), "x")[0].vehicle_sources == ("vehicle/state",)
+    fault = SensorFault("tilt", "jumps", 1.0, 2.0)
+    told = json.loads(text_of(scenario(Failure.MOTOR, fault), ""))
+    del told["scenario"]["faults"][0]["source"]
+    assert scenario_of(json.dumps(told), "x")[0].faults == (fault,)
 
 
 GOOD = text_of(scenario(Failure.MOTOR), "")

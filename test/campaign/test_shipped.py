@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from campaign_bench import SHIPPED
 
-from chute_ros.campaign.scenario import Vehicle
+from chute_ros.campaign.scenario import Vehicle, draw
 from chute_ros.nodes import (
     mavlink_parameters,
     supervisor_parameters,
@@ -16,6 +16,7 @@ from chute_ros.nodes import (
     upf_parameters,
 )
 from chute_ros.nodes.parameters import Parameter
+from chute_ros.nodes.vehicle_sources import SOURCES
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.umbilical.config import UmbilicalConfig
 from chute_ros.protocol.upf.config import UpfConfig
@@ -33,6 +34,11 @@ def test_the_links_have_the_standard_settings_of_their_nodes() -> None:
     upf = upf_parameters.config_from(standard(upf_parameters.PARAMETERS), {}, "upf_can", 0.0)
     # Which is another on each machine.
     assert replace(upf, unique_id=UpfConfig().unique_id) == UpfConfig()
+
+
+def test_its_second_sources_are_ones_that_the_supervisor_takes() -> None:
+    drawn = {one for seed in range(200) for one in draw(seed).vehicle_sources}
+    assert {"vehicle/state", "imu", "odometry"} == drawn <= set(SOURCES)
 
 
 @pytest.mark.parametrize("vehicle", Vehicle)

@@ -13,9 +13,10 @@ from chute_ros.campaign import campaign as flights
 from chute_ros.campaign import kept_tally
 from chute_ros.campaign.judge import Count, Judged
 from chute_ros.campaign.kept_tally import code_that_flies
-from chute_ros.campaign.scenario import draw
+from chute_ros.campaign.scenario import Failure, Vehicle, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign
+from chute_ros.tools.machine import machine
 
 
 def run(monkeypatch, *arguments):
@@ -52,7 +53,10 @@ def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
     run(monkeypatch, "--flights", "3", "--seed", "5", *with_page)
     assert "3 of 3 flights in" in capsys.readouterr().out
     text = page.read_text()
-    assert "`make campaign FLIGHTS=3 SEED=5`" in text
+    written = re.search(r"`make campaign FLIGHTS=3 SEED=5`: (\d+) s, (\d+) flights a minute", text)
+    took, rate = map(float, written.groups())
+    assert 3.0 / rate * 60.0 == pytest.approx(took, rel=0.1, abs=0.6)
+    assert f", 1 at a time on {machine()}." in text
     assert "| mavlink, " in text or "| upf, " in text or "| both, " in text
     for suffix in (".svg", ".heights.svg"):
         assert f"]({page.with_suffix(suffix).name})" in text
@@ -173,6 +177,17 @@ def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_p
     assert capsys.readouterr().out == from_file
     assert '"seed": 7' in from_file
     assert "   0.000 s  is up" in from_file
+
+
+def test_a_replay_says_who_outlives_the_autopilot(monkeypatch, tmp_path, capsys):
+    lost = replace(draw(7), faults=(), failure=Failure.POWER, vehicle=Vehicle.MAVLINK)
+    lost = replace(lost, profile="multirotor", vehicle_sources=("vehicle/state", "odometry"))
+    file = tmp_path / "lost.json"
+    file.write_text(text_of(lost, "made by hand"))
+    run(monkeypatch, "--replay", str(file))
+    told = capsys.readouterr().out
+    assert '"vehicle_sources": [' in told
+    assert "and with it the autopilot, outlived by: odometry" in told
 
 
 def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_path, capsys):

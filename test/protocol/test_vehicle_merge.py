@@ -6,7 +6,7 @@ import math
 import pytest
 
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
-from chute_ros.nodes.vehicle_merge import VehicleMerge
+from chute_ros.protocol.vehicle_merge import VehicleMerge
 
 LEVEL, TILTED = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)
 OK = (LinkState.OK, 4)

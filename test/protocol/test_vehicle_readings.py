@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Imu, NavSatFix
 
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
-from chute_ros.nodes import vehicle_readings as readings
+from chute_ros.protocol import vehicle_readings as readings
 
 NAN, INF = math.nan, math.inf
 HALF = math.sqrt(0.5)

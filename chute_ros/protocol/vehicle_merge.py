@@ -14,14 +14,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.model import LinkState, VehicleState
-from chute_ros.nodes import vehicle_readings as readings
+from chute_ros.protocol import vehicle_readings as readings
 
 #: The source with chute_msgs/VehicleState, and the one with MAVROS's topics. Both know the
 #: autopilot itself, the other sources do not.
 VEHICLE_STATE, MAVROS = "vehicle/state", "mavros"
 AUTOPILOTS = (VEHICLE_STATE, MAVROS)
+ODOMETRY, IMU = "odometry", "imu"
 #: How old a word may be, s, before another source's word on the same part counts instead.
 FRESH = 1.0
+#: Sensors may send hundreds of messages a second: the picture is told no more often than this, s.
+TELL_INTERVAL = 0.02
 
 #: A link in order of preference: who hears the autopilot knows more of it than who lost it.
 _PREFERENCE = (LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.NEVER_SEEN)
