@@ -41,8 +41,8 @@ class _Word:
 class VehicleMerge:
     """The newest words of some sources, and the picture that they make together.
 
-    sources: names, the preferred ones first. lost_after: an autopilot's source that is silent for
-    longer (s) has lost it. Times are monotonic seconds.
+    sources: names, the preferred ones first. lost_after: a source that has not heard its autopilot
+    for longer (s), or is silent itself, has lost it. Times are monotonic seconds.
     """
 
     def __init__(self, sources: Sequence[str], lost_after: float) -> None:
@@ -93,8 +93,12 @@ class VehicleMerge:
     ) -> None:
         if values is None:
             self._words[source].pop(part, None)
-        else:
-            self._words[source][part] = _Word(values, received)
+            return
+        before = self._words[source].get(part)
+        if part == readings.AUTOPILOT and values[0] is not LinkState.OK and before is not None:
+            # Who says that he does not hear it has no new word of it.
+            received = before.received
+        self._words[source][part] = _Word(values, received)
 
     def _source(self, part: str, now: float) -> str | None:
         """Whose word on this part counts; None: nobody knows."""

@@ -15,8 +15,8 @@ from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending, State
 
 _CODEC = Codec(State)
-#: What an id of chute_msgs/SafetyDecision can hold.
-_LARGEST_ID = 2**64 - 1
+#: An id of chute_msgs/SafetyDecision has 64 bits; who goes on from here must have ids left.
+_LARGEST_ID = 2**63
 
 
 def told(state: State, now: float) -> str:

@@ -46,6 +46,20 @@ def test_the_order_of_the_list_decides_while_the_first_is_fresh():
     assert late.attitude_age == pytest.approx(0.11)
 
 
+def test_a_source_that_hears_its_autopilot_no_more_has_lost_it_after_the_limit():
+    """However often it says so: it knows no more of it than one that is silent."""
+    one = merge("vehicle/state", "imu")
+    one.hear_state(VehicleState(link_state=LinkState.OK, system_status=4), 10.0)
+    for tenth in range(1, 31):
+        stale = VehicleState(link_state=LinkState.STALE, system_status=4)
+        one.hear_state(stale, 10.0 + tenth / 10.0)
+        lost = tenth > 25
+        expected = LinkState.LOST if lost else LinkState.STALE
+        assert one.state(10.0 + tenth / 10.0).link_state is expected, tenth
+    one.hear_state(VehicleState(link_state=LinkState.OK, system_status=4), 13.1)
+    assert one.state(13.2).link_state is LinkState.OK
+
+
 def test_when_all_are_old_the_newest_counts_and_stays_as_old_as_it_is():
     one = merge("imu", "odometry")
     one.hear("odometry", {"attitude": TILTED}, 10.0)

@@ -187,7 +187,7 @@ def spoilt(**fields: object) -> str:
         {"epoch": 2**32},
         {"epoch": 0},
         {"epoch": -5},
-        {"next_id": 2**64},
+        {"next_id": 2**64 - 1},
         {"next_id": 0},
         {"alarms": ["\ud800"]},
         {"device_blocks": [["\udfff", "why"]]},
