@@ -121,15 +121,23 @@ def _run() -> None:
 
 
 def _parameters(entries: list[str]) -> dict[str, p.Value]:
-    """The entries of --parameter."""
+    """The entries of --parameter, taken as the device itself takes them."""
+    from chute_ros.sim.upf_memory import fitting
+
     values: dict[str, p.Value] = {}
     for entry in entries:
         name, equals, text = entry.partition("=")
         if not equals or name not in p.BY_NAME:
             known = ", ".join(p.BY_NAME)
             raise ParameterError(f"--parameter {entry!r}: need NAME=VALUE with one of {known}")
-        kind = "boolean" if p.BY_NAME[name].kind is bool else "integer"
-        values[name] = p.parse(text, kind, name)
+        documented = p.BY_NAME[name]
+        kind = "boolean" if documented.kind is bool else "integer"
+        wanted = p.parse(text, kind, f"--parameter {entry!r}: {name}")
+        value = fitting(documented, wanted)
+        if value is None:
+            need = f"need {documented.minimum} to {documented.maximum}"
+            raise ParameterError(f"--parameter {entry!r}: {name} cannot be {wanted}: {need}")
+        values[name] = value
     return values
 
 

@@ -45,7 +45,7 @@ class ParameterMemory:
 
     def set(self, name: str, wanted: p.Value) -> bool:
         """Take a value if its kind and range fit; keep it, if that is wanted. Whether it did."""
-        value = _fitting(p.BY_NAME[name], wanted)
+        value = fitting(p.BY_NAME[name], wanted)
         if value is None:
             return False
         self.values[name] = value
@@ -89,7 +89,7 @@ class ParameterMemory:
         return True
 
 
-def _fitting(documented: p.DocumentedParameter, wanted: p.Value) -> p.Value | None:
+def fitting(documented: p.DocumentedParameter, wanted: p.Value) -> p.Value | None:
     """wanted as the parameter keeps it; None: another kind, or out of range."""
     if isinstance(wanted, str):
         return None

@@ -72,8 +72,19 @@ def test_node_ids_and_errors_can_be_chosen(bus, start):  # noqa: F811
     ("wrong", "told"),
     [
         (("--parameter", "Enable Lite=false"), "Enable Light"),
-        (("--parameter", "Enable Light=perhaps"), "true or false"),
+        (
+            ("--parameter", "Enable Light=perhaps"),
+            "--parameter 'Enable Light=perhaps': Enable Light cannot be 'perhaps': need true or",
+        ),
         (("--parameter", "Static Node ID=many"), "need a number"),
+        (
+            ("--parameter", "Static Node ID=999"),
+            "--parameter 'Static Node ID=999': Static Node ID cannot be 999: need 0 to 125",
+        ),
+        (("--parameter", "Static Node ID=-1"), "cannot be -1: need 0 to 125"),
+        (("--parameter", "Parachute Status Interval(ms)=0"), "cannot be 0: need 2 to 60000"),
+        (("--parameter", "Parachute Status Interval(ms)=-5"), "cannot be -5: need 2 to 60000"),
+        (("--parameter", "Node Status Interval(ms)=0"), "cannot be 0: need 2 to 1000"),
         (("--error", "NOTHING"), "LOW_POWER"),
         (("--no-controller", "--no-trigger"), "nothing is left"),
         (("--at", "1:explode"), "need one of"),
