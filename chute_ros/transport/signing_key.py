@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import stat
 import time
-from pathlib import Path
 
 from chute_ros.errors import SigningKeyError
 from chute_ros.protocol.mavlink.signing import (
     EPOCH_2015,
+    KEY_BYTES,
     UNITS_PER_SECOND,
     Signer,
     SigningClock,
@@ -21,6 +21,8 @@ from chute_ros.protocol.mavlink.signing import (
 #: Where the wall clock was set back, signing goes on so far after the newest time that was kept:
 #: the last ones before a crash were not. s
 _NOT_KEPT = 10.0
+#: No key file is longer: two digits a byte, and blanks around them.
+_LONGEST = 2 * KEY_BYTES + 64
 
 
 def signing_from_file(
@@ -33,11 +35,7 @@ def signing_from_file(
     time.
     """
     before = before or Times()
-    try:
-        with Path(name).open("rb") as file:
-            about, text = os.fstat(file.fileno()), file.read()
-    except OSError as error:
-        raise SigningKeyError(f"{option}: {name}: {error.strerror}") from None
+    about, text = _read(name, option)
     if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise SigningKeyError(f"{option}: {name} may be read by others: chmod 600 {name}")
     if about.st_uid not in (0, os.geteuid()):
@@ -49,3 +47,27 @@ def signing_from_file(
         start = newest + _NOT_KEPT
     clock = SigningClock(start - time.monotonic())
     return Signer(key, clock, link_id), Verifier(key, clock, before.streams)
+
+
+def _read(name: str, option: str) -> tuple[os.stat_result, bytes]:
+    """What file name is, and what is in it; SigningKeyError if no key can be."""
+    try:
+        # So that a pipe that nobody writes to is opened, and refused.
+        file = os.open(name, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            about = os.fstat(file)
+            if not stat.S_ISREG(about.st_mode):
+                raise SigningKeyError(
+                    f"{option}: {name} is no regular file: name a file with a key"
+                )
+            text = os.read(file, _LONGEST + 1)
+        finally:
+            os.close(file)
+    except OSError as error:
+        raise SigningKeyError(f"{option}: {name}: {error.strerror}") from None
+    if len(text) > _LONGEST:
+        raise SigningKeyError(
+            f"{option}: {name} is no key, it holds more than {_LONGEST} bytes: need "
+            f"{KEY_BYTES} raw bytes or {2 * KEY_BYTES} hexadecimal digits"
+        )
+    return about, text
