@@ -24,7 +24,7 @@ from chute_ros.tools.rocket_story import RocketStory
 
 
 def main() -> None:
-    """Fly; exit code 0 if every step happened."""
+    """Fly; exit code 0 if every step happened, 2 if the folder for the logs cannot be used."""
     options = argparse.ArgumentParser("demo", description=__doc__)
     options.add_argument(
         "--vehicle",
@@ -43,10 +43,10 @@ def main() -> None:
         "--fault", choices=FAULTS, help="spoil a step, to see that the demo then fails"
     )
     chosen = options.parse_args()
+    if chosen.logs is not None:
+        _make(chosen.logs)
     with tempfile.TemporaryDirectory(prefix="chute_ros_demo_") as scratch:
-        folder = chosen.logs or Path(scratch)
-        folder.mkdir(parents=True, exist_ok=True)
-        processes = Processes(folder)
+        processes = Processes(chosen.logs or Path(scratch))
         try:
             with isolated_ros() as namespace:
                 director = Director(namespace, processes)
@@ -66,6 +66,18 @@ def main() -> None:
             sys.exit(f"\nDEMO FAILED: {error}")
         finally:
             processes.end()
+
+
+def _make(folder: Path) -> None:
+    """The folder for the logs, which files can be written in."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        why = error.strerror or error
+        print(f"demo: --logs {folder}: {why}: name a folder to write in", file=sys.stderr)
+        sys.exit(2)
 
 
 def _fly_drone(rig: Rig, director: Director) -> None:

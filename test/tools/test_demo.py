@@ -200,3 +200,17 @@ def test_a_fault_that_is_none_is_refused():
     )
     assert done.returncode == 2
     assert "parachute-silent" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["/proc/x", "/proc", "file", "file/below"])
+def test_a_folder_for_the_logs_that_cannot_be_is_told_in_one_line(name, tmp_path):
+    """Not even root can write below /proc."""
+    (tmp_path / "file").write_text("notes")
+    folder = tmp_path / name
+    child = start("--logs", str(folder))
+    out, err = child.communicate(timeout=60.0)
+    assert (child.returncode, out) == (2, ""), err
+    assert err.startswith(f"demo: --logs {folder}: ")
+    assert err.endswith(": name a folder to write in\n")
+    assert err.count("\n") == 1
+    assert (tmp_path / "file").read_text() == "notes"
