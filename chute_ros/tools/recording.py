@@ -122,6 +122,9 @@ class _Reader:
         try:
             return deserialize_message(entry.data, kind)
         except Exception as error:  # noqa: BLE001
+            if isinstance(error.__cause__, KeyboardInterrupt):
+                # Ctrl-C in the middle of it: to the middleware one more failure of its own.
+                raise error.__cause__ from None
             # The middleware says what it likes of bytes that are no message, by its own classes.
             topic = entry.channel.topic
             told = f"{self._path}: message {entry.number} of {topic} cannot be read"

@@ -15,7 +15,7 @@ from chute_ros.campaign.judge import Count, Judged
 from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.scenario import Failure, Vehicle, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
-from chute_ros.tools import campaign
+from chute_ros.tools import campaign_command as campaign
 from chute_ros.tools.machine import machine
 
 
@@ -211,6 +211,7 @@ def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=60.0)
     assert process.returncode == 130, err
+    assert err.splitlines()[-1] == "campaign: interrupted"
     assert "Traceback" not in err
     flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
     assert flown >= int(first.split()[0]) > 0

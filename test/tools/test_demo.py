@@ -188,7 +188,7 @@ def test_ctrl_c_in_the_middle_ends_it_in_one_line():
     assert any("READY" in line for line in child.stdout)
     child.send_signal(signal.SIGINT)
     out, err = child.communicate(timeout=30.0)
-    assert (child.returncode, err.strip()) == (1, "demo: interrupted"), out + err
+    assert (child.returncode, err.strip()) == (130, "demo: interrupted"), out + err
 
 
 def test_a_fault_that_is_none_is_refused():

@@ -14,8 +14,8 @@ from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.measurements import Measured
 from chute_ros.supervisor.state import Pending, State
 from chute_ros.tools import explore_key
-from chute_ros.tools.explore import BEGINNINGS, Explorer, Found, page
 from chute_ros.tools.explore_properties import PROPERTIES
+from chute_ros.tools.explorer import BEGINNINGS, Explorer, Found, page
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,11 +1,12 @@
 """What was recorded is read back, whatever became of the file."""
 
 import random
+import signal
 import struct
 import zlib
 
 import pytest
-from chute_msgs.msg import SafetyState
+from chute_msgs.msg import SafetyState, SupervisorRecord
 from flight_bench import END, NAMESPACE, START, STEP, WALL, Flight
 from mcap.writer import Writer
 from zstandard import ZstdCompressor
@@ -183,4 +184,15 @@ def test_inputs_that_this_version_does_not_know_are_told(flight, tmp_path, monke
 
     monkeypatch.setattr(recording, "CODEC", Codec(i.DeployRequest))
     with pytest.raises(RecordError, match=r"class \w+ is not known: written by another version"):
+        read(flight.files(), {})
+
+
+def test_ctrl_c_in_the_middle_of_a_message_is_not_the_fault_of_the_recording(flight, monkeypatch):
+    """The middleware, which makes the message, calls it an error of its own."""
+
+    def interrupted(_, **__):
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(SupervisorRecord, "__init__", interrupted)
+    with pytest.raises(KeyboardInterrupt):
         read(flight.files(), {})

@@ -10,7 +10,7 @@ from flight_bench import DEPLOY_AT, END, STEP, Flight, run
 from chute_ros.model import Action
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.record import CODEC
-from chute_ros.tools import replay
+from chute_ros.tools import replay_command as replay
 from chute_ros.tools.recording import read
 from chute_ros.tools.replaying import Other, Replayer, rows
 

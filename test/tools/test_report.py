@@ -12,7 +12,7 @@ from flight_bench import DEPLOY_AT, Flight, run
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools import report
+from chute_ros.tools import report_command as report
 from chute_ros.tools.recording import read
 from chute_ros.tools.replayed_states import replayed_states
 from chute_ros.tools.state_rows import rules_of, state_rows

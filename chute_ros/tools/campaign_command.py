@@ -1,0 +1,233 @@
+"""What campaign does: many flights in virtual time with faults at every layer, counted.
+
+A flight that must not be is saved as a scenario, as text: --replay SEED or FILE tells it step by
+step. Ctrl-C ends it: what was flown until then is counted and written; --resume FILE goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import time
+from pathlib import Path
+
+from chute_ros.campaign import campaign, kept_tally
+from chute_ros.campaign.judge import Count
+from chute_ros.campaign.page import page
+from chute_ros.campaign.picture import picture
+from chute_ros.campaign.scenario import Scenario, draw
+from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.campaign.tellers import outlives
+from chute_ros.errors import RecordError
+from chute_ros.nodes.config_folder import config_folder
+from chute_ros.nodes.private_files import replace_text
+from chute_ros.nodes.ros_home import ros_home
+from chute_ros.tools.machine import machine
+
+_TELL_EVERY = 5.0  # s
+_KEEP_EVERY = 60.0  # s
+#: So many of those that must not be are told; all are saved.
+_MOST_TOLD = 20
+
+
+def main() -> None:
+    """Fly; exit code 1 if a flight was what must not be."""
+    options = argparse.ArgumentParser("campaign", description=__doc__)
+    options.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
+    options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
+    options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
+    options.add_argument("--page", type=writable, help="write the results there, beside pictures")
+    options.add_argument(
+        "--failures",
+        type=Path,
+        default=ros_home() / "campaign_failures",
+        help="folder for the flights that must not be (default: %(default)s)",
+    )
+    options.add_argument(
+        "--resume",
+        type=writable,
+        metavar="FILE",
+        help="keep there what was flown, each minute; go on from it if it is there",
+    )
+    options.add_argument(
+        "--replay", type=scenario, metavar="SEED|FILE", help="tell one flight step by step"
+    )
+    # `ros2 run` adds arguments for nodes, which this is none of.
+    chosen, _ = options.parse_known_args()
+    profiles = config_folder() / "profiles"
+    if chosen.replay is not None:
+        _replay(profiles, chosen.replay)
+        return
+    kept = _Kept(chosen.resume, chosen.seed, profiles)
+    try:
+        tally = kept.tally()
+    except RecordError as error:
+        options.error(f"argument --resume: {error}")
+    progress = _Progress(chosen.flights, chosen.failures, kept)
+    how = (chosen.flights, chosen.seed, chosen.jobs)
+    tally = campaign.run(profiles, *how, progress.look, tally)
+    kept.keep(tally)
+    for count in Count:
+        print(f"{tally.counts[count]:8d}  {count.value}")
+    for line in tally.wrong[:_MOST_TOLD]:
+        print(f"  {_told(line)}")
+    print(f"{tally.flights} of {chosen.flights} flights in {tally.took:.0f} s")
+    if progress.unsaved:
+        print(f"not saved, name another folder with --failures: {progress.unsaved}")
+    elif tally.wrong:
+        print(f"saved in {chosen.failures}; --replay FILE tells one step by step")
+    if chosen.page and tally.flights:
+        how = f"{chosen.jobs} at a time on {machine()}"
+        _write(tally, chosen.seed, how, chosen.page)
+    if tally.wrong:
+        sys.exit(1)
+    if tally.flights < chosen.flights:
+        # What was flown until then is told; now it ends as every tool does.
+        raise KeyboardInterrupt
+
+
+def _told(line: campaign.Line) -> str:
+    what = f"{line.vehicle}, {line.profile}, {line.failure}"
+    return f"seed {line.seed}, {what}: {line.count.name}: {line.why}"
+
+
+class _Kept:
+    """What was flown so far, in a file; None: nowhere."""
+
+    def __init__(self, path: Path | None, seed: int, profiles: Path) -> None:
+        self._path, self._seed = path, seed
+        self._code = "" if path is None else kept_tally.code_that_flies(profiles)
+        self._at = time.monotonic()
+
+    def tally(self) -> campaign.Tally:
+        """The flights of the last time; RecordError: they are not of this campaign."""
+        if self._path is None or not self._path.exists():
+            return campaign.Tally()
+        text = self._path.read_text(encoding="utf-8", errors="replace")
+        tally = kept_tally.tally_of(text, self._seed, self._code, str(self._path))
+        print(f"goes on after {tally.flights} flights of {self._path}", file=sys.stderr)
+        return tally
+
+    def look(self, tally: campaign.Tally) -> None:
+        """Keep it from time to time."""
+        if time.monotonic() - self._at >= _KEEP_EVERY:
+            self.keep(tally)
+
+    def keep(self, tally: campaign.Tally) -> None:
+        """Now: whole, or as it was."""
+        self._at = time.monotonic()
+        if self._path is None:
+            return
+        try:
+            replace_text(self._path, kept_tally.text_of(tally, self._seed, self._code))
+        except OSError as error:
+            print(f"not kept: {error}; trying again", file=sys.stderr, flush=True)
+
+
+class _Progress:
+    """A line each few seconds, on the terminal's second channel, and one for each flight that must
+    not be, which is saved at once: others may take hours."""
+
+    def __init__(self, flights: int, failures: Path, kept: _Kept) -> None:
+        self._flights, self._failures, self._kept = flights, failures, kept
+        self._told_at = time.monotonic()
+        self._wrong = 0
+        #: Why a flight that must not be could not be saved; empty: all were.
+        self.unsaved = ""
+
+    def look(self, tally: campaign.Tally) -> None:
+        """One more flight has been flown."""
+        for line in tally.wrong[self._wrong :]:
+            self._wrong += 1
+            if self._wrong <= _MOST_TOLD:
+                print(_told(line), file=sys.stderr, flush=True)
+            self._save(line)
+        self._kept.look(tally)
+        if time.monotonic() - self._told_at < _TELL_EVERY:
+            return
+        self._told_at = time.monotonic()
+        print(
+            f"{tally.flights} of {self._flights} flights, {tally.a_minute:.0f} a minute, "
+            f"{len(tally.wrong)} that must not be",
+            file=sys.stderr,
+            flush=True,
+        )
+
+    def _save(self, line: campaign.Line) -> None:
+        text = text_of(draw(line.seed), f"{line.count.name}: {line.why}")
+        try:
+            self._failures.mkdir(parents=True, exist_ok=True)
+            (self._failures / f"{line.seed}.json").write_text(text, encoding="utf-8")
+        except OSError as error:
+            self.unsaved = str(error)
+
+
+def positive(text: str) -> int:
+    """1 or more."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{text}: need 1 or more")
+    return number
+
+
+def writable(text: str) -> Path:
+    """Said before the flights, not after them."""
+    path = Path(text)
+    if not os.access(path.parent, os.W_OK) or path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text}: no file can be written there")
+    return path
+
+
+def scenario(text: str) -> Scenario:
+    """Of a seed, or in a file that was saved."""
+    if text.removeprefix("-").isdecimal():
+        return draw(int(text))
+    try:
+        return scenario_of(Path(text).read_text(encoding="utf-8"), text)[0]
+    except (OSError, UnicodeDecodeError) as error:
+        raise argparse.ArgumentTypeError(f"{text}: need a seed, or a file: {error}") from None
+    except RecordError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _write(tally: campaign.Tally, seed: int, how: str, path: Path) -> None:
+    drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
+    drawn["delays"].write_text(picture(tally.lines, "release_delay"))
+    drawn["heights"].write_text(picture(tally.lines, "height_lost"))
+    path.write_text(page(tally, seed, how, {what: one.name for what, one in drawn.items()}))
+
+
+def _replay(profiles: Path, scenario: Scenario) -> None:
+    """What was drawn, what happened, what it is counted as."""
+    _, flown, judged = campaign.fly_here(profiles, scenario)
+    print("\n".join(text_of(scenario, "").splitlines()[3:-1]))
+    up, truth, person = flown.up, flown.truth, scenario.person
+    lines = [(at, f"said: {text}") for at, text in flown.said]
+    for at, one in flown.decided:
+        what = f"decided {one.epoch}.{one.id} {one.action.name} by {one.rule!r}"
+        lines.append((at, f"{what}: {'; '.join(one.reasons)}"))
+    lines += [(act.at, f"{act.node} acts on {act.decision.action.name}") for act in flown.acted]
+    for at, what in (
+        (up, "is up"),
+        (up + scenario.failure_at, _failure(scenario)),
+        (up + person.at if person else math.nan, f"a person wants: {person and person.does}"),
+        (truth.at, "ONLY A PARACHUTE HELPS"),
+        (truth.latest, "the last moment for its release"),
+        (flown.released, "RELEASED"),
+        (flown.landed, f"lands at {flown.landing_speed:.1f} m/s"),
+    ):
+        if not math.isnan(at):
+            lines.append((at, what))
+    begin = 0.0 if math.isnan(up) else up
+    for at, text in sorted(lines, key=lambda line: line[0]):
+        print(f"  {at - begin:8.3f} s  {text}")
+    print(f"  {judged.count.value}{': ' if judged.why else ''}{judged.why}")
+
+
+def _failure(scenario: Scenario) -> str:
+    """What fails, and who tells of the vehicle without its autopilot."""
+    if not outlives(scenario):
+        return scenario.failure.value
+    return f"{scenario.failure.value}, outlived by: {', '.join(scenario.second_sources)}"

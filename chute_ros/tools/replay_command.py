@@ -1,0 +1,174 @@
+"""What replay does: decides a recorded flight once more and compares decision by decision.
+
+Without --config the settings are those of the recording, and everything must come out the same,
+bit for bit. With --config the flight is decided with the settings of that ROS parameter file (what
+it does not name has its default, as for the node); what would have differed is shown as a table
+and a picture. What the vehicle did remains as it was recorded: a recording cannot tell how a
+flight would have gone on after another decision.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from chute_ros.errors import ChuteError
+from chute_ros.supervisor.codec import CLASS
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.record import CODEC
+from chute_ros.tools.parameter_file import NODE, other_from
+from chute_ros.tools.plain_text import plain
+from chute_ros.tools.progress import Progress
+from chute_ros.tools.recording import Recording, files_of, read
+from chute_ros.tools.replay_picture import Track, picture
+from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
+
+SAME, DIFFERS, UNREADABLE = 0, 1, 2
+_PROFILE = "profile.name"
+
+
+def main() -> None:
+    """Exit code 0: the same decisions; 1: others; 2: it cannot be read."""
+    options = argparse.ArgumentParser(
+        "replay", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        type=Path,
+        help="files of a black box in their order, or its folder",
+    )
+    options.add_argument(
+        "--config", type=Path, metavar="YAML", help="decide with this ROS parameter file instead"
+    )
+    options.add_argument(
+        "--picture",
+        type=Path,
+        metavar="SVG",
+        help="where the timeline goes (default with --config: FILE.replay.svg)",
+    )
+    chosen = options.parse_args()
+    try:
+        code = _replay(chosen.files, chosen.config, chosen.picture)
+    except ChuteError as error:
+        for line in f"replay: {error}".splitlines():
+            print(plain(line), file=sys.stderr)
+        code = UNREADABLE
+    except BrokenPipeError:
+        # Whoever read the table has seen enough; the interpreter must not complain of it.
+        sys.stdout = None  # type: ignore[assignment]
+        code = UNREADABLE
+    sys.exit(code)
+
+
+def _replay(paths: list[Path], config: Path | None, wanted: Path | None) -> int:
+    files = files_of(paths)
+    recording = read(files, {})
+    require_replayable(recording.turns)
+    other = other_from(config, f"{recording.namespace}/{NODE}") if config else None
+    for remark in recording.remarks:
+        print(f"remark: {plain(remark)}")
+    if other is not None:
+        _print_settings(recording, other)
+    then, now = Replayer(), Replayer(other)
+    before, after = Track("recorded"), Track("replayed")
+    found: list[Row] = []
+    progress = Progress("replaying", len(recording.turns))
+    for number, turn in enumerate(recording.turns):
+        progress.at(number)
+        if other is not None:
+            then.step(turn)
+        outputs = now.step(turn)
+        if outputs is None:
+            continue
+        seconds = recording.seconds(turn.wall)
+        before.follow(seconds, then.state if other is not None else now.state, turn.turn.outputs)
+        after.follow(seconds, now.state, outputs)
+        found += rows(turn, outputs, exact=other is None)
+    _print_rows(recording, found)
+    if wanted is None and other is not None:
+        wanted = files[0].with_name(f"{files[0].name}.replay.svg")
+    if wanted is not None:
+        _write(wanted, picture(recording, before, after))
+    return _print_end(recording, found, now, wanted)
+
+
+def _print_settings(recording: Recording, other: Other) -> None:
+    """What the other settings change."""
+    old = next(one.config for one in recording.turns if one.config is not None)
+    was, would_be = _settings(old), _settings(other.config)
+    print("settings that differ:")
+    different = [name for name in {**was, **would_be} if was.get(name) != would_be.get(name)]
+    if _PROFILE in different:
+        # Another set of rules differs in everything.
+        different = [name for name in different if name == _PROFILE or "profile." not in name]
+    for name in different:
+        print(plain(f"  {name}: {was.get(name, 'none')} -> {would_be.get(name, 'none')}"))
+    if other.mode is not None:
+        print(f"  mode at the start: {other.mode.name}")
+    if not different and other.mode is None:
+        print("  none")
+
+
+def _settings(config: SupervisorConfig) -> dict[str, str]:
+    """Every single setting: where it is -> its value, to the last bit."""
+    found: dict[str, str] = {}
+
+    def collect(name: str, value: Any) -> None:
+        if isinstance(value, dict):
+            for key, one in value.items():
+                if key != CLASS:
+                    collect(f"{name}.{key}" if name else key, one)
+        elif isinstance(value, list) and any(isinstance(one, (dict, list)) for one in value):
+            for number, one in enumerate(value):
+                collect(f"{name}[{number}]", one)
+        else:
+            found[name] = json.dumps(value)
+
+    collect("", CODEC.plain(config, whole=True))
+    return found
+
+
+def _print_rows(recording: Recording, found: list[Row]) -> None:
+    if found:
+        print(f"\n{'time from start':>16}  decision")
+    for row in found:
+        when = f"{recording.seconds(row.wall):14.3f} s"
+        if row.same:
+            print(f"{when}  {plain(row.replayed)}")
+            continue
+        print(f"{when}  DIFFERENT")
+        for name, text, reasons in (
+            ("recorded", row.recorded, row.recorded_reasons),
+            ("replayed", row.replayed, row.replayed_reasons),
+        ):
+            print(f"{'':18}{name}: {plain(text) or 'nothing'}")
+            for reason in reasons:
+                print(f"{'':28}{plain(reason)}")
+
+
+def _print_end(recording: Recording, found: list[Row], now: Replayer, wrote: Path | None) -> int:
+    different = sum(not row.same for row in found)
+    replayed = len(recording.turns) - now.skipped
+    print(f"\n{replayed} turns replayed, {len(found)} decisions and alarms, {different} different")
+    if now.skipped:
+        print(f"{now.skipped} turns could not be replayed: what came before them is missing")
+    for wall in now.strayed:
+        print(f"{recording.seconds(wall):.3f} s: the state differs from the recorded one")
+    if wrote is not None:
+        print(f"picture: {wrote}")
+    if different or now.strayed:
+        return DIFFERS
+    print("the same decisions")
+    return SAME
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ChuteError(f"{path}: {error.strerror or error}") from None

@@ -1,0 +1,85 @@
+"""What report does: one HTML page of a recorded flight, which needs nothing else to be read.
+
+It has the timeline of the links, states, height and speed, the rules and their counters, and the
+decisions with their reasons and with what came of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from chute_msgs.msg import SafetyDecision, SafetyState
+
+from chute_ros.errors import ChuteError
+from chute_ros.tools.flight_story import DECISION, tell
+from chute_ros.tools.plain_text import plain
+from chute_ros.tools.recording import files_of, read
+from chute_ros.tools.replay_picture import vehicle_curves
+from chute_ros.tools.replayed_states import replayed_states
+from chute_ros.tools.report_page import page
+from chute_ros.tools.state_rows import rules_of, state_rows
+from chute_ros.tools.timeline import close_up, draw
+from chute_ros.tools.timeline_rows import Marks, Row, Window
+
+STATE = "safety/state"
+
+
+def main() -> None:
+    """Exit code 0: written; 2: the recording cannot be read, or the page cannot be written."""
+    options = argparse.ArgumentParser(
+        "report", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        type=Path,
+        help="files of a black box in their order, or its folder",
+    )
+    options.add_argument(
+        "--output", type=Path, metavar="HTML", help="where it goes (default: FILE.html)"
+    )
+    chosen = options.parse_args()
+    try:
+        path = _report(chosen.files, chosen.output)
+    except ChuteError as error:
+        for line in f"report: {error}".splitlines():
+            print(plain(line), file=sys.stderr)
+        sys.exit(2)
+    print(path)
+
+
+def _report(paths: list[Path], output: Path | None) -> Path:
+    files = files_of(paths)
+    path = output or files[0].with_name(f"{files[0].name}.html")
+    text = report(files)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ChuteError(f"{path}: {error.strerror or error}") from None
+    return path
+
+
+def report(files: list[Path]) -> str:
+    """The page of these files; RecordError if they cannot be read."""
+    recording = read(files, {STATE: SafetyState, DECISION: SafetyDecision})
+    story = tell(recording)
+    published = recording.messages.get(STATE, [])
+    states = replayed_states(recording) or [
+        (recording.seconds(wall), state) for wall, state in published
+    ]
+    rows: list[Row] = [
+        *state_rows(states),
+        Marks("decisions", story.decision_marks()),
+        Marks("what came of them", story.report_marks()),
+        Marks("alarms", story.alarm_marks()),
+        *vehicle_curves(recording),
+    ]
+    end = recording.seconds(recording.turns[-1].wall)
+    windows = [Window("the whole recording", 0.0, end), *close_up(story.fired, end)]
+    title = f"Flight report: {files[0].name}"
+    if len(files) > 1:
+        title += f" and {len(files) - 1} more"
+    return page(title, recording, story, rules_of(states), draw(rows, windows, title))

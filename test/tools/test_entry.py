@@ -1,0 +1,88 @@
+"""Ctrl-C ends every tool in one line and with exit code 130, at whatever moment it comes."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+#: Stays in the middle of the imports of a tool, once it has said so.
+SLOW = """
+import signal
+import sys
+
+
+class Slow:
+    def find_spec(self, name, path=None, target=None):
+        if name == "chute_ros.errors":
+            print("importing", flush=True)
+            signal.pause()
+
+
+sys.meta_path.insert(0, Slow())
+"""
+
+
+def start(tool, *arguments, **how):
+    return subprocess.Popen(
+        [sys.executable, "-m", f"chute_ros.tools.{tool}", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        **how,
+    )
+
+
+def interrupted(tool):
+    """Its exit code and the end of what it says."""
+    tool.send_signal(signal.SIGINT)
+    _, err = tool.communicate(timeout=60.0)
+    return tool.returncode, err
+
+
+@pytest.mark.parametrize("tool", ["demo", "replay", "report", "campaign", "explore"])
+def test_while_it_imports(tool, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(SLOW)
+    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
+    started = start(tool, env={**os.environ, "PYTHONPATH": path})
+    assert started.stdout.readline() == "importing\n"
+    assert interrupted(started) == (130, f"{tool}: interrupted\n")
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A recording that is never told to its end."""
+    path = tmp_path / "recording.mcap"
+    os.mkfifo(path)
+    return path
+
+
+@pytest.mark.parametrize("tool", ["replay", "report"])
+def test_while_it_reads(tool, recording):
+    started = start(tool, str(recording))
+    with recording.open("wb"):  # waits until it is opened there, too
+        assert interrupted(started) == (130, f"{tool}: interrupted\n")
+
+
+def test_while_it_explores():
+    started = start("explore", "--depth", "9")
+    assert started.stderr.readline().startswith("depth 1: ")
+    assert interrupted(started) == (130, "explore: interrupted\n")
+
+
+def test_one_that_is_to_ignore_it_goes_on(recording):
+    """As a shell starts what is to run behind its back."""
+    started = start(
+        "replay",
+        str(recording),
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )
+    with recording.open("wb") as file:
+        started.send_signal(signal.SIGINT)
+        file.write(b"no MCAP")
+    _, err = started.communicate(timeout=60.0)
+    assert (started.returncode, err) == (2, f"replay: {recording} is no MCAP file\n")
