@@ -8,37 +8,46 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.transport.signing_key import signing_from_file
 
 PARACHUTE, AUTOPILOT = "sim_mavlink_parachute", "sim_autopilot"
 BOTH = pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
 LOCAL = "127.0.0.1"
+MSG_DEFS = Path(__file__).parents[2] / "msg_defs"
 #: Makes `import rclpy` fail as on a machine without ROS.
+ROS = ("rclpy", "rosidl_runtime_py", "rpyutils")
 NO_ROS = """
 import sys
 
 
 class NoRos:
     def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in ("rclpy", "rosidl_runtime_py", "rpyutils"):
-            raise ImportError(f"no ROS here: {name}")
+        if name.partition(".")[0] in {names}:
+            raise ImportError(f"no ROS here: {{name}}")
 
 
 sys.meta_path.insert(0, NoRos())
 """
 
 
+def environment_without(names, folder):
+    """An environment in which these modules cannot be imported."""
+    (folder / "sitecustomize.py").write_text(NO_ROS.format(names=names))
+    path = os.pathsep.join([str(folder), *filter(None, sys.path)])
+    return {**os.environ, "PYTHONPATH": path}
+
+
 @pytest.fixture
 def environment(tmp_path):
     """An environment in which rclpy cannot be imported."""
-    (tmp_path / "sitecustomize.py").write_text(NO_ROS)
-    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
-    return {**os.environ, "PYTHONPATH": path}
+    return environment_without(ROS, tmp_path)
 
 
 class Simulator:
@@ -137,6 +146,52 @@ def test_it_runs_without_ros_answers_and_ends_on_an_interrupt(simulator, start, 
     assert frame.device == f"1/{component}"
     assert running.end() == 0
     assert all(re.match(r" *\d+\.\d{3} ", line) for line in running.lines), running.lines
+
+
+#: What the simulators import of others, and the package that has it.
+PACKAGES = {
+    "pymavlink": "pymavlink",
+    "serial": "pyserial",
+    "orjson": "orjson",
+    "yaml": "PyYAML",
+    "dronecan": "dronecan",
+    "can": "python-can",
+    "msgpack": "msgpack",
+    "mcap": "mcap",
+    "ament_index_python": "a ROS",
+}
+
+
+@pytest.mark.parametrize(
+    ("simulator", "connection", "more"),
+    [
+        (PARACHUTE, ("--connection", f"udpin:{LOCAL}:0"), ()),
+        (AUTOPILOT, ("--connection", f"udpin:{LOCAL}:0"), ()),
+        ("sim_flight_computer", (), ("--telem-path", str(MSG_DEFS / "telem"))),
+        (
+            "sim_upf",
+            ("--connection", f"mcast:0:{free_udp_ports(1)[0]}"),
+            ("--dsdl-path", str(MSG_DEFS / "dsdl" / "flyfire")),
+        ),
+    ],
+)
+def test_it_needs_the_packages_that_the_readme_says_and_no_others(
+    simulator, connection, more, tmp_path, await_until
+):
+    readme = (MSG_DEFS.parent / "README.md").read_text()
+    (row,) = re.findall(rf"^\| [^|]*`{simulator}`[^|]* \| ([\w -]+) \| ([^|]+) \|$", readme, re.M)
+    assert not more or f"`{more[0]} msg_defs/" in row[1]
+    missing = tuple(name for name, package in PACKAGES.items() if package not in row[0].split())
+    assert len(PACKAGES) - len(missing) == len(row[0].split())
+    running = Simulator(
+        simulator, environment_without(ROS + missing, tmp_path), *connection, *more
+    )
+    try:
+        await_until(lambda: running.said("is open"), "it is open")
+        assert running.end() == 0
+    finally:
+        running.process.kill()
+        running.process.stdout.close()
 
 
 def test_it_ends_on_a_termination_too(start, await_until):
