@@ -18,7 +18,12 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.substitutions import ExecutableInPackage
 
+from chute_ros.protocol.upf.parameters import EXCLUDES
 from launch import LaunchContext, LaunchDescription
+
+#: As a controller is delivered it takes off, arms, disarms and lands by itself, and refuses to be
+#: told to: safety/arm would never succeed.
+BY_COMMAND = [part for name in EXCLUDES.values() for part in ("--parameter", f"{name}=false")]
 
 
 def _vehicle(context: LaunchContext) -> list:
@@ -37,7 +42,7 @@ def _vehicle(context: LaunchContext) -> list:
     if parachute in ("mavlink", "both"):
         simulators.append(_simulator("sim_mavlink_parachute", network, f"udpout:{air}"))
     if parachute in ("upf", "both"):
-        feel = ("--vehicle", f"udpout:{air}")
+        feel = ("--vehicle", f"udpout:{air}", *BY_COMMAND)
         simulators.append(_simulator("sim_upf", bus, arguments=feel))
     return [
         IncludeLaunchDescription(

@@ -2,6 +2,7 @@
 
 import ast
 import importlib.util
+import itertools
 import sys
 import types
 from pathlib import Path
@@ -9,7 +10,10 @@ from typing import ClassVar
 
 import pytest
 
+from chute_ros.protocol.upf.parameters import EXCLUDES
 from chute_ros.sim.command_line import parser
+from chute_ros.sim.sim_upf import _parameters
+from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "launch").glob("*.launch.py"))
@@ -103,7 +107,7 @@ def test_the_simulators_take_the_options_that_are_given_to_them():
     options = parser("any", "", "udpin:127.0.0.1:0", "")
     known = {text for action in options._actions for text in action.option_strings}
     # Of sim_upf alone, and of sim_flight_computer.
-    known |= {"--vehicle", "--link"}
+    known |= {"--vehicle", "--parameter", "--link"}
     (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
     texts = [
         node.value
@@ -180,6 +184,17 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     if vehicle:
         started = [one for one in made if "executable" in one.options]
         assert all(one.options["respawn"] for one in started), "what dies is started again"
+
+
+@pytest.mark.parametrize("parachute", ["upf", "both"])
+def test_a_simulated_upf_can_be_armed_by_command(parachute, monkeypatch):
+    """As delivered it arms by itself, and rejects who tells it to."""
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    made = made_by(simulation, monkeypatch, parachute=parachute, namespace="sim")
+    (upf,) = [one.options["cmd"] for one in made if one.options.get("name") == "sim_upf"]
+    given = [after for before, after in itertools.pairwise(upf) if before == "--parameter"]
+    values = {**CONTROLLER_PARAMETERS, **_parameters(given)}
+    assert [name for name in EXCLUDES.values() if values[name]] == []
 
 
 @pytest.mark.parametrize(
