@@ -21,6 +21,8 @@ FORMS = (
 )
 SERIAL_FORMS = "serial:PATH[:BAUD] or usb:VENDOR:PRODUCT[:SERIAL]"
 DEFAULT_BAUD = 57600
+#: Names there, above all under by-path, hold colons of their own.
+_COLONS_IN_NAMES = "/dev/serial/"
 _USB_ID = re.compile(r"(?:0[xX])?[0-9a-fA-F]{1,4}")
 _LISTENING = ("udpin", "tcpin")
 _PARTS = {"udpin": 2, "udpout": 2, "udppair": 4, "tcp": 2, "tcpin": 2}
@@ -54,18 +56,14 @@ def _port(text: str, whole: str, lowest: int) -> int:
 def parse_address(text: str) -> Address:
     """The address in text; ParameterError with the allowed forms if it is none."""
     kind, colon, rest = text.partition(":")
-    if kind == "serial":
-        path, colon_before_baud, baud = rest.rpartition(":")
-        if not colon_before_baud or (baud and not _is_whole(baud)):
-            # Names under /dev/serial/by-path hold colons of their own.
-            path, baud = rest, str(DEFAULT_BAUD)
-        if path and baud and int(baud) > 0:
-            return Address(kind, path, int(baud))
+    if kind == "serial" and rest:
+        return _serial(rest, text)
     if kind == "usb":
         return _usb(rest, text)
     parts = rest.split(":") if colon else []
     if kind not in _PARTS or len(parts) != _PARTS[kind] or not all(parts):
-        raise ParameterError(f"connection {text!r} is not understood: need {FORMS}")
+        told = f"connection {text!r} is not understood: need {FORMS}"
+        raise ParameterError(told + _meant(text))
     if kind == "udppair":
         host, port, send_host, send_port = parts
         return Address(kind, host, _port(port, text, 0), send_host, _port(send_port, text, 1))
@@ -77,8 +75,28 @@ def parse_serial_address(text: str) -> Address:
     """The same for what must be a serial port."""
     kind = text.partition(":")[0]
     if kind not in ("serial", "usb"):
-        raise ParameterError(f"connection {text!r} is no serial port: need {SERIAL_FORMS}")
+        told = f"connection {text!r} is no serial port: need {SERIAL_FORMS}"
+        raise ParameterError(told + _meant(text))
     return parse_address(text)
+
+
+def _meant(text: str) -> str:
+    """What a path alone should have been."""
+    return f"; did you mean {f'serial:{text}'!r}?" if text.startswith("/") else ""
+
+
+def _serial(rest: str, whole: str) -> Address:
+    path, colon, baud = rest.rpartition(":")
+    if not colon or (baud and not _is_whole(baud) and path.startswith(_COLONS_IN_NAMES)):
+        path, baud = rest, str(DEFAULT_BAUD)
+    if not path:
+        raise ParameterError(f"connection {whole!r} names no port: need {FORMS}")
+    if not _is_whole(baud) or not int(baud):
+        raise ParameterError(
+            f"connection {whole!r}: baud rate {baud!r} is no whole number from 1 on, such as "
+            f"{DEFAULT_BAUD} (a path with a colon of its own needs it as well): need {FORMS}"
+        )
+    return Address("serial", path, int(baud))
 
 
 def _usb(rest: str, whole: str) -> Address:

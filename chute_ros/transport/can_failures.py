@@ -58,6 +58,9 @@ def system_error(error: BaseException) -> OSError | None:
 def reason(error: BaseException) -> str:
     """Error in one line, with what it comes from."""
     text = str(error) or type(error).__name__
+    if type(error) is NameError:
+        # Kvaser's without canlib: its functions are only defined where it was found.
+        text = f"the driver's own library is not found: install it ({text})"
     cause = error.__cause__
     whole = f"{text} ({cause})" if cause is not None and str(cause) not in text else text
     return " ".join(whole.split())

@@ -27,6 +27,7 @@ FORMS_AND_MEANING = {
     "usb:c0de:cafe": (Address("usb", "", 0xC0DE, send_port=0xCAFE), SerialWire),
     "usb:0x0403:6001:A10K": (Address("usb", "A10K", 0x0403, send_port=0x6001), SerialWire),
     f"serial:{BY_PATH}:115200": (Address("serial", BY_PATH, 115200), SerialWire),
+    "serial:/tmp/tty:rocket:9600": (Address("serial", "/tmp/tty:rocket", 9600), SerialWire),
 }
 
 
@@ -104,9 +105,21 @@ def test_a_port_that_is_none_is_named_with_its_connection(text, port):
     assert FORMS in str(caught.value)
 
 
-def test_what_is_too_long_for_a_baud_rate_is_part_of_the_path():
-    text = "/dev/ttyUSB0:" + "9" * 5000
-    assert parse_address(f"serial:{text}") == Address("serial", text, 57600)
+@pytest.mark.parametrize("baud", ["abc", "", "0", "-1", "57k6", "9" * 5000, "\u0661"])
+def test_a_baud_rate_that_is_none_is_named_with_its_connection(baud):
+    text = f"serial:/dev/ttyUSB0:{baud}"
+    with pytest.raises(ParameterError) as caught:
+        parse_address(text)
+    told = f"connection {text!r}: baud rate {baud!r} is no whole number from 1 on, such as 57600"
+    assert told in str(caught.value)
+    assert FORMS in str(caught.value)
+
+
+def test_a_path_alone_is_answered_with_what_was_meant():
+    for path in ("/dev/ttyUSB0", "/dev/ttyUSB0:57600"):
+        for parse in (parse_address, parse_serial_address):
+            with pytest.raises(ParameterError, match=rf"; did you mean 'serial:{path}'\?$"):
+                parse(path)
 
 
 @pytest.mark.parametrize("text", ["serial:/dev/ttyACM0", "usb:c0de:cafe:A1"])

@@ -6,7 +6,7 @@ import can
 import pytest
 from serial import SerialException, SerialTimeoutException
 
-from chute_ros.transport.can_failures import bad_frame, is_full
+from chute_ros.transport.can_failures import bad_frame, is_full, reason
 
 
 def caused(error, cause):
@@ -47,3 +47,10 @@ def test_a_full_queue_is_told_from_an_interface_that_is_gone(error, full):
 )
 def test_a_bad_frame_is_told_from_an_interface_that_is_gone(error, kind):
     assert bad_frame(error) == kind
+
+
+def test_a_driver_without_its_library_is_told_in_words():
+    """As python-can's Kvaser interface fails where canlib is not installed."""
+    told = reason(NameError("name 'canGetNumberOfChannels' is not defined"))
+    assert told.startswith("the driver's own library is not found: install it (name 'canGet")
+    assert reason(ValueError("CRC")) == "CRC"
