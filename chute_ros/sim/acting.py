@@ -3,11 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 #: Name -> what it does; what follows "=" comes as the argument.
 ActionTable = dict[str, Callable[[str], None]]
+
+
+@dataclass(frozen=True)
+class Argument:
+    """What an action takes. convert: turns it from text, KeyError or ValueError if it is none;
+    need: what it can be, in words."""
+
+    convert: Callable[[str], Any]
+    need: str
+
+
+def one_of(choices: Mapping[str, Any]) -> Argument:
+    """The name of one of them."""
+    return Argument(choices.__getitem__, f"one of {', '.join(choices)}")
+
+
+def number_of(unit: str, highest: float) -> Argument:
+    """From 0 to highest."""
+
+    def convert(text: str) -> float:
+        if not 0.0 <= (value := float(text)) <= highest:
+            raise ValueError(text)
+        return value
+
+    return Argument(convert, f"0 to {highest:g} {unit}")
 
 
 class Actor:
@@ -15,8 +41,8 @@ class Actor:
 
     def __init__(self, name: str = "") -> None:
         self.actions: ActionTable = {}
-        #: Action -> what turns its argument from text; KeyError or ValueError if it is none.
-        self.arguments: dict[str, Callable[[str], Any]] = {}
+        #: Action -> what it takes; those that are not here take nothing.
+        self.arguments: dict[str, Argument] = {}
         self._prefix = f"{name}: " if name else ""
         self._said: list[str] = []
 

@@ -10,6 +10,7 @@ import math
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.goals import FORCE_DISARM
+from chute_ros.sim.acting import number_of
 from chute_ros.sim.flight import GRAVITY, FlightModel
 from chute_ros.sim.mavlink_device import MavlinkDevice, Params
 
@@ -54,7 +55,7 @@ class AutopilotDevice(MavlinkDevice):
             "takeoff": lambda height: setattr(self.model, "target_height", float(height)),
             "fail-motor": lambda _: self._fail_motor(),
         }
-        self.arguments |= {"takeoff": float}
+        self.arguments |= {"takeoff": number_of("m", 10_000.0)}
 
     def reboot(self) -> None:
         """Start anew: an autopilot that restarts in the air does not hold the vehicle any more."""

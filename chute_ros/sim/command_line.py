@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from chute_ros.errors import ChuteError, ParameterError
+from chute_ros.sim.acting import Argument
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
@@ -127,6 +128,21 @@ def number(name: str, lowest: int, highest: int) -> Any:
     return convert
 
 
+def real(name: str, lowest: float, highest: float) -> Any:
+    """The same for any number."""
+
+    def convert(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not lowest <= value <= highest:
+            raise argparse.ArgumentTypeError(f"{name} {text!r}: need {lowest:g} to {highest:g}")
+        return value
+
+    return convert
+
+
 class Acting(ProtocolLink, Protocol):
     """A simulated device with actions: see MavlinkDevice and UpfBus."""
 
@@ -135,8 +151,8 @@ class Acting(ProtocolLink, Protocol):
         """What --at can have it do."""
 
     @property
-    def arguments(self) -> Mapping[str, Callable[[str], Any]]:
-        """What turns the argument of an action from text."""
+    def arguments(self) -> Mapping[str, Argument]:
+        """What its actions take."""
 
 
 def _check_script(device: Acting, options: argparse.Namespace) -> None:
@@ -149,16 +165,16 @@ def _check_action(device: Acting, action: str) -> None:
     if name not in device.actions:
         known = ", ".join(sorted(device.actions))
         raise ParameterError(f"--at: action {name!r} is not known: need one of {known}")
-    convert = device.arguments.get(name)
-    if convert is None:
+    taken = device.arguments.get(name)
+    if taken is None:
         if equals:
             raise ParameterError(f"--at: action {action!r}: {name} takes no argument")
         return
     try:
-        convert(argument)
+        taken.convert(argument)
     except (KeyError, ValueError):
         text = f"--at: action {action!r}: {argument!r} is nothing that {name} can take"
-        raise ParameterError(text) from None
+        raise ParameterError(f"{text}: need {name}={taken.need}") from None
 
 
 def run(device: MavlinkDevice, options: argparse.Namespace) -> None:

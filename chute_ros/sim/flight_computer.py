@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Hashable
 
 from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.sim.acting import Actor, Script
+from chute_ros.sim.acting import Actor, Script, one_of
 from chute_ros.sim.flight_computer_commands import NAMES, CommandReceiver
 from chute_ros.sim.flight_computer_flight import FlightProgram
 from chute_ros.sim.flight_computer_memory import Memory
@@ -74,7 +74,7 @@ class FlightComputer(Actor):
             "lose-dump-end": lambda _: self.memory.disturb_dump("loses-end"),
             "dump-stalls": lambda _: self.memory.disturb_dump("stalls"),
         }
-        self.arguments = {"jump": Mode.__getitem__}
+        self.arguments = {"jump": one_of(Mode.__members__)}
         #: Those that are not for the flight program.
         self.commands_apart: dict[str, Callable[[], None]] = {
             "<R>": self.reboot,

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from chute_ros.model import DeploymentTrigger, ErrorFlags, SafetyFlags, TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.sim.acting import one_of
 from chute_ros.sim.mavlink_device import MavlinkDevice, Params
 
 _ALL_TRIGGERS = 0xFF
@@ -69,8 +70,8 @@ class ParachuteDevice(MavlinkDevice):
             "deploy": lambda name: self._deploy(DeploymentTrigger[name]),
         }
         self.arguments |= {
-            "error": ErrorFlags.__getitem__,
-            "deploy": DeploymentTrigger.__getitem__,
+            "error": one_of(ErrorFlags.__members__),
+            "deploy": one_of(DeploymentTrigger.__members__),
         }
 
     def reboot(self) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
+
 from chute_ros.model import DeploymentTrigger, ErrorFlags
-from chute_ros.sim.command_line import main_of, number, parser, run, script_of
+from chute_ros.sim.command_line import main_of, number, parser, real, run, script_of
 
 
 def _run() -> None:
@@ -46,11 +48,15 @@ def _run() -> None:
         default=start.ground_cleared,
         help="auto: by the height that an autopilot on the network tells, yes where none is heard",
     )
-    options.add_argument("--clear-height", type=float, default=start.clear_height, help="m")
+    options.add_argument(
+        "--clear-height", type=real("m", 0.0, 10_000.0), default=start.clear_height, help="m"
+    )
     options.add_argument(
         "--ats-arm-altitude", type=number("m", 0, 255), default=start.ats_arm_altitude
     )
-    options.add_argument("--packed-date", default=start.packed_date, help="YYYY-MM-DD")
+    options.add_argument(
+        "--packed-date", type=_date, default=start.packed_date, help="YYYY-MM-DD; empty: not told"
+    )
     options.add_argument(
         "--system-status",
         type=number("MAV_STATE", 0, 8),
@@ -71,6 +77,15 @@ def _run() -> None:
         system_status=chosen.system_status,
     )
     run(ParachuteDevice(settings, script_of(chosen.at)), chosen)
+
+
+def _date(text: str) -> str:
+    from chute_ros.protocol.mavlink.parachute import packed_date
+
+    date, wrong = packed_date(text)
+    if wrong:
+        raise argparse.ArgumentTypeError(f"{wrong}: need a day of the calendar")
+    return date
 
 
 def main() -> None:

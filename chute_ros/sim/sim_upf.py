@@ -9,7 +9,7 @@ from dataclasses import replace
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
-from chute_ros.sim.command_line import main_of, number, parser, run_on_can, script_of
+from chute_ros.sim.command_line import main_of, number, parser, real, run_on_can, script_of
 from chute_ros.transport.address import FORMS
 
 
@@ -51,7 +51,9 @@ def _run() -> None:
         metavar="NAME=VALUE",
         help="of the controller, as delivered, for example 'Enable Auto-Arm=false'",
     )
-    options.add_argument("--minimum-height", type=float, default=0.0, help="m, for TYPE_DEPLOY")
+    options.add_argument(
+        "--minimum-height", type=real("m", 0.0, 10_000.0), default=0.0, help="m, for TYPE_DEPLOY"
+    )
     options.add_argument(
         "--vehicle",
         metavar="WIRE",

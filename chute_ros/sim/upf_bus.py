@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any
 
-from chute_ros.sim.acting import Script
+from chute_ros.sim.acting import Argument, Script
 from chute_ros.sim.upf_node import UpfNode
 
 
@@ -26,9 +25,9 @@ class UpfBus:
         return {name: action for node in self.nodes for name, action in node.actions.items()}
 
     @property
-    def arguments(self) -> dict[str, Callable[[str], Any]]:
-        """What turns the arguments of their actions from text."""
-        return {name: turn for node in self.nodes for name, turn in node.arguments.items()}
+    def arguments(self) -> dict[str, Argument]:
+        """What their actions take."""
+        return {name: what for node in self.nodes for name, what in node.arguments.items()}
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
         for node in self.nodes:

@@ -19,6 +19,7 @@ from chute_ros.protocol.upf import machine
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.protocol.upf.machine import Stimulus
+from chute_ros.sim.acting import one_of
 from chute_ros.sim.upf_aps import ApsLimits, AutomaticDeployment, Motion
 from chute_ros.sim.upf_automatic import AutomaticFunctions, AutomaticLimits
 from chute_ros.sim.upf_errors import error_places, told_errors
@@ -92,7 +93,7 @@ class UpfController(UpfNode):
             "clear-errors": lambda _: self._set_errors(set()),
             "deploy": lambda _: self.launch("a person at the device"),
         }
-        self.arguments |= {"error": self._error_places.__getitem__}
+        self.arguments |= {"error": one_of(self._error_places)}
 
     # -- the world -------------------------------------------------------------------------------
 

@@ -316,11 +316,24 @@ def test_a_mistake_is_told_in_one_line(simulator, arguments, said, fail):
     ("simulator", "arguments", "said"),
     [
         (PARACHUTE, ("--at", "5:error=TIRED"), "'TIRED' is nothing that error can take"),
-        (PARACHUTE, ("--at", "5:deploy"), "'' is nothing that deploy can take"),
+        (
+            PARACHUTE,
+            ("--at", "5:deploy"),
+            "'' is nothing that deploy can take: need deploy=one of NONE, ",
+        ),
+        (PARACHUTE, ("--packed-date", "2024-13-01"), "packed date '2024-13-01' is no date YYYY-"),
+        (PARACHUTE, ("--packed-date", "yesterday"), "packed date 'yesterday' is no date YYYY-MM"),
+        (PARACHUTE, ("--clear-height", "nan"), "--clear-height: m 'nan': need 0 to 10000"),
+        (PARACHUTE, ("--clear-height", "high"), "--clear-height: m 'high': need 0 to 10000"),
         (PARACHUTE, ("--armed", "256"), "mask '256': need 0 to 255"),
         (PARACHUTE, ("--ats-arm-altitude", "300"), "m '300': need 0 to 255"),
         (PARACHUTE, ("--error", "TIRED"), "invalid choice: 'TIRED'"),
-        (AUTOPILOT, ("--at", "5:takeoff=high"), "'high' is nothing that takeoff can take"),
+        (
+            AUTOPILOT,
+            ("--at", "5:takeoff=high"),
+            "'high' is nothing that takeoff can take: need takeoff=0 to 10000 m",
+        ),
+        (AUTOPILOT, ("--at", "5:takeoff=nan"), "'nan' is nothing that takeoff can take: need "),
     ],
 )
 def test_a_mistake_in_its_own_options_is_told_too(simulator, arguments, said, fail):

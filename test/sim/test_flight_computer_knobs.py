@@ -77,9 +77,9 @@ def test_the_script_is_done_in_time():
 def test_actions_and_arguments_are_those_of_every_simulator():
     device = Host().device
     assert set(device.arguments) <= set(device.actions)
-    assert device.arguments["jump"]("Coast") == 3
+    assert device.arguments["jump"].convert("Coast") == 3
     with pytest.raises(KeyError):
-        device.arguments["jump"]("Landed")
+        device.arguments["jump"].convert("Landed")
 
 
 # Heartbeats and log lines

@@ -546,7 +546,7 @@ def test_a_trigger_that_is_not_heard_any_more_is_told_but_stops_nothing(layout):
 @BOTH_LAYOUTS
 def test_every_error_has_an_action_and_is_told_by_its_name(layout):
     story = ready(layout)
-    known = story.controller.arguments["error"]
+    known = story.controller.arguments["error"].convert
     for name in ("IMU", "BAROMETER", "TRIGGER_CONNECTION"):
         known(name)
         story.bus.act(f"error={name}")
