@@ -17,8 +17,8 @@ from chute_ros.supervisor.handover import followed, told
 from chute_ros.supervisor.lease import Claim
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.state import State
-from chute_ros.tools.explore import BEGINNINGS, Explorer
 from chute_ros.tools.explore_steps import LINKS, Step, configuration, steps
+from chute_ros.tools.explorer import BEGINNINGS, Explorer
 from fuzz.plain_json import NOW, changed
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
