@@ -7,7 +7,7 @@ allowed. Parameters are read-only unless a change in flight cannot be dangerous.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,9 +96,14 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
 def _tell_unknown(node: Node, known: list[str]) -> None:
     for name in node._parameter_overrides:
         if not node.has_parameter(name) and not name.startswith("qos_overrides."):
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f": did you mean {near[0]}?" if near else ""
+            hint = what_was_meant(name, known)
             node.get_logger().error(f"has no parameter {name}, its value is not used{hint}")
+
+
+def what_was_meant(name: str, known: Iterable[str]) -> str:
+    """The end of a text that says that there is no such parameter; empty: none is like it."""
+    near = difflib.get_close_matches(name, known, 1)
+    return f": did you mean {near[0]}?" if near else ""
 
 
 def liveness_from(values: Mapping[str, Any], name: str) -> LivenessLimits:

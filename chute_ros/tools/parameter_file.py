@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import reprlib
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
@@ -12,7 +11,7 @@ from typing import Any
 import yaml
 
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.parameters import Parameter
+from chute_ros.nodes.parameters import Parameter, what_was_meant
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.replaying import Other
@@ -31,8 +30,7 @@ def other_from(path: Path, node: str) -> Other:
     known = {one.name: one for one in PARAMETERS}
     for name in given:
         if name.partition(".")[0] not in {*known, *_EVERYWHERE}:
-            near = difflib.get_close_matches(name, known, 1)
-            hint = f": did you mean {near[0]}?" if near else ""
+            hint = what_was_meant(name, known)
             raise ParameterError(f"{path}: {NODE} has no parameter {name}{hint}")
     for name, parameter in known.items():
         if name in given:

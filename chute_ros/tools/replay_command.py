@@ -9,7 +9,6 @@ flight would have gone on after another decision.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from pathlib import Path
@@ -23,6 +22,7 @@ from chute_ros.tools.parameter_file import NODE, other_from
 from chute_ros.tools.plain_text import plain
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, files_of, read
+from chute_ros.tools.recording_options import complain, recording_options
 from chute_ros.tools.replay_picture import Track, picture
 from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
 
@@ -32,16 +32,7 @@ _PROFILE = "profile.name"
 
 def main() -> None:
     """Exit code 0: the same decisions; 1: others; 2: it cannot be read."""
-    options = argparse.ArgumentParser(
-        "replay", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    options.add_argument(
-        "files",
-        metavar="FILE",
-        nargs="+",
-        type=Path,
-        help="files of a black box in their order, or its folder",
-    )
+    options = recording_options("replay", __doc__)
     options.add_argument(
         "--config", type=Path, metavar="YAML", help="decide with this ROS parameter file instead"
     )
@@ -55,8 +46,7 @@ def main() -> None:
     try:
         code = _replay(chosen.files, chosen.config, chosen.picture)
     except ChuteError as error:
-        for line in f"replay: {error}".splitlines():
-            print(plain(line), file=sys.stderr)
+        complain("replay", error)
         code = UNREADABLE
     except BrokenPipeError:
         # Whoever read the table has seen enough; the interpreter must not complain of it.

@@ -6,7 +6,6 @@ decisions with their reasons and with what came of them.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from chute_msgs.msg import SafetyDecision, SafetyState
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.flight_story import DECISION, tell
-from chute_ros.tools.plain_text import plain
 from chute_ros.tools.recording import files_of, read
+from chute_ros.tools.recording_options import complain, recording_options
 from chute_ros.tools.replay_picture import vehicle_curves
 from chute_ros.tools.replayed_states import replayed_states
 from chute_ros.tools.report_page import page
@@ -28,16 +27,7 @@ STATE = "safety/state"
 
 def main() -> None:
     """Exit code 0: written; 2: the recording cannot be read, or the page cannot be written."""
-    options = argparse.ArgumentParser(
-        "report", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    options.add_argument(
-        "files",
-        metavar="FILE",
-        nargs="+",
-        type=Path,
-        help="files of a black box in their order, or its folder",
-    )
+    options = recording_options("report", __doc__)
     options.add_argument(
         "--output", type=Path, metavar="HTML", help="where it goes (default: FILE.html)"
     )
@@ -45,8 +35,7 @@ def main() -> None:
     try:
         path = _report(chosen.files, chosen.output)
     except ChuteError as error:
-        for line in f"report: {error}".splitlines():
-            print(plain(line), file=sys.stderr)
+        complain("report", error)
         sys.exit(2)
     print(path)
 

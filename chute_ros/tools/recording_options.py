@@ -1,0 +1,31 @@
+"""What the tools that read recordings share: their files on the command line, and their errors."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from chute_ros.errors import ChuteError
+from chute_ros.tools.plain_text import plain
+
+
+def recording_options(program: str, description: str | None) -> argparse.ArgumentParser:
+    """The parser of program, with files to read."""
+    options = argparse.ArgumentParser(
+        program, description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        type=Path,
+        help="files of a black box in their order, or its folder",
+    )
+    return options
+
+
+def complain(program: str, error: ChuteError) -> None:
+    """Why it cannot go on, without what would move a cursor."""
+    for line in f"{program}: {error}".splitlines():
+        print(plain(line), file=sys.stderr)
