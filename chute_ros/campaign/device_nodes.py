@@ -95,7 +95,12 @@ class UpfNode(DeviceNode):
         if device == TRIGGER:
             fire: Callable[[int, float], None] = self.link.fire_triggers
             return fire
-        return lambda token, at: self.link.deploy(token, True, at, int(device or 0))
+
+        def begin(token: int, now: float) -> None:
+            self.link.kill_waited_for(now)
+            self.link.deploy(token, True, now, int(device or 0))
+
+        return begin
 
     def flight_block(self, reason: str, now: float) -> None:
         """It asks for it and does nothing about it itself."""

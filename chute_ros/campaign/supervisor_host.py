@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.sensor_messages import Imu, Odometry
 from chute_ros.campaign.vehicle_hearing import VehicleHearing
-from chute_ros.model import Action, Decision, VehicleState
+from chute_ros.model import Action, Decision
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 from chute_ros.supervisor import handover
 from chute_ros.supervisor import inputs as i
@@ -176,8 +176,8 @@ class SupervisorHost:
         self._hearing.hear(one, now)
         self._ros.world.stir(self)
 
-    def _vehicle_told(self, state: VehicleState, now: float) -> None:
-        self._turn((i.VehicleReport(state),), now)
+    def _vehicle_told(self, report: i.VehicleReport, now: float) -> None:
+        self._turn((report,), now)
 
     def _heartbeat(self, one: i.LinkHeartbeat, difference: float, now: float) -> None:
         self._stamps[one.link] = now + self.process.clock - difference

@@ -6,21 +6,20 @@ import math
 from collections.abc import Callable
 
 from chute_ros.campaign.sensor_messages import Imu, Odometry
-from chute_ros.model import VehicleState
 from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, TELL_INTERVAL, VehicleMerge
 from chute_ros.supervisor import inputs as i
 
 
 class VehicleHearing:
-    """sources: as the parameter vehicle_sources; lost_after: vehicle_state_age, s. tell(state,
+    """sources: as the parameter vehicle_sources; lost_after: vehicle_state_age, s. tell(report,
     now) is called at once, or together with what else comes until the interval is over."""
 
     def __init__(
         self,
         sources: tuple[str, ...],
         lost_after: float,
-        tell: Callable[[VehicleState, float], None],
+        tell: Callable[[i.VehicleReport, float], None],
     ) -> None:
         self._merge, self._tell = VehicleMerge(sources, lost_after), tell
         self._told_at = -math.inf
@@ -43,4 +42,4 @@ class VehicleHearing:
     def tell_now(self, now: float) -> None:
         """The picture by now."""
         self.due, self._told_at = math.inf, now
-        self._tell(self._merge.state(now), now)
+        self._tell(i.VehicleReport(self._merge.state(now), self._merge.disputed(now)), now)

@@ -107,7 +107,7 @@ class SafetySupervisorNode(Node):
             self, self.config, self.wall, self._recorder, self._health, self._turn
         )
         self._vehicle_sources = VehicleSources(
-            self, self.values, lambda state: self._turn(inputs.VehicleReport(state))
+            self, self.values, lambda *told: self._turn(inputs.VehicleReport(*told))
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().warning(

@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros import model
 from chute_ros.nodes import diagnostics
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.flight import measured, unusable
+from chute_ros.supervisor.flight import doubt, measured, unusable
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import judge
@@ -95,7 +95,9 @@ def decisions_task(
     for measurement in config.profile.limits:
         value = measured(config, state, measurement, now)
         why = unusable(config, state, measurement, now)
-        values[measurement] = f"{value:.2f}" if not why else f"unusable: {why}"
+        in_doubt = doubt(state, measurement, now)
+        told = f"{value:.2f} (in doubt: {in_doubt})" if in_doubt else f"{value:.2f}"
+        values[measurement] = f"unusable: {why}" if why else told
     return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")
 
 

@@ -141,9 +141,12 @@ class UpfCanNode(DeviceNode):
             self.decisions.report(decision, model.Outcome.FAILED, text)
         else:
             node_id = int(device or 0)
-            self.deploy_for(
-                decision, lambda link, token, now: link.deploy(token, force, now, node_id)
-            )
+
+            def begin(link: Any, token: int, now: float) -> None:
+                link.kill_waited_for(now)
+                link.deploy(token, force, now, node_id)
+
+            self.deploy_for(decision, begin)
 
     def arm_link(self, link: UpfLink, token: int, request: Any, now: float) -> None:
         link.arm(token, request.arm, request.triggers, now)

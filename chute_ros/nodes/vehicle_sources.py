@@ -84,15 +84,15 @@ class VehicleSources:
     """Subscribes to what the parameters name and tells what the vehicle is by then.
 
     values: the node's parameters, VEHICLE_PARAMETERS among them, and vehicle_state_age (s): a
-    source of the autopilot that is silent for longer has lost it. tell(state) is called by the
-    node's executor. clock: monotonic seconds.
+    source of the autopilot that is silent for longer has lost it. tell(state, disputed) is called
+    by the node's executor. clock: monotonic seconds.
     """
 
     def __init__(
         self,
         node: Node,
         values: Mapping[str, Any],
-        tell: Callable[[model.VehicleState], object],
+        tell: Callable[[model.VehicleState, frozenset[str]], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._node, self._values, self._tell, self._clock = node, values, tell, clock
@@ -143,7 +143,7 @@ class VehicleSources:
     # -- messages -------------------------------------------------------------------------------
 
     def _pass_on(self, message: VehicleState) -> None:
-        self._tell(messages.vehicle_state_from(message))
+        self._tell(messages.vehicle_state_from(message), frozenset())
 
     def _vehicle_state(self, message: VehicleState) -> None:
         now = self._clock()
@@ -181,7 +181,7 @@ class VehicleSources:
     def _tell_now(self) -> None:
         self._timer.cancel()
         self._told_at = self._clock()
-        self._tell(self._merge.state(self._told_at))
+        self._tell(self._merge.state(self._told_at), self._merge.disputed(self._told_at))
 
 
 def _checked(sources: list[str]) -> list[str]:

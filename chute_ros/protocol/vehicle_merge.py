@@ -5,10 +5,15 @@ time of its receipt; a source that says that it does not know a part any more ta
 word back. Of the sources that give a part, the first in the user's order counts as long as its
 word is fresh; when that is old, the first other one with a fresh word; when all are old, the
 newest. Old words keep their true age: the supervisor decides how old is too old.
+
+Two sources that tell otherwise of the same part at the same time dispute it: one of them lies, and
+nobody knows which. One that jumps as nothing that flies does disputes its own word. So it stays
+for a while, also where only one of them is left.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,10 +26,25 @@ from chute_ros.protocol import vehicle_readings as readings
 VEHICLE_STATE, MAVROS = "vehicle/state", "mavros"
 AUTOPILOTS = (VEHICLE_STATE, MAVROS)
 ODOMETRY, IMU = "odometry", "imu"
-#: How old a word may be, s, before another source's word on the same part counts instead.
-FRESH = 1.0
+#: How old a word may be, s, before another source's word on the same part counts instead: less
+#: than the supervisor believes one (max_age of the measurements), so that it sees no gap, and
+#: what jumps from one source to the other as the jump that it is.
+FRESH = 0.8
+_FRESH_SOONER = {"attitude": 0.4, "acceleration": 0.4}
 #: Sensors may send hundreds of messages a second: the picture is told no more often than this, s.
 TELL_INTERVAL = 0.02
+
+#: By how much two sources differ that cannot both be right: part -> place of its value, and m/s,
+#: rad (that of one that tumbles may be a tenth of a second older), m/s^2 (motors shake).
+_DISPUTES = {"vertical_speed": (0, 5.0), "attitude": (3, math.pi / 2.0), "acceleration": (0, 6.0)}
+#: Parts that can be another at once: a force is, when the motors stop.
+_MAY_JUMP = ("acceleration",)
+#: Two words are of the same time if they are at most so far apart, s.
+_SAME_TIME = 0.1
+#: And must differ for so long, s: the last word of one that dies with the motors proves nothing.
+_DIFFER_FOR = 0.2
+#: So long it is remembered, s: as long as a fall may last.
+DISPUTED = 10.0
 
 #: A link in order of preference: who hears the autopilot knows more of it than who lost it.
 _PREFERENCE = (LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.NEVER_SEEN)
@@ -50,6 +70,10 @@ class VehicleMerge:
         self._lost_after = lost_after
         self._words: dict[str, dict[str, _Word]] = {source: {} for source in sources}
         self._vehicle = VehicleState()
+        #: (Part, source) -> when another source last told otherwise.
+        self._disputed: dict[tuple[str, str], float] = {}
+        #: (Part, two sources) -> since when they differ.
+        self._differ: dict[tuple[str, frozenset[str]], float] = {}
 
     def hear(self, source: str, parts: readings.Parts, now: float) -> None:
         """A message of source came now and says this."""
@@ -88,6 +112,15 @@ class VehicleMerge:
             **fields,
         )
 
+    def disputed(self, now: float) -> frozenset[str]:
+        """The parts that are told by a source that another one has lately contradicted."""
+        return frozenset(
+            part
+            for part in _DISPUTES
+            if (source := self._source(part, now)) is not None
+            and now - self._disputed.get((part, source), -math.inf) < DISPUTED
+        )
+
     def _store(
         self, source: str, part: str, values: readings.Values | None, received: float
     ) -> None:
@@ -98,13 +131,34 @@ class VehicleMerge:
         if part == readings.AUTOPILOT and values[0] is not LinkState.OK and before is not None:
             # Who says that he does not hear it has no new word of it.
             received = before.received
-        self._words[source][part] = _Word(values, received)
+        word = _Word(values, received)
+        if part in _DISPUTES:
+            self._compare(part, source, word)
+        self._words[source][part] = word
+
+    def _compare(self, part: str, source: str, word: _Word) -> None:
+        """With the newest words of all sources, of this one as well."""
+        place, most = _DISPUTES[part]
+        for other, words in self._words.items():
+            theirs = words.get(part)
+            if theirs is None or abs(word.received - theirs.received) > _SAME_TIME:
+                continue
+            differs = abs(word.values[place] - theirs.values[place]) > most
+            if other == source:
+                if differs and part not in _MAY_JUMP:
+                    self._disputed[part, source] = word.received
+                continue
+            both = part, frozenset((source, other))
+            if not differs:
+                self._differ.pop(both, None)
+            elif word.received - self._differ.setdefault(both, word.received) >= _DIFFER_FOR:
+                self._disputed[part, source] = self._disputed[part, other] = word.received
 
     def _source(self, part: str, now: float) -> str | None:
         """Whose word on this part counts; None: nobody knows."""
         givers = [source for source in self._sources if part in self._words[source]]
         for source in givers:
-            if now - self._words[source][part].received <= FRESH:
+            if now - self._words[source][part].received <= _FRESH_SOONER.get(part, FRESH):
                 return source
         return max(givers, key=lambda one: self._words[one][part].received, default=None)
 

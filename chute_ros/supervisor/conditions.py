@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.rules import (
     ALL,
@@ -28,11 +29,14 @@ _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 
 class Finding(NamedTuple):
     """holds None: it cannot be said. tell: says what was found, asked only where somebody reads
-    it. samples: so many distinct ones came so far; -1: none do."""
+    it. samples: so many distinct ones came so far; -1: none do. doubted: the sensor that tells it
+    has just told what cannot be. expected: what cannot be said now was said a moment ago."""
 
     holds: bool | None
     tell: Callable[[], str]
     samples: int = -1
+    doubted: bool = False
+    expected: bool = True
 
     @property
     def text(self) -> str:
@@ -57,12 +61,20 @@ def _measurement(
             taken = ", taken to be so" if condition.if_unknown else ""
             return f"{name} cannot be used: {why} (asked for: {condition.limits}){taken}"
 
-        return Finding(True, tell) if condition.if_unknown else Finding(None, tell, samples)
+        if condition.if_unknown:
+            return Finding(True, tell)
+        gap = now - flight.last_usable(config, state, name) <= UNKNOWN_STANDS
+        return Finding(None, tell, samples, expected=gap)
+    doubt = flight.doubt(state, name, now)
     if value != known.value:
-        samples = state.measured("height").count  # told by the heights instead
+        samples, doubt = state.measured("height").count, ""  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
     holds = not (value <= condition.above or value >= condition.below)
-    return Finding(holds, lambda: f"{name} {value:.2f} ({condition.limits})", samples)
+
+    def told() -> str:
+        return f"{name} {value:.2f} ({condition.limits}{f'; in doubt: {doubt}' if doubt else ''})"
+
+    return Finding(holds, told, samples, bool(doubt))
 
 
 def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.rules import Rule
+from chute_ros.supervisor.rules import Rule, is_counted
 
 #: Two floats that count the same seconds may differ by this, s.
 _ROUNDING = 1e-6
@@ -22,12 +23,24 @@ _WEIGHTS_ROUNDING = 1e-9
 UNKNOWN_STANDS = 3.0
 
 
+class Look(NamedTuple):
+    """A condition as it was found. holds None: it cannot be said. samples: so many of what it
+    rests on have come so far; -1: none come. doubted: it counts only the rule's part of it.
+    expected False: what cannot be said has not been for long, and keeps nothing that was counted.
+    """
+
+    holds: bool | None
+    samples: int = -1
+    doubted: bool = False
+    expected: bool = True
+
+
 @dataclass(frozen=True)
 class RuleEvidence:
     """What is known of a rule. level: s, 0 to the rule's hold."""
 
     level: float = 0.0
-    #: The conditions held at the last look; None: it could not be said.
+    #: The conditions that are counted held at the last look; None: it could not be said.
     holds: bool | None = False
     #: For how long it has not been possible to say, s.
     unknown: float = 0.0
@@ -61,27 +74,29 @@ class RuleEvidence:
             return self
         return replace(self, level=level, unknown=unknown)
 
-    def seeing(self, rule: Rule, found: Sequence[tuple[bool | None, int]]) -> RuleEvidence:
-        """After the conditions were looked at. found: for each whether it holds (None: it cannot
-        be said), and how many samples of what it rests on have come so far (-1: none come)."""
+    def seeing(self, rule: Rule, found: Sequence[Look]) -> RuleEvidence:
+        """After the conditions were looked at. found: each of them, in their order."""
         known = len(self.shown) == len(found)  # otherwise it is another rule of this name
         before = self.shown if known else (0.0,) * len(found)
         last = self.seen if known else (-1,) * len(found)
         shown, now_seen = [], []
         weight = possible = sure = 0.0
-        for condition, (holds, seen), count, old in zip(
+        for condition, (holds, seen, doubted, expected), count, old in zip(
             rule.conditions, found, before, last, strict=True
         ):
+            counts = condition.weight * (rule.doubted if doubted else 1.0)
             now_seen.append(seen)
             if seen != old:
                 change = 1.0 if holds else 0.0 if holds is None else -rule.leak
                 count = min(max(0.0, count + change), float(rule.samples))
             shown.append(count)
             if holds:
-                weight += condition.weight
-                sure += condition.weight if seen < 0 or count >= rule.samples else 0.0
-            if holds is not False:
-                possible += condition.weight
+                sure += counts if seen < 0 or count >= rule.samples else 0.0
+            presumed = not is_counted(condition)
+            if holds or presumed:
+                weight += counts
+            if holds or presumed or (holds is None and expected):
+                possible += counts
         enough = rule.needed - _WEIGHTS_ROUNDING
         rule_holds = True if weight >= enough else None if possible >= enough else False
         is_sure, shown_now, seen_now = sure >= enough, tuple(shown), tuple(now_seen)

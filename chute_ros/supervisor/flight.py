@@ -36,6 +36,8 @@ _HEARD_BEFORE = 1.0
 #: The heights lie so near to a climb with the rate that they tell, m, and so much more for each
 #: m/s of it: a second of free fall bends them by 0.4 m, one of ten times the gravity by 4 m.
 _SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
+#: Measurement -> the part of vehicle/state that tells it, where that has another name.
+_PARTS = {"tilt_deg": "attitude"}
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
 
@@ -59,6 +61,21 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
 def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
     """A measurement, or NaN where it cannot be used."""
     return reading(config, state, name, now)[0]
+
+
+def doubt(state: State, name: str, now: float) -> str:
+    """Why a measurement that can be used is a weaker sign than another; empty: it is not."""
+    if _PARTS.get(name, name) in state.disputed:
+        return "another source told otherwise"
+    return state.measured(name).doubt(name, now)
+
+
+def last_usable(config: SupervisorConfig, state: State, name: str) -> float:
+    """Until when what tells a measurement could be used, monotonic s; -infinity: never."""
+    tellers = {CLIMB_RATE: (HEIGHT,), "vertical_speed": ("vertical_speed", HEIGHT)}
+    limits = config.profile.limits
+    times = [state.measured(one).last_usable(limits[one]) for one in tellers.get(name, (name,))]
+    return max([time for time in times if not math.isnan(time)], default=-math.inf)
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:

@@ -38,9 +38,11 @@ class ParachuteReport:
 
 @dataclass(frozen=True)
 class VehicleReport:
-    """A VehicleState came."""
+    """A VehicleState came. disputed: its parts (vertical_speed, attitude, acceleration) that
+    another source has lately told otherwise."""
 
     state: VehicleState
+    disputed: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -53,8 +53,8 @@ STANDARD_LIMITS: dict[str, Limits] = {
     "height": Limits(-500.0, 50_000.0, 400.0, 10.0, 1.0, 5.0),
     # m/s, up positive
     "vertical_speed": Limits(-400.0, 400.0, 200.0, 5.0, 1.0, 5.0),
-    # degrees between the vehicle's axis and the vertical, 0 upright to 180
-    "tilt_deg": Limits(0.0, 180.0, 2000.0, 60.0, 0.5, 5.0),
+    # degrees between the vehicle's axis and the vertical, 0 upright to 180; pi as float32 is more
+    "tilt_deg": Limits(0.0, 180.001, 2000.0, 60.0, 0.5, 5.0),
     # m/s^2, length of the specific force: 9.8 at rest, 0 in free fall
     "acceleration": Limits(0.0, 2000.0, 100_000.0, 200.0, 0.5, 5.0),
     # m over ground from where it took off
@@ -70,6 +70,11 @@ HEIGHT = "height"
 FALL_SIGNS = ("vertical_speed", "acceleration")
 #: A jump that was believed is doubted for so long, s: as long as a fall may last.
 JUMP_DOUBTED = 10.0
+#: And so long what follows a sample that was not taken, s: noise leaves some that could be.
+REJECTION_DOUBTED = 1.0
+#: m/s^2. To the last bit so: an accelerometer that fails. One that falls feels its drag and its
+#: noise.
+_FAILED_ACCELERATION = 0.0
 #: From the heights of the last second; on it conditions can rest as on the measurements.
 CLIMB_RATE = "climb_rate"
 
@@ -134,12 +139,33 @@ class Measured:
 
     def turns_at(self, limits: Limits, now: float) -> float:
         """When time alone makes it usable, or too old; infinity: it does not."""
-        turns = (self.measured_at - _JITTER, self.measured_at + limits.max_age)
+        turns = (
+            self.measured_at - _JITTER,
+            self.measured_at + limits.max_age,
+            self.doubted_at + REJECTION_DOUBTED,
+            self.jumped_at + JUMP_DOUBTED,
+        )
         return min([turn for turn in turns if turn >= now], default=math.inf)
+
+    def last_usable(self, limits: Limits) -> float:
+        """Until when it could be used, or can be, monotonic s; NaN: it never could."""
+        if limits.stuck_after > 0.0:
+            return min(self.measured_at, self.same_since + limits.stuck_after)
+        return self.measured_at
 
     def has_jumped(self, now: float) -> bool:
         """A moment ago it was another, and which of the two is right nobody knows."""
         return now < self.jumped_at + JUMP_DOUBTED
+
+    def doubt(self, name: str, now: float) -> str:
+        """Why one that can be used is a weaker sign than another; empty: it is not."""
+        if self.has_jumped(now):
+            return f"it jumped {now - self.jumped_at:.1f} s ago"
+        if now < self.doubted_at + REJECTION_DOUBTED:
+            return f"another was not taken {now - self.doubted_at:.1f} s ago"
+        if name == "acceleration" and self.value == _FAILED_ACCELERATION:
+            return "exactly 0 is what an accelerometer that fails reads"
+        return ""
 
     def usable(self, limits: Limits, now: float) -> float:
         """The value, or NaN where it cannot be used."""

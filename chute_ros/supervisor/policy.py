@@ -11,7 +11,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions import Finding, find
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.counter import RuleEvidence
+from chute_ros.supervisor.counter import Look, RuleEvidence
 from chute_ros.supervisor.gate import against_rule, too_low
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.reports import Reports
@@ -41,7 +41,7 @@ class Judged(NamedTuple):
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
-    found = [(finding.holds, finding.samples) for finding in findings]
+    found = [Look(one.holds, one.samples, one.doubted, one.expected) for one in findings]
     evidence = state.rule(rule.name).seeing(rule, found)
     return Judged(rule, evidence, findings)
 
@@ -56,9 +56,9 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
         deadlines.append(evidence.deadline(rule, now))
         if rule.asks_the_autopilot:
             deadlines.append(state.vehicle_received + config.vehicle_state_age)
+        turns = rule.silences if rule.doubted == 1.0 else rule.silences.union(rule.measured)
         deadlines += [
-            state.measured(name).turns_at(config.profile.limits[name], now)
-            for name in rule.silences
+            state.measured(name).turns_at(config.profile.limits[name], now) for name in turns
         ]
         if evidence.holds:
             deadlines += [
@@ -126,6 +126,7 @@ class Policy(Reports):
             state.measurements is before.measurements
             and state.heights is before.heights
             and state.vehicle is before.vehicle
+            and state.disputed == before.disputed
             and state.vehicle_received == before.vehicle_received
             and state.rebooted == before.rebooted
             and self.now < before.vehicle_rests_until

@@ -46,7 +46,7 @@ _ACTIONS = {
 }
 _RULE_KEYS = (
     *("says", "source", "states", "conditions", "needed", "for", "leak", "samples"),
-    *("action", "clears"),
+    *("doubted", "action", "clears"),
 )
 _CONDITION_KEYS = ("measurement", "link", "autopilot", "device")
 _PROFILE_KEYS = (
@@ -169,6 +169,7 @@ def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: R
         "for": lambda w: {"hold": reader.number(w, f"for of {what}", 0.0, 600.0)},
         "leak": lambda w: {"leak": reader.number(w, f"leak of {what}", 0.0, 100.0)},
         "samples": lambda w: {"samples": int(_whole(reader, w, f"samples of {what}"))},
+        "doubted": lambda w: {"doubted": reader.number(w, f"doubted of {what}", 0.0, 1.0)},
         "clears": lambda w: {"clears": _member(reader, w, f"clears of {what}", Clears)},
         "says": lambda w: {"says": reader.text(w, f"says of {what}")},
         "source": lambda w: {"source": reader.text(w, f"source of {what}")},
@@ -193,10 +194,12 @@ def _member(reader: _ProfileLines, where: Where, what: str, kind: type[_Kind]) -
 def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | None:
     entries = reader.mapping(
         where,
-        (*_CONDITION_KEYS, "above", "below", "if_unknown", "is", "weight"),
+        (*_CONDITION_KEYS, "above", "below", "if_unknown", "is", "counted", "weight"),
         f"a condition of {what}",
     )
     kinds = [key for key in _CONDITION_KEYS if key in entries]
+    if "counted" in entries and kinds != ["autopilot"]:
+        reader.wrong(entries["counted"].line, "counted belongs to the autopilot: remove it here")
     weight = 1.0
     if "weight" in entries:
         weight = reader.number(entries["weight"], f"weight in {what}", 1e-6, 1e6)
@@ -213,7 +216,10 @@ def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | No
         reader.wrong(entries["is"].line, "`is` belongs to a link: remove it here")
     if "autopilot" in kinds:
         fact = _member(reader, entries["autopilot"], f"autopilot in {what}", AutopilotFact)
-        return AutopilotCondition(fact, weight)
+        counted = True
+        if "counted" in entries:
+            counted = reader.truth(entries["counted"], f"counted of {fact.value} in {what}")
+        return AutopilotCondition(fact, weight, counted)
     if "device" in kinds:
         device = _member(reader, entries["device"], f"device in {what}", DeviceFact)
         link = ANY

@@ -91,6 +91,7 @@ class Reports(Requests):
             state,
             vehicle=new,
             vehicle_received=self.now,
+            disputed=one.disputed,
             measurements=MappingProxyType({**state.measurements, **measurements}),
         )
         self._note_height_told()

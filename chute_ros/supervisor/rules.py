@@ -93,10 +93,15 @@ class LinkCondition:
 
 @dataclass(frozen=True)
 class AutopilotCondition:
-    """The autopilot is so."""
+    """The autopilot is so.
+
+    counted False: the rule's counter goes up without it as well. It must hold once the rule is
+    acted on; but what has been waited for already, as silence has, need not be waited for twice.
+    """
 
     fact: AutopilotFact
     weight: float = 1.0
+    counted: bool = True
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,11 @@ class DeviceCondition:
 Condition = MeasurementCondition | LinkCondition | AutopilotCondition | DeviceCondition
 
 
+def is_counted(condition: Condition) -> bool:
+    """Does the rule's counter wait for it?"""
+    return not isinstance(condition, AutopilotCondition) or condition.counted
+
+
 def is_silence(condition: Condition) -> bool:
     """Does it tell only that somebody is not heard, or may it?"""
     if isinstance(condition, MeasurementCondition):
@@ -123,7 +133,8 @@ def is_silence(condition: Condition) -> bool:
 @dataclass(frozen=True)
 class Rule:
     """One rule. Fulfilled once the weights of the true conditions have been at least needed, for
-    hold s by a counter that goes up while they are and leaks leak s each s while they are not."""
+    hold s by a counter that goes up while they are and leaks leak s each s while they are not.
+    (Without those that are not counted, until they are true as well.)"""
 
     name: str
     conditions: tuple[Condition, ...]
@@ -135,6 +146,8 @@ class Rule:
     leak: float = 0.5
     #: Distinct samples that must have shown it, where it rests on measurements.
     samples: int = 1
+    #: So much of its weight a measurement counts that is in doubt (Measured.doubt), 0 to 1.
+    doubted: float = 1.0
     clears: Clears = Clears.NEVER
     #: What it means, and where its values come from, in words.
     says: str = ""

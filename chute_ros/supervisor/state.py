@@ -118,6 +118,8 @@ class State:
     links: Mapping[str, LinkEvidence] = field(default_factory=lambda: MappingProxyType({}))
     vehicle: VehicleState = field(default=VehicleState())
     vehicle_received: float = math.nan
+    #: Parts of it that another source has lately told otherwise.
+    disputed: frozenset[str] = frozenset()
     measurements: Mapping[str, Measured] = field(default_factory=lambda: MappingProxyType({}))
     #: (monotonic s, m) of the heights of the last second, the oldest first.
     heights: tuple[tuple[float, float], ...] = ()

@@ -133,6 +133,7 @@ def _vehicle(config: SupervisorConfig, state: State, now: float) -> Hashable:
         vehicle.link_state,
         vehicle.system_status,
         vehicle.reboot_count,
+        state.disputed,
     )
 
 

@@ -109,7 +109,7 @@ def test_a_power_failure_that_a_second_source_told_of_is_no_excuse() -> None:
 
 
 @pytest.mark.parametrize(
-    ("sources", "left"), [(WITH_ODOMETRY, 3.0), (IMU_FIRST, 3.0), ((ODOMETRY, *WITH_IMU), 2.0)]
+    ("sources", "left"), [(WITH_ODOMETRY, 2.8), (IMU_FIRST, 2.8), ((ODOMETRY, *WITH_IMU), 2.0)]
 )
 def test_the_last_word_of_an_autopilot_without_power_is_waited_out(
     sources: tuple[str, ...], left: float

@@ -30,9 +30,13 @@ class Listener(Node):
     def __init__(self, **options):
         super().__init__("listener", **options)
         self.now = 100.0
-        self.told = []
+        self.told, self.disputed = [], frozenset()
         values = {**declare(self, VEHICLE_PARAMETERS), "vehicle_state_age": 2.5}
-        self.sources = VehicleSources(self, values, self.told.append, lambda: self.now)
+        self.sources = VehicleSources(self, values, self.hear, lambda: self.now)
+
+    def hear(self, state, disputed):
+        self.told.append(state)
+        self.disputed = disputed
 
 
 @pytest.fixture

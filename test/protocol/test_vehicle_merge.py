@@ -6,7 +6,8 @@ import math
 import pytest
 
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
-from chute_ros.protocol.vehicle_merge import VehicleMerge
+from chute_ros.protocol.vehicle_merge import DISPUTED, VehicleMerge
+from chute_ros.supervisor.measurements import STANDARD_LIMITS
 
 LEVEL, TILTED = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)
 OK = (LinkState.OK, 4)
@@ -37,13 +38,27 @@ def test_each_part_has_its_own_age():
 
 def test_the_order_of_the_list_decides_while_the_first_is_fresh():
     one = merge("imu", "odometry")
-    one.hear("imu", {"attitude": LEVEL}, 10.0)
-    one.hear("odometry", {"attitude": TILTED}, 10.9)
-    assert one.state(11.0).tilt == 0.0
-    assert one.state(11.0).source == "imu"
-    late = one.state(11.01)
-    assert (late.tilt, late.source) == (1.0, "odometry")
+    one.hear("imu", {"attitude": LEVEL, "height": (5.0,)}, 10.0)
+    one.hear("odometry", {"attitude": TILTED, "height": (9.0,)}, 10.3)
+    assert one.state(10.39).tilt == 0.0
+    assert one.state(10.39).source == "imu"
+    late = one.state(10.41)
+    assert (late.tilt, late.height, late.source) == (1.0, 5.0, "imu, odometry")
     assert late.attitude_age == pytest.approx(0.11)
+    assert one.state(10.79).height == 5.0
+    assert one.state(10.81).height == 9.0
+
+
+def test_a_fresh_word_is_younger_than_what_the_supervisor_believes():
+    """Otherwise a change of the source is a gap, in which a jump is none."""
+    limits = {"attitude": "tilt_deg", "acceleration": "acceleration"}
+    for part in ("height", "vertical_speed", "attitude", "acceleration"):
+        most = STANDARD_LIMITS[limits.get(part, part)].max_age
+        one = merge("imu", "odometry")
+        values = {"attitude": LEVEL}.get(part, (1.0,))
+        one.hear("imu", {part: values}, 10.0)
+        one.hear("odometry", {part: values}, 10.0 + most - 0.1)
+        assert one.state(10.0 + most - 0.1).source == "odometry", part
 
 
 def test_a_source_that_hears_its_autopilot_no_more_has_lost_it_after_the_limit():
@@ -167,3 +182,88 @@ def test_the_autopilot_is_lost_only_when_nobody_hears_it(sources, told, link_sta
         one.hear(source, {"autopilot": word}, at)
     state = one.state(10.0)
     assert (state.link_state, state.system_status) == (link_state, system_status)
+
+
+# -- sources that contradict each other -----------------------------------------------------------
+
+TURNED = (0.0, 0.0, 0.0, math.pi)
+
+
+def hear_both(one, seconds, autopilot, imu, start=10.0):
+    """Both sources at 10 Hz, the IMU 50 ms after the autopilot."""
+    for tenth in range(round(seconds * 10)):
+        now = start + tenth / 10.0
+        one.hear("vehicle/state", autopilot, now)
+        one.hear("imu", imu, now + 0.05)
+    return one, start + seconds
+
+
+@pytest.mark.parametrize(
+    ("part", "right", "near", "wrong"),
+    [
+        ("attitude", LEVEL, (0.0, 0.0, 0.0, 1.5), TURNED),
+        ("acceleration", (9.8,), (4.0,), (0.0,)),
+        ("vertical_speed", (0.0,), (-5.0,), (-15.0,)),
+    ],
+)
+def test_two_that_tell_otherwise_dispute_it_also_when_one_is_left(part, right, near, wrong):
+    """Given an IMU that lies beside its autopilot, then the autopilot hangs."""
+    both, now = hear_both(merge("vehicle/state", "imu"), 0.5, {part: right}, {part: near})
+    assert both.disputed(now) == frozenset()
+    both, now = hear_both(both, 0.5, {part: right}, {part: wrong}, start=now)
+    assert both.disputed(now) == {part}
+    for tenth in range(10):
+        both.hear("imu", {part: wrong}, now + tenth / 10.0)
+    assert both.state(now + 0.9).source == "imu"
+    assert both.disputed(now + 0.9) == {part}
+    assert both.disputed(now + DISPUTED - 0.2) == {part}
+    assert both.disputed(now + DISPUTED) == frozenset()
+
+
+def test_a_last_word_before_the_power_went_disputes_nothing():
+    """The autopilot dies with its motors, and what it said last was of before."""
+    one, now = hear_both(
+        merge("vehicle/state", "imu"),
+        1.0,
+        {"acceleration": (9.8,), "vertical_speed": (0.0,)},
+        {"acceleration": (9.8,)},
+    )
+    for hundredth in range(2, 60, 2):
+        falls = {"acceleration": (0.1,)}
+        one.hear("imu", falls, now - 0.1 + hundredth / 100.0)
+    assert one.state(now + 0.45).acceleration == 0.1
+    assert one.disputed(now + 0.45) == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("part", "before", "after", "disputed"),
+    [
+        ("attitude", LEVEL, TURNED, True),
+        ("vertical_speed", (0.0,), (-15.0,), True),
+        ("acceleration", (9.8,), (0.1,), False),
+        ("attitude", LEVEL, TILTED, False),
+    ],
+)
+def test_one_that_jumps_disputes_its_own_word(part, before, after, disputed):
+    one = merge("vehicle/state", "imu")
+    one.hear("imu", {part: before}, 10.0)
+    one.hear("imu", {part: after}, 10.02)
+    assert one.disputed(10.02) == (frozenset({part}) if disputed else frozenset())
+
+
+def test_after_a_gap_it_may_have_turned():
+    one = merge("vehicle/state", "imu")
+    one.hear("imu", {"attitude": LEVEL}, 10.0)
+    one.hear("imu", {"attitude": TURNED}, 10.2)
+    assert one.disputed(10.2) == frozenset()
+
+
+def test_only_the_source_that_counts_is_doubted():
+    """Given a preferred one that nobody contradicts, and a second one that jumps."""
+    one = merge("vehicle/state", "imu")
+    one.hear("vehicle/state", {"attitude": LEVEL}, 9.98)
+    one.hear("imu", {"attitude": TURNED}, 10.0)
+    one.hear("imu", {"attitude": LEVEL}, 10.02)
+    assert one.disputed(10.1) == frozenset()
+    one.hear("imu", {"attitude": LEVEL}, 10.5)
+    assert one.disputed(10.5) == {"attitude"}

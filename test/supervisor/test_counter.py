@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from story import SINKS, Story, rule, shipped, with_rules
 
-from chute_ros.supervisor.counter import RuleEvidence
+from chute_ros.supervisor.counter import Look, RuleEvidence
 from chute_ros.supervisor.rules import MeasurementCondition, Rule
 
 #: Full after 1 s, empty again after 2 s, and three samples must have shown it.
@@ -21,7 +21,7 @@ def counted(pattern: str, one: Rule = RULE, every: float = 0.1) -> list[RuleEvid
         evidence = evidence.counted(one, every) if n else evidence
         seen += mark != "-"
         holds = evidence.holds if mark == "-" else mark == "x"
-        evidence = evidence.seeing(one, [(holds, seen)])
+        evidence = evidence.seeing(one, [Look(holds, seen)])
         told.append(evidence)
     return told
 
@@ -81,11 +81,11 @@ def test_samples_of_another_condition_do_not_count_for_it() -> None:
     evidence = RuleEvidence()
     for n in range(10):
         # One sample says that it sinks, and no more come; tilt comes all the time.
-        evidence = evidence.seeing(both, [(True, 1), (True, n)])
+        evidence = evidence.seeing(both, [Look(True, 1), Look(True, n)])
         assert evidence.holds
         assert not evidence.fulfilled(both)
     for n in (2, 3):
-        evidence = evidence.seeing(both, [(True, n), (True, 9)])
+        evidence = evidence.seeing(both, [Look(True, n), Look(True, 9)])
     assert evidence.fulfilled(both)
 
 
@@ -94,11 +94,11 @@ def test_what_was_shown_before_the_rule_held_counts() -> None:
     both = rule(SINKS, TILTS, samples=3)
     evidence = RuleEvidence()
     for n in range(3):
-        evidence = evidence.seeing(both, [(False, n), (True, n)])
+        evidence = evidence.seeing(both, [Look(False, n), Look(True, n)])
     assert evidence.holds is False
     for n in range(3, 6):
         assert not evidence.fulfilled(both)
-        evidence = evidence.seeing(both, [(True, n), (True, 2)])
+        evidence = evidence.seeing(both, [Look(True, n), Look(True, 2)])
     assert evidence.fulfilled(both)
 
 
@@ -113,13 +113,13 @@ def test_one_wrong_sample_beside_a_battery_that_is_dead_fires_nothing() -> None:
 def test_a_rule_of_the_same_name_with_other_conditions_begins_anew() -> None:
     before = counted("x" * 20)[-1]
     other = rule(SINKS, TILTS, hold=1.0, samples=3)
-    assert before.seeing(other, [(True, 50), (True, 50)]).shown == (1.0, 1.0)
+    assert before.seeing(other, [Look(True, 50), Look(True, 50)]).shown == (1.0, 1.0)
 
 
 def test_what_rests_on_no_measurement_needs_no_samples() -> None:
     evidence = RuleEvidence()
     for _ in range(12):
-        evidence = evidence.counted(RULE, 0.1).seeing(RULE, [(True, -1)])
+        evidence = evidence.counted(RULE, 0.1).seeing(RULE, [Look(True, -1)])
     assert evidence.fulfilled(RULE)
 
 
@@ -130,7 +130,7 @@ def test_without_a_hold_it_is_fulfilled_at_once() -> None:
 def test_it_has_cleared_once_it_is_empty_and_does_not_hold() -> None:
     evidence = counted("x" * 11)[-1]
     assert not evidence.cleared()
-    assert not evidence.seeing(RULE, [(False, 99)]).cleared()
+    assert not evidence.seeing(RULE, [Look(False, 99)]).cleared()
     assert counted("x" * 11 + "." * 22)[-1].cleared()
 
 
@@ -159,7 +159,7 @@ def test_its_level_is_that_of_the_seconds_told_and_stays_between_empty_and_full(
     for seen, (passed, holds) in enumerate(told):
         level += passed if evidence.holds else -leak * passed
         level = min(max(level, 0.0), hold)
-        evidence = evidence.counted(one, passed).seeing(one, [(holds, seen)])
+        evidence = evidence.counted(one, passed).seeing(one, [Look(holds, seen)])
         assert evidence.level == pytest.approx(level)
         assert 0.0 <= evidence.level <= hold
         if evidence.fulfilled(one):

@@ -7,7 +7,7 @@ import pytest
 from story import SINKS, rule
 
 from chute_ros.model import Action
-from chute_ros.supervisor.counter import UNKNOWN_STANDS, RuleEvidence
+from chute_ros.supervisor.counter import UNKNOWN_STANDS, Look, RuleEvidence
 
 RULE = rule(SINKS, action=Action.DEPLOY, hold=2.0, leak=0.5, samples=3)
 UNKNOWN = RuleEvidence(level=1.0, holds=None, shown=(2.0,), seen=(5,))
@@ -18,7 +18,7 @@ def test_how_long_nothing_can_be_said_adds_up_and_ends_with_a_word() -> None:
     assert (once.unknown, once.level, once.shown) == (1.0, 1.0, (2.0,))
     assert once.counted(RULE, 0.5).unknown == 1.5
     for holds in (True, False):
-        assert once.seeing(RULE, [(holds, 6)]).counted(RULE, 0.5).unknown == 0.0
+        assert once.seeing(RULE, [Look(holds, 6)]).counted(RULE, 0.5).unknown == 0.0
 
 
 def test_past_its_stand_it_leaks_for_as_long_as_it_is_past() -> None:
@@ -29,19 +29,19 @@ def test_past_its_stand_it_leaks_for_as_long_as_it_is_past() -> None:
 
 
 def test_what_cannot_be_said_shows_nothing_and_denies_nothing() -> None:
-    assert UNKNOWN.seeing(RULE, [(None, 6)]).shown == (2.0,)
-    assert UNKNOWN.seeing(RULE, [(None, 6)]).holds is None
+    assert UNKNOWN.seeing(RULE, [Look(None, 6)]).shown == (2.0,)
+    assert UNKNOWN.seeing(RULE, [Look(None, 6)]).holds is None
 
 
 def test_a_sample_counts_once_also_where_none_has_come_so_far() -> None:
-    first = RuleEvidence().seeing(RULE, [(True, 0)])
+    first = RuleEvidence().seeing(RULE, [Look(True, 0)])
     assert (first.shown, first.seen) == ((1.0,), (0,))
-    assert first.seeing(RULE, [(True, 0)]).shown == (1.0,)
+    assert first.seeing(RULE, [Look(True, 0)]).shown == (1.0,)
 
 
 @pytest.mark.parametrize(("seen", "enough"), [(-1, True), (0, False), (1, False)])
 def test_only_what_has_no_samples_needs_none(seen: int, enough: bool) -> None:
-    full = RuleEvidence(level=2.0, shown=(1.0,), seen=(0,)).seeing(RULE, [(True, seen)])
+    full = RuleEvidence(level=2.0, shown=(1.0,), seen=(0,)).seeing(RULE, [Look(True, seen)])
     assert full.holds
     assert full.fulfilled(RULE) is enough
 
@@ -57,22 +57,22 @@ def test_it_holds_with_enough_weight_and_cannot_be_said_where_the_rest_could_be(
         ([None, True], True),
         ([False, None], None),
     ):
-        pairs: list[tuple[bool | None, int]] = [(each, -1) for each in found]
+        pairs = [Look(each) for each in found]
         assert RuleEvidence().seeing(one, pairs).holds is holds
 
 
 def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure() -> None:
     light, heavy = replace(SINKS, weight=1.0), replace(SINKS, weight=2.0)
     one = rule(light, heavy, needed=2.0, samples=2)
-    evidence = RuleEvidence().seeing(one, [(True, 1), (True, 1)])
-    assert not evidence.seeing(one, [(True, 2), (True, 1)]).fulfilled(one)
-    assert evidence.seeing(one, [(True, 1), (True, 2)]).fulfilled(one)
-    assert not evidence.seeing(one, [(True, 2), (False, 2)]).fulfilled(one)
+    evidence = RuleEvidence().seeing(one, [Look(True, 1), Look(True, 1)])
+    assert not evidence.seeing(one, [Look(True, 2), Look(True, 1)]).fulfilled(one)
+    assert evidence.seeing(one, [Look(True, 1), Look(True, 2)]).fulfilled(one)
+    assert not evidence.seeing(one, [Look(True, 2), Look(False, 2)]).fulfilled(one)
 
 
 def test_weights_that_miss_by_the_rounding_are_sure_as_well() -> None:
     one = rule(SINKS, needed=1.0 + 1e-9)
-    assert RuleEvidence().seeing(one, [(True, -1)]).fulfilled(one)
+    assert RuleEvidence().seeing(one, [Look(True, -1)]).fulfilled(one)
 
 
 def test_the_rounding_itself_is_full_and_empty() -> None:

@@ -58,6 +58,7 @@ def leader(clock: float) -> State:
         links=frozen(umbilical=LinkEvidence(heard=clock)),
         vehicle=replace(FLYING, source="the leader's"),
         vehicle_received=clock - 0.25,
+        disputed=frozenset({"attitude"}),
         measurements=frozen(height=Measured(30.0, clock, clock, 9)),
         heights=((clock - 0.25, 30.0),),
         vehicle_rests_until=clock + 0.125,

@@ -32,11 +32,12 @@ def flying(*rules: Rule, **profile: Any) -> Story:
 # -- what a rule makes of its conditions ---------------------------------------------------------
 
 
-def judged(one: Rule, **told: float) -> bool | None:
-    """Does it hold where only this is told?"""
+def judged(one: Rule, since: float = 2.0, **told: float) -> bool | None:
+    """Does it hold where only this is told, and all was told since s ago?"""
     story = Story(with_rules(one))
-    story.at(0.0, vehicle(**told))
-    return judge(story.config, story.state, one, START).evidence.holds
+    story.at(0.0, vehicle(tilt=0.0, vertical_speed=0.0))
+    story.at(since, vehicle(**told))
+    return judge(story.config, story.state, one, START + since).evidence.holds
 
 
 @pytest.mark.parametrize(
@@ -54,6 +55,17 @@ def test_it_cannot_be_said_while_what_is_not_known_could_be_enough(
     told: dict[str, float], holds: bool | None
 ) -> None:
     assert judged(rule(TILTS, SINKS), **told) is holds
+
+
+@pytest.mark.parametrize(("since", "holds"), [(3.0, None), (3.1, False)])
+def test_what_is_not_known_for_long_is_not_waited_for(since: float, holds: bool | None) -> None:
+    assert judged(rule(TILTS, SINKS), since, tilt=90.0) is holds
+
+
+def test_what_was_never_known_is_not_waited_for() -> None:
+    story = Story(with_rules(one := rule(TILTS, SINKS)))
+    story.at(0.0, vehicle(tilt=90.0))
+    assert judge(story.config, story.state, one, START).evidence.holds is False
 
 
 @pytest.mark.parametrize("rounding", [0.0, 1e-9])

@@ -225,8 +225,10 @@ JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED"
 PROFILE_KEYS = (
     "profile, minimum_height, below_minimum, moving_speed, landed_hold, measurements, rules"
 )
-RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, action, clears"
-CONDITION_KEYS = "measurement, link, autopilot, device, above, below, if_unknown, is, weight"
+RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, doubted, action, clears"
+CONDITION_KEYS = (
+    "measurement, link, autopilot, device, above, below, if_unknown, is, counted, weight"
+)
 LIMIT_KEYS = "minimum, maximum, rate, jump, max_age, stuck_after"
 FLYING = "its states may be IN_FLIGHT and KILLING"
 KINDS = "needs one of measurement, link, autopilot, device; it has"

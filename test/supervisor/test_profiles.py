@@ -53,9 +53,18 @@ class Case:
 
 
 def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: Any) -> list[Case]:
-    """Cases of a rule that needs something besides one of these signs of falling."""
+    """Cases of a rule that needs something besides one of these signs of falling. (Heights that
+    are told must not deny the sink.)"""
+    without_heights = {"vertical_speed": {**less, "height": math.nan}}
     return [
-        Case(profile, rule, {**less, name: over}, {**less, name: under}, hold, 2)
+        Case(
+            profile,
+            rule,
+            {**without_heights.get(name, less), name: over},
+            {**without_heights.get(name, less), name: under},
+            hold,
+            2,
+        )
         for name, (over, under) in signs.items()
     ]
 

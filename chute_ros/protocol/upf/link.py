@@ -131,6 +131,11 @@ class UpfLink:
         self.vehicle_service.kill_confirmed(now)
         self._drive(now)
 
+    def kill_waited_for(self, now: float) -> None:
+        """A deploy was decided: its kill has had its time."""
+        self.vehicle_service.kill_waited_for(now)
+        self._drive(now)
+
     def supervisor_said(self, blocked: bool, standing: Collection[str], now: float) -> None:
         """Flight is blocked or not, and the devices of this link whose block is known."""
         self.vehicle_service.supervisor_said(blocked, standing, now)

@@ -20,7 +20,7 @@ from chute_ros.protocol.upf.config import Policy, UpfConfig
 from chute_ros.protocol.upf.definitions import VEHICLE_SERVICE, Definitions
 from chute_ros.protocol.upf.machine import BLOCKING
 
-#: A kill that was confirmed so lately (s) answers a request that comes after it.
+#: A kill that was confirmed, or waited for, so lately (s) answers a request that comes after it.
 KILL_MEMORY = 5.0
 #: What the supervisor should know by now is said again, s.
 _SAY_AGAIN = 0.5
@@ -87,7 +87,7 @@ class VehicleService:
         self.counts: Counter[str] = Counter()
         self.newest_answer = ""
         self._pending: list[_Pending] = []
-        self._kill_confirmed = -math.inf
+        self._kill_confirmed = self._kill_waited_for = -math.inf
         #: Device -> why it wants flight blocked.
         self._blocks: dict[str, str] = {}
         self._standing: frozenset[str] = frozenset()
@@ -166,6 +166,12 @@ class VehicleService:
         self._kill_confirmed = now
         self._answer_what_is_so(now)
 
+    def kill_waited_for(self, now: float) -> None:
+        """A deploy was decided, whose kill nobody has confirmed in the time that it is given: no
+        device waits for it a second time."""
+        self._kill_waited_for = now
+        self._answer_what_is_so(now)
+
     def motors_may_turn(self, said_at: float) -> None:
         """The vehicle said that it is armed: a kill from before says nothing any more."""
         if said_at > self._kill_confirmed:
@@ -242,6 +248,12 @@ class VehicleService:
         for one in [one for one in self._pending if self._happened(one, now)]:
             self._pending.remove(one)
             self._respond(one.request, "SUCCESS")
+        if now - self._kill_waited_for > KILL_MEMORY:
+            return
+        for one in [one for one in self._pending if one.ask is Ask.KILL]:
+            self._pending.remove(one)
+            self.counts["KILL waited for before the deploy"] += 1
+            self._respond(one.request, "FAILED")
 
     def _respond(self, request: Heard, result: str) -> None:
         name = self._definitions.type_name(VEHICLE_SERVICE, request.values) or "bad request"

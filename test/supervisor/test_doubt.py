@@ -1,0 +1,150 @@
+"""A sign in doubt counts half where one would decide alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from story import Story, shipped
+
+from chute_ros.model import Action, LinkState, VehicleState
+from chute_ros.supervisor import flight
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
+
+LOST = {"link_state": LinkState.LOST}
+
+
+def flying(profile: str = "multirotor") -> Story:
+    return Story(shipped(profile)).ready().fly(0.3)
+
+
+def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight() -> None:
+    """Given a sensor of the second source that turns by 180 degrees at once, flying well."""
+    story = flying().fly(1.0, 0.02, **LOST)
+    story.fly(4.0, 0.02, **LOST, tilt=179.0)
+    assert story.fired() == []
+    assert story.state.stage is Stage.IN_FLIGHT
+
+
+def test_with_a_second_sign_it_does() -> None:
+    story = flying().fly(1.0, 0.02, **LOST)
+    story.fly(2.0, 0.02, **LOST, tilt=179.0)
+    story.fly(2.5, 0.02, **LOST, tilt=179.0, acceleration=3.0)
+    assert story.fired()[0] == "KILL"
+    assert story.newest(Action.KILL).rule == "autopilot lost and falling"
+    reasons = " ".join(story.newest(Action.KILL).reasons)
+    assert "tilt_deg 179.00 (above 45; in doubt: it jumped" in reasons
+
+
+def test_one_that_tips_over_as_bodies_do_is_not_in_doubt() -> None:
+    """Given the attitude alone, as of an IMU: at 400 degrees a second it turns over."""
+    story = flying().fly(1.0, 0.02, **LOST)
+    for step in range(1, 60):
+        told = {"tilt": min(8.0 * step, 170.0), "vertical_speed": math.nan}
+        story.fly(story.t + 0.02, 0.02, **LOST, **told)
+    assert story.fired()[0] == "KILL"
+
+
+def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last() -> None:
+    story = flying().fly(1.0, 0.02)
+    story.fly(1.02, 0.02, tilt=179.0)
+    assert story.state.measured("tilt_deg").rejected
+    story.fly(1.1, 0.02, tilt=179.0)
+    jumped = story.state.measured("tilt_deg").jumped_at
+    known = story.state.measured("tilt_deg")
+    assert known.doubt("tilt_deg", jumped + JUMP_DOUBTED - 0.1) == "it jumped 9.9 s ago"
+    assert known.doubt("tilt_deg", jumped + JUMP_DOUBTED) == ""
+
+
+def test_after_one_that_was_not_taken_it_is_doubted_for_a_second() -> None:
+    """Noise leaves some that could be."""
+    story = flying().fly(1.0, 0.02)
+    story.fly(1.02, 0.02, tilt=179.0)
+    story.fly(1.04, 0.02, tilt=3.0)
+    known = story.state.measured("tilt_deg")
+    assert known.rejected == ""
+    assert "another was not taken" in known.doubt("tilt_deg", known.measured_at)
+    assert known.doubt("tilt_deg", known.doubted_at + REJECTION_DOUBTED) == ""
+
+
+@pytest.mark.parametrize(("force", "fires"), [(0.0, False), (0.01, True)])
+def test_a_force_of_exactly_nothing_is_what_a_broken_sensor_says(
+    force: float, fires: bool
+) -> None:
+    story = flying()
+    for _ in range(20):
+        told = story.told(**LOST)
+        exactly = replace(told, state=replace(told.state, acceleration=force))
+        story.at(story.t + 0.05, story.heartbeat(), exactly)
+    assert bool(story.fired()) is fires
+
+
+def test_one_that_is_upside_down_is_no_impossible_one() -> None:
+    """Pi as a message carries it is a little more than pi."""
+    story = flying()
+    told = story.told()
+    story.at(story.t + 0.5, replace(told, state=replace(told.state, tilt=3.1415927410125732)))
+    assert story.state.measured("tilt_deg").rejected == ""
+
+
+def test_what_another_source_contradicts_is_doubted() -> None:
+    story = flying()
+    told = story.told(tilt=90.0, **LOST)
+    for _ in range(20):
+        report = replace(told, disputed=frozenset({"attitude"}))
+        story.at(story.t + 0.05, story.heartbeat(), report)
+    assert story.fired() == []
+    assert flight.doubt(story.state, "tilt_deg", 0.0) == "another source told otherwise"
+    assert flight.doubt(story.state, "acceleration", 0.0) == ""
+    story.fly(story.t + 0.5, **LOST, tilt=90.0)
+    assert story.fired()[0] == "KILL"
+
+
+def test_a_report_says_nothing_of_disputes_unless_told() -> None:
+    assert i.VehicleReport(VehicleState()).disputed == frozenset()
+
+
+# -- a sink needs the heights, where they are told ------------------------------------------------
+
+
+@pytest.mark.parametrize(("sinks", "fires"), [(0.0, False), (8.0, True)])
+def test_a_speed_that_the_heights_deny_is_no_sink(sinks: float, fires: bool) -> None:
+    """Given a vertical speed that drifts, beside heights that stay where they are."""
+    story = flying().fly(1.0, **LOST)
+    for step in range(60):
+        told = {"vertical_speed": -8.0, "height": 50.0 - sinks * step * 0.05}
+        story.fly(story.t + 0.05, **LOST, **told)
+    assert bool(story.fired()) is fires
+
+
+# -- silence that was waited for ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("before", "delay"), [(0.0, 1.0), (0.5, 0.5), (2.0, 0.05)])
+def test_signs_are_counted_while_the_silence_is_waited_for(before: float, delay: float) -> None:
+    """Given an aeroplane on its side for so long before its autopilot counts as lost."""
+    story = flying("fixed_wing")
+    story.fly(story.t + before, tilt=80.0 if before else 0.0)
+    assert story.fired() == []
+    lost_at = story.t
+    story.fly(story.t + 1.5, tilt=80.0, **LOST)
+    assert story.when(Action.KILL) - lost_at == pytest.approx(delay, abs=0.051)
+
+
+def test_what_was_counted_leaks_before_the_silence_as_well() -> None:
+    story = flying("fixed_wing").fly(1.0, tilt=80.0)
+    story.fly(3.0).fly(3.5, tilt=80.0, **LOST)
+    assert story.fired() == []
+
+
+def test_a_force_that_is_noise_does_not_keep_what_it_counted() -> None:
+    """Given an IMU alone, that tells no speed: its noise is below the limit now and then."""
+    story = flying().fly(4.5, 0.02, vertical_speed=math.nan, height=math.nan)
+    forces = (9.0, 3.5, 12.0, 3.0, 20.0, 9.8, 3.9, 3.1, 15.0, 7.0)
+    for step in range(300):
+        told = {"acceleration": forces[step % len(forces)] + step * 1e-4}
+        story.fly(story.t + 0.02, 0.02, **LOST, **told, vertical_speed=math.nan, height=math.nan)
+    assert story.fired() == []
