@@ -76,6 +76,7 @@ def followed(state: State, text: str, now: float) -> State:
         links=state.links,
         vehicle=state.vehicle,
         vehicle_received=state.vehicle_received,
+        disputed=state.disputed,
         measurements=state.measurements,
         heights=state.heights,
     )

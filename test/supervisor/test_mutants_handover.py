@@ -103,6 +103,7 @@ OWN: dict[str, Any] = {
     "links": frozen(mavlink_parachute=LinkEvidence(heard=HERE)),
     "vehicle": replace(FLYING, source="its own"),
     "vehicle_received": HERE - 0.125,
+    "disputed": frozenset({"height"}),
     "measurements": frozen(height=Measured(31.0, HERE, HERE, 8)),
     "heights": ((HERE - 0.125, 31.0),),
     "vehicle_rests_until": -math.inf,
