@@ -72,3 +72,16 @@ def test_where_no_parachute_comes_it_fails_in_time_and_says_why(bench, link):
     report = bench.until(lambda: reports and reports[-1], "it is reported")
     assert report.outcome == Outcome.FAILED
     assert "heard" in report.detail
+
+
+def test_a_controller_does_not_wait_for_the_kill_that_the_decision_has_waited_for(bench):
+    """Given a kill that nobody confirms, and a controller that would wait for it for a minute."""
+    network = UpfNetwork(bench, vehicle_service_timeout=60.0, decided_deploy_forces=True)
+    trigger = network.trigger()
+    controller = network.controller(kill_wait=60.0)
+    network.plug(controller, trigger)
+    bench.until(lambda: controller.vehicle_connected, "the controller knows its vehicle")
+    decide(bench, "upf_can")
+    bench.until(lambda: trigger.fired, "it is deployed")
+    assert "TYPE_KILLSWITCH" in network.link.vehicle_service.newest_answer
+    assert "FAILED" in network.link.vehicle_service.newest_answer

@@ -22,6 +22,7 @@ from chute_ros.supervisor.rules import (
     MeasurementCondition,
     Profile,
     Rule,
+    is_counted,
 )
 
 LINKS = (LINK, "upf_can")
@@ -123,6 +124,10 @@ def test_without_needed_all_conditions_must_hold() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
+        ("leak: 0.25", "doubted: 1.5", 22, "doubted of rule 'falls' is 1.5: need 0 to 1"),
+        ("leak: 0.25", "doubted: -0.1", 22, "doubted of rule 'falls' is -0.1: need 0 to 1"),
+        ("rebooted}", "rebooted, counted: 2}", 18, "counted of rebooted in rule 'falls' is 2"),
+        ("abnormal,", "abnormal, counted: false,", 19, "counted belongs to the autopilot"),
         ("profile: mine\n", "", 1, "profile is missing: a profile needs its name and its rules"),
         ("profile: mine", "profile: 7", 1, "profile is 7: need words"),
         ("profile: mine", "profile: ''", 1, "profile is '': need words"),
@@ -297,3 +302,15 @@ def test_a_key_that_aliases_make_endless_is_not_spelt_out() -> None:
         lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
     (told,) = [one for one in mistakes("\n".join([*lines, "? *l", ": 1"])) if "no word" in one]
     assert told.startswith("mine.yaml, line 12: a key of a profile is no word")
+
+
+def test_what_is_in_doubt_counts_in_full_and_all_is_counted_unless_it_says_so() -> None:
+    falls = read(WHOLE).rules[0]
+    assert falls.doubted == 1.0
+    assert all(is_counted(one) for one in falls.conditions)
+    text = WHOLE.replace("leak: 0.25", "doubted: 0.25").replace(
+        "rebooted}", "lost, counted: false}"
+    )
+    falls = read(text).rules[0]
+    assert falls.doubted == 0.25
+    assert [is_counted(one) for one in falls.conditions] == [True, True, True, False, True]

@@ -39,6 +39,39 @@ def test_kill_is_answered_with_success_once_the_motors_are_off(alone):
     assert story.at(5.0).answers() == ["SUCCESS"]
 
 
+def test_a_kill_that_a_decided_deploy_has_waited_for_is_not_waited_for_again(alone):
+    """Given a kill that nobody confirms; then the deploy is decided all the same."""
+    story = alone().ask(KILL).at(0.3)
+    assert story.answers() == []
+    story.link.kill_waited_for(story.now)
+    assert story.step().answers() == [failed(story)]
+    assert story.link.vehicle_service.counts["KILL waited for before the deploy"] == 1
+    story.ask(KILL, number=1).step()
+    assert story.answers() == [failed(story)] * 2, "at once, also of one that asks after it"
+    assert story.asked() == [("KILL", "33")] * 3, "the supervisor hears of it as ever"
+
+
+def test_one_that_was_confirmed_all_the_same_has_happened(alone):
+    story = alone()
+    story.link.kill_waited_for(story.now)
+    story.link.kill_confirmed(story.now)
+    assert story.ask(KILL).step().answers() == ["SUCCESS"]
+
+
+def test_a_kill_long_after_the_deploy_is_another_one(alone):
+    story = alone()
+    story.link.kill_waited_for(story.now)
+    story.at(5.1).ask(KILL).step()
+    assert story.answers() == []
+    assert story.at(6.0).answers() == [failed(story)]
+
+
+def test_a_flight_block_is_waited_for_also_after_a_deploy(alone):
+    story = alone()
+    story.link.kill_waited_for(story.now)
+    assert story.ask(BLOCK).step().answers() == []
+
+
 def test_kill_that_does_not_happen_is_answered_with_a_failure_in_time(alone):
     story = alone().ask(KILL).at(0.79)
     assert story.answers() == []
