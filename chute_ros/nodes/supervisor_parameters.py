@@ -230,11 +230,13 @@ def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
     silent, and it is the only source of measurements."""
     if set(sources) - {VEHICLE_STATE, MAVROS}:
         return []
-    lost = AutopilotCondition(AutopilotFact.LOST)
     return [
         rule.name
         for rule in config.profile.rules
-        if any(replace(one, weight=1.0) == lost for one in rule.conditions)
+        if any(
+            isinstance(one, AutopilotCondition) and one.fact is AutopilotFact.LOST
+            for one in rule.conditions
+        )
         and sum(one.weight for one in rule.conditions if is_silence(one)) < rule.needed
     ]
 

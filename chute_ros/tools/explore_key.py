@@ -141,7 +141,7 @@ def _measured(config: SupervisorConfig, state: State, name: str, now: float) -> 
     measured, limits = state.measured(name), config.profile.limits[name]
     return (
         round(measured.value, 3) if not math.isnan(measured.value) else None,
-        _since(measured.measured_at, now, limits.max_age),
+        _since(measured.measured_at, now, max(limits.max_age, UNKNOWN_STANDS)),
         _since(measured.doubted_at, now, 1.0),
         _since(measured.jumped_at, now, JUMP_DOUBTED),
         round(measured.before_jump, 3) if not math.isnan(measured.before_jump) else None,
