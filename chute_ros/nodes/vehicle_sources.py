@@ -18,7 +18,7 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, Imu, NavSatFix
 from std_msgs.msg import Float64
 
@@ -130,8 +130,9 @@ class VehicleSources:
 
     def _subscribe(self, kind: Any, parameter: str, callback: Callable[[Any], None]) -> None:
         topic = self._values[parameter]
-        # Best effort matches every publisher, and volatile brings nothing of before.
-        profile: QoSProfile = qos_profile_sensor_data
+        # Best effort matches every publisher, and volatile brings nothing of before. The newest
+        # alone: words that waited would all be dated by now, and the vehicle seem to leap.
+        profile = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         try:
             self._node.create_subscription(kind, topic, callback, profile)
         except (InvalidTopicNameException, ValueError) as error:

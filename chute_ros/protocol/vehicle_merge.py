@@ -37,12 +37,15 @@ TELL_INTERVAL = 0.02
 #: By how much two sources differ that cannot both be right: part -> place of its value, and m/s,
 #: rad (that of one that tumbles may be a tenth of a second older), m/s^2 (motors shake).
 _DISPUTES = {"vertical_speed": (0, 5.0), "attitude": (3, math.pi / 2.0), "acceleration": (0, 6.0)}
-#: Parts that can be another at once: a force is, when the motors stop.
-_MAY_JUMP = ("acceleration",)
+#: By so much more a word may differ from the one before of its own source, each second: six
+#: times the gravity, m/s, and three turns, rad. A force is another at once, when the motors stop.
+_CHANGES = {"vertical_speed": 60.0, "attitude": 6.0 * math.pi, "acceleration": 1e6}
 #: Two words are of the same time if they are at most so far apart, s.
 _SAME_TIME = 0.1
 #: And must differ for so long, s: the last word of one that dies with the motors proves nothing.
 _DIFFER_FOR = 0.2
+#: Without two words to compare for so long, s, nobody knows whether they still do.
+_DIFFERENCE_PAUSES = 0.5
 #: So long it is remembered, s: as long as a fall may last.
 DISPUTED = 10.0
 
@@ -56,6 +59,21 @@ class _Word:
 
     values: readings.Values
     received: float
+
+
+@dataclass(frozen=True)
+class _Difference:
+    """Two sources differ since begun, and did when the newest of their words came, monotonic s."""
+
+    begun: float
+    newest: float
+
+
+def _continued(before: _Difference | None, word: _Word) -> _Difference:
+    """They differ by this word, too; after a pause that is another time."""
+    if before is None or abs(word.received - before.newest) > _DIFFERENCE_PAUSES:
+        return _Difference(word.received, word.received)
+    return _Difference(before.begun, word.received)
 
 
 class VehicleMerge:
@@ -73,7 +91,7 @@ class VehicleMerge:
         #: (Part, source) -> when another source last told otherwise.
         self._disputed: dict[tuple[str, str], float] = {}
         #: (Part, two sources) -> since when they differ.
-        self._differ: dict[tuple[str, frozenset[str]], float] = {}
+        self._differ: dict[tuple[str, frozenset[str]], _Difference] = {}
 
     def hear(self, source: str, parts: readings.Parts, now: float) -> None:
         """A message of source came now and says this."""
@@ -143,16 +161,18 @@ class VehicleMerge:
             theirs = words.get(part)
             if theirs is None or abs(word.received - theirs.received) > _SAME_TIME:
                 continue
-            differs = abs(word.values[place] - theirs.values[place]) > most
+            difference = abs(word.values[place] - theirs.values[place])
             if other == source:
-                if differs and part not in _MAY_JUMP:
+                if difference > most + _CHANGES[part] * abs(word.received - theirs.received):
                     self._disputed[part, source] = word.received
                 continue
             both = part, frozenset((source, other))
-            if not differs:
+            if difference <= most:
                 self._differ.pop(both, None)
-            elif word.received - self._differ.setdefault(both, word.received) >= _DIFFER_FOR:
-                self._disputed[part, source] = self._disputed[part, other] = word.received
+            elif difference > most:  # one that is not a number says nothing
+                since = self._differ[both] = _continued(self._differ.get(both), word)
+                if since.newest - since.begun >= _DIFFER_FOR:
+                    self._disputed[part, source] = self._disputed[part, other] = word.received
 
     def _source(self, part: str, now: float) -> str | None:
         """Whose word on this part counts; None: nobody knows."""

@@ -22,6 +22,7 @@ from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.quick_replace import replace
+from chute_ros.supervisor.rules import is_counted
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
 #: What people ask for, besides a kill, which devices want as well.
@@ -104,10 +105,16 @@ class _Update(Deploying):
             link: replace(evidence, heard=evidence.heard + late)
             for link, evidence in self.state.links.items()
         }
+        rules = dict(self.state.rules)
+        # They were full, it may be, before a silence that was none.
+        for rule in self.config.profile.rules:
+            if not all(is_counted(one) for one in rule.conditions) and rule.name in rules:
+                rules[rule.name] = replace(rules[rule.name], level=0.0, holds=False)
         unseen = late * _CLIMBS_UNSEEN >= self.config.profile.minimum_height
         self.state = replace(
             self.state,
             links=MappingProxyType(heard),
+            rules=MappingProxyType(rules),
             late_count=self.state.late_count + 1,
             # A height that can be used counts all the same.
             was_high=self.state.was_high or (self.state.airborne and unseen),

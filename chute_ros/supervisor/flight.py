@@ -72,9 +72,9 @@ def doubt(state: State, name: str, now: float) -> str:
 
 def last_usable(config: SupervisorConfig, state: State, name: str) -> float:
     """Until when what tells a measurement could be used, monotonic s; -infinity: never."""
-    tellers = {CLIMB_RATE: (HEIGHT,), "vertical_speed": ("vertical_speed", HEIGHT)}
-    limits = config.profile.limits
-    times = [state.measured(one).last_usable(limits[one]) for one in tellers.get(name, (name,))]
+    times = [state.climb_told_at] if name in (CLIMB_RATE, "vertical_speed") else []
+    if name != CLIMB_RATE:
+        times.append(state.measured(name).last_usable(config.profile.limits[name]))
     return max([time for time in times if not math.isnan(time)], default=-math.inf)
 
 

@@ -79,6 +79,7 @@ def followed(state: State, text: str, now: float) -> State:
         disputed=state.disputed,
         measurements=state.measurements,
         heights=state.heights,
+        climb_told_at=state.climb_told_at,
     )
 
 

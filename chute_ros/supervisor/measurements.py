@@ -193,6 +193,8 @@ class Measured:
                 candidates=0,
             )
         doubtful = self._doubtful(sample, limits)
+        # A date that went back puts the value in no doubt.
+        leaps = _jumps(self.value, self.measured_at, sample, limits)
         if doubtful:
             agrees = not _jumps(self.candidate, self.candidate_at, sample, limits)
             candidates = self.candidates + 1 if agrees else 1
@@ -200,7 +202,7 @@ class Measured:
                 return replace(
                     self,
                     rejected=doubtful,
-                    doubted_at=sample.measured_at,
+                    doubted_at=sample.measured_at if leaps else self.doubted_at,
                     candidate=sample.value,
                     candidate_at=sample.measured_at,
                     candidates=candidates,
@@ -211,7 +213,9 @@ class Measured:
         # With the time since the last that was taken, a jump may come to be one that can be.
         nearer = abs(sample.value - self.candidate) < abs(sample.value - self.value)
         jumped_at, before_jump = self.jumped_at, self.before_jump
-        if doubtful or (self.candidates and nearer):
+        candidate = Sample(self.candidate, self.candidate_at)
+        leapt = _jumps(self.value, self.measured_at, candidate, limits)
+        if (doubtful and leaps) or (self.candidates and nearer and leapt):
             # A jump back to what it was before ends what the first one has put in doubt.
             back = abs(sample.value - before_jump) <= limits.jump
             jumped_at, before_jump = (

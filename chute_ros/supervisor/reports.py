@@ -113,6 +113,8 @@ class Reports(Requests):
             kept = (*kept, (height.measured_at, height.value))
         if not math.isnan(height.measured_at) and kept != self.state.heights:
             self.state = replace(self.state, heights=kept)
+            if not math.isnan(flight.climb_rate(self.config, self.state, self.now)):
+                self.state = replace(self.state, climb_told_at=self.now)
 
     def _note_reboots(self, new: VehicleState) -> None:
         """Restarts on the ground do not count; a node that counts from 0 again has restarted."""

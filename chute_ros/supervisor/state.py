@@ -123,6 +123,8 @@ class State:
     measurements: Mapping[str, Measured] = field(default_factory=lambda: MappingProxyType({}))
     #: (monotonic s, m) of the heights of the last second, the oldest first.
     heights: tuple[tuple[float, float], ...] = ()
+    #: When they last told a rate, monotonic s.
+    climb_told_at: float = math.nan
     rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
     #: Until then time alone changes nothing of what is known of the vehicle, monotonic s;
     #: -infinity: nobody has looked.

@@ -267,3 +267,34 @@ def test_only_the_source_that_counts_is_doubted():
     assert one.disputed(10.1) == frozenset()
     one.hear("imu", {"attitude": LEVEL}, 10.5)
     assert one.disputed(10.5) == {"attitude"}
+
+
+def test_after_a_pause_without_words_to_compare_it_is_another_time():
+    """Given one word that differs, and another one a minute later."""
+    one = merge("vehicle/state", "imu")
+    for start in (10.0, 70.0):
+        one.hear("vehicle/state", {"attitude": LEVEL}, start)
+        one.hear("imu", {"attitude": TURNED}, start + 0.05)
+        assert one.disputed(start + 0.05) == frozenset()
+
+
+def test_what_is_not_a_number_agrees_with_nobody():
+    one = merge("vehicle/state", "imu")
+    unknown_tilt = (0.0, 0.0, 0.0, math.nan)
+    for tenth in range(5):
+        now = 10.0 + tenth / 10.0
+        one.hear("vehicle/state", {"attitude": LEVEL}, now)
+        one.hear("imu", {"attitude": unknown_tilt if tenth % 2 else TURNED}, now + 0.05)
+    assert one.disputed(10.5) == {"attitude"}
+
+
+def test_one_that_tumbles_disputes_nothing():
+    """Given two truthful sources of a vehicle that turns twice a second."""
+    one = merge("vehicle/state", "imu")
+    for hundredth in range(0, 300, 2):
+        now = 10.0 + hundredth / 100.0
+        tilt = abs(math.remainder(4.0 * math.pi * now, 2.0 * math.pi))
+        one.hear("imu", {"attitude": (0.0, 0.0, 0.0, tilt)}, now)
+        if hundredth % 10 == 0:
+            one.hear("vehicle/state", {"attitude": (0.0, 0.0, 0.0, tilt)}, now)
+        assert one.disputed(now) == frozenset()

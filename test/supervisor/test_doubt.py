@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 import pytest
-from story import Story, shipped
+from story import START, Story, shipped, vehicle
 
 from chute_ros.model import Action, LinkState, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
 
@@ -19,6 +20,10 @@ LOST = {"link_state": LinkState.LOST}
 
 def flying(profile: str = "multirotor") -> Story:
     return Story(shipped(profile)).ready().fly(0.3)
+
+
+def doubt(story: Story, name: str) -> str:
+    return flight.doubt(story.state, name, START + story.t)
 
 
 def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight() -> None:
@@ -148,3 +153,39 @@ def test_a_force_that_is_noise_does_not_keep_what_it_counted() -> None:
         told = {"acceleration": forces[step % len(forces)] + step * 1e-4}
         story.fly(story.t + 0.02, 0.02, **LOST, **told, vertical_speed=math.nan, height=math.nan)
     assert story.fired() == []
+
+
+def test_a_date_that_goes_back_puts_no_value_in_doubt() -> None:
+    """Given two sources of one truth, of which one is told later: its dates go back and forth."""
+    story = flying().fly(1.0)
+    for _ in range(10):
+        for age in (0.0, 0.3):
+            told = vehicle(age, tilt=5.0, acceleration=9.7)
+            story.at(story.t + 0.05, story.heartbeat(), told)
+            assert doubt(story, "tilt_deg") == ""
+    assert math.isnan(story.state.measured("tilt_deg").jumped_at)
+
+
+def test_who_was_late_has_counted_nothing_while_the_silence_was_its_own() -> None:
+    """Given a banked vehicle whose supervisor hangs: its first word afterwards is that the
+    autopilot is lost, as nobody has read it."""
+    story = flying("fixed_wing").fly(3.0, tilt=80.0)
+    story._update((story.heartbeat(), story.told(tilt=80.0, **LOST)), 6.0)
+    assert "silence meanwhile does not count" in story.said()
+    story.at(6.05, story.told(tilt=80.0))
+    story.fly(8.0, tilt=80.0)
+    assert story.fired() == []
+
+
+@pytest.mark.parametrize(("every", "fires"), [(1.2, False), (0.1, True)])
+def test_heights_too_seldom_for_a_rate_tell_none(every: float, fires: bool) -> None:
+    """Given a force that is noise, and heights: only where these told a rate a moment ago does a
+    gap in it keep what was counted."""
+    story = flying().fly(4.0, 0.05, vertical_speed=math.nan, height=math.nan)
+    for step in range(20):
+        told = {"vertical_speed": math.nan, "height": 50.0 + step * 1e-3}
+        story.fly(story.t + 0.05, 0.05, **told)
+        rest = {"vertical_speed": math.nan, "height": math.nan}
+        story.fly(story.t + every - 0.05, 0.05, **rest)
+    known = flight.last_usable(story.config, story.state, "vertical_speed")
+    assert (START + story.t - known <= UNKNOWN_STANDS) is fires

@@ -58,6 +58,7 @@ def leader(clock: float) -> State:
         links=frozen(umbilical=LinkEvidence(heard=clock)),
         vehicle=replace(FLYING, source="the leader's"),
         vehicle_received=clock - 0.25,
+        climb_told_at=clock - 0.75,
         disputed=frozenset({"attitude"}),
         measurements=frozen(height=Measured(30.0, clock, clock, 9)),
         heights=((clock - 0.25, 30.0),),
@@ -106,6 +107,7 @@ OWN: dict[str, Any] = {
     "disputed": frozenset({"height"}),
     "measurements": frozen(height=Measured(31.0, HERE, HERE, 8)),
     "heights": ((HERE - 0.125, 31.0),),
+    "climb_told_at": HERE - 0.5,
     "vehicle_rests_until": -math.inf,
 }
 #: Nobody waits at the one that follows, which does not decide.

@@ -308,9 +308,18 @@ def test_what_is_in_doubt_counts_in_full_and_all_is_counted_unless_it_says_so() 
     falls = read(WHOLE).rules[0]
     assert falls.doubted == 1.0
     assert all(is_counted(one) for one in falls.conditions)
-    text = WHOLE.replace("leak: 0.25", "doubted: 0.25").replace(
-        "rebooted}", "lost, counted: false}"
-    )
-    falls = read(text).rules[0]
+    text = WHOLE.replace("leak: 0.25", "doubted: 0.25").replace("on_disarm", "never")
+    falls = read(text.replace("rebooted}", "lost, counted: false}")).rules[0]
     assert falls.doubted == 0.25
     assert [is_counted(one) for one in falls.conditions] == [True, True, True, False, True]
+
+
+def test_a_rule_that_would_be_full_at_once_again_is_refused() -> None:
+    text = WHOLE.replace("rebooted}", "rebooted, counted: false}")
+    assert "with `counted: false` it clears never" in wrong(text)
+
+
+def test_a_rule_that_counts_nothing_is_refused() -> None:
+    silent = "conditions: {link: mavlink_parachute, is: LOST}"
+    lost = "conditions: {autopilot: lost, counted: false}"
+    assert "rule 'silent' counts nothing" in wrong(WHOLE.replace(silent, lost))

@@ -24,6 +24,8 @@ from chute_ros.protocol.upf.machine import BLOCKING
 KILL_MEMORY = 5.0
 #: What the supervisor should know by now is said again, s.
 _SAY_AGAIN = 0.5
+#: The word that a kill is confirmed may be so long behind the decision that rests on it, s.
+_WORD_ON_ITS_WAY = 0.05
 #: A kill that is not confirmed yet is asked for again, s.
 _ASK_AGAIN = 0.2
 #: A device that is silent for longer does not hold its block against a reset of the supervisor, s.
@@ -248,12 +250,10 @@ class VehicleService:
         for one in [one for one in self._pending if self._happened(one, now)]:
             self._pending.remove(one)
             self._respond(one.request, "SUCCESS")
-        if now - self._kill_waited_for > KILL_MEMORY:
-            return
-        for one in [one for one in self._pending if one.ask is Ask.KILL]:
-            self._pending.remove(one)
-            self.counts["KILL waited for before the deploy"] += 1
-            self._respond(one.request, "FAILED")
+        if now - self._kill_waited_for <= KILL_MEMORY:
+            for one in self._pending:
+                if one.ask is Ask.KILL:
+                    one.until = min(one.until, now + _WORD_ON_ITS_WAY)
 
     def _respond(self, request: Heard, result: str) -> None:
         name = self._definitions.type_name(VEHICLE_SERVICE, request.values) or "bad request"

@@ -44,18 +44,20 @@ def test_a_kill_that_a_decided_deploy_has_waited_for_is_not_waited_for_again(alo
     story = alone().ask(KILL).at(0.3)
     assert story.answers() == []
     story.link.kill_waited_for(story.now)
-    assert story.step().answers() == [failed(story)]
-    assert story.link.vehicle_service.counts["KILL waited for before the deploy"] == 1
-    story.ask(KILL, number=1).step()
-    assert story.answers() == [failed(story)] * 2, "at once, also of one that asks after it"
+    assert story.at(0.34).answers() == []
+    assert story.at(0.36).answers() == [failed(story)]
+    story.ask(KILL, number=1).at(0.42)
+    assert story.answers() == [failed(story)] * 2, "so it is with one that asks after it"
     assert story.asked() == [("KILL", "33")] * 3, "the supervisor hears of it as ever"
 
 
 def test_one_that_was_confirmed_all_the_same_has_happened(alone):
-    story = alone()
+    """Given the word that the motors are off a little behind the deploy that rests on it."""
+    story = alone().ask(KILL)
     story.link.kill_waited_for(story.now)
-    story.link.kill_confirmed(story.now)
-    assert story.ask(KILL).step().answers() == ["SUCCESS"]
+    story.at(0.03).link.kill_confirmed(story.now)
+    assert story.step().answers() == ["SUCCESS"]
+    assert story.ask(KILL, number=1).step().answers() == ["SUCCESS"] * 2
 
 
 def test_a_kill_long_after_the_deploy_is_another_one(alone):
