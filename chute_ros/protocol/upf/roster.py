@@ -124,8 +124,9 @@ class UpfDevices:
             if trigger.doubted:
                 self.counts["launched that nobody ordered, not believed yet"] += 1
             if trigger.doubted and not doubted:
-                text = f"trigger {node_id} says that it has fired, which nobody ordered"
-                self.notice(Severity.WARNING, f"{text}: believed when it goes on saying so")
+                text = f"trigger {node_id} says that it has fired, not by an order from here"
+                until = "it goes on saying so, or its controller does"
+                self.notice(Severity.WARNING, f"{text}: believed once {until}")
 
     def node_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A NodeStatus of anybody."""
