@@ -7,8 +7,8 @@ from chute_ros.model import LinkState, ParachuteState
 
 COUNT = "launched that nobody ordered, not believed yet"
 DOUBT = (
-    "trigger 34 says that it has fired, not by an order from here: believed once it goes on saying "
-    "so, or its controller does"
+    "trigger 34 says that it has fired, not by an order from here: believed once it goes on "
+    "saying so, or its controller does"
 )
 
 
