@@ -71,7 +71,7 @@ def decisions_task(
     level = diagnostics.OK
     if state.alarms or state.stage is Stage.FAULT:
         level = diagnostics.ERROR
-    elif reasons or state.mode is not Mode.ACTIVE:
+    elif reasons or state.disputed or state.mode is not Mode.ACTIVE:
         level = diagnostics.WARN
     values: dict[str, object] = {
         "state": state.stage.name,
@@ -80,6 +80,7 @@ def decisions_task(
         "decisions": state.next_id - 1,
         "profile": config.profile.name,
         "device asked to kill": ", ".join(state.asks),
+        "sources contradict each other": ", ".join(sorted(state.disputed)),
     }
     for link in config.links:
         evidence = state.evidence(link)
@@ -136,4 +137,9 @@ def _stage_text(state: State, reasons: tuple[str, ...]) -> str:
         return f"{state.stage.name}: {'; '.join(reasons)}"
     if state.alarms:
         return f"{state.stage.name}: {state.alarms[-1]}"
+    if state.disputed:
+        parts = ", ".join(sorted(state.disputed))
+        return (
+            f"{state.stage.name}: {parts} in doubt, as the vehicle's sources contradict each other"
+        )
     return state.stage.name

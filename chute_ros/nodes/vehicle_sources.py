@@ -100,6 +100,7 @@ class VehicleSources:
         self._merge = VehicleMerge(sources, values["vehicle_state_age"])
         self._told_at = -math.inf
         self._refused: set[str] = set()
+        self._disputed: frozenset[str] = frozenset()
         inputs = {source: self._inputs(source) for source in sources if source != VEHICLE_STATE}
         # Runs only while something waits for the end of the interval.
         self._timer = node.create_timer(
@@ -182,7 +183,14 @@ class VehicleSources:
     def _tell_now(self) -> None:
         self._timer.cancel()
         self._told_at = self._clock()
-        self._tell(self._merge.state(self._told_at), self._merge.disputed(self._told_at))
+        disputed = self._merge.disputed(self._told_at)
+        if new := sorted(disputed - self._disputed):
+            self._node.get_logger().warning(
+                f"vehicle_sources: {', '.join(new)} is told otherwise by another source, or has "
+                "jumped: in doubt, and half a sign where one would decide alone (docs/rules.md)"
+            )
+        self._disputed = disputed
+        self._tell(self._merge.state(self._told_at), disputed)
 
 
 def _checked(sources: list[str]) -> list[str]:

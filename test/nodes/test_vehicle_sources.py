@@ -156,6 +156,22 @@ def test_what_comes_fast_is_told_together_and_the_last_is_not_lost(bench, listen
     assert len(node.told) == told
 
 
+def test_sources_that_contradict_each_other_are_told_and_logged_once(bench, listen, capfd):
+    node = listen("vehicle/state", "imu")
+    told, upside_down = autopilot(), level()
+    told.attitude_age = 0.0
+    upside_down.orientation = Quaternion(x=1.0, w=0.0)
+    for n in range(1, 6):
+        node.now = 100.0 + n / 10.0
+        heard = len(node.told)
+        bench.publish(told, "vehicle/state")
+        bench.until(lambda heard=heard: len(node.told) > heard, "vehicle/state is told")
+        bench.publish(upside_down, "imu")
+        bench.until(lambda heard=heard: len(node.told) > heard + 1, "the IMU is told")
+    assert node.disputed == {"attitude"}
+    assert capfd.readouterr().err.count("attitude is told otherwise by another source") == 1
+
+
 def test_odometry_with_axes_that_point_down_is_not_used(bench, listen):
     node = listen("odometry")
     bench.publish(falling_on_its_side("odom_ned"), "odometry")
