@@ -106,8 +106,9 @@ class _Update(Deploying):
             for link, evidence in self.state.links.items()
         }
         rules = dict(self.state.rules)
-        # They were full, it may be, before a silence that was none.
-        for rule in self.config.profile.rules:
+        # Full before a silence that was our own, they would fire at its first word.
+        deaf = late >= self.config.vehicle_state_age / 2.0
+        for rule in self.config.profile.rules if deaf else ():
             if not all(is_counted(one) for one in rule.conditions) and rule.name in rules:
                 rules[rule.name] = replace(rules[rule.name], level=0.0, holds=False)
         unseen = late * _CLIMBS_UNSEEN >= self.config.profile.minimum_height

@@ -177,6 +177,16 @@ def test_who_was_late_has_counted_nothing_while_the_silence_was_its_own() -> Non
     assert story.fired() == []
 
 
+def test_a_supervisor_that_stalls_shortly_goes_on_counting() -> None:
+    """Given one that stalls again and again as its aeroplane falls."""
+    story = flying("fixed_wing").fly(1.0, tilt=80.0, **LOST)
+    for _ in range(2):
+        story._update((story.heartbeat(), story.told(tilt=80.0, **LOST)), story.t + 0.8)
+    assert "silence meanwhile does not count" in story.said()
+    story.fly(story.t + 0.3, tilt=80.0, **LOST)
+    assert story.fired()[0] == "KILL"
+
+
 @pytest.mark.parametrize(("every", "fires"), [(1.2, False), (0.1, True)])
 def test_heights_too_seldom_for_a_rate_tell_none(every: float, fires: bool) -> None:
     """Given a force that is noise, and heights: only where these told a rate a moment ago does a
