@@ -96,8 +96,7 @@ def decisions_task(
     for measurement in config.profile.limits:
         value = measured(config, state, measurement, now)
         why = unusable(config, state, measurement, now)
-        told_by_itself = value == state.measured(measurement).value
-        in_doubt = doubt(state, measurement, now) if told_by_itself else ""
+        in_doubt = doubt(state, measurement, value, now)
         told = f"{value:.2f} (in doubt: {in_doubt})" if in_doubt else f"{value:.2f}"
         values[measurement] = f"unusable: {why}" if why else told
     return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")

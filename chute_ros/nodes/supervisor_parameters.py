@@ -19,7 +19,7 @@ from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.lease import LeaseConfig
 from chute_ros.supervisor.link_evidence import LinkLimits
-from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, is_silence
+from chute_ros.supervisor.rules import AutopilotFact, is_silence
 
 PARAMETERS = (
     Parameter(
@@ -233,10 +233,7 @@ def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
     return [
         rule.name
         for rule in config.profile.rules
-        if any(
-            isinstance(one, AutopilotCondition) and one.fact is AutopilotFact.LOST
-            for one in rule.conditions
-        )
+        if rule.asks(AutopilotFact.LOST)
         and sum(one.weight for one in rule.conditions if is_silence(one)) < rule.needed
     ]
 

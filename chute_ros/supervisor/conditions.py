@@ -65,9 +65,9 @@ def _measurement(
             return Finding(True, tell)
         gap = now - flight.last_usable(config, state, name) <= UNKNOWN_STANDS
         return Finding(None, tell, samples, expected=gap)
-    doubt = flight.doubt(state, name, now)
+    doubt = flight.doubt(state, name, value, now)
     if value != known.value:
-        samples, doubt = state.measured("height").count, ""  # told by the heights instead
+        samples = state.measured("height").count  # told by the heights instead
     # A limit that is not asked for is NaN, and nothing is beyond it.
     holds = not (value <= condition.above or value >= condition.below)
 

@@ -22,7 +22,6 @@ from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.rules import is_counted
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
 #: What people ask for, besides a kill, which devices want as well.
@@ -109,7 +108,7 @@ class _Update(Deploying):
         # Full before a silence that was our own, they would fire at its first word.
         deaf = late >= self.config.vehicle_state_age / 2.0
         for rule in self.config.profile.rules if deaf else ():
-            if not all(is_counted(one) for one in rule.conditions) and rule.name in rules:
+            if not all(one.counted for one in rule.conditions) and rule.name in rules:
                 rules[rule.name] = replace(rules[rule.name], level=0.0, holds=False)
         unseen = late * _CLIMBS_UNSEEN >= self.config.profile.minimum_height
         self.state = replace(

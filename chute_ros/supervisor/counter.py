@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.rules import Rule, is_counted
+from chute_ros.supervisor.rules import Rule
 
 #: Two floats that count the same seconds may differ by this, s.
 _ROUNDING = 1e-6
@@ -92,7 +92,7 @@ class RuleEvidence:
             shown.append(count)
             if holds:
                 sure += counts if seen < 0 or count >= rule.samples else 0.0
-            presumed = not is_counted(condition)
+            presumed = not condition.counted
             if holds or presumed:
                 weight += counts
             if holds or presumed or (holds is None and expected):

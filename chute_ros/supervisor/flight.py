@@ -63,8 +63,11 @@ def measured(config: SupervisorConfig, state: State, name: str, now: float) -> f
     return reading(config, state, name, now)[0]
 
 
-def doubt(state: State, name: str, now: float) -> str:
-    """Why a measurement that can be used is a weaker sign than another; empty: it is not."""
+def doubt(state: State, name: str, value: float, now: float) -> str:
+    """Why a measurement that can be used is a weaker sign than another; empty: it is not. value:
+    what was read of it, which may be what the heights tell in its place."""
+    if value != state.measured(name).value:
+        return ""
     if _PARTS.get(name, name) in state.disputed:
         return "another source told otherwise"
     return state.measured(name).doubt(name, now)

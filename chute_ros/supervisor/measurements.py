@@ -194,7 +194,7 @@ class Measured:
             )
         doubtful = self._doubtful(sample, limits)
         # A date that went back puts the value in no doubt.
-        leaps = _jumps(self.value, self.measured_at, sample, limits)
+        leaps = bool(doubtful) and _jumps(self.value, self.measured_at, sample, limits)
         if doubtful:
             agrees = not _jumps(self.candidate, self.candidate_at, sample, limits)
             candidates = self.candidates + 1 if agrees else 1
@@ -214,8 +214,7 @@ class Measured:
         nearer = abs(sample.value - self.candidate) < abs(sample.value - self.value)
         jumped_at, before_jump = self.jumped_at, self.before_jump
         candidate = Sample(self.candidate, self.candidate_at)
-        leapt = _jumps(self.value, self.measured_at, candidate, limits)
-        if (doubtful and leaps) or (self.candidates and nearer and leapt):
+        if leaps or (nearer and _jumps(self.value, self.measured_at, candidate, limits)):
             # A jump back to what it was before ends what the first one has put in doubt.
             back = abs(sample.value - before_jump) <= limits.jump
             jumped_at, before_jump = (

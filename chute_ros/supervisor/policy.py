@@ -56,9 +56,9 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
         deadlines.append(evidence.deadline(rule, now))
         if rule.asks_the_autopilot:
             deadlines.append(state.vehicle_received + config.vehicle_state_age)
-        turns = rule.silences if rule.doubted == 1.0 else rule.silences.union(rule.measured)
         deadlines += [
-            state.measured(name).turns_at(config.profile.limits[name], now) for name in turns
+            state.measured(name).turns_at(config.profile.limits[name], now)
+            for name in rule.turned_by_time
         ]
         if evidence.holds:
             deadlines += [

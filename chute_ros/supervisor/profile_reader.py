@@ -32,7 +32,6 @@ from chute_ros.supervisor.rules import (
     MeasurementCondition,
     Profile,
     Rule,
-    is_counted,
     is_silence,
 )
 from chute_ros.supervisor.yaml_lines import LineReader, Where, compose
@@ -156,10 +155,10 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
             reader.wrong(entries["needed"].line, f"{text} {weights:g}")
     rule = Rule(name, tuple(conditions), action, tuple(states), needed)
     rule = _timing(reader, what, entries, rule)
-    if conditions and not any(is_counted(one) for one in conditions):
+    if conditions and not any(one.counted for one in conditions):
         text = f"{what} counts nothing: one of its conditions must do without `counted: false`"
         reader.wrong(where.line, text)
-    if not all(is_counted(one) for one in conditions) and rule.clears is not Clears.NEVER:
+    if not all(one.counted for one in conditions) and rule.clears is not Clears.NEVER:
         text = f"{what} would be full at once again: with `counted: false` it clears never"
         reader.wrong(where.line, text)
     if rule.samples > 1 and rule.hold <= 0.0:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
+from typing import ClassVar
 
 from chute_ros.model import Action
 from chute_ros.supervisor.link_evidence import LinkJudgement
@@ -72,6 +73,7 @@ class MeasurementCondition:
     weight: float = 1.0
     #: Where nothing usable tells, it is taken to hold: a second sign that may be missing.
     if_unknown: bool = False
+    counted: ClassVar[bool] = True
 
     @cached_property
     def limits(self) -> str:
@@ -89,6 +91,7 @@ class LinkCondition:
     link: str
     judged: tuple[LinkJudgement, ...]
     weight: float = 1.0
+    counted: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -111,14 +114,10 @@ class DeviceCondition:
     fact: DeviceFact
     link: str = ANY
     weight: float = 1.0
+    counted: ClassVar[bool] = True
 
 
 Condition = MeasurementCondition | LinkCondition | AutopilotCondition | DeviceCondition
-
-
-def is_counted(condition: Condition) -> bool:
-    """Does the rule's counter wait for it?"""
-    return not isinstance(condition, AutopilotCondition) or condition.counted
 
 
 def is_silence(condition: Condition) -> bool:
@@ -184,6 +183,11 @@ class Rule:
         return frozenset(names - {CLIMB_RATE} | ({HEIGHT} if by_height else set()))
 
     @cached_property
+    def turned_by_time(self) -> frozenset[str]:
+        """The measurements of which it may come to hold though nothing new is told."""
+        return self.silences if self.doubted == 1.0 else self.silences.union(self.measured)
+
+    @cached_property
     def rests_on_the_vehicle(self) -> bool:
         """All its conditions are what the vehicle tells, and nothing of what we did."""
         kinds = (MeasurementCondition, AutopilotCondition)
@@ -194,9 +198,12 @@ class Rule:
     @cached_property
     def asks_for_a_kill_aloft(self) -> bool:
         """One of its conditions is AutopilotFact.KILLED_ALOFT."""
+        return self.asks(AutopilotFact.KILLED_ALOFT)
+
+    def asks(self, fact: AutopilotFact) -> bool:
+        """One of its conditions is this of the autopilot."""
         return any(
-            isinstance(one, AutopilotCondition) and one.fact is AutopilotFact.KILLED_ALOFT
-            for one in self.conditions
+            isinstance(one, AutopilotCondition) and one.fact is fact for one in self.conditions
         )
 
 

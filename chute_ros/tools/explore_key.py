@@ -15,7 +15,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import JUMP_DOUBTED
+from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
 from chute_ros.supervisor.rules import MeasurementCondition, Rule
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
@@ -143,7 +143,7 @@ def _measured(config: SupervisorConfig, state: State, name: str, now: float) -> 
     return (
         round(measured.value, 3) if not math.isnan(measured.value) else None,
         _since(measured.measured_at, now, max(limits.max_age, UNKNOWN_STANDS)),
-        _since(measured.doubted_at, now, 1.0),
+        _since(measured.doubted_at, now, REJECTION_DOUBTED),
         _since(measured.jumped_at, now, JUMP_DOUBTED),
         round(measured.before_jump, 3) if not math.isnan(measured.before_jump) else None,
         bool(measured.rejected),

@@ -23,7 +23,8 @@ def flying(profile: str = "multirotor") -> Story:
 
 
 def doubt(story: Story, name: str) -> str:
-    return flight.doubt(story.state, name, START + story.t)
+    value = story.state.measured(name).value
+    return flight.doubt(story.state, name, value, START + story.t)
 
 
 def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight() -> None:
@@ -102,8 +103,8 @@ def test_what_another_source_contradicts_is_doubted() -> None:
         report = replace(told, disputed=frozenset({"attitude"}))
         story.at(story.t + 0.05, story.heartbeat(), report)
     assert story.fired() == []
-    assert flight.doubt(story.state, "tilt_deg", 0.0) == "another source told otherwise"
-    assert flight.doubt(story.state, "acceleration", 0.0) == ""
+    assert doubt(story, "tilt_deg") == "another source told otherwise"
+    assert doubt(story, "acceleration") == ""
     story.fly(story.t + 0.5, **LOST, tilt=90.0)
     assert story.fired()[0] == "KILL"
 

@@ -22,7 +22,6 @@ from chute_ros.supervisor.rules import (
     MeasurementCondition,
     Profile,
     Rule,
-    is_counted,
 )
 
 LINKS = (LINK, "upf_can")
@@ -307,11 +306,11 @@ def test_a_key_that_aliases_make_endless_is_not_spelt_out() -> None:
 def test_what_is_in_doubt_counts_in_full_and_all_is_counted_unless_it_says_so() -> None:
     falls = read(WHOLE).rules[0]
     assert falls.doubted == 1.0
-    assert all(is_counted(one) for one in falls.conditions)
+    assert all(one.counted for one in falls.conditions)
     text = WHOLE.replace("leak: 0.25", "doubted: 0.25").replace("on_disarm", "never")
     falls = read(text.replace("rebooted}", "lost, counted: false}")).rules[0]
     assert falls.doubted == 0.25
-    assert [is_counted(one) for one in falls.conditions] == [True, True, True, False, True]
+    assert [one.counted for one in falls.conditions] == [True, True, True, False, True]
 
 
 def test_a_rule_that_would_be_full_at_once_again_is_refused() -> None:
