@@ -1,12 +1,14 @@
 """The vehicle's own MAVLink network, in the measuring process: autopilot and parachute.
 
-A thread reads one socket; the simulated devices answer, and what matters is put down with its
-time.
+A thread reads one socket; the simulated devices answer, and what matters is put down with the time
+at which the kernel had it: when this process gets the processor is not the nodes' matter.
 """
 
 from __future__ import annotations
 
 import select
+import socket
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -17,19 +19,22 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
-from chute_ros.transport.address import parse_address
-from chute_ros.transport.udp import UdpWire
 
 #: What the two devices send by themselves once they are asked for measurements, frames a second.
 NOMINAL_RATE = 65.0
+#: SO_TIMESTAMPNS, also the type of its control message (asm-generic/socket.h): a struct timespec
+#: of the wall clock. Python has no name for it.
+_TIMESTAMPNS, _TIMESPEC = 35, struct.Struct("@qq")
 
 
 class VehicleWire:
     """Talks to the node that listens on port."""
 
     def __init__(self, port: int) -> None:
-        self._wire = UdpWire(parse_address(f"udpout:127.0.0.1:{port}"))
-        self._wire.open()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, _TIMESTAMPNS, 1)
+        self._node = ("127.0.0.1", port)
         self._autopilot = AutopilotDevice(1, [])
         self._parachute = ParachuteDevice(ParachuteSettings(), [])
         self._decoder = FrameDecoder()
@@ -53,7 +58,7 @@ class VehicleWire:
         """Both are gone."""
         self._stopping = True
         self._thread.join()
-        self._wire.close()
+        self._socket.close()
 
     def flood(self, times: float) -> None:
         """Send attitudes besides, so many times as much as the devices say; 0: no more."""
@@ -77,13 +82,13 @@ class VehicleWire:
             for device in (self._autopilot, self._parachute):
                 device.update(now)
                 for data in device.take_output():
-                    self._wire.write(data)
+                    self._socket.sendto(data, self._node)
                     self.said += 1
             self._add_to_flood(now)
             deadlines = [self._autopilot.next_deadline(), self._parachute.next_deadline()]
             deadlines += [self._flood_at] if self._flood_interval else []
             wait = max(0.0, min(min(deadlines) - now, 0.05))
-            if select.select(self._wire.files(), [], [], wait)[0]:
+            if select.select([self._socket], [], [], wait)[0]:
                 self._hear()
 
     def _add_to_flood(self, now: float) -> None:
@@ -92,17 +97,15 @@ class VehicleWire:
             return
         while self._flood_at <= now:
             self._flood_at += self._flood_interval
-            self._wire.write(self._encoder.encode(attitude(now), now))
+            self._socket.sendto(self._encoder.encode(attitude(now), now), self._node)
 
     def _hear(self) -> None:
-        for file in self._wire.files():
-            for data, _ in self._wire.read(file):
-                # Before anything is decoded: what that takes here is not the nodes'.
-                at, now = time.perf_counter_ns(), time.monotonic()
-                for frame in self._decoder.feed_datagram(data, now):
-                    self._note(frame.message, at)
-                for device in (self._autopilot, self._parachute):
-                    device.receive(data, now)
+        data, control, _, _ = self._socket.recvmsg(2048, socket.CMSG_SPACE(_TIMESPEC.size))
+        now = time.monotonic()
+        for frame in self._decoder.feed_datagram(data, now):
+            self._note(frame.message, _came_at(control))
+        for device in (self._autopilot, self._parachute):
+            device.receive(data, now)
 
     def _note(self, message: dialect.MAVLink_message, at: int) -> None:
         kind = message.get_type()
@@ -110,3 +113,11 @@ class VehicleWire:
             self.blocks.append(at)
         if kind == "COMMAND_LONG" and message.command == dialect.MAV_CMD_DO_PARACHUTE:
             self.releases.append(at)
+
+
+def _came_at(control: list[tuple[int, int, bytes]]) -> int:
+    """perf_counter_ns at which the kernel had the datagram. control: its control messages."""
+    (stamp,) = (data for _, kind, data in control if kind == _TIMESTAMPNS)
+    seconds, nanoseconds = _TIMESPEC.unpack(stamp)
+    wall_ahead = time.time_ns() - time.perf_counter_ns()
+    return int(seconds) * 1_000_000_000 + int(nanoseconds) - wall_ahead
