@@ -8,10 +8,10 @@ import importlib
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
+from chute_ros.interrupts import at_ctrl_c
 from chute_ros.nodes.middleware import set_up_middleware
 
 #: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
@@ -27,7 +27,7 @@ _NOT_BUILT = (
 
 def run(name: str, class_name: str) -> None:
     """Make the class of node name and spin it until the end; exits with 2 on a user's mistake."""
-    with _nothing_to_end():
+    with at_ctrl_c(signal.SIG_DFL):
         node_class = _imported(f"chute_ros.nodes.{name}_node", class_name)
     set_up_middleware()
     sys.setswitchinterval(_SWITCH_INTERVAL)
@@ -67,21 +67,6 @@ def run(name: str, class_name: str) -> None:
         # The signal's own handler may be shutting down at this very moment.
         with contextlib.suppress(RuntimeError):
             rclpy.try_shutdown()
-
-
-@contextlib.contextmanager
-def _nothing_to_end() -> Iterator[None]:
-    """Ctrl-C ends the process at once: while it imports there is nothing that must be ended, and
-    Python would tell where in an import it was."""
-    before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
-        yield  # who started us wants it otherwise
-        return
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _imported(module: str, class_name: str) -> Any:

@@ -7,7 +7,8 @@ import importlib
 import os
 import signal
 import sys
-from collections.abc import Iterator
+
+from chute_ros.interrupts import at_ctrl_c
 
 #: The exit code of what a Ctrl-C ended, as shells have it.
 INTERRUPTED = 128 + signal.SIGINT
@@ -16,7 +17,12 @@ _STDERR = 2
 
 def run(name: str, module: str) -> None:
     """Run main of the module of tool name; exit code 130 if Ctrl-C ended it."""
-    with _nothing_to_end(name):
+
+    def end(*_: object) -> None:
+        _tell(name)
+        os._exit(INTERRUPTED)
+
+    with at_ctrl_c(end):
         # Here: it takes up to a second.
         main = importlib.import_module(f"chute_ros.tools.{module}").main
     try:
@@ -27,26 +33,6 @@ def run(name: str, module: str) -> None:
     finally:
         # All is ended; a second Ctrl-C would only tell where in the interpreter it was.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-@contextlib.contextmanager
-def _nothing_to_end(name: str) -> Iterator[None]:
-    """Ctrl-C ends the process at once: while it imports there is nothing that must be ended, and
-    Python would tell where in an import it was."""
-    before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
-        yield  # who started us wants it otherwise
-        return
-
-    def end(*_: object) -> None:
-        _tell(name)
-        os._exit(INTERRUPTED)
-
-    signal.signal(signal.SIGINT, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _tell(name: str) -> None:
