@@ -119,11 +119,38 @@ def test_a_report_says_nothing_of_disputes_unless_told() -> None:
 @pytest.mark.parametrize(("sinks", "fires"), [(0.0, False), (8.0, True)])
 def test_a_speed_that_the_heights_deny_is_no_sink(sinks: float, fires: bool) -> None:
     """Given a vertical speed that drifts, beside heights that stay where they are."""
-    story = flying().fly(1.0, **LOST)
+    story = flying().fly(1.0, **LOST).fly(1.05, **LOST, vertical_speed=-4.0)
     for step in range(60):
         told = {"vertical_speed": -8.0, "height": 50.0 - sinks * step * 0.05}
         story.fly(story.t + 0.05, **LOST, **told)
     assert bool(story.fired()) is fires
+
+
+@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+@pytest.mark.parametrize(("sinks", "fires"), [(0.0, False), (12.0, True)])
+def test_beside_a_speed_that_jumped_a_gust_that_lifts_is_no_sign(
+    profile: str, sinks: float, fires: bool
+) -> None:
+    """Given a speed that is suddenly 16 m/s too low, and a force of less than half its weight."""
+    story = flying(profile)
+    begun = story.t
+    for step in range(60):
+        height = 50.0 - sinks * step * 0.05
+        told = {"vertical_speed": -16.0, "acceleration": 4.0, "height": height}
+        story.fly(story.t + 0.05, **told)
+    assert "it jumped" in doubt(story, "vertical_speed")
+    assert bool(story.fired()) is fires
+    if fires:
+        assert story.when(Action.KILL) - begun < 2.5
+
+
+def test_a_fall_whose_speed_was_not_told_for_a_second_is_no_jump() -> None:
+    story = flying().fly(1.0)
+    begun = story.t
+    story.fly(begun + 1.0, vertical_speed=math.nan, height=math.nan, acceleration=4.5)
+    story.fly(begun + 2.0, vertical_speed=-14.0, height=math.nan, acceleration=4.5)
+    assert story.newest(Action.KILL).rule == "critical sink"
+    assert story.when(Action.KILL) - begun < 1.6
 
 
 # -- silence that was waited for ------------------------------------------------------------------

@@ -74,7 +74,7 @@ def test_a_tumbling_vehicle_whose_attitude_swings_through_the_upright_is_deploye
 
 
 def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> None:
-    story = aloft()
+    story = aloft().fall(2.0)
     start = story.t
     for n in range(80):
         speed = -11.0 if n % 5 == 4 else -14.0
@@ -86,6 +86,8 @@ def test_a_fall_with_gusts_is_deployed_although_single_samples_look_well() -> No
 def test_dropped_messages_do_not_reset_the_count() -> None:
     story = aloft()
     start = story.t
+    for speed in (-5.0, -10.0):
+        story.fly(story.t + 0.05, vertical_speed=speed)
     for n in range(40):
         # Two samples out of three never arrive.
         told = story.told(vertical_speed=-14.0, acceleration=4.5)

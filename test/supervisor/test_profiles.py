@@ -19,6 +19,8 @@ K, D = Action.KILL, Action.DEPLOY
 EVERY = 0.05
 LOST = {"link_state": LinkState.LOST}
 REBOOTED = {"reboot_count": 1, "rebooted_in_flight": True}
+#: m/s between two samples.
+STEP = 5
 ONE_METRE = 1.0 / 111_195.0  # degrees of latitude
 
 
@@ -42,7 +44,12 @@ class Case:
 
     def flying(self) -> Story:
         story = Story(shipped(self.profile)).ready()
-        return story.fly(0.3, every=EVERY, **self.before)
+        story.fly(0.3, every=EVERY, **self.before)
+        # Faster and faster: a speed that jumped would be in doubt.
+        speed = self.over.get("vertical_speed", 0.0)
+        for told in range(-STEP, round(speed) + 1, -STEP):
+            story.fly(story.t + EVERY, EVERY, **{**self.before, "vertical_speed": float(told)})
+        return story
 
     def over_for(self, story: Story, samples: int) -> Story:
         return story.fly(story.t + samples * EVERY, EVERY, **{**self.before, **self.over})

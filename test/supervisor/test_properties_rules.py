@@ -272,5 +272,8 @@ def test_one_that_falls_in_flight_is_killed_and_deployed_whatever_came_before(
     if watch.state.stage is not Stage.IN_FLIGHT:
         return
     moving = {"vertical_speed": -14.0, "acceleration": 4.5, **sign, **lie}
+    # Faster and faster, as bodies do: a speed that jumped would be in doubt.
+    for speed in (-5.0, -10.0):
+        run(watch, [("told", {**FLYING_WELL, "vertical_speed": speed, **lie}, 1)])
     run(watch, [("told", {**FLYING_WELL, **moving}, 25)])
     assert watch.state.stage in (Stage.DEPLOYING, Stage.DEPLOYED, Stage.FAULT)
