@@ -18,6 +18,7 @@ from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.upf import parameters as p
+from chute_ros.sim.flight import GRAVITY
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.sim.upf_aps import Motion
 from chute_ros.sim.upf_bus import UpfBus
@@ -110,6 +111,7 @@ class Aircraft(Rig):
             self.add_source(source, self.model)
         self._speed = 0.0
         self._flew = False
+        self._light_until = math.nan
 
     def _add_upf(self) -> None:
         bus = Bus(self.world, CAN, f"{self.scenario.seed} can")
@@ -137,6 +139,9 @@ class Aircraft(Rig):
     def refused_at(self) -> float:
         return math.nan if self.only_parachute is None else self.only_parachute.misled_at
 
+    def light_until(self) -> float:
+        return self._light_until
+
     def fail(self, now: float) -> None:
         failure, plug = self.scenario.failure, self.plugs["autopilot"]
         if failure is Failure.MOTOR:
@@ -163,6 +168,8 @@ class Aircraft(Rig):
                 self.landed, self.landing_speed = now, self._speed
         elif not carried and not self.truth.falls and math.isnan(self.released):
             self.truth = observe(model, now)
+        if self.truth.falls and model.acceleration < GRAVITY / 2.0:
+            self._light_until = now
         self._speed = max(0.0, -model.vertical_speed)
 
     def _out(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -24,6 +25,8 @@ _LONGEST_GAP = 1.0
 _TAKEN_OVER, _TAKEN_OVER_DEAF = 1.5, 2.5
 #: What a sensor told counts for so long, s.
 _LASTS = 1.0
+#: What a sensor says may be one more lie for so long after it lied, s.
+_DISTRUSTED = 10.0
 #: Sensor -> the measurements of the reasons that it tells.
 _TOLD_BY = {
     "height": ("height", "climb_rate"),
@@ -66,9 +69,16 @@ def enough_time(scenario: Scenario) -> float:
     return _ENOUGH_TIME + (FRESH if waits else 0.0)
 
 
-def blinded(scenario: Scenario, up: float, need: Need, told: Sequence[float] = ()) -> str:
-    """Which faults left no time in a row that is enough; empty: there was. told: when lines of a
-    rocket's flight computer came whole, virtual s."""
+def blinded(
+    scenario: Scenario,
+    up: float,
+    need: Need,
+    told: Sequence[float] = (),
+    light_until: float = math.nan,
+) -> str:
+    """Which faults left no time in a row that is enough; empty: there was. All in virtual s. told:
+    when lines of a rocket's flight computer came whole; light_until: when less than half of its
+    weight last carried an aircraft in its fall."""
     failed_at = up + scenario.failure_at
     silent = scenario.failure in _NO_POWER and not outlives(scenario)
     if silent and failed_at < need.end:
@@ -76,7 +86,8 @@ def blinded(scenario: Scenario, up: float, need: Need, told: Sequence[float] = (
     drawn = [replace(one, begin=up + one.begin, end=up + one.end) for one in _all_hidden(scenario)]
     if scenario.vehicle is Vehicle.ROCKET:
         drawn += _gaps(told, need)
-    hidden = [one for one in drawn if one.begin < need.end]
+    drawn += _as_in_flight(scenario, up, light_until)
+    hidden = [one for one in drawn if one.begin < min(one.end, need.end)]
     free, best = need.begin, 0.0
     for one in sorted(hidden, key=lambda one: one.begin):
         best = max(best, one.begin - free)
@@ -148,6 +159,23 @@ def _gaps(told: Sequence[float], need: Need) -> list[_Hidden]:
         _Hidden(before, after, "no line of the flight computer came whole")
         for before, after in itertools.pairwise((need.begin, *times, need.end))
         if after - before > _LONGEST_GAP
+    ]
+
+
+def _as_in_flight(scenario: Scenario, up: float, light_until: float) -> list[_Hidden]:
+    """Where an IMU is all that is left, its attitude lies or has lied, and drag carries what falls
+    as wings and rotors carry what flies: just so it would tell of one that flies well, whose
+    autopilot hangs and whose attitude alone is wrong - and that must not be ended. Virtual s."""
+    if not outlives(scenario) or scenario.second_sources != (IMU,):
+        return []
+    return [
+        _Hidden(
+            up + one.begin if math.isnan(light_until) else max(up + one.begin, light_until),
+            up + one.end + (_LASTS if one.how == "gone" else _DISTRUSTED),
+            f"all that was left was an {IMU}, whose tilt was wrong, and drag carried the vehicle",
+        )
+        for one in scenario.faults
+        if isinstance(one, SensorFault) and (one.source, one.sensor) == (IMU, "tilt")
     ]
 
 

@@ -57,6 +57,8 @@ class Flown:
     refused: float = math.nan
     #: What the person was answered; empty: nothing.
     answer: str = ""
+    #: When less than half of its weight last carried it in its fall.
+    light_until: float = math.nan
 
 
 def _end_of(fault: Fault) -> float:
@@ -187,6 +189,7 @@ class Flight:
             tuple(rig.told()),
             rig.refused_at(),
             "" if answer is None else f"{answer.success}: {answer.message}",
+            rig.light_until(),
         )
 
 

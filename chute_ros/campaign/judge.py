@@ -105,7 +105,8 @@ def _fallen(flown: Flown) -> Judged | None:
     enough = enough_time(scenario)
     if not truth.leeway >= enough:
         return Judged(Count.NO_TIME, f"{truth.leeway:.2f} s were left (need {enough:g} s)")
-    if blind := blinded(scenario, flown.up, Need(truth.at, truth.latest), flown.told):
+    need = Need(truth.at, truth.latest)
+    if blind := blinded(scenario, flown.up, need, flown.told, flown.light_until):
         return Judged(Count.NOT_TOLD, blind)
     if flown.refused <= truth.latest:
         return Judged(Count.NOT_TOLD, _REFUSED)

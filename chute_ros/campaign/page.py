@@ -36,7 +36,11 @@ and that nobody else told of, those whose only parachute refused in time, as by 
 that it was told it stood, and those that were ended while two sensors told what was not so: every
 rule rests on two signs, and no more can be known than they tell; one sensor that is wrong must
 neither end a flight nor hide a fall. A sensor counts where the supervisor may go by it: its source
-is the preferred one of those that know this, or a preferred one falls silent."""
+is the preferred one of those that know this, or a preferred one falls silent.
+Where the autopilot has no power and an IMU is all that is left, no more can be known once drag
+carries half of the weight and its attitude is wrong, or lied in the last 10 s: just so it would
+tell of one that flies well, whose autopilot hangs and whose attitude alone is wrong. Those are
+named as well."""
 
 
 def page(tally: Tally, seed: int, how: str, pictures: Mapping[str, str]) -> str:

@@ -108,6 +108,10 @@ class Rig(ABC):
         """When the only parachute refused its release by a wrong height, virtual s; NaN: never."""
         return math.nan
 
+    def light_until(self) -> float:
+        """When less than half of its weight last carried it in its fall, virtual s; NaN: never."""
+        return math.nan
+
     # -- faults ----------------------------------------------------------------------------------
 
     def plan(self, up: float) -> None:

@@ -140,6 +140,50 @@ def test_what_hid_the_fall(faults, end: float, cause: str) -> None:
     assert blinded(scenario(Failure.MOTOR, *faults), 0.0, Need(1.0, end)) == cause
 
 
+LEFT = "all that was left was an imu, whose tilt was wrong, and drag carried the vehicle"
+
+
+@pytest.mark.parametrize(
+    ("how", "sensor", "sources", "light_until", "cause"),
+    [
+        ("jumps", "tilt", ("vehicle/state", "imu"), 2.0, LEFT),
+        ("gone", "tilt", ("vehicle/state", "imu"), 2.0, LEFT),
+        ("gone", "tilt", ("vehicle/state", "imu"), math.nan, LEFT),
+        # A force that is nearly nothing told it for long enough.
+        ("jumps", "tilt", ("vehicle/state", "imu"), 4.0, ""),
+        # Its attitude told it, or the heights of another source.
+        ("jumps", "force", ("vehicle/state", "imu"), 2.0, ""),
+        ("jumps", "tilt", ("vehicle/state", "imu", "odometry"), 2.0, ""),
+    ],
+)
+def test_what_falls_like_one_that_flies_well_cannot_be_known(
+    how: str, sensor: str, sources: tuple, light_until: float, cause: str
+) -> None:
+    """Given an autopilot that lost its power at 1 s, and the ground at 8 s."""
+    lies = SensorFault(sensor, how, 1.5, 6.0, "imu")
+    alone = scenario(Failure.POWER, lies, vehicle_sources=sources)
+    assert blinded(alone, 0.0, Need(1.0, 8.0), light_until=light_until) == cause
+    # An autopilot that has its power tells more.
+    told = replace(alone, failure=Failure.MOTOR)
+    assert blinded(told, 0.0, Need(1.0, 8.0), light_until=light_until) == ""
+
+
+@pytest.mark.parametrize(("how", "cause"), [("jumps", LEFT), ("gone", "")])
+def test_what_lied_a_moment_ago_may_lie_again(how: str, cause: str) -> None:
+    lies = SensorFault("tilt", how, 0.0, 3.0, "imu")
+    alone = scenario(Failure.POWER, lies, vehicle_sources=("vehicle/state", "imu"))
+    assert blinded(alone, 0.0, Need(1.0, 8.0)) == cause
+    # Ten seconds later it is taken at its word.
+    assert blinded(alone, 0.0, Need(1.0, 16.0)) == ""
+
+
+def test_a_fall_is_light_until_drag_carries_half_of_it() -> None:
+    fell = flown(Failure.MOTOR, height=80.0, fall_speed=25.0)
+    # v = 25 m/s times the root of a half; a fall reaches that after 2.2 s, or its canopy opens.
+    assert fell.truth.at < fell.light_until < fell.truth.at + 2.5
+    assert math.isnan(flown(Failure.NOTHING).light_until)
+
+
 def test_where_no_line_of_a_flight_computer_came_whole_nothing_was_told() -> None:
     need, cause = Need(1.0, 8.0), "no line of the flight computer came whole"
     falls = rocket(Failure.NO_DROGUE)
