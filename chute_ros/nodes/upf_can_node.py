@@ -167,7 +167,7 @@ class UpfCanNode(DeviceNode):
         wire = self.wire_picture()
         return [
             bus_task(name, details, traffic, wire),
-            *device_tasks(name, details),
+            *device_tasks(name, details, self.values["without_controller"]),
             vehicle_service_task(name, details),
             allocation_task(name, details, str(self._file.path)),
         ]

@@ -20,6 +20,7 @@ from chute_ros.protocol.upf.link import UpfLink
 class DeviceDetails:
     """One controller or trigger, ready to be told."""
 
+    kind: str
     task: str
     device: str
     healthy: bool
@@ -93,11 +94,11 @@ def bus_task(
     return diagnostics.wire_task(name, wire, troubles, details.received, values, details.dropped)
 
 
-def device_tasks(name: str, details: Details) -> list[DiagnosticStatus]:
-    """One task for each controller and trigger."""
+def device_tasks(name: str, details: Details, without_controller: bool) -> list[DiagnosticStatus]:
+    """One task for each controller and trigger, and one for a controller that is missing."""
     if not details.devices:
         return [diagnostics.never_heard(name)]
-    return [
+    heard = [
         diagnostics.status(
             name,
             one.task,
@@ -108,6 +109,11 @@ def device_tasks(name: str, details: Details) -> list[DiagnosticStatus]:
         )
         for one in details.devices
     ]
+    if without_controller or any(one.kind == Controller.kind for one in details.devices):
+        return heard
+    told = "never heard, and without it there is no parachute here (controller_node_id: "
+    told += "its node id, or 0; without_controller: true where the vehicle has none)"
+    return [diagnostics.status(name, Controller.kind, diagnostics.ERROR, told, {}, ""), *heard]
 
 
 def vehicle_service_task(name: str, details: Details) -> DiagnosticStatus:
@@ -143,6 +149,7 @@ def _details(
     one: Device, state: str, faults: list[str], values: Mapping[str, Any], now: float
 ) -> DeviceDetails:
     return DeviceDetails(
+        one.kind,
         f"{one.kind} {one.node_id}",
         one.device,
         one.liveness.state is model.LinkState.OK and not faults,

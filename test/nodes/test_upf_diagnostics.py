@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from chute_msgs.msg import TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import OTHER_LAYOUT, Devices, Network, follow_log, tasks, values
@@ -99,3 +100,20 @@ def test_fields_that_the_types_lack_are_in_the_log_at_the_start(bench):
             lambda absent=absent: any(f"have no {absent}" in one.msg for one in said),
             f"{absent} is named",
         )
+
+
+@pytest.mark.parametrize("without_controller", [False, True])
+def test_a_controller_that_is_missing_beside_its_trigger_is_an_error(
+    bench, without_controller: bool
+) -> None:
+    network = Network(bench, without_controller=without_controller)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    network.party(34).say(
+        TRIGGER_STATUS, state=network.definitions.constant(TRIGGER_STATUS, "STATE_READY")
+    )
+    bench.until(lambda: "trigger 34" in tasks(diagnostics), "the trigger is there")
+    said = tasks(diagnostics)
+    assert ("controller" in said) is not without_controller
+    if not without_controller:
+        assert said["controller"].level == ERROR
+        assert said["controller"].message.startswith("never heard, and without it")
