@@ -33,7 +33,7 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.decision_carrier import DecisionCarrier
 from chute_ros.nodes.inbox import Inbox
-from chute_ros.nodes.link_log import log_event
+from chute_ros.nodes.link_log import UselessWire, log_event
 from chute_ros.nodes.parameters import Parameter, declare
 from chute_ros.nodes.request_desk import CallFailed, RequestDesk
 from chute_ros.nodes.supervisor_watch import (
@@ -129,6 +129,7 @@ class DeviceNode(Node, ABC):
         self._decided_block = ""
         self._seq = count()
         self._loop_faults = 0
+        self._useless_wire = UselessWire()
         self._summary: Summary | None = None
         self._status_publisher = self.create_publisher(
             ParachuteStatus, "parachute/status", qos.STATUS
@@ -390,9 +391,16 @@ class DeviceNode(Node, ABC):
             statuses.append(diagnostics.status(name, "link", diagnostics.ERROR, text, {}, ""))
         if summary is not None:
             statuses += self.diagnose(summary)
+            self._look_at_wire(statuses)
         faults = {
             "exceptions in the link's thread": self._loop_faults,
             "pictures left out, as the executor did not keep up": self._inbox.left_out,
         }
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
         self._diagnostics_publisher.publish(self.stamp(), statuses)
+
+    def _look_at_wire(self, statuses: list[DiagnosticStatus]) -> None:
+        assert self.loop is not None
+        link = next(one for one in statuses if one.name.endswith(": link"))
+        bad = self.loop.wire.is_open and link.level != diagnostics.OK
+        self._useless_wire.look(self.get_logger(), link.message if bad else "", time.monotonic())

@@ -24,7 +24,7 @@ from node_bench import Bench, stamped
 from simulated_device import SimulatedDevice
 
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
-from chute_ros.nodes import qos
+from chute_ros.nodes import link_log, qos
 
 #: Parameters of every device node, quickened.
 HEARTBEAT_RATE = 50.0
@@ -122,6 +122,25 @@ class DeviceSuite:
             return next((r for r in matching if r.outcome == outcome), None)
 
         return self.bench.until(found, f"{outcome.name} is reported")
+
+    # -- the wire -----------------------------------------------------------------------------
+
+    def test_a_wire_on_which_nobody_is_heard_is_told_once(
+        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(link_log, "QUIET_FOR", 1.5)
+        said = self.bench.follow_log()
+        device.plug_in_mute()
+        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
+
+        def told() -> list[str]:
+            return [line.msg for line in said if "nothing received yet" in line.msg]
+
+        self.bench.until(told, "it is told")
+        assert " is open, nothing received yet, for " in told()[0]
+        looked = len(diagnostics)
+        self.bench.until(lambda: len(diagnostics) >= looked + 3, "it was looked at again")
+        assert len(told()) == 1
 
     # -- link states --------------------------------------------------------------------------
 

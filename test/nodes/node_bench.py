@@ -7,11 +7,14 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 
 from chute_ros.nodes import qos
 from chute_ros.nodes.node_executor import NodeExecutor
@@ -42,6 +45,8 @@ class Bench:
         self.executor = NodeExecutor()
         self.nodes: list[Node] = []
         self.loops: list[WireLoop[Any]] = []
+        #: What else is taken down.
+        self.at_end = ExitStack()
         self.client = Node("client", namespace=namespace)
         self.executor.add_node(self.client)
         self.nodes.append(self.client)
@@ -81,6 +86,7 @@ class Bench:
         """Take everything down."""
         for loop in self.loops:
             loop.stop()
+        self.at_end.close()
         for node in self.nodes:
             self.executor.remove_node(node)
             node.destroy_node()
@@ -116,6 +122,10 @@ class Bench:
         heard: list[Any] = []
         self.client.create_subscription(kind, topic, heard.append, profile)
         return heard
+
+    def follow_log(self) -> list[Any]:
+        """A list that grows by every line of any node's log."""
+        return self.follow(Log, "/rosout", QoSProfile(depth=1000))
 
     def publish(self, message: Any, topic: str, profile: Any = qos.STATUS) -> None:
         """Publish once somebody listens."""

@@ -12,6 +12,9 @@ class SimulatedDevice(ABC):
     def plug_in(self) -> None:
         """It is on the wire, and speaks often."""
 
+    def plug_in_mute(self) -> None:  # noqa: B027
+        """Its wire is there and nobody speaks on it, as a network's is from the start."""
+
     @abstractmethod
     def fall_silent(self) -> None:
         """It says nothing any more."""

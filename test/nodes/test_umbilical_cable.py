@@ -9,8 +9,6 @@ import threading
 import pytest
 from chute_msgs.msg import Telem
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import Log
-from rclpy.qos import QoSProfile
 from umbilical_bench import PATIENT, RATE, Cable
 
 from chute_ros.errors import ParameterError
@@ -183,8 +181,7 @@ def test_lines_that_are_cut_and_garbage_in_between_cost_only_themselves(bench):
 
 
 def test_each_way_that_a_port_cannot_be_opened_is_one_clear_line_and_it_keeps_trying(bench):
-    logs = []
-    bench.client.create_subscription(Log, "/rosout", logs.append, QoSProfile(depth=100))
+    logs = bench.follow_log()
     cable = Cable(bench)
 
     def said(text):

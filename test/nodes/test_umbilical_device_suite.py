@@ -18,6 +18,9 @@ class RocketDevice(SimulatedDevice):
     def plug_in(self):
         self.cable.plug()
 
+    def plug_in_mute(self):
+        self.cable.plug_mute()
+
     def fall_silent(self):
         self.cable.act("silent")
 

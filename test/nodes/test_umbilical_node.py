@@ -7,9 +7,7 @@ import math
 import pytest
 from chute_msgs.msg import LinkHeartbeat, Telem, VehicleState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rcl_interfaces.msg import Log
 from rclpy.logging import LoggingSeverity
-from rclpy.qos import QoSProfile
 from umbilical_bench import RATE, Cable
 
 from chute_ros.model import LandedState, LinkState, ParachuteState
@@ -210,8 +208,7 @@ def values(status):
 
 
 def test_its_log_lines_go_to_the_log_at_their_level(bench):
-    logs = []
-    bench.client.create_subscription(Log, "/rosout", logs.append, QoSProfile(depth=100))
+    logs = bench.follow_log()
     cable = Cable(bench, FlightComputerSettings(rate=RATE, debug=True))
     cable.plugged()
     assert cable.arm().success

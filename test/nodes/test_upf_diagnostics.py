@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from chute_msgs.msg import TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from upf_bench import OTHER_LAYOUT, Devices, Network, follow_log, tasks, values
+from upf_bench import OTHER_LAYOUT, Devices, Network, tasks, values
 
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
@@ -93,7 +93,7 @@ def test_a_launch_that_nobody_ordered_is_told_by_its_reason(bench):
 
 
 def test_fields_that_the_types_lack_are_in_the_log_at_the_start(bench):
-    said = follow_log(bench)
+    said = bench.follow_log()
     network = Network(bench, dsdl_path=str(OTHER_LAYOUT))
     for absent in network.definitions.absent:
         bench.until(

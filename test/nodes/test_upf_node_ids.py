@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from upf_bench import PATIENT, Network, follow_log, tasks, values
+from upf_bench import PATIENT, Network, tasks, values
 
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.upf_allocation_file import AllocationFile
@@ -95,7 +95,7 @@ def test_an_id_in_use_by_a_static_node_is_not_given_out(bench, tmp_path):
 
 
 def test_without_a_place_for_the_table_nothing_is_given_out_until_there_is_one(bench, tmp_path):
-    said = follow_log(bench)
+    said = bench.follow_log()
     folder, target = tmp_path / "folder", tmp_path / "target"
     folder.symlink_to(target)
     network = network_of(bench, folder / "ids.json")

@@ -15,7 +15,7 @@ from chute_msgs.srv import (
     TransportStats,
     UpfCommand,
 )
-from upf_bench import PATIENT, Devices, Network, follow_log
+from upf_bench import PATIENT, Devices, Network
 
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.upf import parameters as p
@@ -128,7 +128,7 @@ def test_a_command_to_what_is_no_controller_is_refused(bench, devices, number, n
 
 
 def test_a_command_is_in_the_log_with_its_reason(bench, devices):
-    said = follow_log(bench)
+    said = bench.follow_log()
     command(bench, Command.TAKEOFF)
     bench.until(
         lambda: any(one.msg == "~/command TYPE_TAKEOFF called: 'a test'" for one in said),

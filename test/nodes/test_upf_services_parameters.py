@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from chute_msgs.msg import ParachuteStatus
 from chute_msgs.srv import Deploy, GetParam, ListParams, NodeRequest, SetParam
-from upf_bench import PATIENT, Devices, Network, follow_log
+from upf_bench import PATIENT, Devices, Network
 
 from chute_ros.protocol.upf import parameters as p
 
@@ -162,7 +162,7 @@ def test_protection_is_not_switched_off_in_the_air(bench, devices, name, off):
 
 @pytest.mark.parametrize("name", p.PROTECTION)
 def test_protection_is_switched_off_by_force_and_that_is_logged(bench, devices, name):
-    said = follow_log(bench)
+    said = bench.follow_log()
     statuses = bench.follow(ParachuteStatus, "parachute/status")
     devices.fly()
     answer = set_param(bench, name, "false", force=True)

@@ -7,7 +7,7 @@ from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyR
 from chute_msgs.srv import Deploy
 from node_bench import stamped
 from rclpy.node import Node
-from upf_bench import Network, follow_log
+from upf_bench import Network
 
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
 from chute_ros.nodes import qos
@@ -235,7 +235,7 @@ def both(bench, **parameters):
 @pytest.mark.parametrize("force", [True, False])
 def test_a_controller_that_does_not_answer_is_gone_round(bench, force):
     vehicle = both(bench, give_up_after=10.0)
-    said = follow_log(bench)
+    said = bench.follow_log()
     vehicle.plug.call(lambda link, now: link.act("mute"))
     bench.until(lambda: vehicle.controller.mute, "it is mute")
     answer = vehicle.deploy(force=force)

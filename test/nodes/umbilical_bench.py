@@ -87,6 +87,12 @@ class Cable:
         self.loop.start()
         self.bench.loops.append(self.loop)
 
+    def plug_mute(self) -> None:
+        """Something is at the end of the cable that never says a word."""
+        wire = PtyWire(str(self.path))
+        wire.open()
+        self.bench.at_end.callback(wire.close)
+
     def pull(self) -> None:
         """The cable is pulled."""
         assert self.loop is not None

@@ -8,8 +8,6 @@ from typing import Any
 
 from chute_msgs.msg import LinkHeartbeat, VehicleState
 from node_bench import Bench, stamped
-from rcl_interfaces.msg import Log
-from rclpy.qos import QoSProfile
 from upf_party import Party
 
 from chute_ros.model import LinkState
@@ -240,9 +238,3 @@ def tasks(diagnostics: list[Any]) -> dict[str, Any]:
 def values(status: Any) -> dict[str, str]:
     """Key -> value of one diagnostic status."""
     return {pair.key: pair.value for pair in status.values}
-
-
-def follow_log(bench: Bench) -> list[Any]:
-    """A list that grows by every line of the node's log."""
-    said: list[Any] = bench.follow(Log, "/rosout", QoSProfile(depth=1000))
-    return said
