@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -100,8 +101,12 @@ class DeviceNode(Node, ABC):
     UNHURRIED: tuple[type, ...] = ()
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
-        super().__init__(name, **options)
+        # Before ROS knows the node: Kilted destroys what it knows, also one that a parameter
+        # keeps from being built.
         self.loop: WireLoop[Any] | None = None
+        #: What is done once the link's thread has ended and the node is gone.
+        self.at_end = ExitStack()
+        super().__init__(name, **options)
         self.values = declare(self, (*COMMON_PARAMETERS, *parameters))
         self.add_on_set_parameters_callback(self._parameters_set)
         # The wall clock stamps, whatever use_sim_time says; decisions are as old as the watch of
@@ -163,6 +168,7 @@ class DeviceNode(Node, ABC):
             self.loop.stop()
             self.loop = None
         super().destroy_node()
+        self.at_end.close()
 
     def serve(self, kind: Any, name: str, callback: Any) -> None:
         """Offer a service whose callback may await the device."""
@@ -391,7 +397,7 @@ class DeviceNode(Node, ABC):
             statuses.append(diagnostics.status(name, "link", diagnostics.ERROR, text, {}, ""))
         if summary is not None:
             statuses += self.diagnose(summary)
-            self._look_at_wire(statuses)
+            self._look_at_wire(summary.link_state, statuses)
         faults = {
             "exceptions in the link's thread": self._loop_faults,
             "pictures left out, as the executor did not keep up": self._inbox.left_out,
@@ -399,8 +405,9 @@ class DeviceNode(Node, ABC):
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
         self._diagnostics_publisher.publish(self.stamp(), statuses)
 
-    def _look_at_wire(self, statuses: list[DiagnosticStatus]) -> None:
+    def _look_at_wire(self, device: model.LinkState, statuses: list[DiagnosticStatus]) -> None:
         assert self.loop is not None
         link = next(one for one in statuses if one.name.endswith(": link"))
-        bad = self.loop.wire.is_open and link.level != diagnostics.OK
+        never = device is model.LinkState.NEVER_SEEN
+        bad = never and self.loop.wire.is_open and link.level != diagnostics.OK
         self._useless_wire.look(self.get_logger(), link.message if bad else "", time.monotonic())

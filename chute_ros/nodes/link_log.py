@@ -21,7 +21,8 @@ class UselessWire:
         self._told = False
 
     def look(self, log: Any, trouble: str, now: float) -> None:
-        """trouble: in words; empty: there is none, or the wire is known to be shut. now: s."""
+        """trouble: in words; empty: there is none, a device was heard, or the wire is known to be
+        shut. now: s."""
         if not trouble:
             self._since, self._told = math.inf, False
             return

@@ -51,6 +51,8 @@ class MavlinkParachuteNode(DeviceNode):
         address = parse_address(self.values["connection"])
         config = config_from(self.values)
         self._signing = SigningMemory(self, self.values)
+        # Once the newest times are known.
+        self.at_end.callback(self._signing.finish)
         #: Why take-off is forbidden, as it was last told.
         self._doubts: set[str] = set()
         link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
@@ -63,25 +65,20 @@ class MavlinkParachuteNode(DeviceNode):
         self.serve(GetInfo, "~/get_info", self._get_info)
         self.begin()
 
-    def destroy_node(self) -> None:
-        """The link's thread ends first: then the newest times are known, and are written."""
-        super().destroy_node()
-        self._signing.finish()
-
     # -- what DeviceNode asks for ---------------------------------------------------------------
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         self._signing.keep(now)
         chosen = link.chosen_parachute()
         details = details_of(link, now)
+        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
+        known = details.vehicle.armed is model.Armed.ARMED or not details.doubts
         if not self.values["expect_parachute"]:
             state, age = details.vehicle.link_state, details.vehicle.armed_age
-            return Summary(state, state is model.LinkState.OK, age, details)
+            return Summary(state, state is model.LinkState.OK and known, age, details)
         if chosen is None:
             return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
-        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
-        flying = details.vehicle.armed is model.Armed.ARMED
-        healthy = chosen.status(now).healthy and (flying or not details.doubts)
+        healthy = chosen.status(now).healthy and known
         return Summary(chosen.liveness.state, healthy, chosen.liveness.age(now), details)
 
     def link_event(self, event: Any) -> None:

@@ -62,6 +62,9 @@ class SafetySupervisorNode(Node):
     """The node safety_supervisor."""
 
     def __init__(self, **options: Any) -> None:
+        # Before ROS knows the node: Kilted destroys what it knows, also one that a parameter
+        # keeps from being built.
+        self._at_end = ExitStack()
         super().__init__("safety_supervisor", **options)
         self.values = declare(self, PARAMETERS)
         self.config = config_from(self.values)
@@ -78,13 +81,16 @@ class SafetySupervisorNode(Node):
         )
         first: tuple[inputs.Input, ...] = ()
         self._memory = Memory(self, self.values, self.config)
+        self._at_end.callback(self._memory.close)
         if (before := self._memory.recall()) is not None:
             self.state = before
             if not lease.standby:
                 first = (inputs.TakeOver(epoch_above(max(epoch, before.epoch), lease.rank)),)
         self._recorder = FlightRecorder(self, self.values)
+        self._at_end.callback(self._recorder.close)
         self._health = Health()
         self._afterwards = Afterwards()
+        self._at_end.callback(self._afterwards.look, math.inf)
         self.services_offered = SupervisorServices(self, self.wall, self._turn)
         self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
         self._seq = count()
@@ -311,6 +317,4 @@ class SafetySupervisorNode(Node):
         """The black box ends its file, the memory is written."""
         with ExitStack() as each:  # from the last to the first, each whatever the others raise
             each.callback(super().destroy_node)
-            each.callback(self._recorder.close)
-            each.callback(self._memory.close)
-            each.callback(self._afterwards.look, math.inf)
+            each.callback(self._at_end.close)

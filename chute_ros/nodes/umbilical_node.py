@@ -48,6 +48,8 @@ class UmbilicalNode(DeviceNode):
                 text = f"{layout.name}: umbilical/telem has no field for {', '.join(names)}"
                 self.get_logger().warning(text)
         self.files = DumpFiles(self.values["dump_folder"])
+        # A dump that is under way keeps what has come.
+        self.at_end.callback(self.files.finish, False)
         link = UmbilicalLink(config_from(self.values), layouts)
         self.loop = WireLoop(link, make_wire(address), self.deliver, link.wire_opened)
         self._progress = ""
@@ -61,11 +63,6 @@ class UmbilicalNode(DeviceNode):
             )
         self.offered = UmbilicalServices(self)
         self.begin()
-
-    def destroy_node(self) -> None:
-        """A dump that is under way keeps what has come."""
-        super().destroy_node()
-        self.files.finish(False)
 
     # -- what DeviceNode asks for ---------------------------------------------------------------
 

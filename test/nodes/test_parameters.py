@@ -18,6 +18,8 @@ from rclpy.parameter import Parameter
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.nodes.umbilical_node import UmbilicalNode
+from chute_ros.nodes.upf_can_node import UpfCanNode
 from chute_ros.protocol.mavlink.dialect import dialect
 
 NODES = {"mavlink_parachute": MavlinkParachuteNode, "safety_supervisor": SafetySupervisorNode}
@@ -84,6 +86,26 @@ def test_two_that_contradict_each_other_are_both_named(bench, node, name):
         bench.add(NODES[node], **{stale: 5.0, lost: 5.0})
     assert f"{stale} is 5.0" in str(caught.value)
     assert f"{lost} is 5.0" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [MavlinkParachuteNode, UpfCanNode, UmbilicalNode])
+@pytest.mark.parametrize("bad", [{"heartbeat_rate": 0.0}, {"connection": "x"}])
+def test_a_device_node_that_was_not_built_to_the_end_can_be_destroyed(bench, kind, bad):
+    """As Kilted does with every node that it knows, once ROS is shut down."""
+    destroy_half_built(bench, kind, bad)
+
+
+@pytest.mark.parametrize("bad", [{"mode": "on"}, {"profile": "none"}])
+def test_a_supervisor_that_was_not_built_to_the_end_can_be_destroyed(bench, bad):
+    destroy_half_built(bench, SafetySupervisorNode, bad)
+
+
+def destroy_half_built(bench, kind, bad):
+    node = kind.__new__(kind)
+    given = [Parameter(name, value=value) for name, value in bad.items()]
+    with pytest.raises(ParameterError):
+        node.__init__(namespace=bench.namespace, parameter_overrides=given)
+    node.destroy_node()
 
 
 def run(node, *parameters, namespace="/"):

@@ -173,6 +173,10 @@ def test_where_no_mavlink_parachute_is_expected_the_heartbeat_stands_for_the_aut
     assert not any(name.startswith("parachute") for name in told())
     bench.until(lambda: beats[-1].link_state == LinkState.OK, "the autopilot is heard")
     assert beats[-1].device_healthy
+    second = Autopilot(system_id=2)
+    bench.simulate(second, f"udpout:{LOCAL}:{port_of(node.loop)}")
+    bench.until(lambda: not beats[-1].device_healthy, "a second one makes it doubtful")
+    assert beats[-1].link_state == LinkState.OK
     do(bench, loop, lambda: autopilot.act("silent"))
     bench.until(lambda: beats[-1].link_state == LinkState.LOST, "its silence is told")
     assert not beats[-1].device_healthy
