@@ -40,7 +40,7 @@ PARAMETERS = (
     Parameter(
         "profile",
         "multirotor",
-        "rules of the vehicle: multirotor, fixed_wing, rocket, or a file's path (docs/rules.md)",
+        "rules of the vehicle: multirotor, fixed_wing, rocket, by_hand, or a file (docs/rules.md)",
     ),
     Parameter(
         "deploy_ladder",
