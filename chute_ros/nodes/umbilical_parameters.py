@@ -69,7 +69,13 @@ PARAMETERS = (
         0.05,
         60.0,
     ),
-    Parameter("retry_interval", 0.25, "before another try where a command found no place to wait, s", 0.02, 60.0),
+    Parameter(
+        "retry_interval",
+        0.25,
+        "before another try where a command found no place to wait, s",
+        0.02,
+        60.0,
+    ),
     Parameter("give_up_after", 5.0, "for all tries of a command together, s", 0.1, 10.0),
     Parameter(
         "deploy_stage",
