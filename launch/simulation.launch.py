@@ -13,11 +13,13 @@ from launch.actions import (
     IncludeLaunchDescription,
     OpaqueFunction,
     SetEnvironmentVariable,
+    UnsetEnvironmentVariable,
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.substitutions import ExecutableInPackage
 
+from chute_ros.nodes.middleware import LEADS_ELSEWHERE
 from chute_ros.protocol.upf.parameters import EXCLUDES
 from launch import LaunchContext, LaunchDescription
 
@@ -75,6 +77,7 @@ def generate_launch_description() -> LaunchDescription:
         [
             # A simulation must never meet a real vehicle on the network.
             SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+            *(UnsetEnvironmentVariable(name) for name in LEADS_ELSEWHERE),
             DeclareLaunchArgument("namespace", default_value="sim", description="of the vehicle"),
             DeclareLaunchArgument(
                 "parachute",

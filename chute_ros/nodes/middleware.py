@@ -23,6 +23,9 @@ _RANGE, _OLD_RANGE, _PEERS = (
     "ROS_LOCALHOST_ONLY",
     "ROS_STATIC_PEERS",
 )
+#: What a ground station sets to meet a vehicle, on other hosts as well, whatever the range is: a
+#: simulation must have none of it.
+LEADS_ELSEWHERE = (_PEERS, "ROS_DISCOVERY_SERVER", _SETTINGS[0], _SETTINGS_2[0])
 
 
 def set_up_middleware() -> None:

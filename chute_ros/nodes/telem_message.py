@@ -52,10 +52,14 @@ _OWN = ("header", "layout", "sequence")
 _LACKING = {"flight_mode": Telem.FLIGHT_MODE_UNKNOWN}
 _LACKING |= dict.fromkeys(("blims_phase_id", "blims_loiter_step"), -32768)
 
-_MOST_INT16 = 2**15 - 1
+#: What Telem's whole numbers hold.
+_RANGES = {
+    "uint8": (0, 2**8 - 1),
+    "int8": (-(2**7), 2**7 - 1),
+    "int16": (-(2**15), 2**15 - 1),
+}
 _CONVERT: dict[str, Callable[[Any], Any]] = {
-    "flight_mode": lambda value: min(value, Telem.FLIGHT_MODE_UNKNOWN),
-    "num_satellites": lambda value: min(value, _MOST_INT16),
+    "flight_mode": lambda value: value if 0 <= value < 2**8 else Telem.FLIGHT_MODE_UNKNOWN,
     "device_uptime": lambda value: value / 1000.0,
 }
 
@@ -64,6 +68,18 @@ def without_place(layout: Layout) -> list[str]:
     """The fields of a layout that Telem has no field for."""
     known = Telem.get_fields_and_field_types()
     return [name for name in layout.index if RENAMED.get(name, name) not in known]
+
+
+def unfit(layout: Layout) -> list[str]:
+    """The fields of a layout that Telem cannot hold, in words: a number with a fraction, or NaN,
+    has no place in a whole one."""
+    types = Telem.get_fields_and_field_types()
+    places = ((one, types.get(RENAMED.get(one.name, one.name))) for one in layout.fields)
+    return [
+        f"{one.name} is {one.kind.name} where umbilical/telem has {place}"
+        for one, place in places
+        if place in _RANGES and not one.kind.is_whole
+    ]
 
 
 def telem(record: Record, sequence: int, stamp: Any) -> Telem:
@@ -78,6 +94,14 @@ def telem(record: Record, sequence: int, stamp: Any) -> Telem:
     return message
 
 
+def _into(kind: str) -> Callable[[Any], Any]:
+    """A number that is too large for its place reads as the largest that has one."""
+    if kind not in _RANGES:
+        return float
+    lowest, highest = _RANGES[kind]
+    return lambda value: max(lowest, min(int(value), highest))
+
+
 @cache
 def _places(
     layout: Layout,
@@ -88,8 +112,7 @@ def _places(
     for field, index in layout.index.items():
         name = RENAMED.get(field, field)
         if name in types:
-            plain = float if types[name] == "double" else int
-            places.append((name, index, _CONVERT.get(name, plain)))
+            places.append((name, index, _CONVERT.get(name) or _into(types[name])))
     present = {name for name, _, _ in places}
     lacking = [
         (name, model.NAN if kind == "double" else _LACKING.get(name, -1))

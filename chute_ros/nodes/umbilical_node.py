@@ -9,11 +9,12 @@ from chute_msgs.msg import Telem, VehicleState
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
+from chute_ros.errors import ParameterError
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.device_node import DeviceNode, Summary, block_reason
 from chute_ros.nodes.dump_files import DumpFiles
 from chute_ros.nodes.link_log import log_event
-from chute_ros.nodes.telem_message import telem, without_place
+from chute_ros.nodes.telem_message import telem, unfit, without_place
 from chute_ros.nodes.umbilical_diagnostics import (
     computer_task,
     details_of,
@@ -44,6 +45,8 @@ class UmbilicalNode(DeviceNode):
         address = parse_serial_address(self.values["connection"])
         layouts = load_layouts(self.values["telem_path"], "parameter telem_path")
         for layout in layouts:
+            if bad := unfit(layout):
+                raise ParameterError(f"parameter telem_path: {layout.name}: {'; '.join(bad)}")
             if names := without_place(layout):
                 text = f"{layout.name}: umbilical/telem has no field for {', '.join(names)}"
                 self.get_logger().warning(text)

@@ -13,6 +13,8 @@ from collections.abc import Iterator
 
 from domain_coordinator import domain_id
 
+from chute_ros.nodes.middleware import LEADS_ELSEWHERE
+
 
 @contextlib.contextmanager
 def isolated_ros() -> Iterator[str]:
@@ -24,7 +26,8 @@ def isolated_ros() -> Iterator[str]:
     with domain_id(selector=lambda: secrets.randbelow(100) + 1) as domain:
         os.environ["ROS_DOMAIN_ID"] = str(domain)
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        os.environ.pop("ROS_STATIC_PEERS", None)
+        for name in LEADS_ELSEWHERE:
+            os.environ.pop(name, None)
         yield f"/sim_{secrets.token_hex(4)}"
 
 

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import pytest
 
+from chute_ros.nodes.middleware import LEADS_ELSEWHERE
 from chute_ros.protocol.upf.parameters import EXCLUDES
 from chute_ros.sim.command_line import parser
 from chute_ros.sim.sim_upf import _parameters
@@ -100,6 +101,10 @@ def test_the_simulation_stays_on_this_host():
     (variable,) = calls(simulation, "SetEnvironmentVariable")
     assert variable[0] == "'ROS_AUTOMATIC_DISCOVERY_RANGE'"
     assert variable[1] == "'LOCALHOST'"
+    (variable,) = calls(simulation, "UnsetEnvironmentVariable")
+    assert variable[0] == "name"
+    assert "for name in LEADS_ELSEWHERE" in simulation.read_text()
+    assert {"ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"} < set(LEADS_ELSEWHERE)
     assert "0.0.0.0" not in simulation.read_text()
 
 

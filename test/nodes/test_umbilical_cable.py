@@ -244,3 +244,17 @@ def test_a_layout_with_a_mistake_is_named_with_its_file(bench):
     (folder / "mine.yaml").write_text("name: mine\nfields: 3\n")
     with pytest.raises(ParameterError, match=r"mine\.yaml: no layout of \$TELEM"):
         bench.add(UmbilicalNode, telem_path=str(folder))
+
+
+def test_a_layout_whose_values_the_message_cannot_hold_stops_the_start(bench):
+    folder = bench.folder / "layouts"
+    folder.mkdir()
+    shipped = next(one for one in Cable.shipped_layouts() if one.name == "telem50")
+    kinds = {f.name: f.kind.name for f in shipped.fields} | {"fix_type": "f32"}
+    fields = "\n".join(f"  - {{name: {n}, type: {k}, unit: '1'}}" for n, k in kinds.items())
+    (folder / "mine.yaml").write_text(
+        f"name: mine\ntarget_floats: 2\ntarget_fields: []\nfields:\n{fields}\n"
+    )
+    text = "telem_path: mine: fix_type is f32 where umbilical/telem has int16"
+    with pytest.raises(ParameterError, match=text):
+        bench.add(UmbilicalNode, telem_path=str(folder))

@@ -74,7 +74,13 @@ def test_telem_has_a_place_for_every_field(layouts, name):
 
 @pytest.mark.parametrize(
     ("field", "value", "told"),
-    [("flight_mode", 2**32 - 1, 255), ("num_satellites", 2**32 - 1, 32767)],
+    [
+        ("flight_mode", 2**32 - 1, 255),
+        ("flight_mode", -1, 255),
+        ("num_satellites", 2**32 - 1, 32767),
+        ("cmd_n1", 70_000, 32767),
+        ("sv_open", -200, -128),
+    ],
 )
 def test_a_number_that_is_too_large_for_its_place_reads_as_the_largest(
     layouts, field, value, told

@@ -3,6 +3,7 @@
 import os
 import socket
 
+from chute_ros.nodes.middleware import LEADS_ELSEWHERE
 from chute_ros.tools.isolation import free_udp_ports, isolated_ros
 
 
@@ -13,7 +14,7 @@ def test_this_very_run_is_isolated(ros):
 
 
 def test_two_at_once_get_domains_and_namespaces_of_their_own(ros, monkeypatch):
-    for name in ("ROS_DOMAIN_ID", "ROS_STATIC_PEERS"):
+    for name in ("ROS_DOMAIN_ID", *LEADS_ELSEWHERE):
         monkeypatch.setenv(name, os.environ.get(name, ""))
     outer = os.environ["ROS_DOMAIN_ID"]
     with isolated_ros() as first:
@@ -22,7 +23,7 @@ def test_two_at_once_get_domains_and_namespaces_of_their_own(ros, monkeypatch):
         with isolated_ros() as second:
             assert os.environ["ROS_DOMAIN_ID"] not in (outer, domain)
             assert first != second
-            assert "ROS_STATIC_PEERS" not in os.environ
+            assert not set(LEADS_ELSEWHERE) & set(os.environ)
 
 
 def test_free_ports_are_free_and_different():
