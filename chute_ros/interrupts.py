@@ -1,10 +1,11 @@
-"""Ctrl-C while a process only imports: then there is nothing that must be ended."""
+"""Ctrl-C while a process only imports, and while what must be ended is being made."""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 
@@ -21,3 +22,32 @@ def at_ctrl_c(end: Callable[..., Any] | signal.Handlers) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+class CtrlC:
+    """A handler of SIGINT that raises KeyboardInterrupt, as Python's own does, but may be held."""
+
+    def __init__(self) -> None:
+        self._held = self._came = False
+
+    def install(self) -> None:
+        """Where who started us wants something else of it, that stays."""
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, self)
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Python calls this, in the main thread."""
+        if not self._held:
+            raise KeyboardInterrupt
+        self._came = True
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """It comes afterwards: what has begun and nobody knows yet would never be ended."""
+        self._held = True
+        try:
+            yield
+        finally:
+            self._held = False
+        if self._came:
+            raise KeyboardInterrupt

@@ -103,7 +103,9 @@ class DecisionCarrier:
         elif verdict is Verdict.TOO_LATE:
             log.error(
                 f"{_name(decision)} is {age:.3f} s old (limit {self._gate.max_decision_age:g} s): "
-                "not acted on; do the hosts' clocks agree? is this host overloaded?"
+                "not acted on; do the hosts' clocks agree? is this host overloaded?",
+                # It is sent again and again until somebody answers; diagnostics count.
+                throttle_duration_sec=1.0,
             )
 
 

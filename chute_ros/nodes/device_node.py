@@ -85,6 +85,12 @@ class CarriedOut:
     text: str
 
 
+def _old(status: DiagnosticStatus) -> DiagnosticStatus:
+    status.level = diagnostics.STALE
+    status.message = f"not known now; was: {status.message}"
+    return status
+
+
 def block_reason(decision: model.Decision) -> str:
     """Why this decision keeps the vehicle on the ground; empty: it lets it go."""
     if decision.action is model.Action.FLIGHT_BLOCK_RELEASE:
@@ -99,6 +105,8 @@ class DeviceNode(Node, ABC):
     PICTURES: tuple[type, ...] = (ParachuteChanged, VehicleChanged)
     #: Events that need only be told of, within a heartbeat's interval.
     UNHURRIED: tuple[type, ...] = ()
+    #: What this node says to its device keeps a vehicle on the ground.
+    BLOCKS_FLIGHT = True
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
         # Before ROS knows the node: Kilted destroys what it knows, also one that a parameter
@@ -123,7 +131,7 @@ class DeviceNode(Node, ABC):
         self._service_group = ReentrantCallbackGroup()
         guard = self.create_guard_condition(self._drain)
         # An autopilot tells its measurements one right after the other; each picture has all.
-        self._inbox = Inbox(
+        self.inbox = Inbox(
             self._take, guard.trigger, self.PICTURES, (VehicleChanged,), self.UNHURRIED
         )
         self.desk = RequestDesk(self.in_link, self.deliver, self.decisions.report)
@@ -286,10 +294,10 @@ class DeviceNode(Node, ABC):
 
     def deliver(self, events: list[Any]) -> None:
         """In the link's turn: hand events to the executor."""
-        self._inbox.put(events)
+        self.inbox.put(events)
 
     def _drain(self) -> None:
-        self._inbox.drain()
+        self.inbox.drain()
 
     def _take(self, event: Any) -> None:
         if isinstance(event, Summary):
@@ -339,7 +347,7 @@ class DeviceNode(Node, ABC):
     def _supervisor_lost(self, lost: bool) -> None:
         """Nobody would stop the motors: a vehicle that stands stays where it is."""
         log = self.get_logger()
-        blocks = self.values["on_supervisor_lost"] == BLOCK_FLIGHT
+        blocks = self.values["on_supervisor_lost"] == BLOCK_FLIGHT and self.BLOCKS_FLIGHT
         if lost:
             log.error(f"the supervisor is lost: {'flight is blocked' if blocks else 'held'}")
         else:
@@ -391,16 +399,17 @@ class DeviceNode(Node, ABC):
         summary = self._summary
         assert self.loop is not None
         silent = time.monotonic() - self.loop.last_run
-        statuses = []
+        statuses = [] if summary is None else self.diagnose(summary)
         if summary is None or silent > OWNER_SILENCE:
             text = f"the link's thread has not run for {silent:.1f} s"
-            statuses.append(diagnostics.status(name, "link", diagnostics.ERROR, text, {}, ""))
-        if summary is not None:
-            statuses += self.diagnose(summary)
+            hangs = diagnostics.status(name, "link", diagnostics.ERROR, text, {}, "")
+            # What it said last says nothing of now.
+            statuses = [hangs, *(_old(one) for one in statuses if one.name != hangs.name)]
+        else:
             self._look_at_wire(summary.link_state, statuses)
         faults = {
             "exceptions in the link's thread": self._loop_faults,
-            "pictures left out, as the executor did not keep up": self._inbox.left_out,
+            "pictures left out, as the executor did not keep up": self.inbox.left_out,
         }
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
         self._diagnostics_publisher.publish(self.stamp(), statuses)

@@ -11,7 +11,7 @@ import sys
 from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
-from chute_ros.interrupts import at_ctrl_c
+from chute_ros.interrupts import CtrlC, at_ctrl_c
 from chute_ros.nodes.middleware import set_up_middleware
 
 #: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
@@ -37,11 +37,15 @@ def run(name: str, class_name: str) -> None:
     from chute_ros.nodes.node_executor import NodeExecutor
 
     node = None
+    # Before ROS, whose own handler calls it.
+    ctrl_c = CtrlC()
+    ctrl_c.install()
     try:
         _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
         executor = NodeExecutor()
-        node = node_class()
+        with ctrl_c.held():
+            node = node_class()
         executor.add_node(node)
         # What is there now stays; to go over all of it once more would hold up a decision by
         # 30 ms.

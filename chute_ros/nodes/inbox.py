@@ -53,6 +53,10 @@ class Inbox:
         if hurried:
             self._wake()
 
+    def left(self) -> list[Any]:
+        """What waits, once nobody drains any more."""
+        return list(self._waiting)
+
     def drain(self) -> None:
         """In the executor: take what is there. What comes meanwhile waits for its turn: a flood
         must not keep decisions from theirs."""

@@ -1,5 +1,5 @@
-"""A file with the newest of what it is given. A thread writes: a slow disk must not be in the way
-of whoever decides."""
+"""What is written to a disk is written by a thread: a slow one must not be in the way of whoever
+decides, or acts."""
 
 from __future__ import annotations
 
@@ -13,8 +13,43 @@ from chute_ros.nodes.private_files import replace_text
 T = TypeVar("T")
 
 
+class Newest(Generic[T]):
+    """Does something, in a thread of this name, with the newest of what it is given."""
+
+    def __init__(self, do: Callable[[T], None], name: str) -> None:
+        self._do = do
+        self._newest: list[T] = []
+        self._closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._do_all, name=name, daemon=True)
+        self._thread.start()
+
+    def give(self, value: T) -> None:
+        """The newest; what waits before it never has its turn."""
+        with self._changed:
+            self._newest = [value]
+            self._changed.notify()
+
+    def close(self) -> None:
+        """What waits is done."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join(timeout=2.0)
+
+    def _do_all(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._newest or self._closed)
+                newest, self._newest = self._newest, []
+            if not newest:
+                return
+            self._do(newest[0])
+
+
 class KeptFile(Generic[T]):
-    """render: the text for it; empty: the file goes. name: of the thread."""
+    """A file with the newest of what it is given. render: the text for it; empty: the file goes.
+    name: of the thread."""
 
     def __init__(self, path: Path, render: Callable[[T], str], name: str) -> None:
         self.path = path
@@ -22,43 +57,17 @@ class KeptFile(Generic[T]):
         self.trouble = ""
         self.times_written = 0
         self._render = render
-        self._newest: list[T] = []
-        self._closed = False
-        self._changed = threading.Condition()
-        self._thread = threading.Thread(target=self._write_all, name=name, daemon=True)
-        self._thread.start()
-
-    def keep(self, value: T) -> None:
-        """The newest; what is not written yet before it never is."""
-        with self._changed:
-            self._newest = [value]
-            self._changed.notify()
-
-    def close(self) -> None:
-        """Write what waits."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
-        self._thread.join(timeout=2.0)
-
-    def _write_all(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._newest or self._closed)
-                newest, self._newest = self._newest, []
-            if not newest:
-                return
-            try:
-                self._write(newest[0])
-                self.trouble = ""
-            except OSError as error:
-                self.trouble = str(error)
+        self._newest: Newest[T] = Newest(self._write, name)
+        self.keep, self.close = self._newest.give, self._newest.close
 
     def _write(self, value: T) -> None:
-        text = self._render(value)
-        if not text:
-            self.path.unlink(missing_ok=True)
-            return
-        # Not flushed to the disk: a power cut may cost it, a crash of the process does not.
-        replace_text(self.path, text)
-        self.times_written += 1
+        try:
+            if text := self._render(value):
+                # Not flushed to the disk: a power cut may cost it, a crash does not.
+                replace_text(self.path, text)
+                self.times_written += 1
+            else:
+                self.path.unlink(missing_ok=True)
+            self.trouble = ""
+        except OSError as error:
+            self.trouble = str(error)

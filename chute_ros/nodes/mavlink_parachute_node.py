@@ -220,10 +220,11 @@ class MavlinkParachuteNode(DeviceNode):
     # -- inside ---------------------------------------------------------------------------------
 
     def _armed_triggers(self, device: str) -> int:
-        """By the newest status that was published."""
-        statuses = [self.statuses[device]] if device in self.statuses else []
-        statuses += [] if device else list(self.statuses.values())
-        return next((int(status.armed_triggers) for status in statuses), 0)
+        """By the newest status that was published; without a device that of the one that was
+        asked, the first that is not lost."""
+        told = [one for name, one in self.statuses.items() if device in ("", name)]
+        heard = [one for one in told if one.link_state is not model.LinkState.LOST]
+        return next((int(status.armed_triggers) for status in (*heard, *told)), 0)
 
 
 def _fill(response: Any, end: RequestFinished) -> Any:

@@ -86,6 +86,8 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
             raise _not_allowed(node, parameter, _given(node, parameter)) from None
         if value is None:
             value = []  # how ROS reads an empty list on the command line
+            if not isinstance(parameter.default, list):
+                raise _not_allowed(node, parameter, value)
         if parameter.choices and value not in parameter.choices:
             raise _not_allowed(node, parameter, value)
         values[parameter.name] = value

@@ -17,7 +17,10 @@ def load_profile(named: str, links: Sequence[str]) -> Profile:
     ParameterError if there is none; ProfileError lists what is wrong in it, with lines.
     """
     is_path = "/" in named or named.endswith((".yaml", ".yml"))
-    path = Path(named).expanduser() if is_path else _folder() / f"{named}.yaml"
+    try:
+        path = Path(named).expanduser() if is_path else _folder() / f"{named}.yaml"
+    except RuntimeError as error:
+        raise ParameterError(f"parameter profile is {named!r}: {error}") from None
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError, ValueError) as error:

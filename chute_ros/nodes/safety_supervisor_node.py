@@ -160,6 +160,7 @@ class SafetySupervisorNode(Node):
         self.lease.look(now)
         outputs = self._update(new, now)
         if outputs is None and new:
+            self._end_calls(new)
             outputs = self._update((), now)
         if outputs is None:
             # The core cannot even look at the clock: silence tells everybody.
@@ -177,6 +178,12 @@ class SafetySupervisorNode(Node):
         if deadline - now > 2.0 * EARLY:
             deadline -= EARLY
         self._sleep(min(deadline, self.lease.deadline(now), self._beat_at, self._afterwards.until))
+
+    def _end_calls(self, refused: tuple[inputs.Input, ...]) -> None:
+        """Who called must not wait for what the core could not take."""
+        text = f"refused: {self._health.newest}"
+        for token in (getattr(one, "token", 0) for one in refused):
+            self.services_offered.finished(inputs.Finish(token, False, False, text))
 
     def _update(
         self, new: tuple[inputs.Input, ...], now: float
@@ -210,8 +217,9 @@ class SafetySupervisorNode(Node):
         self._timer.reset()
 
     def _carry_out(self, outputs: tuple[inputs.Output, ...], now: float) -> None:
-        """All but the decisions, which have left by now."""
-        for output in outputs:
+        """All but the decisions, which have left by now. Answers first: who waits for one must get
+        it, whatever fails besides."""
+        for output in sorted(outputs, key=lambda one: not isinstance(one, inputs.Finish)):
             if not isinstance(output, inputs.Decide):
                 self._do(output, now)
 

@@ -121,8 +121,11 @@ class LeaseKeeper:
         if message.name == self.config.name:
             return
         now = time.monotonic()
-        if message.leader == self.config.name and len(self._followers) < RANKS:
-            self._followers[message.name] = now
+        if message.leader == self.config.name:
+            here = self.followers(now)
+            self._followers = {name: self._followers[name] for name in here}
+            if message.name in here or len(here) < RANKS:
+                self._followers[message.name] = now
         other = Claim(
             message.name,
             message.rank,

@@ -52,6 +52,8 @@ class SupervisorWatch:
         self._times_lost = 0
         #: Of each supervisor, also of one that only looks on: it may lead next.
         self._clocks: dict[str, ClockSteps] = {}
+        #: When each of these was heard, s.
+        self._heard_at: dict[str, float] = {}
         self._clock = ClockSteps(limit / 2)
         #: When each of our newest heartbeats left, by its stamp (s, ns).
         self._sent: dict[tuple[int, int], float] = {}
@@ -80,7 +82,11 @@ class SupervisorWatch:
             return
         now, difference = time.monotonic(), self._difference(message.header.stamp)
         if message.link not in self._clocks and len(self._clocks) >= RANKS:
-            return
+            silent = min(self._heard_at, key=self._heard_at.__getitem__)
+            if now - self._heard_at[silent] <= self._lost_after:
+                return  # made-up names must not push out one that is there
+            del self._clocks[silent], self._heard_at[silent]
+        self._heard_at[message.link] = now
         clock = self._clocks.setdefault(message.link, ClockSteps(self._limit / 2))
         clock.heard(difference, now)
         if message.device_healthy:

@@ -51,8 +51,7 @@ class UmbilicalNode(DeviceNode):
                 text = f"{layout.name}: umbilical/telem has no field for {', '.join(names)}"
                 self.get_logger().warning(text)
         self.files = DumpFiles(self.values["dump_folder"])
-        # A dump that is under way keeps what has come.
-        self.at_end.callback(self.files.finish, False)
+        self.at_end.callback(self._end_dump)
         link = UmbilicalLink(config_from(self.values), layouts)
         self.loop = WireLoop(link, make_wire(address), self.deliver, link.wire_opened)
         self._progress = ""
@@ -66,6 +65,13 @@ class UmbilicalNode(DeviceNode):
             )
         self.offered = UmbilicalServices(self)
         self.begin()
+
+    def _end_dump(self) -> None:
+        """One that is under way keeps what has come."""
+        for event in self.inbox.left():
+            if isinstance(event, events.DumpData):
+                self.files.write(event.data)
+        self.files.finish(False)
 
     # -- what DeviceNode asks for ---------------------------------------------------------------
 

@@ -19,6 +19,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros import model
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.device_node import DeviceNode, Summary
+from chute_ros.nodes.kept_file import Newest
 from chute_ros.nodes.upf_allocation_file import AllocationFile
 from chute_ros.nodes.upf_diagnostics import (
     allocation_task,
@@ -60,6 +61,7 @@ class _FailedEnd:
 class UpfCanNode(DeviceNode):
     """The node upf_can."""
 
+    BLOCKS_FLIGHT = False
     # Has left by then, and the supervisor needs the processor now.
     UNHURRIED = (AskSupervisor,)
 
@@ -70,6 +72,8 @@ class UpfCanNode(DeviceNode):
         types = load_data_types(self.values["dsdl_path"], "parameter dsdl_path")
         self._file = AllocationFile(self.values["allocation_table_file"], name)
         table = self._file.load() if self.values["allocator"] else {}
+        self._tables = Newest(self._keep, "node ids")
+        self.at_end.callback(self._tables.close)
         utc_offset = time.time() - time.monotonic()
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
         self.loop = WireLoop(link, make_can_wire(address), self.deliver)
@@ -112,7 +116,7 @@ class UpfCanNode(DeviceNode):
         elif isinstance(event, TriggerChanged):
             self._publish_trigger(event)
         elif isinstance(event, KeepTable):
-            self._keep(event)
+            self._tables.give(event)
 
     def failed_end(self, token: int, text: str) -> _FailedEnd:
         finished = EffectFinished(token, False, False, NO_ANSWER, text)
@@ -221,6 +225,7 @@ class UpfCanNode(DeviceNode):
         self._trigger_publisher.publish(message)
 
     def _keep(self, event: KeepTable) -> None:
+        """In a thread of its own: to be sure that it is on the disk may take long."""
         try:
             self._file.save(event.table)
         except OSError as error:
@@ -231,4 +236,5 @@ class UpfCanNode(DeviceNode):
             )
             return
         self.get_logger().info(f"node ids kept: {sorted(event.table.values())}")
-        self.in_link(lambda link, now: link.table_kept(event.number, now))
+        if (loop := self.loop) is not None:
+            loop.call(lambda link, now: link.table_kept(event.number, now))

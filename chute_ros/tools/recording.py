@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +52,27 @@ class Recording:
         return self.turns[0].wall
 
     def seconds(self, wall: int) -> float:
-        """From the start to this moment (Unix ns)."""
-        return (wall - self.start) / 1e9
+        """From the start to this moment (Unix ns), by the monotonic clock of the nearest turn: a
+        wall clock that is set in flight moves nothing."""
+        walls, passed = self._passed
+        at = bisect.bisect_left(walls, wall)
+        around = range(max(0, at - 1), min(at + 1, len(walls)))
+        near = min(around, key=lambda n: abs(walls[n] - wall))
+        return passed[near] + (wall - walls[near]) / 1e9
+
+    @cached_property
+    def _passed(self) -> tuple[list[int], list[float]]:
+        """The wall clock of each turn, rising, and what had passed since the first, s."""
+        passed, last = [(self.start, 0.0)], self.turns[0]
+        for one in self.turns[1:]:
+            step = one.turn.now - last.turn.now
+            if one.number != last.number + 1 or step < 0.0:
+                # Another start, perhaps of the host: its monotonic clock is another.
+                step = max(0.0, (one.wall - last.wall) / 1e9)
+            passed.append((one.wall, passed[-1][1] + step))
+            last = one
+        passed.sort()
+        return [wall for wall, _ in passed], [seconds for _, seconds in passed]
 
 
 def files_of(paths: Iterable[Path]) -> list[Path]:

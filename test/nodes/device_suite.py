@@ -19,7 +19,7 @@ from chute_msgs.msg import (
     SafetyState,
 )
 from chute_msgs.srv import Arm, Deploy
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from node_bench import Bench, stamped
 from simulated_device import SimulatedDevice
 
@@ -177,6 +177,13 @@ class DeviceSuite:
     ) -> None:
         self.plugged(device)
         node = next(one for one in self.bench.nodes if one.get_name() == self.name)
+        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
+
+        def levels() -> dict[str, tuple[bytes, str]]:
+            every = [status for array in diagnostics[-1:] for status in array.status]
+            told = [one for one in every if f"/{self.name}: " in one.name]
+            assert len({one.name for one in told}) == len(told), "each task once"
+            return {one.name.rpartition(": ")[2]: (one.level, one.message) for one in told}
 
         def broken(*_: Any) -> None:
             raise RuntimeError("a mistake of ours")
@@ -187,6 +194,14 @@ class DeviceSuite:
         told, faults = len(self.beats), node._loop_faults
         self.bench.until(lambda: node._loop_faults > faults + 2, "it goes on failing")
         assert len(self.beats) == told
+        self.bench.until(
+            lambda: levels().get("link", ("", ""))[1].startswith("the link's thread has not run"),
+            "diagnostics tell it",
+        )
+        rest = {task: one for task, one in levels().items() if task not in ("link", "supervisor")}
+        assert rest
+        assert {level for level, _ in rest.values()} == {DiagnosticStatus.STALE}
+        assert all(text.startswith("not known now; was: ") for _, text in rest.values())
         monkeypatch.undo()
         self.bench.until(lambda: len(self.beats) > told, "it is heard again")
         self.await_link(LinkState.OK)

@@ -151,8 +151,7 @@ def test_a_restart_of_the_autopilot_in_flight_is_seen(bench, network):
 def test_two_parachutes_on_one_link_are_told_apart(bench, network):
     statuses = bench.follow(ParachuteStatus, "parachute/status")
     first, second = (Module(ParachuteSettings(component_id=i)) for i in (161, 162))
-    for module in (first, second):
-        network.plug(module)
+    loops = [network.plug(module) for module in (first, second)]
     bench.until(lambda: {s.device for s in statuses} == {"1/161", "1/162"}, "both are told")
     answer = bench.call(
         SetTriggers, "mavlink_parachute/set_triggers", arm=4, select=4, device="1/162"
@@ -165,6 +164,15 @@ def test_two_parachutes_on_one_link_are_told_apart(bench, network):
     # In the order in which they were heard, which the network decides.
     assert "1/161" in answer.message
     assert "1/162" in answer.message
+    # Without a name it is the one that is still there, whichever was told first.
+    bench.unplug(loops[0])
+    bench.until(
+        lambda: any(s.device == "1/161" and s.link_state == LinkState.LOST for s in statuses),
+        "the first is lost",
+    )
+    answer = bench.call(SetTriggers, "mavlink_parachute/set_triggers", arm=8, select=8)
+    assert answer.success, answer.message
+    assert (second.armed, answer.armed_triggers) == (12, 12)
 
 
 def test_another_vehicle_on_the_network_is_neither_heard_nor_fired(bench):

@@ -129,6 +129,17 @@ def run(node, *parameters, namespace="/"):
         (MAVLINK, "signing_key_file:=/none", "parameter signing_key_file: /none: No such file"),
         (SUPERVISOR, "mode:=on", "parameter mode of {ns}/safety_supervisor is "),
         (SUPERVISOR, "kill_links:=[]", "kill_links"),
+        (
+            SUPERVISOR,
+            "require_vehicle_state:=[]",
+            "vehicle_state of {ns}/safety_supervisor is []: need",
+        ),
+        (
+            MAVLINK,
+            "system_id:=[]",
+            "system_id of {ns}/mavlink_parachute is []: need a whole number",
+        ),
+        (SUPERVISOR, "profile:=~nobody_at_all/x.yaml", "profile is '~nobody_at_all/x.yaml': "),
     ],
 )
 def test_a_real_start_ends_in_one_line(namespace, node, given, said):
@@ -272,3 +283,34 @@ def test_a_new_message_rate_reaches_the_autopilot(bench):
     (result,) = network.node.set_parameters([Parameter("autopilot_message_rate", value=500.0)])
     assert not result.successful
     assert network.node.get_parameter("autopilot_message_rate").value == 20.0
+
+
+CTRL_C_IN_THE_MIDDLE = """
+import os, signal
+from chute_ros.nodes.entry import run
+from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+
+begin = MavlinkParachuteNode.begin
+
+def interrupted(self):
+    begin(self)
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(1000):  # where Python would look at the signal
+        pass
+
+MavlinkParachuteNode.begin = interrupted
+run("mavlink_parachute", "MavlinkParachuteNode")
+"""
+
+
+def test_ctrl_c_as_the_link_has_just_begun_ends_the_node(namespace):
+    ros = ["--ros-args", "-r", f"__ns:={namespace}", "-p", "connection:=udpin:127.0.0.1:0"]
+    done = subprocess.run(
+        [sys.executable, "-c", CTRL_C_IN_THE_MIDDLE, *ros],
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,18 +1,22 @@
 """The supervisor watches itself, and the device nodes watch the supervisor."""
 
 import itertools
+import math
 import time
 
 import pytest
 from chute_msgs.msg import LinkHeartbeat, SafetyState
+from chute_msgs.srv import Kill
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, do
 from node_bench import stamped
+from rclpy.clock import Clock, ClockType
 from supervisor_bench import Scene
 
 from chute_ros.model import Action
 from chute_ros.nodes import safety_supervisor_node
 from chute_ros.nodes.supervisor_health import Health
+from chute_ros.nodes.supervisor_watch import SupervisorWatch
 from chute_ros.sim.parachute_device import ParachuteSettings
 from chute_ros.supervisor import core, inputs
 
@@ -66,6 +70,15 @@ def test_an_input_that_the_core_cannot_take_is_left_out_and_reported(bench, monk
     assert values["newest mistake"].startswith("left out ActionReport: ZeroDivisionError")
     seen = len(scene.own_beats())
     bench.until(lambda: len(scene.own_beats()) > seen + 3, "the loop goes on")
+
+
+def test_who_called_for_what_the_core_cannot_take_is_answered(bench, monkeypatch):
+    Watched(bench)
+    poison = failing(lambda new: any(isinstance(one, inputs.KillRequest) for one in new))
+    monkeypatch.setattr(safety_supervisor_node, "update", poison)
+    answer = bench.call(Kill, "safety/kill", reason="a test")
+    assert not answer.success
+    assert "refused: left out KillRequest: ZeroDivisionError" in answer.message
 
 
 def test_what_fails_beside_the_core_is_reported_and_does_not_end_the_process(bench, monkeypatch):
@@ -200,3 +213,20 @@ def test_a_supervisor_that_only_looks_on_does_not_count(bench):
             break
         bench.turns(0.1)
     assert scene.network.node._supervisor._times_lost == 1
+
+
+def test_a_supervisor_of_a_fifth_name_counts_once_another_is_gone():
+    """Given four that were heard before: made-up names, or supervisors that were renamed."""
+    watch = SupervisorWatch(0.5, 0.2, Clock(clock_type=ClockType.SYSTEM_TIME))
+    for name in "abcd":
+        watch.heartbeat(LinkHeartbeat(link=name, supervisor=True))
+    leads = LinkHeartbeat(link="e", supervisor=True, device_healthy=True)
+    watch.heartbeat(leads)
+    assert math.isnan(watch._heard), "four are there"
+    end = time.monotonic() + 5.0
+    while math.isnan(watch._heard):
+        assert time.monotonic() < end, "a place becomes free"
+        for name in "bcd":
+            watch.heartbeat(LinkHeartbeat(link=name, supervisor=True))
+        watch.heartbeat(leads)
+    assert set(watch._clocks) == set("bcde")

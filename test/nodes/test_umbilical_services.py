@@ -14,6 +14,7 @@ from umbilical_bench import PATIENT, RATE, Cable
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.nodes.dump_files import PART
+from chute_ros.protocol.umbilical import events
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 
 #: Name -> (token, what telemetry then says; None: it cannot show it).
@@ -280,6 +281,18 @@ def test_a_dump_that_stalls_is_given_up(bench):
     assert not answer.success
     assert "silent for 0.5 s, its end mark did not come" in answer.message
     assert answer.path_written.endswith(PART)
+
+
+def test_a_node_that_ends_in_a_dump_keeps_what_has_come(bench):
+    settings = FlightComputerSettings(rate=RATE, dump_size=200_000, dump_rate=200.0)
+    cable = Cable(bench, settings, **PATIENT)
+    cable.plugged()
+    bench.ask(Dump, "umbilical/dump", memory="flash")
+    (part,) = bench.until(lambda: list((bench.folder / "dumps").glob(f"*{PART}")), "it has begun")
+    waits = events.DumpData(b"the last that came\n")
+    cable.node.inbox.put([waits])
+    bench.remove(cable.node)
+    assert part.read_bytes().endswith(waits.data)
 
 
 def test_a_cable_pulled_in_a_dump_ends_it(bench):

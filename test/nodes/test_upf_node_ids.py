@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -54,6 +56,26 @@ def test_devices_without_node_ids_are_given_some_and_work(bench, tmp_path):
     assert task().level == DiagnosticStatus.OK
     assert values(task())["file"] == str(path)
     assert values(task())[f"node {ids[0]}"] == controller.settings.unique_id.hex()
+
+
+def test_a_slow_disk_is_not_in_the_way_of_heartbeats(bench, tmp_path, monkeypatch):
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    saved, may_go_on = AllocationFile.save, threading.Event()
+
+    def slow(file, entries):
+        assert may_go_on.wait(20.0)
+        saved(file, entries)
+
+    monkeypatch.setattr(AllocationFile, "save", slow)
+    network = network_of(bench, tmp_path / "ids.json")
+    controller, trigger = network.controller(**DYNAMIC), network.trigger(**DYNAMIC)
+    network.plug(controller, trigger)
+    bench.until(lambda: network.node.loop.link.bus.allocator.table, "an id is to be kept")
+    count = len(beats)
+    bench.until(lambda: len(beats) > count + 5, "it beats meanwhile")
+    assert (controller.node_id, trigger.node_id) == (0, 0), "none is given out before"
+    may_go_on.set()
+    await_ids(bench, controller, trigger)
 
 
 def test_after_a_restart_of_the_node_each_device_has_the_same_id_again(bench, tmp_path):

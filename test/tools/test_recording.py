@@ -12,8 +12,9 @@ from zstandard import ZstdCompressor
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.record import Turn
 from chute_ros.tools.mcap_entries import McapEntries
-from chute_ros.tools.recording import files_of, read
+from chute_ros.tools.recording import RecordedTurn, Recording, files_of, read
 
 KINDS = {"safety/state": SafetyState}
 
@@ -196,3 +197,23 @@ def test_ctrl_c_in_the_middle_of_a_message_is_not_the_fault_of_the_recording(fli
     monkeypatch.setattr(SupervisorRecord, "__init__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         read(flight.files(), {})
+
+
+def turn(number, wall, now):
+    return RecordedTurn(round(wall * 1e9), number, Turn(now, (), ()))
+
+
+@pytest.mark.parametrize("step", [86_400.0, -3_600.0])
+def test_a_wall_clock_that_is_set_moves_nothing(step):
+    """Given one that is set after the third turn, as by GPS."""
+    walls = [100.0, 101.0, 102.0, 103.0 + step, 104.0 + step]
+    recording = Recording([turn(n, wall, 5.0 + n) for n, wall in enumerate(walls)])
+    told = [recording.seconds(one.wall) for one in recording.turns]
+    assert told == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0])
+    assert recording.seconds(round((102.25) * 1e9)) == pytest.approx(2.25)
+    assert recording.seconds(round((104.5 + step) * 1e9)) == pytest.approx(4.5)
+
+
+def test_after_another_start_the_wall_clock_tells_how_long_it_was_away():
+    recording = Recording([turn(0, 100.0, 5.0), turn(1, 101.0, 6.0), turn(0, 161.0, 2.0)])
+    assert [recording.seconds(one.wall) for one in recording.turns] == [0.0, 1.0, 61.0]
