@@ -72,8 +72,6 @@ class UpfCanNode(DeviceNode):
         types = load_data_types(self.values["dsdl_path"], "parameter dsdl_path")
         self._file = AllocationFile(self.values["allocation_table_file"], name)
         table = self._file.load() if self.values["allocator"] else {}
-        self._tables = Newest(self._keep, "node ids")
-        self.at_end.callback(self._tables.close)
         utc_offset = time.time() - time.monotonic()
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
         self.loop = WireLoop(link, make_can_wire(address), self.deliver)
@@ -87,6 +85,9 @@ class UpfCanNode(DeviceNode):
         )
         self.create_subscription(ActionReport, "safety/action", self._action, qos.DECISION)
         UpfServices(self)
+        # Its thread keeps us alive: not before all that may end the start.
+        self._tables = Newest(self._keep, "node ids")
+        self.at_end.callback(self._tables.close)
         self.begin()
 
     # -- what DeviceNode asks for ---------------------------------------------------------------
