@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import shutil
 import tempfile
@@ -51,11 +52,16 @@ class Bench:
         self.executor.add_node(self.client)
         self.nodes.append(self.client)
         self._publishers: dict[str, Any] = {}
+        self._half_built = False
 
     def add(self, make: Callable[..., Node], *args: Any, **parameters: Any) -> Any:
         """A node of this namespace with these parameters, spun together with the others."""
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
-        node = make(*args, namespace=self.namespace, parameter_overrides=overrides)
+        try:
+            node = make(*args, namespace=self.namespace, parameter_overrides=overrides)
+        except Exception:
+            self._half_built = True
+            raise
         self.executor.add_node(node)
         self.nodes.append(node)
         return node
@@ -91,6 +97,9 @@ class Bench:
             self.executor.remove_node(node)
             node.destroy_node()
         self.executor.shutdown()
+        if self._half_built:
+            # What was not built to its end is in the graph for as long as it is in memory.
+            gc.collect()
         shutil.rmtree(self.folder)
 
     # -- waiting --------------------------------------------------------------------------------
