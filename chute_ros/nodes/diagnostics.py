@@ -50,9 +50,9 @@ def wire_task(
     values: Mapping[str, object],
     dropped: Mapping[str, int],
 ) -> DiagnosticStatus:
-    """The wire, what is doubtful on it, and what was dropped on it, by reason."""
+    """The wire, what is doubtful on it while it is open, and what was dropped on it, by reason."""
     level, text = (OK if wire.is_open else ERROR), wire.text
-    if troubles:
+    if wire.is_open and troubles:
         level, text = ERROR, "; ".join(troubles)
     elif wire.is_open and not received and dropped:
         # As with another baud rate, or where one side has a key and the other has not.

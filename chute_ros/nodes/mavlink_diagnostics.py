@@ -65,8 +65,9 @@ def link_task(
         "acknowledgements that came late": details.late_acknowledgements,
         "heartbeats of devices beyond the sixteen that are followed": details.not_followed,
     }
-    doubts = details.doubts if wire.is_open else ()
-    return diagnostics.wire_task(name, wire, doubts, details.received, values, details.dropped)
+    return diagnostics.wire_task(
+        name, wire, details.doubts, details.received, values, details.dropped
+    )
 
 
 def parachute_tasks(name: str, details: Details, expected: bool) -> list[DiagnosticStatus]:

@@ -90,8 +90,9 @@ def bus_task(
         **details.nodes,
         **details.data_types,
     }
-    troubles = details.troubles if wire.is_open else ()
-    return diagnostics.wire_task(name, wire, troubles, details.received, values, details.dropped)
+    return diagnostics.wire_task(
+        name, wire, details.troubles, details.received, values, details.dropped
+    )
 
 
 def device_tasks(name: str, details: Details, without_controller: bool) -> list[DiagnosticStatus]:
