@@ -6,9 +6,9 @@ import datetime
 import re
 from pathlib import Path
 
-from chute_ros.errors import ParameterError
 from chute_ros.nodes.private_files import make_folder
 from chute_ros.nodes.ros_home import ros_home
+from chute_ros.transport.given_path import given_path
 
 
 class BoxFolder:
@@ -16,10 +16,8 @@ class BoxFolder:
     of several vehicles on one host are told apart. most_files: how many of them are kept."""
 
     def __init__(self, path: str, name: str, most_files: int) -> None:
-        try:
-            self.path = Path(path).expanduser() if path else ros_home() / "black_box"
-        except RuntimeError as error:
-            raise ParameterError(f"parameter black_box_folder is {path!r}: {error}") from None
+        named = "parameter black_box_folder"
+        self.path = given_path(path, named) if path else ros_home() / "black_box"
         self._name = name.strip("/").replace("/", ".")
         self._most_files = most_files
         self._pattern = re.compile(re.escape(self._name) + r"_(\d{6,})_[0-9TZ]+\.mcap")

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from io import BufferedWriter
 from pathlib import Path
 
-from chute_ros.errors import ParameterError
 from chute_ros.nodes.private_files import make_folder, open_new
 from chute_ros.nodes.ros_home import ros_home
+from chute_ros.transport.given_path import given_path
 
 PART = ".part"
 
@@ -33,10 +33,8 @@ class DumpFiles:
     under ROS_HOME."""
 
     def __init__(self, folder: str) -> None:
-        try:
-            self.folder = Path(folder).expanduser() if folder else ros_home() / "dumps"
-        except RuntimeError as error:
-            raise ParameterError(f"parameter dump_folder is {folder!r}: {error}") from None
+        named = "parameter dump_folder"
+        self.folder = given_path(folder, named) if folder else ros_home() / "dumps"
         self._final = Path()
         self._file: BufferedWriter | None = None
         self._size = 0

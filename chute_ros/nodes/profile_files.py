@@ -9,6 +9,7 @@ from chute_ros.errors import ParameterError, ProfileError
 from chute_ros.nodes.config_folder import config_folder
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import Profile
+from chute_ros.transport.given_path import given_path
 
 
 def load_profile(named: str, links: Sequence[str]) -> Profile:
@@ -17,10 +18,7 @@ def load_profile(named: str, links: Sequence[str]) -> Profile:
     ParameterError if there is none; ProfileError lists what is wrong in it, with lines.
     """
     is_path = "/" in named or named.endswith((".yaml", ".yml"))
-    try:
-        path = Path(named).expanduser() if is_path else _folder() / f"{named}.yaml"
-    except RuntimeError as error:
-        raise ParameterError(f"parameter profile is {named!r}: {error}") from None
+    path = given_path(named, "parameter profile") if is_path else _folder() / f"{named}.yaml"
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError, ValueError) as error:

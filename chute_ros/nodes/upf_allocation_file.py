@@ -10,16 +10,15 @@ from chute_ros.errors import ParameterError
 from chute_ros.nodes.private_files import read_own_text, replace_text
 from chute_ros.nodes.ros_home import ros_home
 from chute_ros.protocol.dronecan.allocation import HIGHEST, LOWEST, UNIQUE_ID_LENGTH
+from chute_ros.transport.given_path import given_path
 
 
 class AllocationFile:
     """path: of the file; empty: under ROS_HOME (~/.ros), named after the node."""
 
     def __init__(self, path: str, node_name: str) -> None:
-        try:
-            self.path = Path(path).expanduser() if path else _default_path(node_name)
-        except RuntimeError as error:
-            raise ParameterError(f"parameter allocation_table_file is {path!r}: {error}") from None
+        named = "parameter allocation_table_file"
+        self.path = given_path(path, named) if path else _default_path(node_name)
 
     def load(self) -> dict[bytes, int]:
         """The table; empty if there is no file. ParameterError if it cannot be believed: to begin

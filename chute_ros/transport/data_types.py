@@ -8,6 +8,7 @@ from typing import Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.data_types import DataTypes
+from chute_ros.transport.given_path import given_path
 from chute_ros.transport.shared_folder import shared_folder
 
 _STANDARD = "uavcan."
@@ -24,7 +25,7 @@ def load_data_types(folder: str, named: str) -> DataTypes:
     from dronecan.dsdl import DsdlException, parse_namespaces
 
     path = (
-        Path(folder).expanduser()
+        given_path(folder, named)
         if folder
         else shared_folder("dsdl/flyfire", "the DroneCAN data types")
     )

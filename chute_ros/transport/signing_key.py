@@ -17,6 +17,7 @@ from chute_ros.protocol.mavlink.signing import (
     Verifier,
     key_from_text,
 )
+from chute_ros.transport.given_path import given_path
 
 #: Where the wall clock was set back, signing goes on so far after the newest time that was kept:
 #: the last ones before a crash were not. s
@@ -53,7 +54,7 @@ def _read(name: str, option: str) -> tuple[os.stat_result, bytes]:
     """What file name is, and what is in it; SigningKeyError if no key can be."""
     try:
         # So that a pipe that nobody writes to is opened, and refused.
-        file = os.open(name, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        file = os.open(given_path(name, option), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
             about = os.fstat(file)
             if not stat.S_ISREG(about.st_mode):

@@ -8,6 +8,7 @@ import yaml
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.umbilical.layouts import REFERENCE_LAYOUT, Layout, layout_from
+from chute_ros.transport.given_path import given_path
 from chute_ros.transport.shared_folder import shared_folder
 
 
@@ -16,7 +17,7 @@ def load_layouts(folder: str, named: str) -> list[Layout]:
 
     ParameterError, with named for where the folder comes from, if it has none or one is wrong.
     """
-    path = Path(folder).expanduser() if folder else shared_folder("telem", "the layouts of $TELEM")
+    path = given_path(folder, named) if folder else shared_folder("telem", "the layouts of $TELEM")
     files = sorted(path.glob("*.yaml"))
     if not files:
         raise ParameterError(f"{named} is {folder!r}: there is no layout (*.yaml) in this folder")

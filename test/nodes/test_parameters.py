@@ -26,6 +26,7 @@ NODES = {"mavlink_parachute": MavlinkParachuteNode, "safety_supervisor": SafetyS
 CONFIG = Path(__file__).parents[2] / "config" / "mavlink_vehicle.yaml"
 NAN, INF = float("nan"), float("inf")
 MAVLINK, SUPERVISOR = NODES
+UPF, UMBILICAL = "upf_can", "umbilical"
 
 # node, parameter, value, what is allowed
 BAD = [
@@ -140,6 +141,9 @@ def run(node, *parameters, namespace="/"):
             "system_id of {ns}/mavlink_parachute is []: need a whole number",
         ),
         (SUPERVISOR, "profile:=~nobody_at_all/x.yaml", "profile is '~nobody_at_all/x.yaml': "),
+        (UMBILICAL, "telem_path:=~nobody_at_all", "parameter telem_path is '~nobody_at_all': "),
+        (MAVLINK, "signing_key_file:=~nobody_at_all/key", "is '~nobody_at_all/key': "),
+        (UPF, "dsdl_path:=~nobody_at_all", "parameter dsdl_path is '~nobody_at_all': "),
     ],
 )
 def test_a_real_start_ends_in_one_line(namespace, node, given, said):

@@ -80,3 +80,9 @@ def test_no_more_is_read_of_a_file_than_a_key_may_have(key):
         SigningKeyError, match=r"key is no key, it holds more than 128 bytes: need "
     ):
         signing_from_file(key, 0, "test")
+
+
+def test_a_key_may_be_named_from_the_home_folder(key, monkeypatch):
+    monkeypatch.setenv("HOME", os.path.dirname(key))
+    signer, _ = signing_from_file("~/key", 0, "test")
+    assert signer is not None
