@@ -95,7 +95,9 @@ class RuleEvidence:
             presumed = not condition.counted
             if holds or presumed:
                 weight += counts
-            if holds or presumed or (holds is None and expected):
+            # What cannot be said keeps no more than it has shown itself.
+            stands = holds is None and expected and (seen < 0 or count > 0.0)
+            if holds or presumed or stands:
                 possible += counts
         enough = rule.needed - _WEIGHTS_ROUNDING
         rule_holds = True if weight >= enough else None if possible >= enough else False

@@ -12,6 +12,7 @@ from chute_ros.supervisor.rules import MeasurementCondition, Rule
 
 #: Full after 1 s, empty again after 2 s, and three samples must have shown it.
 RULE = rule(SINKS, hold=1.0, leak=0.5, samples=3)
+TILTS = MeasurementCondition("tilt_deg", above=60.0)
 
 
 def counted(pattern: str, one: Rule = RULE, every: float = 0.1) -> list[RuleEvidence]:
@@ -71,9 +72,6 @@ def test_a_sample_that_denies_it_takes_the_leak_of_one_away() -> None:
     assert counted("xx......")[-1].shown == (0.0,)
     assert counted("x" * 9 + ".")[-1].shown == (2.5,), "it holds no more than are needed"
     assert fulfilled("xxx.xx.xx.xx.xxxx") == [16], "two of three are enough"
-
-
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 
 
 def test_samples_of_another_condition_do_not_count_for_it() -> None:
@@ -193,3 +191,27 @@ def test_while_nobody_looked_nothing_is_counted() -> None:
     story._update((story.told(vertical_speed=-14.0),), 3.0)  # 2.9 s without a look
     assert story.fired() == []
     assert "silence meanwhile does not count" in story.said()
+
+
+def noisy(sink: list[bool | None]) -> list[float]:
+    """The levels where every fifth attitude is bad, each 20 ms, and the sink is what is told."""
+    either = rule(TILTS, SINKS, needed=1.0, hold=0.5, leak=1.0, samples=2)
+    evidence, shown, levels = RuleEvidence(), 0, []
+    for n, holds in enumerate(sink):
+        shown += holds is not None
+        evidence = evidence.counted(either, 0.02).seeing(
+            either, [Look(n % 5 == 4, n + 1), Look(holds, shown)]
+        )
+        levels.append(evidence.level)
+    return levels
+
+
+def test_what_cannot_be_said_keeps_what_it_has_shown() -> None:
+    levels = noisy([True] * 10 + [None] * 40)
+    assert levels[10:15] == pytest.approx([0.2] * 5)
+    assert levels[-1] == pytest.approx(0.34)
+
+
+def test_what_cannot_be_said_and_had_shown_nothing_keeps_nothing() -> None:
+    """Else the few bad ones of a sensor that is noise add up beside one that is silent."""
+    assert max(noisy([False] * 10 + [None] * 200)) <= 0.02 + 1e-9

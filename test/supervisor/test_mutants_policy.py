@@ -33,10 +33,12 @@ def flying(*rules: Rule, **profile: Any) -> Story:
 
 
 def judged(one: Rule, since: float = 2.0, **told: float) -> bool | None:
-    """Does it hold where only this is told, and all was told since s ago?"""
+    """Does it hold where only this is told, and all was told, and showed it, since s ago?"""
     story = Story(with_rules(one))
-    story.at(0.0, vehicle(tilt=0.0, vertical_speed=0.0))
+    story.at(0.0, vehicle(tilt=90.0, vertical_speed=-14.0))
+    seen = judge(story.config, story.state, one, START).evidence
     story.at(since, vehicle(**told))
+    story.state = replace(story.state, rules={one.name: seen})
     return judge(story.config, story.state, one, START + since).evidence.holds
 
 

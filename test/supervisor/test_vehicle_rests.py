@@ -89,7 +89,7 @@ def test_a_heartbeat_looks_at_no_rule_that_rests_on_the_vehicle(looked: list[str
 def test_a_rule_that_holds_or_of_which_nothing_can_be_said_is_looked_at(
     looked: list[str], told: dict[str, float]
 ) -> None:
-    story = flying(rule(TILTS, action=ALARM, hold=60.0))
+    story = flying(rule(TILTS, action=ALARM, hold=60.0)).fly(1.1, tilt=90.0)
     story.fly(1.2, **told)
     looked.clear()
     story.at(1.21, story.heartbeat())
