@@ -11,9 +11,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
 from chute_msgs.msg import (
@@ -26,8 +24,6 @@ from chute_msgs.srv import Arm, Deploy
 from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.task import Future
 
 from chute_ros import model
@@ -35,8 +31,9 @@ from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.decision_carrier import DecisionCarrier
 from chute_ros.nodes.inbox import Inbox
 from chute_ros.nodes.link_log import UselessWire, log_event
-from chute_ros.nodes.parameters import Parameter, declare
+from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.request_desk import CallFailed, RequestDesk
+from chute_ros.nodes.suite_node import SuiteNode
 from chute_ros.nodes.supervisor_watch import (
     BLOCK_FLIGHT,
     WATCH_PARAMETERS,
@@ -98,7 +95,7 @@ def block_reason(decision: model.Decision) -> str:
     return "; ".join(decision.reasons) or decision.rule
 
 
-class DeviceNode(Node, ABC):
+class DeviceNode(SuiteNode, ABC):
     """Base of the nodes that speak to a device. The subclass makes self.loop and calls begin."""
 
     #: Events that may be left out where the executor does not keep up.
@@ -109,24 +106,15 @@ class DeviceNode(Node, ABC):
     BLOCKS_FLIGHT = True
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
-        # Before ROS knows the node: Kilted destroys what it knows, also one that a parameter
-        # keeps from being built.
+        # Before ROS knows the node, as at_end.
         self.loop: WireLoop[Any] | None = None
-        #: What is done once the link's thread has ended and the node is gone.
-        self.at_end = ExitStack()
-        super().__init__(name, **options)
-        self.values = declare(self, (*COMMON_PARAMETERS, *parameters))
+        super().__init__(name, (*COMMON_PARAMETERS, *parameters), **options)
         self.add_on_set_parameters_callback(self._parameters_set)
-        # The wall clock stamps, whatever use_sim_time says; decisions are as old as the watch of
-        # the supervisor tells.
-        self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
+        # Decisions are as old as the watch of the supervisor tells.
         limit = self.values["max_decision_age"]
         self._supervisor = SupervisorWatch(limit, self.values["supervisor_lost_after"], self.wall)
         self.decisions = DecisionCarrier(self, limit, self._supervisor.age, self.carry_out)
         self.wire_text = "not opened yet"
-        #: With the namespace, so that the diagnostics of several vehicles can be told apart.
-        self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         # A service that awaits the device must not keep the other callbacks from running.
         self._service_group = ReentrantCallbackGroup()
         guard = self.create_guard_condition(self._drain)
@@ -140,20 +128,15 @@ class DeviceNode(Node, ABC):
         self._received_at = (0, 0.0)
         #: Why flight is blocked by decision; empty: it is not.
         self._decided_block = ""
-        self._seq = count()
         self._loop_faults = 0
         self._useless_wire = UselessWire()
         self._summary: Summary | None = None
         self._status_publisher = self.create_publisher(
             ParachuteStatus, "parachute/status", qos.STATUS
         )
-        self._heartbeat_publisher = self.create_publisher(
-            LinkHeartbeat, "safety/heartbeat", qos.STATUS
-        )
         self._request_publisher = self.create_publisher(
             SafetyRequest, "safety/request", qos.STATUS
         )
-        self._diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
 
     def begin(self) -> None:
         """Start the link's thread and everything that reacts to it."""
@@ -166,12 +149,13 @@ class DeviceNode(Node, ABC):
         self.serve(Arm, "~/arm", self._arm)
         self.serve(Deploy, "~/deploy", self._deploy)
         period = 1.0 / self.values["heartbeat_rate"]
-        self.create_timer(period, self._beat, clock=self._steady)
-        self.create_timer(1.0, self._diagnose, clock=self._steady)
+        self.create_timer(period, self._beat, clock=self.steady)
+        self.create_timer(1.0, self._diagnose, clock=self.steady)
         self.loop.start()
 
     def destroy_node(self) -> None:
-        """End the link's thread first: it must not call into a node that is gone."""
+        """End the link's thread first: it must not call into a node that is gone; and what is
+        left of it once nothing reacts to it any more."""
         if self.loop is not None:
             self.loop.stop()
             self.loop = None
@@ -286,10 +270,6 @@ class DeviceNode(Node, ABC):
         connection = self.values["connection"]
         return diagnostics.WirePicture(self.loop.wire.is_open, self.wire_text, connection)
 
-    def stamp(self) -> Any:
-        """The wall clock, for headers."""
-        return self.wall.now().to_msg()
-
     # -- inside ---------------------------------------------------------------------------------
 
     def deliver(self, events: list[Any]) -> None:
@@ -358,15 +338,13 @@ class DeviceNode(Node, ABC):
     def _publish_heartbeat(self, summary: Summary) -> None:
         self._summary = summary
         message = LinkHeartbeat(
-            link=self.get_name(),
             link_state=int(summary.link_state),
-            seq=next(self._seq) % 2**32,
             device_healthy=summary.device_healthy,
             age=summary.age,
         )
         message.header.stamp = self.stamp()
         self._supervisor.beat(message.header.stamp)
-        self._heartbeat_publisher.publish(message)
+        self.publish_heartbeat(message)
 
     def _safety_state(self, message: SafetyState) -> None:
         self._supervisor.picture(message, self.get_name())
@@ -412,7 +390,7 @@ class DeviceNode(Node, ABC):
             "pictures left out, as the executor did not keep up": self.inbox.left_out,
         }
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
-        self._diagnostics_publisher.publish(self.stamp(), statuses)
+        self.diagnostics_publisher.publish(self.stamp(), statuses)
 
     def _look_at_wire(self, device: model.LinkState, statuses: list[DiagnosticStatus]) -> None:
         assert self.loop is not None

@@ -15,21 +15,18 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
-from itertools import count
 from operator import attrgetter
 from typing import Any
 
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyState
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
 from chute_ros import model
-from chute_ros.nodes import diagnostics, messages, qos
+from chute_ros.nodes import messages, qos
 from chute_ros.nodes.afterwards import Afterwards
 from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.flight_recorder import FlightRecorder
-from chute_ros.nodes.parameters import declare
+from chute_ros.nodes.suite_node import SuiteNode
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_inputs import SupervisorInputs
 from chute_ros.nodes.supervisor_lease import LeaseKeeper
@@ -58,21 +55,13 @@ EARLY = 0.0012
 SHORTEST_SLEEP = 0.0001
 
 
-class SafetySupervisorNode(Node):
+class SafetySupervisorNode(SuiteNode):
     """The node safety_supervisor."""
 
     def __init__(self, **options: Any) -> None:
-        # Before ROS knows the node: Kilted destroys what it knows, also one that a parameter
-        # keeps from being built.
-        self._at_end = ExitStack()
-        super().__init__("safety_supervisor", **options)
-        self.values = declare(self, PARAMETERS)
+        super().__init__("safety_supervisor", PARAMETERS, **options)
         self.config = config_from(self.values)
         lease = lease_from(self.values, self.config, self.get_name())
-        #: With the namespace, so that the diagnostics of several vehicles can be told apart.
-        self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
-        self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         now = time.monotonic()
         # Rises from start to start; a device node that knows a higher one makes us go on above it.
         epoch = epoch_above(max(0, int(time.time()) & 0xFFFFFFFF), lease.rank)
@@ -81,19 +70,18 @@ class SafetySupervisorNode(Node):
         )
         first: tuple[inputs.Input, ...] = ()
         self._memory = Memory(self, self.values, self.config)
-        self._at_end.callback(self._memory.close)
+        self.at_end.callback(self._memory.close)
         if (before := self._memory.recall()) is not None:
             self.state = before
             if not lease.standby:
                 first = (inputs.TakeOver(epoch_above(max(epoch, before.epoch), lease.rank)),)
         self._recorder = FlightRecorder(self, self.values)
-        self._at_end.callback(self._recorder.close)
+        self.at_end.callback(self._recorder.close)
         self._health = Health()
         self._afterwards = Afterwards()
-        self._at_end.callback(self._afterwards.look, math.inf)
+        self.at_end.callback(self._afterwards.look, math.inf)
         self.services_offered = SupervisorServices(self, self.wall, self._turn)
         self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
-        self._seq = count()
         self._beat_at = now
         self._state_at = now
         self._published: State | None = None
@@ -101,10 +89,6 @@ class SafetySupervisorNode(Node):
             SafetyDecision, "safety/decision", qos.DECISION
         )
         self._state_publisher = self.create_publisher(SafetyState, "safety/state", qos.LATCHED)
-        self._heartbeat_publisher = self.create_publisher(
-            LinkHeartbeat, "safety/heartbeat", qos.STATUS
-        )
-        self._diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
         self.lease = LeaseKeeper(
             self,
             lease,
@@ -129,8 +113,8 @@ class SafetySupervisorNode(Node):
             self.get_logger().warning(f"mode is {MODES[self.state.mode]} (parameter mode)")
         if self.lease.leading:
             self.services_offered.open()
-        self.create_timer(1.0, self._diagnose, clock=self._steady)
-        self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self._steady)
+        self.create_timer(1.0, self._diagnose, clock=self.steady)
+        self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self.steady)
         self._turn(*first)
 
     # -- the loop -------------------------------------------------------------------------------
@@ -238,7 +222,7 @@ class SafetySupervisorNode(Node):
         log.error(output.text) if output.alarm else log.info(output.text)
 
     def _publish_decision(self, decision: model.Decision) -> SafetyDecision:
-        message = messages.decision(decision, self.wall.now().to_msg())
+        message = messages.decision(decision, self.stamp())
         self._decision_publisher.publish(message)
         return message
 
@@ -284,15 +268,13 @@ class SafetySupervisorNode(Node):
         self._health.beat_late = now - self._beat_at
         self._beat_at = max(self._beat_at + HEARTBEAT_INTERVAL, now)
         message = LinkHeartbeat(
-            link=self.get_name(),
             link_state=LinkHeartbeat.LINK_OK,
-            seq=next(self._seq) % 2**32,
             device_healthy=self.lease.leading,
             age=0.0,
             supervisor=True,
         )
-        message.header.stamp = self.wall.now().to_msg()
-        self._heartbeat_publisher.publish(message)
+        message.header.stamp = self.stamp()
+        self.publish_heartbeat(message)
         self.lease.tell(now)
         self.services_offered.tidy()
 
@@ -304,7 +286,7 @@ class SafetySupervisorNode(Node):
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL
         self._memory.keep(self.state)
-        stamp = self.wall.now().to_msg()
+        stamp = self.stamp()
         message = state_message(self.config, self.state, now, stamp)
         message.supervisor = self.get_name()
         message.link_stamps = [self._inputs.stamps.get(link, Time()) for link in self.config.links]
@@ -319,10 +301,10 @@ class SafetySupervisorNode(Node):
             self._memory.task(name),
             *self._recorder.tasks(),
         ]
-        self._diagnostics_publisher.publish(self.wall.now().to_msg(), tasks)
+        self.diagnostics_publisher.publish(self.stamp(), tasks)
 
     def destroy_node(self) -> None:
         """The black box ends its file, the memory is written."""
         with ExitStack() as each:  # from the last to the first, each whatever the others raise
             each.callback(super().destroy_node)
-            each.callback(self._at_end.close)
+            each.callback(self.at_end.close)

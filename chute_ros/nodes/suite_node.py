@@ -1,0 +1,44 @@
+"""What every node of the suite has: parameters, clocks, a heartbeat, diagnostics, and an end."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from itertools import count
+from typing import Any
+
+from chute_msgs.msg import LinkHeartbeat
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+
+from chute_ros.nodes import diagnostics, qos
+from chute_ros.nodes.parameters import Parameter, declare
+
+
+class SuiteNode(Node):
+    """Base of all nodes. The subclass closes at_end when it is destroyed."""
+
+    def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
+        #: What is done at its end. Before ROS knows the node: Kilted destroys what it knows, also
+        #: one that a parameter keeps from being built.
+        self.at_end = ExitStack()
+        super().__init__(name, **options)
+        self.values = declare(self, parameters)
+        # The wall clock only stamps, whatever use_sim_time says.
+        self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
+        self.steady = Clock(clock_type=ClockType.STEADY_TIME)
+        #: With the namespace, so that the diagnostics of several vehicles can be told apart.
+        self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
+        self._seq = count()
+        self._heartbeat_publisher = self.create_publisher(
+            LinkHeartbeat, "safety/heartbeat", qos.STATUS
+        )
+        self.diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
+
+    def stamp(self) -> Any:
+        """The wall clock, for headers."""
+        return self.wall.now().to_msg()
+
+    def publish_heartbeat(self, message: LinkHeartbeat) -> None:
+        """On safety/heartbeat, as this node's next one; it has its stamp."""
+        message.link, message.seq = self.get_name(), next(self._seq) % 2**32
+        self._heartbeat_publisher.publish(message)
