@@ -21,9 +21,11 @@ PARTS ?=
 LOOPS ?= 300
 # How long make fuzz may take.
 MINUTES ?= 10
-# How many flights of the campaign, and the seed of the first.
+# How many flights of the campaign, and the seed of the first; of so many fly only the first EACH of
+# each kind (empty: all).
 FLIGHTS ?= 1000
 SEED ?= 0
+EACH ?=
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -49,9 +51,9 @@ test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kil
 bench: build ## measure against bare scripts, write docs/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
 
-campaign: build ## fly FLIGHTS flights in virtual time from SEED on, write docs/campaign.*
+campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/campaign.*
 	@$(OVERLAY) && exec python3 -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
-	    --page docs/campaign.md
+	    $(if $(EACH),--each $(EACH) --page docs/campaign_of_each.md,--page docs/campaign.md)
 
 hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write docs/hosts.md (PARTS=...)
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults $(PARTS)

@@ -9,7 +9,7 @@ import multiprocessing
 import signal
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -115,19 +115,18 @@ def _line(folder: Path, seed: int) -> Line:
 
 def run(
     folder: Path,
-    flights: int,
-    seed: int,
+    seeds: Sequence[int],
     jobs: int,
     progress: Callable[[Tally], None],
     tally: Tally,
 ) -> Tally:
-    """Flights with the seeds from seed on, in their order, added to tally, which has the first of
-    them already. folder: of the profiles.
+    """Flights with these seeds, in their order, added to tally, which has the first of them
+    already. folder: of the profiles.
 
     Ended by Ctrl-C, it returns those until then: hours of flights are not lost."""
     begun = time.monotonic() - tally.took
     try:
-        for line in _all(folder, range(seed + tally.flights, seed + flights), jobs):
+        for line in _all(folder, seeds[tally.flights :], jobs):
             tally.add(line)
             tally.took = time.monotonic() - begun
             progress(tally)
@@ -136,7 +135,7 @@ def run(
     return tally
 
 
-def _all(folder: Path, seeds: range, jobs: int) -> Iterator[Line]:
+def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     one = functools.partial(_line, folder)
     if jobs == 1:
         yield from map(one, seeds)

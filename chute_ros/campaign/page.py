@@ -42,14 +42,33 @@ carries half of the weight and its attitude is wrong, or lied in the last 10 s: 
 tell of one that flies well, whose autopilot hangs and whose attitude alone is wrong. Those are
 named as well."""
 
+#: Seeds that were looked at, flights, how many of each kind.
+_OF_EACH = """\
+Of {} seeds these are {} flights: the first {} of each kind, and no more. A kind is what fails on
+which vehicle with which sources, with which kinds of faults around it and which person; or with
+which sensors wrong, and how. So the rare are flown as often as the common, and the numbers below
+say nothing of how often anything happens."""
 
-def page(tally: Tally, seed: int, how: str, pictures: Mapping[str, str]) -> str:
+
+def page(
+    tally: Tally,
+    seed: int,
+    how: str,
+    pictures: Mapping[str, str],
+    looked_at: int = 0,
+    each: int = 0,
+) -> str:
     """As Markdown. how: what the speed depends on, in words; pictures: the names of the files of
-    "delays" and "heights"."""
+    "delays" and "heights"; looked_at: the seeds of which so many of each kind were flown (0: all
+    were)."""
     flown = f"{tally.took:.0f} s, {tally.a_minute:.0f} flights a minute, {how}"
+    seeds = f"FLIGHTS={looked_at} SEED={seed} EACH={each}"
+    if not looked_at:
+        seeds = f"FLIGHTS={tally.flights} SEED={seed}"
     lines = [
         *("# Fault campaign", ""),
-        *(f"Written by `make campaign FLIGHTS={tally.flights} SEED={seed}`: {flown}.", ""),
+        *(f"Written by `make campaign {seeds}`: {flown}.", ""),
+        *((_OF_EACH.format(looked_at, tally.flights, each), "") if looked_at else ()),
         *(_INTRODUCTION, ""),
         *_counts(tally),
         *_wrong(tally),

@@ -11,12 +11,14 @@ import math
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.campaign import campaign, kept_tally
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
+from chute_ros.campaign.rare import rare
 from chute_ros.campaign.scenario import Scenario, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.tellers import outlives
@@ -37,6 +39,13 @@ def main() -> None:
     options = argparse.ArgumentParser("campaign", description=__doc__)
     options.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
+    options.add_argument(
+        "--each",
+        type=positive,
+        metavar="N",
+        help="of so many seeds (--flights) fly only the first N of each kind of flight: the rare "
+        "as often as the common",
+    )
     options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
     options.add_argument("--page", type=writable, help="write the results there, beside pictures")
     options.add_argument(
@@ -60,30 +69,36 @@ def main() -> None:
     if chosen.replay is not None:
         _replay(profiles, chosen.replay)
         return
+    if chosen.each and chosen.resume:
+        options.error("argument --each: a campaign of each kind cannot be interrupted (--resume)")
+    seeds: Sequence[int] = range(chosen.seed, chosen.seed + chosen.flights)
+    if chosen.each:
+        seeds = rare(seeds, chosen.each)
+        print(f"{len(seeds)} of {chosen.flights} seeds are flown", file=sys.stderr, flush=True)
     kept = _Kept(chosen.resume, chosen.seed, profiles)
     try:
         tally = kept.tally()
     except RecordError as error:
         options.error(f"argument --resume: {error}")
-    progress = _Progress(chosen.flights, chosen.failures, kept)
-    how = (chosen.flights, chosen.seed, chosen.jobs)
-    tally = campaign.run(profiles, *how, progress.look, tally)
+    progress = _Progress(len(seeds), chosen.failures, kept)
+    tally = campaign.run(profiles, seeds, chosen.jobs, progress.look, tally)
     kept.keep(tally)
     for count in Count:
         print(f"{tally.counts[count]:8d}  {count.value}")
     for line in tally.wrong[:_MOST_TOLD]:
         print(f"  {_told(line)}")
-    print(f"{tally.flights} of {chosen.flights} flights in {tally.took:.0f} s")
+    print(f"{tally.flights} of {len(seeds)} flights in {tally.took:.0f} s")
     if progress.unsaved:
         print(f"not saved, name another folder with --failures: {progress.unsaved}")
     elif tally.wrong:
         print(f"saved in {chosen.failures}; --replay FILE tells one step by step")
     if chosen.page and tally.flights:
         how = f"{chosen.jobs} at a time on {machine()}"
-        _write(tally, chosen.seed, how, chosen.page)
+        looked_at = chosen.flights if chosen.each else 0
+        _write(tally, chosen.page, chosen.seed, how, looked_at, chosen.each or 0)
     if tally.wrong:
         sys.exit(1)
-    if tally.flights < chosen.flights:
+    if tally.flights < len(seeds):
         # What was flown until then is told; now it ends as every tool does.
         raise KeyboardInterrupt
 
@@ -192,11 +207,14 @@ def scenario(text: str) -> Scenario:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _write(tally: campaign.Tally, seed: int, how: str, path: Path) -> None:
+def _write(
+    tally: campaign.Tally, path: Path, seed: int, how: str, looked_at: int, each: int
+) -> None:
     drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
     drawn["delays"].write_text(picture(tally.lines, "release_delay"))
     drawn["heights"].write_text(picture(tally.lines, "height_lost"))
-    path.write_text(page(tally, seed, how, {what: one.name for what, one in drawn.items()}))
+    names = {what: one.name for what, one in drawn.items()}
+    path.write_text(page(tally, seed, how, names, looked_at, each))
 
 
 def _replay(profiles: Path, scenario: Scenario) -> None:

@@ -199,7 +199,7 @@ def test_every_scenario_is_drawn_within_its_bounds() -> None:
 def test_a_campaign_counts_every_flight_once() -> None:
     tallies = []
     tally = campaign.run(
-        FOLDER, 6, 100, 2, lambda one: tallies.append(one.flights), campaign.Tally()
+        FOLDER, range(100, 106), 2, lambda one: tallies.append(one.flights), campaign.Tally()
     )
     assert tallies == [1, 2, 3, 4, 5, 6]
     assert sum(tally.counts.values()) == tally.flights == 6
@@ -212,6 +212,6 @@ def test_an_exception_in_a_flight_is_counted_and_ends_nothing(monkeypatch) -> No
         raise ValueError("the rig fell apart")
 
     monkeypatch.setattr(campaign, "Flight", broken)
-    tally = campaign.run(FOLDER, 2, 0, 1, lambda _: None, campaign.Tally())
+    tally = campaign.run(FOLDER, range(2), 1, lambda _: None, campaign.Tally())
     assert tally.counts[Count.BROKEN] == 2
     assert tally.wrong[0].why == "ValueError: the rig fell apart"

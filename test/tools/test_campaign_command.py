@@ -29,6 +29,8 @@ def run(monkeypatch, *arguments):
     [
         (["--flights", "0"], "argument --flights: 0: need 1 or more"),
         (["--flights", "-5"], "argument --flights: -5: need 1 or more"),
+        (["--each", "0"], "argument --each: 0: need 1 or more"),
+        (["--each", "1", "--resume", "/tmp/kept"], "argument --each: a campaign of each kind"),
         (["--jobs", "0"], "argument --jobs: 0: need 1 or more"),
         (["--jobs", "many"], "argument --jobs: invalid positive value: 'many'"),
         (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
@@ -62,6 +64,19 @@ def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
         assert f"]({page.with_suffix(suffix).name})" in text
         assert page.with_suffix(suffix).read_text().startswith("<svg")
     assert not (tmp_path / "failures").exists()
+
+
+def test_of_each_kind_it_flies_the_first(monkeypatch, tmp_path, capsys):
+    page = tmp_path / "campaign.md"
+    with_page = ("--jobs", "1", "--page", str(page), "--failures", str(tmp_path / "failures"))
+    monkeypatch.setattr(campaign, "rare", lambda seeds, each: list(seeds)[5 : 5 + 2 * each])
+    run(monkeypatch, "--flights", "30", "--seed", "100", "--each", "2", *with_page)
+    told = capsys.readouterr()
+    assert "4 of 30 seeds are flown" in told.err
+    assert "4 of 4 flights in" in told.out
+    text = page.read_text()
+    assert "`make campaign FLIGHTS=30 SEED=100 EACH=2`: " in text
+    assert "Of 30 seeds these are 4 flights: the first 2 of each kind" in text
 
 
 def fly_on(monkeypatch, tmp_path, flights, seed=40):

@@ -1,0 +1,71 @@
+"""Of each kind of flight a few: the rare ones are flown as well as the common."""
+
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from chute_ros.campaign.rare import kinds, rare
+from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle, draw
+from chute_ros.campaign.sensors import SensorFault
+from chute_ros.protocol.vehicle_merge import IMU, VEHICLE_STATE
+
+SEEDS = range(1000, 5000)
+PLAIN = replace(
+    draw(7), vehicle=Vehicle.UPF, failure=Failure.HANG, faults=(), person=None,
+    vehicle_sources=(VEHICLE_STATE, IMU),
+)  # fmt: skip
+LIES = SensorFault("force", "noise", 1.0, 2.0, IMU)
+STOPS = Stop("supervisor", 1.0, 0.5)
+
+
+@pytest.mark.parametrize("each", [1, 2])
+def test_every_kind_is_among_them_and_nothing_is_that_has_no_rare_kind(each):
+    chosen = rare(SEEDS, each)
+    every, flown = Counter(), Counter()
+    for seed in SEEDS:
+        every.update(kinds(draw(seed)))
+    for seed in chosen:
+        assert any(flown[kind] < each for kind in kinds(draw(seed)))
+        flown.update(kinds(draw(seed)))
+    assert {kind for kind in every if flown[kind] < min(each, every[kind])} == set()
+    assert chosen == sorted(chosen)
+    assert len(chosen) < 0.6 * len(SEEDS)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        replace(PLAIN, height=PLAIN.height + 1.0, gusts=0.5, failure_at=2.0),
+        replace(PLAIN, standby=not PLAIN.standby),
+    ],
+)
+def test_numbers_make_no_other_kind(other):
+    assert kinds(other) == kinds(PLAIN)
+
+
+def test_when_a_fault_begins_and_how_often_makes_no_other_kind():
+    once = replace(PLAIN, faults=(LIES, STOPS))
+    assert kinds(replace(PLAIN, faults=(STOPS, STOPS, LIES.later(0.5)))) == kinds(once)
+
+
+@pytest.mark.parametrize(
+    ("other", "differ"),
+    [
+        (replace(PLAIN, vehicle=Vehicle.MAVLINK), (True, True)),
+        (replace(PLAIN, failure=Failure.POWER), (True, True)),
+        (replace(PLAIN, vehicle_sources=(VEHICLE_STATE,)), (True, True)),
+        (replace(PLAIN, person=Person("kill", 1.0)), (True, False)),
+        (replace(PLAIN, faults=(STOPS,)), (True, False)),
+        (replace(PLAIN, faults=(LIES,)), (True, True)),
+    ],
+)
+def test_what_fails_who_acts_and_who_lies_makes_another_kind(other, differ):
+    assert tuple(a != b for a, b in zip(kinds(other), kinds(PLAIN), strict=True)) == differ
+
+
+def test_who_lies_and_how_makes_another_kind():
+    lies = replace(PLAIN, faults=(LIES,))
+    otherwise = replace(PLAIN, faults=(replace(LIES, how="zero"),))
+    assert kinds(otherwise)[0] == kinds(lies)[0]
+    assert kinds(otherwise)[1] != kinds(lies)[1]
