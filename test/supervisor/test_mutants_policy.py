@@ -10,6 +10,7 @@ from story import SINKS, START, Story, rule, vehicle, with_rules
 from chute_ros.model import Action, Armed, LandedState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import JUMP_DOUBTED, Measured
 from chute_ros.supervisor.policy import judge, rule_deadlines
 from chute_ros.supervisor.rules import (
     AutopilotCondition,
@@ -75,6 +76,22 @@ def test_weights_that_miss_by_the_rounding_are_enough(rounding: float) -> None:
     one = rule(replace(TILTS, weight=2.0), needed=2.0 + rounding)
     assert judged(one, tilt=90.0) is True
     assert judged(one) is None
+
+
+@pytest.mark.parametrize(("doubted", "holds"), [(1.0, True), (0.5, False)])
+def test_a_sign_in_doubt_counts_for_the_rules_part_of_it(doubted: float, holds: bool) -> None:
+    story = Story(with_rules(one := rule(SINKS, doubted=doubted)))
+    story.at(0.0, vehicle(vertical_speed=-14.0))
+    assert judge(story.config, story.state, one, START).evidence.holds is True
+    state = replace(story.state, disputed=frozenset({"vertical_speed"}))
+    assert judge(story.config, state, one, START).evidence.holds is holds
+
+
+def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends() -> None:
+    story = flying(rule(SINKS, doubted=0.5))
+    jumped = {"vertical_speed": Measured(jumped_at=START)}
+    state = replace(story.state, measurements=jumped)
+    assert START + JUMP_DOUBTED in rule_deadlines(story.config, state, START + story.t)
 
 
 def test_a_sample_that_is_looked_at_twice_showed_it_once() -> None:
