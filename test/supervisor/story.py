@@ -102,6 +102,8 @@ def rule(
 
 #: It sinks faster than 12 m/s.
 SINKS = MeasurementCondition("vertical_speed", below=-12.0)
+#: It lies on its side, or nearly.
+TILTS = MeasurementCondition("tilt_deg", above=60.0)
 
 
 def with_rules(

@@ -5,14 +5,13 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from story import SINKS, Story, rule, shipped, with_rules
+from story import SINKS, TILTS, Story, rule, shipped, with_rules
 
 from chute_ros.supervisor.counter import Look, RuleEvidence
-from chute_ros.supervisor.rules import MeasurementCondition, Rule
+from chute_ros.supervisor.rules import Rule
 
 #: Full after 1 s, empty again after 2 s, and three samples must have shown it.
 RULE = rule(SINKS, hold=1.0, leak=0.5, samples=3)
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 
 
 def counted(pattern: str, one: Rule = RULE, every: float = 0.1) -> list[RuleEvidence]:

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from story import LINK, SINKS, STANDING, Story, rule, with_rules
+from story import LINK, SINKS, STANDING, TILTS, Story, rule, with_rules
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -17,11 +17,9 @@ from chute_ros.supervisor.rules import (
     AutopilotFact,
     BelowMinimum,
     LinkCondition,
-    MeasurementCondition,
 )
 
 K, D = Action.KILL, Action.DEPLOY
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 EVERYWHERE = tuple(Stage)
 
 

@@ -4,14 +4,13 @@ import math
 from dataclasses import replace
 
 import pytest
-from story import SINKS, rule
+from story import SINKS, TILTS, rule
 
 from chute_ros.model import Action
 from chute_ros.supervisor.counter import UNKNOWN_STANDS, Look, RuleEvidence
 from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, MeasurementCondition
 
 RULE = rule(SINKS, action=Action.DEPLOY, hold=2.0, leak=0.5, samples=3)
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 LOST = AutopilotCondition(AutopilotFact.LOST, counted=False)
 BOTH = rule(TILTS, SINKS)
 UNKNOWN = RuleEvidence(level=1.0, holds=None, shown=(2.0,), seen=(5,))

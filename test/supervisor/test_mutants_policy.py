@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from story import SINKS, START, Story, rule, vehicle, with_rules
+from story import SINKS, START, TILTS, Story, rule, vehicle, with_rules
 
 from chute_ros.model import Action, Armed, LandedState
 from chute_ros.supervisor import inputs as i
@@ -17,12 +17,10 @@ from chute_ros.supervisor.rules import (
     AutopilotFact,
     BelowMinimum,
     Clears,
-    MeasurementCondition,
     Rule,
 )
 
 K, ALARM = Action.KILL, Action.NONE
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 LOW = {"minimum_height": 10.0, "below_minimum": BelowMinimum.NOTHING}
 
 

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from story import DOWN, LINK, SINKS, STANDING, START, Story, rule, with_rules
+from story import DOWN, LINK, SINKS, STANDING, START, TILTS, Story, rule, with_rules
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -20,7 +20,6 @@ from chute_ros.supervisor.rules import (
 )
 
 K, D, ALARM = Action.KILL, Action.DEPLOY, Action.NONE
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 HIGH = MeasurementCondition("height", above=100.0)
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from story import LINK, START, Story, falling, rule, shipped, with_rules
+from story import LINK, START, TILTS, Story, falling, rule, shipped, with_rules
 
 from chute_ros.model import Action, Armed, LinkState
 from chute_ros.supervisor import inputs as i
@@ -26,7 +26,6 @@ from chute_ros.supervisor.rules import (
     Rule,
 )
 
-TILTS = MeasurementCondition("tilt_deg", above=60.0)
 LOST = AutopilotCondition(AutopilotFact.LOST)
 DISARMED = AutopilotCondition(AutopilotFact.DISARMED)
 ALARM = Action.NONE
