@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from chute_ros.campaign.campaign import Tally
 from chute_ros.campaign.judge import WRONG, Count
 from chute_ros.campaign.picture import groups_of
+from chute_ros.campaign.rare import OfEach
 from chute_ros.campaign.scenario import MOST_FAULTS
 from chute_ros.protocol.vehicle_merge import FRESH
 
@@ -55,20 +56,20 @@ def page(
     seed: int,
     how: str,
     pictures: Mapping[str, str],
-    looked_at: int = 0,
-    each: int = 0,
+    of_each: OfEach | None = None,
 ) -> str:
     """As Markdown. how: what the speed depends on, in words; pictures: the names of the files of
-    "delays" and "heights"; looked_at: the seeds of which so many of each kind were flown (0: all
-    were)."""
+    "delays" and "heights"; of_each: how the flights were chosen; None: each seed was flown."""
     flown = f"{tally.took:.0f} s, {tally.a_minute:.0f} flights a minute, {how}"
-    seeds = f"FLIGHTS={looked_at} SEED={seed} EACH={each}"
-    if not looked_at:
-        seeds = f"FLIGHTS={tally.flights} SEED={seed}"
+    seeds, chosen = f"FLIGHTS={tally.flights} SEED={seed}", []
+    if of_each is not None:
+        looked_at, each = of_each
+        seeds = f"FLIGHTS={looked_at} SEED={seed} EACH={each}"
+        chosen = [_OF_EACH.format(looked_at, tally.flights, each), ""]
     lines = [
         *("# Fault campaign", ""),
         *(f"Written by `make campaign {seeds}`: {flown}.", ""),
-        *((_OF_EACH.format(looked_at, tally.flights, each), "") if looked_at else ()),
+        *chosen,
         *(_INTRODUCTION, ""),
         *_counts(tally),
         *_wrong(tally),

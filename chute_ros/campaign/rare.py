@@ -6,9 +6,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Iterable
+from typing import NamedTuple
 
 from chute_ros.campaign.scenario import Scenario, draw
 from chute_ros.campaign.sensors import SensorFault
+
+
+class OfEach(NamedTuple):
+    """Of so many seeds so many flights of each kind."""
+
+    seeds: int
+    each: int
 
 
 def kinds(scenario: Scenario) -> tuple[Hashable, Hashable]:

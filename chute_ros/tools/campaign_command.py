@@ -18,7 +18,7 @@ from chute_ros.campaign import campaign, kept_tally
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
-from chute_ros.campaign.rare import rare
+from chute_ros.campaign.rare import OfEach, rare
 from chute_ros.campaign.scenario import Scenario, draw
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.tellers import outlives
@@ -94,8 +94,8 @@ def main() -> None:
         print(f"saved in {chosen.failures}; --replay FILE tells one step by step")
     if chosen.page and tally.flights:
         how = f"{chosen.jobs} at a time on {machine()}"
-        looked_at = chosen.flights if chosen.each else 0
-        _write(tally, chosen.page, chosen.seed, how, looked_at, chosen.each or 0)
+        of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
+        _write(tally, chosen.page, chosen.seed, how, of_each)
     if tally.wrong:
         sys.exit(1)
     if tally.flights < len(seeds):
@@ -207,14 +207,12 @@ def scenario(text: str) -> Scenario:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _write(
-    tally: campaign.Tally, path: Path, seed: int, how: str, looked_at: int, each: int
-) -> None:
+def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEach | None) -> None:
     drawn = {"delays": path.with_suffix(".svg"), "heights": path.with_suffix(".heights.svg")}
     drawn["delays"].write_text(picture(tally.lines, "release_delay"))
     drawn["heights"].write_text(picture(tally.lines, "height_lost"))
     names = {what: one.name for what, one in drawn.items()}
-    path.write_text(page(tally, seed, how, names, looked_at, each))
+    path.write_text(page(tally, seed, how, names, of_each))
 
 
 def _replay(profiles: Path, scenario: Scenario) -> None:
