@@ -110,6 +110,8 @@ def test_every_frame_that_leaves_is_signed_whatever_it_orders(attacked, bench, d
             ],
             f"{action.name} is carried out",
         )
+        # The block is confirmed at once; the arming it undoes is heard of a beat later.
+        bench.until(lambda: not attacked.autopilot.model.armed, "arming on the ground is undone")
     every = attacked.attacker.heard
     frames, counts = read(every, Verifier(KEY, clock()))
     assert len(frames) == len(every)
