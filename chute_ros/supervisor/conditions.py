@@ -30,13 +30,15 @@ _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 class Finding(NamedTuple):
     """holds None: it cannot be said. tell: says what was found, asked only where somebody reads
     it. samples: so many distinct ones came so far; -1: none do. doubted: the sensor that tells it
-    has just told what cannot be. expected: what cannot be said now was said a moment ago."""
+    has just told what cannot be. expected: what cannot be said now was said a moment ago. presumed:
+    it is not known, and taken to be so."""
 
     holds: bool | None
     tell: Callable[[], str]
     samples: int = -1
     doubted: bool = False
     expected: bool = True
+    presumed: bool = False
 
     @property
     def text(self) -> str:
@@ -62,7 +64,7 @@ def _measurement(
             return f"{name} cannot be used: {why} (asked for: {condition.limits}){taken}"
 
         if condition.if_unknown:
-            return Finding(True, tell)
+            return Finding(True, tell, presumed=True)
         gap = now - flight.last_usable(config, state, name) <= UNKNOWN_STANDS
         return Finding(None, tell, samples, expected=gap)
     doubt = flight.doubt(state, name, value, now)

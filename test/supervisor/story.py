@@ -204,6 +204,14 @@ class Story:
             self.at(start + step * 0.05, self.heartbeat(), self.told(**parts))
         return self
 
+    def sink(self, until: float, fastest: float, **told: Any) -> Story:
+        """As fly, sinking as fast as bodies fall, down to fastest, m/s: no speed that jumps."""
+        start, steps = self.t, round((until - self.t) / 0.05)
+        for step in range(1, steps + 1):
+            parts = {**told, "vertical_speed": -min(9.81 * step * 0.05, fastest)}
+            self.at(start + step * 0.05, self.heartbeat(), self.told(**parts))
+        return self
+
     def fired(self) -> list[str]:
         """Every kill and deploy, each once, in their order."""
         return [d.action.name for d in self.decisions() if d.action >= Action.KILL]

@@ -127,9 +127,22 @@ def test_a_vertical_speed_that_is_wrong_alone_ends_no_flight() -> None:
 
 def test_a_vertical_speed_is_believed_alone_where_no_height_can_be_used() -> None:
     story = aloft()
-    story.fly(story.t + 2.0, vertical_speed=-14.0, height=math.nan)
+    story.sink(story.t + 3.5, 14.0, height=math.nan)
     assert story.fired() == ["KILL", "DEPLOY"]
     assert any("taken to be so" in reason for reason in story.newest(K).reasons)
+
+
+def test_one_that_jumped_is_not_believed_alone_where_no_height_can_be_used() -> None:
+    story = aloft()
+    story.fly(10.0, vertical_speed=-14.0, height=math.nan)
+    assert story.fired() == []
+
+
+def test_one_that_jumped_is_believed_beside_a_sign_that_is_told() -> None:
+    story = aloft()
+    story.fly(story.t + 2.0, vertical_speed=-14.0, height=math.nan, acceleration=4.5)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.newest(K).rule == "critical sink"
 
 
 def test_a_landing_in_earnest_deploys_nothing() -> None:
@@ -245,7 +258,7 @@ def test_an_autopilot_that_starts_anew_and_flies_on_is_not_deployed() -> None:
 
 def test_its_height_that_starts_at_zero_does_not_hold_the_deploy_back() -> None:
     story = aloft().fly(1.5, **ANEW)
-    story.fly(3.2, **{**ANEW, "vertical_speed": -14.0})
+    story.sink(4.7, 14.0, **ANEW)
     assert story.fired() == ["KILL", "DEPLOY"]
 
 

@@ -17,6 +17,7 @@ from chute_ros.supervisor.rules import (
     AutopilotFact,
     BelowMinimum,
     Clears,
+    MeasurementCondition,
     Rule,
 )
 
@@ -83,6 +84,41 @@ def test_a_sign_in_doubt_counts_for_the_rules_part_of_it(doubted: float, holds: 
     assert judge(story.config, story.state, one, START).evidence.holds is True
     state = replace(story.state, disputed=frozenset({"vertical_speed"}))
     assert judge(story.config, state, one, START).evidence.holds is holds
+
+
+@pytest.mark.parametrize(
+    ("disputed", "told", "holds"),
+    [
+        ((), {"vertical_speed": -14.0}, True),
+        (("vertical_speed",), {"vertical_speed": -14.0}, False),
+        (("vertical_speed",), {"vertical_speed": -14.0, "tilt": 90.0}, True),
+        (("attitude",), {"vertical_speed": -14.0, "tilt": 90.0}, True),
+        # A sign that does not hold puts none in doubt, whatever is doubted of it.
+        (("attitude",), {"vertical_speed": -14.0, "tilt": 5.0}, True),
+    ],
+)
+def test_what_is_only_taken_to_be_so_is_in_doubt_with_what_it_stands_beside(
+    disputed: tuple[str, ...], told: dict[str, float], holds: bool
+) -> None:
+    """Given a sink, heights that tell no rate, and one more sign."""
+    presumed = MeasurementCondition("climb_rate", below=-6.0, if_unknown=True)
+    one = rule(SINKS, presumed, TILTS, needed=1.5, doubted=0.5)
+    story = Story(with_rules(one))
+    story.at(0.0, vehicle(**told))
+    state = replace(story.state, disputed=frozenset(disputed))
+    assert judge(story.config, state, one, START).evidence.holds is holds
+
+
+def test_heights_that_tell_a_sink_are_a_whole_sign_beside_one_in_doubt() -> None:
+    told = MeasurementCondition("climb_rate", below=-6.0, if_unknown=True)
+    one = rule(SINKS, told, needed=1.5, doubted=0.5)
+    story = Story(with_rules(one))
+    for step in range(12):
+        story.at(step * 0.1, vehicle(vertical_speed=-14.0 - step * 1e-3, height=90.0 - step))
+    state = replace(story.state, disputed=frozenset({"vertical_speed"}))
+    judged = judge(story.config, state, one, START + story.t)
+    assert "climb_rate -10.00" in judged.findings[1].text
+    assert judged.evidence.holds is True
 
 
 def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends() -> None:

@@ -72,8 +72,9 @@ def test_heights_that_scatter_say_so() -> None:
 
 def test_an_upright_sink_is_seen_although_the_height_is_stuck() -> None:
     story = Story(shipped("multirotor")).flying().fly(2.0)
-    for _ in range(150):
-        told = replace(story.told(vertical_speed=-15.0, tilt=20.0).state, height=50.0)
+    for step in range(1, 151):
+        speed = -min(9.81 * step * 0.05, 15.0)
+        told = replace(story.told(vertical_speed=speed, tilt=20.0).state, height=50.0)
         story.at(story.t + 0.05, story.heartbeat(), i.VehicleReport(told))
     assert story.fired() == ["KILL", "DEPLOY"]
 
