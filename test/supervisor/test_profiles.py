@@ -130,7 +130,7 @@ DEPLOYS = [
     *falls(
         "multirotor",
         "autopilot lost and falling",
-        0.3,
+        0.8,
         LOST,
         vertical_speed=(-6.1, -5.9),
         tilt=(45.1, 44.9),
