@@ -30,8 +30,8 @@ _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 class Finding(NamedTuple):
     """holds None: it cannot be said. tell: says what was found, asked only where somebody reads
     it. samples: so many distinct ones came so far; -1: none do. doubted: the sensor that tells it
-    has just told what cannot be. expected: what cannot be said now was said a moment ago. presumed:
-    it is not known, and taken to be so."""
+    has just told what cannot be. expected: what cannot be said now was said a moment ago.
+    presumed: it is not known, and taken to be so."""
 
     holds: bool | None
     tell: Callable[[], str]
