@@ -77,6 +77,8 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     deadlines += [ask.at + ASK_LASTS for ask in state.asks.values()]
     if state.airborne:
         deadlines.append(flight.landed_at(config, state))
+        if state.stage is Stage.KILLING:
+            deadlines.append(flight.down_after_kill_at(config, state))
     deadlines += [one + _JUST_AFTER for one in rule_deadlines(config, state, now)]
     return min([deadline for deadline in deadlines if deadline > now], default=math.inf)
 
@@ -201,6 +203,15 @@ class _Update(Deploying):
         if in_air is False and not math.isnan(self.state.killed_height):
             # It has come down, whatever is told, or not told any more, from now on.
             self.state = replace(self.state, killed_height=math.nan)
+        if self._down_since_kill():
+            # As one that was killed on the ground: who lifts it is not to be met by its canopy.
+            self.state = replace(
+                self.state,
+                airborne=False,
+                killed_in_flight=False,
+                rebooted=False,
+                landed_at=self.now,
+            )
         if self.state.stage is Stage.LANDED and flight.disarmed(self.config, self.state, self.now):
             self.move(Stimulus.SECURED)
         if in_air is False and not self.state.flown and self.state.stage in ON_GROUND:
@@ -213,6 +224,12 @@ class _Update(Deploying):
             return True
         again = state.kill is not None and self.armed_since(state.kill)
         return not state.killed_in_flight and not state.deploy_rule and again
+
+    def _down_since_kill(self) -> bool:
+        """It was killed in the air, nothing is to follow, and it has come down for good."""
+        state = self.state
+        killed = state.stage is Stage.KILLING and state.killed_in_flight and not state.deploy_rule
+        return killed and self.now >= flight.down_after_kill_at(self.config, state)
 
     def _falls_since_kill(self) -> bool:
         """It was killed as one on the ground, and was in the air all the same."""
@@ -253,6 +270,7 @@ class _Update(Deploying):
             airborne=True,
             airborne_since=self.now,
             was_high=False,
+            took_off_height=flight.measured(self.config, self.state, "height", self.now),
             home=home,
             measurements=MappingProxyType(measurements),
             # What was acted on in an earlier flight says nothing about this one.
@@ -320,8 +338,7 @@ class _Update(Deploying):
             # It ends with the stage, by its limit or because a parachute is out.
             return self.state.stage is Stage.DEPLOYING and bool(pending.unreported())
         if action is Action.KILL:
-            limit = max(self.config.kill_timeout, self.config.deploy_timeout)
-            return self.now < pending.decided_at + limit and bool(pending.unreported())
+            return self.kill_can_help(pending) and bool(pending.unreported())
         return any(
             not self.evidence(link).silent(self.config.limits(link).lost_after, self.now)
             for link in pending.unreported()

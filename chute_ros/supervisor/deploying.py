@@ -75,14 +75,24 @@ class Deploying(Policy):
         since = self.state.stage_since
         back = any(self.evidence(rung.link).regained_at > since for rung in self.ladder)
         over = back or self.now >= since + self.config.deploy_timeout
-        in_air = flight.in_air(self.config, self.state, self.now)
-        if over and in_air and self.state.deploys and self.state.mode is i.Mode.ACTIVE:
+        if (
+            over
+            and self._still_in_air()
+            and self.state.deploys
+            and self.state.mode is i.Mode.ACTIVE
+        ):
             rule = self.state.deploys[0].decision.rule
             if rule != OPERATOR and too_low(self.config, self.state, self.now):
                 return
             waited = self.now - self.state.stage_since
             why = f"tried again {waited:.1f} s after the ladder's end: it is still in the air"
             self.order_deploy(rule, (why,))
+
+    def _still_in_air(self) -> bool:
+        """As the autopilot says; where it is silent, because it moves as nothing on the ground."""
+        in_air = flight.in_air(self.config, self.state, self.now)
+        moves = flight.moving(self.config, self.state, self.now)
+        return bool(in_air or (in_air is None and self.state.airborne and moves))
 
     def _climb(self) -> None:
         """Step by step, each with its limit. One whose node is silent is sent, not awaited."""

@@ -25,6 +25,9 @@ _LANDED_HOLD_AFTER_REBOOT = 10.0
 #: One that is armed and says so higher than a deploy needs, on a roof or a hill, for so long, s:
 #: the land detectors of autopilots have erred in a hover.
 _LANDED_HOLD_ALOFT = 5.0
+#: One that was killed in the air must say for so long that it stands, s: its motors are off by the
+#: kill, and a steady fall is taken for standing still where nothing tells its speed for a moment.
+_DOWN_AFTER_KILL = 10.0
 #: For so long after a landing a vehicle may turn out not to have landed, s.
 _FLIGHT_JUST_BEFORE = 60.0
 #: A climb rate needs heights this far apart at least, s.
@@ -168,6 +171,15 @@ def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
     return height
 
 
+def above_its_ground(state: State, height: float) -> float:
+    """A height above the ground of this flight, m, where that lies below home: an autopilot may
+    count from a home that is not where it was armed. NaN: that ground is not known."""
+    if math.isnan(state.took_off_height):
+        return math.nan
+    # One that sets its home anew on arming tells another height once it takes off.
+    return height - max(state.armed_height, state.took_off_height)
+
+
 def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> str:
     """Why a measurement cannot be used; empty: it can."""
     return reading(config, state, name, now)[1]
@@ -259,6 +271,12 @@ def _told_high(config: SupervisorConfig, state: State) -> bool:
 def landed_at(config: SupervisorConfig, state: State) -> float:
     """When one that says that it stands is believed, monotonic s; NaN: it does not say so."""
     return state.down_since + landed_hold(config, state)
+
+
+def down_after_kill_at(config: SupervisorConfig, state: State) -> float:
+    """When one that was killed in the air and says that it stands has come down for good,
+    monotonic s; NaN: it does not say so."""
+    return state.down_since + max(landed_hold(config, state), _DOWN_AFTER_KILL)
 
 
 def landed_hold(config: SupervisorConfig, state: State) -> float:

@@ -18,6 +18,8 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import BelowMinimum, Rule, is_silence
 from chute_ros.supervisor.state import State
 
+#: For so long after a kill in flight what tells of a vehicle that stands may be one that falls, s.
+_FALLS_AT_MOST = 60.0
 #: In place of a rule's name: a person ordered it.
 OPERATOR = "operator"
 #: Where a person may deploy without force.
@@ -48,11 +50,12 @@ def against_rule(
         state.stage is Stage.KILLING and state.killed_in_flight
     ):
         return f"the vehicle is {state.stage.name}, not in flight"
-    if flight.down_undisputed(config, state, now) and not _killed(state):
+    killed = _killed(state, now)
+    if flight.down_undisputed(config, state, now) and not killed:
         return "the vehicle says that it stands, and nothing contradicts it"
-    if flight.disarmed(config, state, now) and not _killed(state):
+    if flight.disarmed(config, state, now) and not killed:
         return "the motors are disarmed, and nothing says that it falls"
-    if _killed(state) and flight.in_air(config, state, now) is False:
+    if killed and flight.in_air(config, state, now) is False:
         return "the vehicle has come down"
     told = [
         finding
@@ -86,14 +89,16 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if known.has_jumped(now) and known.value < known.before_jump:
         height = math.nan  # it has jumped down: that it is low may be as wrong as before
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
-    if -profile.minimum_height <= height < profile.minimum_height:
+    low = -profile.minimum_height <= height < profile.minimum_height
+    if low and not flight.above_its_ground(state, height) >= profile.minimum_height:
         return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"
     if profile.minimum_height > 0.0 and not state.was_high:
         return f"it was never seen at the minimum height, {profile.minimum_height:g} m"
     return ""
 
 
-def _killed(state: State) -> bool:
-    """Our own kill was decided in flight: motors that are off since then are its effect."""
+def _killed(state: State, now: float) -> bool:
+    """Our own kill was decided in flight, and not long ago: motors that are off since then are
+    its effect."""
     in_flight = state.killed_in_flight and not state.killed_standing
-    return in_flight and state.stage is Stage.KILLING
+    return in_flight and state.stage is Stage.KILLING and now < state.killed_at + _FALLS_AT_MOST

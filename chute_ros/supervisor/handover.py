@@ -51,6 +51,7 @@ def told(state: State, now: float) -> str:
         rebooted=state.rebooted,
         reboots_before=state.reboots_before,
         armed_height=state.armed_height,
+        took_off_height=state.took_off_height,
         home=state.home,
         released_before=state.released_before,
         device_blocks=state.device_blocks,

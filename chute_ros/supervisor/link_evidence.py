@@ -174,4 +174,5 @@ class LinkEvidence:
             self.heard + limits.stale_after,
             self.heard + limits.lost_after,
             self.regained_at + limits.regain_after,
+            self.released_at + limits.lost_after,
         )

@@ -40,6 +40,7 @@ class Stimulus(enum.Enum):
     DEPLOY_DUE = "the kill is confirmed or its time is over, and a deploy follows"
     PARACHUTE_OPEN = "a parachute says that it was released"
     TAKEN_BACK = "a parachute that nobody ordered to release says no more that it is out"
+    MODE_CHANGED = "a person changed the mode while a deploy was under way"
     DEPLOY_FAILED = "no parachute confirmed in time"
     RESET = "a person asked for the start"
 
@@ -74,6 +75,7 @@ TRANSITIONS: dict[tuple[Stage, Stimulus], Stage] = {
     (_S.KILLING, _E.PARACHUTE_OPEN): _S.DEPLOYED,
     (_S.KILLING, _E.RESET): _S.STARTUP,
     (_S.DEPLOYING, _E.PARACHUTE_OPEN): _S.DEPLOYED,
+    (_S.DEPLOYING, _E.MODE_CHANGED): _S.KILLING,
     (_S.DEPLOYING, _E.DEPLOY_FAILED): _S.FAULT,
     (_S.DEPLOYED, _E.KILL): _S.KILLING,
     (_S.DEPLOYED, _E.TAKEN_BACK): _S.IN_FLIGHT,

@@ -188,6 +188,8 @@ class Measured:
             return replace(
                 self,
                 rejected=wrong,
+                # One that is not a number is one that was not told.
+                doubted_at=sample.measured_at if math.isfinite(sample.value) else self.doubted_at,
                 candidate=math.nan,
                 candidate_at=math.nan,
                 candidates=0,

@@ -27,7 +27,8 @@ class Orders(Steps):
         self.end_kill()
         if token:
             self.state = replace(self.state, kill_tokens=(*self.state.kill_tokens, token))
-        if self.state.stage is not Stage.DEPLOYED:
+        # Beside an open canopy it changes nothing else; nor does it end what FAULT tries again.
+        if self.state.stage not in (Stage.DEPLOYED, Stage.FAULT):
             self._to_killing("; ".join(reasons))
         if not self._kill_joined(token):
             self.fire(Action.KILL, rule, reasons)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from types import MappingProxyType
 
-from chute_ros.model import Armed, LinkState, Outcome, VehicleState
+from chute_ros.model import Action, Armed, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
@@ -76,6 +76,16 @@ class Reports(Requests):
                     # It may have erred when it said so; with nothing out, the rules must live.
                     self.alarm(text)
                     self.move(Stimulus.TAKEN_BACK, text)
+                    self._unlatch_deploys()
+
+    def _unlatch_deploys(self) -> None:
+        """What a deploy rule was acted on for has not been done."""
+        deploys = {one.name for one in self.config.profile.rules if one.action is Action.DEPLOY}
+        rules = {
+            name: replace(evidence, latched=evidence.latched and name not in deploys)
+            for name, evidence in self.state.rules.items()
+        }
+        self.state = replace(self.state, rules=MappingProxyType(rules))
 
     def vehicle(self, one: i.VehicleReport) -> None:
         """What the vehicle is told to be, and each measurement in it as evidence."""

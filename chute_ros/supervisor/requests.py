@@ -145,7 +145,8 @@ class Requests(Orders):
             self.give_up_waiting(f"mode changed to {one.mode.name}")
             self.state = replace(self.state, kill=None, deploys=())
             if stage is Stage.DEPLOYING:
-                self.move(Stimulus.DEPLOY_FAILED, "the mode was changed")
+                # What is judged anew must find a stage in which the rules live.
+                self.move(Stimulus.MODE_CHANGED)
             block = self.state.block
             if block is not None and (
                 block.decision.action is Action.FLIGHT_BLOCK or block.unreported()

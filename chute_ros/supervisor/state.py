@@ -168,6 +168,8 @@ class State:
     reboots_before: int = 0
     #: Height when it was armed, m; 0: not seen.
     armed_height: float = 0.0
+    #: Height when it was last seen to take off, m; NaN: not known.
+    took_off_height: float = math.nan
     #: Degrees; where it took off.
     home: tuple[float, float] | None = None
     #: (link, device) that were released before the flight: they say nothing of what happens in it.
@@ -201,11 +203,12 @@ class State:
         return self.links.get(link, _NEVER_HEARD)
 
     def links_heard(self, config: SupervisorConfig, now: float) -> int:
-        """How many links have a node that is not silent."""
-        return sum(
+        """How many links have a node that is not silent; the vehicle counts as one more."""
+        links = [
             not self.evidence(link).silent(config.limits(link).lost_after, now)
             for link in config.links
-        )
+        ]
+        return sum(links) + (now - self.vehicle_received <= config.vehicle_state_age)
 
     def newest_heartbeat(self) -> float:
         """When any link was last heard, monotonic s; NaN: none ever was."""

@@ -117,7 +117,12 @@ class Steps:
             )
             return stage is not Stage.DEPLOYING and not under_way
         if slot == "kill":
-            return stage in (Stage.KILLING, Stage.DEPLOYING, Stage.DEPLOYED)
+            if self.state.deploy_rule or stage is Stage.DEPLOYED:
+                return stage in (Stage.KILLING, Stage.DEPLOYING, Stage.DEPLOYED)
+            # One that failed long ago is not what a node that is back must do.
+            kill = self.state.kill
+            young = kill is not None and self.kill_can_help(kill)
+            return young and stage in (Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
         return stage is Stage.DEPLOYING
 
     def renew(self, slot: Slot, why: str) -> None:
@@ -214,6 +219,11 @@ class Steps:
         """Nobody has confirmed it, and nobody is expected to any more."""
         late = self.now >= kill.decided_at + self.config.kill_timeout
         return not kill.confirmed and (late or kill.all_failed())
+
+    def kill_can_help(self, kill: Pending) -> bool:
+        """It was decided so short a time ago that it is still meant."""
+        limit = max(self.config.kill_timeout, self.config.deploy_timeout)
+        return self.now < kill.decided_at + limit
 
     def end_kill(self) -> None:
         """Say how the kill went as soon as that is known, before another takes its place."""

@@ -81,14 +81,19 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         state.reboots_before,
         state.killed_standing,
         _left(flight.height_since_kill(config, state, now), config.profile.minimum_height),
-        round(state.killed_sinking, 3) if not math.isnan(state.killed_sinking) else None,
-        _since(state.down_since, now, flight.landed_hold(config, state)),
+        _known(state.killed_sinking),
+        _since(state.down_since, now, flight.down_after_kill_at(config, state) - state.down_since),
         round(state.armed_height, 3),
+        _known(state.took_off_height),
         tuple(sorted(state.released_before)),
         tuple(sorted(state.device_blocks)),
         (len(state.kill_tokens) > 0, len(state.deploy_tokens) > 0),
         (bool(state.alarms), math.isnan(state.alarm_at)),
     )
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 3)
 
 
 def _left(height: float, minimum: float) -> float:

@@ -200,12 +200,12 @@ def test_inhibited_a_node_that_restarts_is_told_nothing() -> None:
     assert len(story.decisions()) == count
 
 
-def test_leaving_active_after_the_deploy_left_is_a_fault_that_may_be_tried_again() -> None:
+def test_leaving_active_after_the_deploy_left_ends_it_and_it_may_be_ordered_again() -> None:
     story = Story().flying()
     story.at(1.0, i.DeployRequest(1, False, "it falls"))
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     story.at(1.2, i.ModeRequest(2, i.Mode.INHIBITED, force=True))
-    assert story.state.stage is Stage.FAULT
+    assert story.state.stage is Stage.KILLING
     story.at(1.3, i.ModeRequest(3, i.Mode.ACTIVE, force=True))
     story.at(1.4, i.DeployRequest(4, False, "it still falls"))
     story.at(1.5, story.report(K, Outcome.CONFIRMED))

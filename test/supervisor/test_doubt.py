@@ -193,6 +193,17 @@ def test_a_force_that_is_noise_does_not_keep_what_it_counted() -> None:
     assert story.fired() == []
 
 
+def test_an_accelerometer_that_tells_random_bits_ends_no_flight() -> None:
+    """Given an IMU alone: of its numbers most are out of range, and the others are nearly 0."""
+    unknown = {"vertical_speed": math.nan, "height": math.nan}
+    for forces in ((1e30, 0.0), (1e30, 1e30, 1e30, 1e-9, 1e-5), (1e30, 1e-3, 1e-4, 1e-6)):
+        story = flying().fly(4.0, 0.02, **LOST, **unknown)
+        for step in range(200):
+            force = forces[step % len(forces)] * (1.0 + step * 1e-3)
+            story.fly(story.t + 0.02, 0.02, **LOST, **unknown, acceleration=force)
+        assert story.fired() == []
+
+
 def test_a_date_that_goes_back_puts_no_value_in_doubt() -> None:
     """Given two sources of one truth, of which one is told later: its dates go back and forth."""
     story = flying().fly(1.0)

@@ -240,7 +240,7 @@ def test_the_alarm_goes_on_while_somebody_kills_once_more() -> None:
     story = at_its_end()
     story.at(1.5, i.KillRequest(9, "operator", "stop"))
     story.at(20.0)
-    assert story.state.stage is Stage.KILLING
+    assert story.state.stage is Stage.FAULT
     assert len(alarm_times(story)) == 10
 
 

@@ -1,11 +1,12 @@
 """The gate word for word and at its limits: what mutants showed that no story looked at."""
 
+import math
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import LINK, SINKS, Story, parachute, rule, with_rules
+from story import DOWN, LINK, SINKS, Story, parachute, rule, shipped, with_rules
 
 from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome
 from chute_ros.supervisor import gate
@@ -85,11 +86,12 @@ def test_a_rule_hears_why(told: dict[str, Any], why: str) -> None:
 def test_a_rule_hears_that_it_has_come_down() -> None:
     story = flying()
     story.at(0.65, story.heartbeat())
-    state = replace(story.state, stage=Stage.KILLING, killed_in_flight=True)
     now = story.state.updated_at
+    state = replace(story.state, stage=Stage.KILLING, killed_in_flight=True, killed_at=now)
     assert gate.against_rule(story.config, state, RULE, (HOLDS,), now) == ""
     down = flying(landed_state=LandedState.ON_GROUND).state
     down = replace(down, stage=Stage.KILLING, killed_in_flight=True, down_since=900.0)
+    down = replace(down, killed_at=down.updated_at - 59.0)
     assert gate.against_rule(story.config, down, RULE, (HOLDS,), down.updated_at) == (
         "the vehicle has come down"
     )
@@ -111,11 +113,12 @@ def test_findings_that_do_not_belong_to_the_rule_are_an_error() -> None:
 def test_a_kill_of_one_that_stood_or_of_another_stage_excuses_nothing() -> None:
     state = flying(armed=Armed.DISARMED).state
     config, now = with_rules(), state.updated_at
-    killed = replace(state, stage=Stage.KILLING, killed_in_flight=True)
+    killed = replace(state, stage=Stage.KILLING, killed_in_flight=True, killed_at=now - 59.9)
     assert gate.against_rule(config, killed, RULE, (HOLDS,), now) == ""
+    long_ago = replace(killed, killed_at=now - 60.0)
     standing = replace(killed, killed_standing=True)
     earlier = replace(killed, stage=Stage.IN_FLIGHT)
-    for one in (standing, earlier):
+    for one in (standing, earlier, long_ago):
         assert gate.against_rule(config, one, RULE, (HOLDS,), now) == (
             "the motors are disarmed, and nothing says that it falls"
         )
@@ -195,6 +198,54 @@ def test_too_low_to_the_last_bit(height: float, minimum: float, was_high: bool, 
     assert gate.too_low(config, state, state.updated_at) == why
     anywhere = replace(profile, below_minimum=BelowMinimum.DEPLOY)
     assert gate.too_low(replace(config, profile=anywhere), state, state.updated_at) == ""
+
+
+@pytest.mark.parametrize(
+    ("armed", "took_off", "height", "held_back"),
+    [
+        (-20.0, -19.0, 8.9, False),
+        (-20.0, -10.0, -0.1, True),
+        (-20.0, -10.0, 0.0, False),
+        (-10.0, -20.0, 0.0, False),
+        (-10.0, -20.0, -0.1, True),
+        # It counts from where it was armed since it was armed.
+        (-20.0, 0.5, 9.0, True),
+        (0.0, math.nan, 9.0, True),
+        (0.0, 0.5, -5.0, True),
+        # On a hill the ground is higher than home.
+        (50.0, 50.0, 55.0, False),
+    ],
+)
+def test_what_is_low_above_home_may_be_high_above_the_ground_of_this_flight(
+    armed: float, took_off: float, height: float, held_back: bool
+) -> None:
+    now = 1000.0
+    profile = Profile("tested", (), minimum_height=10.0, below_minimum=BelowMinimum.KILL)
+    known = MappingProxyType({"height": Measured(height, now, now, 9)})
+    state = State(
+        epoch=7,
+        started_at=0.0,
+        was_high=True,
+        measurements=known,
+        armed_height=armed,
+        took_off_height=took_off,
+    )
+    assert bool(gate.too_low(SupervisorConfig(profile=profile), state, now)) is held_back
+
+
+def test_one_that_flies_from_a_ground_below_home_is_deployed() -> None:
+    """Given one that landed 20 m below home, was armed there and flies 28 m above that ground."""
+    story = Story(shipped("multirotor")).ready().fly(5.0, height=20.0)
+    for step in range(270):
+        height = max(20.0 - 0.15 * step, -20.0)
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=-1.5)
+    story.fly(42.0, every=0.1, height=-20.0, vertical_speed=0.0, **DOWN)
+    story.fly(44.0, height=-20.0, vertical_speed=0.0, landed_state=LandedState.ON_GROUND)
+    for step in range(140):
+        story.fly(story.t + 0.1, every=0.1, height=-20.0 + 0.2 * step, vertical_speed=1.5)
+    assert story.state.took_off_height < -19.0
+    story.fall(story.t + 2.0, height=8.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
 
 
 # -- a height that has jumped --------------------------------------------------------------------

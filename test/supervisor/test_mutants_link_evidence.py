@@ -73,4 +73,8 @@ def test_it_is_looked_at_again_when_it_grows_stale_lost_or_is_regained() -> None
     never = heard((2.0, beat())).deadlines(LIMITS)
     assert never[:2] == (2.5, 3.0)
     assert math.isnan(never[2]), "it was never lost"
-    assert heard((2.0, beat()), (8.0, beat()), (8.4, beat())).deadlines(LIMITS) == (8.9, 9.4, 9.0)
+    assert math.isnan(never[3]), "none was released"
+    regained = heard((2.0, beat()), (8.0, beat()), (8.4, beat())).deadlines(LIMITS)
+    assert regained[:3] == (8.9, 9.4, 9.0)
+    released = LinkEvidence(released_at=5.0).deadlines(LIMITS)
+    assert released[3] == 6.0, "its word counts no longer than its node may be silent"

@@ -44,6 +44,7 @@ EXPECTED = {
     ),
     "DEPLOYING": (
         "PARACHUTE_OPEN DEPLOYED",
+        "MODE_CHANGED KILLING",
         "DEPLOY_FAILED FAULT",
     ),
     "DEPLOYED": (

@@ -180,6 +180,13 @@ def test_a_jump_back_ends_the_doubt(back_to: float, over: bool) -> None:
     assert math.isnan(known.before_jump) is over
 
 
+def test_after_one_out_of_range_it_is_doubted_for_a_second_but_not_after_none() -> None:
+    known = heights((100.0, 0.0), (9999.0, 0.1), (100.1, 0.2))
+    assert known.doubted_at == 0.1
+    assert "another was not taken" in known.doubt("height", 0.3)
+    assert math.isnan(heights((100.0, 0.0), (math.nan, 0.1), (100.1, 0.2)).doubted_at)
+
+
 def test_what_cannot_be_at_all_forgets_what_was_doubted() -> None:
     known = heights((100.0, 0.0), (60.0, 0.1), (9999.0, 0.15))
     assert known.candidates == 0

@@ -193,5 +193,6 @@ def test_a_kill_after_a_failed_test_on_the_ground_is_none_in_flight() -> None:
     assert story.state.stage is Stage.FAULT
     story.at(0.4, i.KillRequest(6, "operator", "stop"))
     story.at(0.5, story.report(K, Outcome.CONFIRMED))
-    assert story.state.stage is Stage.KILLING
+    assert story.answer(6).success
+    assert story.state.stage is Stage.FAULT
     assert not story.state.killed_in_flight

@@ -426,7 +426,7 @@ def test_a_mode_that_ends_a_deploy_says_so() -> None:
     story.at(1.0, i.DeployRequest(1, False, "it falls"))
     story.at(1.1, story.report(K, Outcome.CONFIRMED))
     story.at(1.2, i.ModeRequest(2, i.Mode.INHIBITED, force=True))
-    line = "DEPLOYING -> FAULT: no parachute confirmed in time (the mode was changed)"
+    line = "DEPLOYING -> KILLING: a person changed the mode while a deploy was under way"
     assert line in story.said().splitlines()
     assert (story.state.kill, story.state.deploys) == (None, ())
 

@@ -129,6 +129,17 @@ def test_a_link_is_heard_as_long_as_its_own_limits_say() -> None:
     assert counts == [2, 1, 1, 0]
 
 
+@pytest.mark.parametrize(
+    ("passed", "count"), [(0.0, 2), (2.5, 2), (2.51, 1)], ids=["now", "at its limit", "old"]
+)
+def test_a_vehicle_that_is_heard_counts_as_one_more(passed: float, count: int) -> None:
+    config = SupervisorConfig(vehicle_state_age=2.5)
+    now = 10.0 + passed
+    links = MappingProxyType({LINK: LinkEvidence(heard=now)})
+    state = State(epoch=7, started_at=0.0, links=links, vehicle_received=10.0)
+    assert state.links_heard(config, now) == count
+
+
 def test_the_newest_heartbeat_is_that_of_any_link() -> None:
     assert math.isnan(State(epoch=7, started_at=0.0).newest_heartbeat())
     heard = {"a": LinkEvidence(), "b": LinkEvidence(heard=12.0), "c": LinkEvidence(heard=11.0)}

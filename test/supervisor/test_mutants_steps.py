@@ -33,6 +33,10 @@ def decided(number: int, action: Action, *targets: str, **known: Any) -> Pending
     return Pending(decision, targets or BOTH, 90.0, 90.0, **known)
 
 
+#: A kill that is still meant, and one that is not: deploy_timeout is 8 s.
+OLD, YOUNG = decided(1, K), replace(decided(1, K), decided_at=92.5)
+
+
 def reports(**outcomes: Outcome) -> MappingProxyType[str, frozenset[Outcome]]:
     links = {"a": LINK, "b": UPF}
     return MappingProxyType({links[name]: frozenset({one}) for name, one in outcomes.items()})
@@ -116,12 +120,16 @@ def test_no_kill_leaves_from_one_that_follows() -> None:
     [
         (Stage.READY, {}, (True, False, False)),
         (Stage.IN_FLIGHT, {}, (True, False, False)),
-        (Stage.KILLING, {}, (True, True, False)),
-        (Stage.KILLING, {"killed_in_flight": True}, (False, True, False)),
-        (Stage.KILLING, {"deploy_rule": "tested"}, (False, True, False)),
-        (Stage.DEPLOYING, {}, (False, True, True)),
-        (Stage.DEPLOYED, {}, (True, True, False)),
-        (Stage.FAULT, {"killed_in_flight": True}, (True, False, False)),
+        (Stage.KILLING, {}, (True, False, False)),
+        (Stage.KILLING, {"kill": YOUNG}, (True, True, False)),
+        (Stage.KILLING, {"kill": OLD}, (True, False, False)),
+        (Stage.KILLING, {"kill": YOUNG, "killed_in_flight": True}, (False, True, False)),
+        (Stage.KILLING, {"kill": OLD, "deploy_rule": "tested"}, (False, True, False)),
+        (Stage.DEPLOYING, {"kill": OLD, "deploy_rule": "tested"}, (False, True, True)),
+        (Stage.DEPLOYED, {"kill": OLD}, (True, True, False)),
+        (Stage.FAULT, {"kill": YOUNG, "killed_in_flight": True}, (True, True, False)),
+        (Stage.FAULT, {"kill": OLD}, (True, False, False)),
+        (Stage.IN_FLIGHT, {"kill": YOUNG}, (True, False, False)),
     ],
 )
 def test_each_stage_wants_what_still_helps(
@@ -133,7 +141,7 @@ def test_each_stage_wants_what_still_helps(
 
 def test_what_is_decided_anew_keeps_its_order_and_its_limits() -> None:
     kill = decided(1, K, given_up=True, details=("old",))
-    one = steps(stage=Stage.KILLING, kill=kill, next_id=4)
+    one = steps(stage=Stage.KILLING, kill=kill, next_id=4, deploy_rule="tested")
     one.renew("kill", "it restarted")
     one.renew("kill", "it restarted")
     decisions = [output.decision for output in one.outputs if isinstance(output, i.Decide)]

@@ -418,6 +418,24 @@ def test_a_flight_computer_in_fault_is_an_alarm(name: str) -> None:
     assert story.fired() == []
 
 
+@pytest.mark.parametrize(("climbs", "fires"), [(60.0, False), (12.0, False), (8.0, True)])
+def test_a_rocket_that_climbs_is_not_ended_by_its_speed_alone(climbs: float, fires: bool) -> None:
+    """Given a speed that is suddenly 33 m/s down, which at ten samples a second is no jump."""
+    story = Story(shipped("rocket")).ready()
+    for step in range(80):
+        told = {"height": 300.0 + climbs * step * 0.1, "acceleration": 0.5}
+        speed = climbs if step < 20 else -33.0 - step % 7 * 0.1
+        story.fly(story.t + 0.1, every=0.1, vertical_speed=speed, **told)
+    assert bool(story.fired()) is fires
+
+
+@pytest.mark.parametrize("height", [3000.0, math.nan])
+def test_a_rocket_that_falls_is_deployed_beside_heights_that_tell_nothing(height: float) -> None:
+    story = Story(shipped("rocket")).ready().fly(1.0, height=3000.0, vertical_speed=1.0)
+    story.sink(story.t + 8.0, 60.0, height=height, acceleration=3.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+
+
 def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
     story = Story(shipped("rocket")).ready().fly(1.0)
     abnormal(story)
