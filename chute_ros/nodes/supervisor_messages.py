@@ -51,15 +51,10 @@ def state_message(config: SupervisorConfig, state: State, now: float, stamp: Tim
         for name in config.profile.limits
         if (why := unusable(config, state, name, now))
     ]
-    newest = max(
-        (p.decision for p in (state.block, state.kill, *state.deploys) if p is not None),
-        key=lambda decision: decision.id,
-        default=None,
-    )
-    if newest is not None:
-        message.decision_id = newest.id
-        message.decision_action = int(newest.action)
-        message.decision_rule = newest.rule
+    if state.newest is not None:
+        message.decision_id = state.newest.id
+        message.decision_action = int(state.newest.action)
+        message.decision_rule = state.newest.rule
     return message
 
 

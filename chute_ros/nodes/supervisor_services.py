@@ -133,6 +133,7 @@ class SupervisorServices:
             response.message = f"mode {request.mode}: need ACTIVE 0, SHADOW 1 or INHIBITED 2"
             return response
         mode = inputs.Mode(request.mode)
-        end = await self._ask(lambda t: inputs.ModeRequest(t, mode, request.force))
+        force, why = request.force, request.reason
+        end = await self._ask(lambda t: inputs.ModeRequest(t, mode, force, why))
         response.success, response.message = end.success, end.message
         return response

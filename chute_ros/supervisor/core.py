@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from types import MappingProxyType
 
-from chute_ros.model import Action
+from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
@@ -28,6 +28,8 @@ from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 _PERSONS = (i.ArmRequest, i.DeployRequest, i.ResetRequest, i.ModeRequest)
 #: What the health of the links can do; in flight nothing.
 _OF_LINKS = (Stimulus.LINKS_UNHEALTHY, Stimulus.LINKS_HEALTHY)
+#: Once `safety/arm` has armed the parachutes, their own status says so within this time, s.
+_ARMED_SHOWS = 2.0
 #: A vehicle that nobody watched may have climbed as fast, m/s.
 _CLIMBS_UNSEEN = 20.0
 #: A limit that an age may just reach has passed this much later, s.
@@ -58,6 +60,8 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
         since = state.vehicle_received - state.vehicle.armed_age
         # Just after the limit, which still counts as young enough.
         deadlines.append(math.nextafter(since + config.vehicle_state_age, math.inf) + _JUST_AFTER)
+    if state.stage is Stage.ARMED:
+        deadlines.append(state.stage_since + _ARMED_SHOWS)
     if state.stage is Stage.STARTUP:
         deadlines += [state.started_at + config.limits(one).startup_grace for one in config.links]
     if state.stage is Stage.DEPLOYED and state.deploy_tokens:
@@ -176,6 +180,7 @@ class _Update(Deploying):
         self._note_height()
         self.look_at_parachutes()
         self.look_at_rules()
+        self._look_at_armed()
         # After the rules, of which one may block flight.
         self._look_at_links()
         self.look_at_kill()
@@ -277,6 +282,22 @@ class _Update(Deploying):
             rules=MappingProxyType({}) if anew else self.state.rules,
             asks=MappingProxyType({}) if anew else self.state.asks,
         )
+
+    def _look_at_armed(self) -> None:
+        """ARMED is what the parachutes say: one may be disarmed past us, or start anew."""
+        state = self.state
+        if state.stage is not Stage.ARMED or self.now < state.stage_since + _ARMED_SHOWS:
+            return
+        said = [
+            status.armed
+            for link in self.config.deploy_links
+            for status in state.evidence(link).devices.values()
+            if status.link_state is LinkState.OK
+        ]
+        if said and not any(said):
+            text = "no parachute says any more that it is armed"
+            self.outputs.append(i.Say(text, alarm=True))
+            self.move(Stimulus.DISARMED, text)
 
     def _look_at_links(self) -> None:
         stage = self.state.stage

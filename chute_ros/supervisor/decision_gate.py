@@ -65,8 +65,10 @@ class DecisionGate:
     acted: deque[tuple[int, int]] = field(default_factory=lambda: deque(maxlen=50))
 
     def judge(self, decision: Decision, age: float) -> Verdict:
-        """What to do with decision, which is age seconds old. Only ACT is remembered as seen."""
+        """What to do with decision, which is age seconds old. Of one for others the epoch is
+        remembered, of one for this link that it was acted on."""
         if self.link not in decision.targets:
+            self._note_term(decision, age)
             return Verdict.NOT_ADDRESSED
         if decision.shadow:
             return Verdict.SHADOW
@@ -76,13 +78,22 @@ class DecisionGate:
             return Verdict.REPEATED
         if not newer and not self._missed_kill(decision):
             return Verdict.OLDER
-        if not -self.max_decision_age <= age <= self.max_decision_age:
+        if not self._young(age):
             return Verdict.TOO_LATE
         if newer:
             self.newest_epoch, self.newest_id = order
             self.newest_action = decision.action
         self.acted.append(order)
         return Verdict.ACT
+
+    def _young(self, age: float) -> bool:
+        return -self.max_decision_age <= age <= self.max_decision_age
+
+    def _note_term(self, decision: Decision, age: float) -> None:
+        """Who decides for others under a higher epoch leads: who led before it does so no more."""
+        if not decision.shadow and self._young(age) and decision.epoch > self.newest_epoch:
+            self.newest_epoch, self.newest_id = decision.epoch, 0
+            self.newest_action = Action.NONE
 
     def _missed_kill(self, decision: Decision) -> bool:
         """The kill that belongs before a deploy, and was lost on its way: turning motors tear an

@@ -52,6 +52,7 @@ def told(state: State, now: float) -> str:
         reboots_before=state.reboots_before,
         armed_height=state.armed_height,
         took_off_height=state.took_off_height,
+        newest=state.newest,
         home=state.home,
         released_before=state.released_before,
         device_blocks=state.device_blocks,
@@ -88,6 +89,8 @@ def check_numbers(state: State) -> None:
     """RecordError for numbers under which nothing can be decided nor told."""
     pending = [one for one in (state.block, state.kill, *state.deploys) if one is not None]
     numbers = [(state.epoch, state.next_id), *(one.number for one in pending)]
+    if state.newest is not None:
+        numbers.append((state.newest.epoch, state.newest.id))
     for epoch, number in numbers:
         if not (1 <= epoch <= LARGEST_EPOCH and 1 <= number <= _LARGEST_ID):
             raise RecordError(f"no decision has the number {epoch}.{number}")

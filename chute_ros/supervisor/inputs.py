@@ -122,6 +122,7 @@ class ModeRequest:
     token: int
     mode: Mode
     force: bool
+    reason: str = ""
 
 
 @dataclass(frozen=True)

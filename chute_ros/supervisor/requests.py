@@ -159,6 +159,8 @@ class Requests(Orders):
         else:
             # What was said in the other mode was not sent; what holds now is decided anew.
             self.state = replace(self.state, block=None)
+        why = one.reason or "no reason given"
+        self.outputs.append(i.Say(f"mode {before.name} -> {one.mode.name} ({why})"))
         # What was only said in one mode is done in the other.
         self.state = replace(self.state, mode=one.mode, rules=MappingProxyType({}))
         self.finish(one.token, True, True, f"mode {one.mode.name}")

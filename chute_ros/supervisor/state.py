@@ -112,6 +112,8 @@ class State:
     #: It holds the lease: what it decides is sent. One that follows only looks on.
     leading: bool = True
     next_id: int = 1
+    #: What was decided last, also where that was only said.
+    newest: Decision | None = None
     updated_at: float = math.nan
     #: Updates that came later than their deadline allows.
     late_count: int = 0

@@ -88,7 +88,7 @@ class Steps:
             state.epoch, state.next_id, action, rule, reasons, targets, shadow, device
         )
         self.outputs.append(i.Decide(decision))
-        self.state = replace(state, next_id=state.next_id + 1)
+        self.state = replace(state, next_id=state.next_id + 1, newest=decision)
         return decision
 
     def decide(

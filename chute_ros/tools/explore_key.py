@@ -26,6 +26,7 @@ LEFT_OUT = frozenset(
         "late_count",
         "updated_at",  # always now
         "next_id",
+        "newest",
         "epoch",
         "deploy_reasons",
         "block_refused",

@@ -1,5 +1,6 @@
 """The gate before a device: a decision passes once, if it is addressed, real, new and young."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,6 +29,30 @@ def test_a_young_new_decision_for_us_is_acted_on_once() -> None:
 def test_a_decision_for_others_is_not_ours() -> None:
     assert gate().judge(decision(targets=("upf_can",)), 0.0) is Verdict.NOT_ADDRESSED
     assert gate().judge(decision(targets=()), 0.0) is Verdict.NOT_ADDRESSED
+
+
+def test_who_led_before_another_decided_for_others_is_not_obeyed() -> None:
+    one = gate()
+    assert one.judge(decision(epoch=5, number=3), 0.0) is Verdict.ACT
+    assert one.judge(decision(epoch=6, number=9, targets=("upf_can",)), 0.5) is (
+        Verdict.NOT_ADDRESSED
+    )
+    assert one.judge(decision(epoch=5, number=4), 0.0) is Verdict.OLDER
+    assert (one.newest_epoch, one.newest_id, one.newest_action) == (6, 0, Action.NONE)
+    assert one.judge(decision(epoch=6, number=1), 0.0) is Verdict.ACT
+    # Within one term the numbers of others say nothing.
+    assert one.judge(decision(epoch=6, number=20, targets=("upf_can",)), 0.0) is (
+        Verdict.NOT_ADDRESSED
+    )
+    assert one.judge(decision(epoch=6, number=2), 0.0) is Verdict.ACT
+
+
+@pytest.mark.parametrize(("shadow", "age"), [(True, 0.0), (False, 0.51), (False, -0.51)])
+def test_what_is_only_said_or_old_shows_no_other_leader(shadow: bool, age: float) -> None:
+    one = gate()
+    other = decision(epoch=6, number=9, targets=("upf_can",), shadow=shadow)
+    assert one.judge(other, age) is Verdict.NOT_ADDRESSED
+    assert one.judge(decision(epoch=5, number=1), 0.0) is Verdict.ACT
 
 
 def test_a_shadow_decision_is_only_said_and_not_remembered() -> None:

@@ -87,6 +87,7 @@ def leader(clock: float) -> State:
         reboots_before=3,
         armed_height=2.0,
         took_off_height=3.0,
+        newest=pending(Action.KILL, clock).decision,
         home=(48.0, 11.0),
         released_before=frozenset({("upf_can", "33")}),
         device_blocks=MappingProxyType({"upf_can 33": "it burns"}),

@@ -411,6 +411,9 @@ def test_a_mode_is_answered_in_whole_words() -> None:
     story.at(0.3, i.DeployRequest(3, False, "it falls"), i.KillRequest(4, "operator", "stop"))
     story.at(0.4, i.ModeRequest(5, i.Mode.SHADOW, force=True))
     assert story.answer(5) == i.Finish(5, True, True, "mode SHADOW")
+    assert "mode ACTIVE -> SHADOW (no reason given)" in story.said().splitlines()
+    story.at(story.t + 0.1, i.ModeRequest(6, i.Mode.ACTIVE, True, "the test is over"))
+    assert "mode SHADOW -> ACTIVE (the test is over)" in story.said().splitlines()
     assert story.answer(3) == i.Finish(3, False, False, "mode changed to SHADOW")
     assert story.answer(4) == i.Finish(4, False, False, "mode changed to SHADOW")
 

@@ -1,0 +1,79 @@
+"""ARMED is what the parachutes say, not what was commanded once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from story import LINK, STANDING, START, Story, parachute
+
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.core import next_deadline
+from chute_ros.supervisor.machine import Stage
+
+UPF = "upf_can"
+GONE = "no parachute says any more that it is armed"
+
+
+def says(armed: bool, link: str = LINK, alive: bool = True) -> i.ParachuteReport:
+    told = parachute(link, alive=alive)
+    return replace(told, status=replace(told.status, armed=armed))
+
+
+def armed(**config: Any) -> Story:
+    """Armed at t = 0 through safety/arm."""
+    story = Story(SupervisorConfig(**config)).ready()
+    story.at(0.0, says(True), i.ArmDone(1, True, True, "armed"))
+    assert story.state.stage is Stage.ARMED
+    return story
+
+
+def keeps_saying(story: Story, until: float, *told: i.ParachuteReport) -> None:
+    while story.t < until - 1e-9:
+        beats = [story.heartbeat(one) for one in (LINK, UPF)]
+        story.at(story.t + 0.1, *beats, i.VehicleReport(STANDING), *told)
+
+
+def test_one_that_was_disarmed_past_the_supervisor_is_armed_no_more() -> None:
+    story = armed()
+    keeps_saying(story, 5.0, says(True))
+    assert story.state.stage is Stage.ARMED
+    story.at(5.1, story.heartbeat(), says(False))
+    assert story.state.stage is Stage.READY
+    assert story.alarms() == [GONE]
+    assert f"ARMED -> READY: the parachute was disarmed ({GONE})" in story.said()
+
+
+@pytest.mark.parametrize(("after", "stage"), [(1.9, Stage.ARMED), (2.05, Stage.READY)])
+def test_its_status_has_two_seconds_to_show_it(after: float, stage: Stage) -> None:
+    story = armed()
+    keeps_saying(story, 1.8, says(False))
+    story.at(after, story.heartbeat())
+    assert story.state.stage is stage
+
+
+def test_the_core_wakes_for_it_by_itself() -> None:
+    story = armed()
+    keeps_saying(story, 1.9, says(False))
+    assert next_deadline(story.config, story.state, START + 1.95) == START + 2.0
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        # Nothing is known of it any more.
+        (says(False, alive=False),),
+        # One of two is.
+        (says(False), says(True, UPF)),
+        # A link that deploys nothing says nothing of it.
+        (says(True), says(False, "umbilical")),
+    ],
+)
+def test_it_stays_armed_while_one_says_so_or_nobody_knows(
+    told: tuple[i.ParachuteReport, ...],
+) -> None:
+    story = armed(deploy_links=(LINK, UPF), required_links=(LINK,))
+    keeps_saying(story, 5.0, *told)
+    assert story.state.stage is Stage.ARMED
