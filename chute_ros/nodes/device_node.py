@@ -57,7 +57,14 @@ COMMON_PARAMETERS = (
         0.05,
         10.0,
     ),
-    Parameter("heartbeat_rate", 10.0, "rate of safety/heartbeat, Hz", 1.0, 100.0),
+    Parameter(
+        "heartbeat_rate",
+        10.0,
+        "rate of safety/heartbeat, Hz; below 4 Hz the supervisor's heartbeat_stale_after or "
+        "link_limits must allow for it",
+        1.0,
+        100.0,
+    ),
     *WATCH_PARAMETERS,
 )
 #: Our own link's heartbeat stops when the executor was silent for this long, s.

@@ -82,7 +82,8 @@ def _imported(module: str, class_name: str) -> Any:
             sys.exit(f"{_NOT_BUILT}\n({error})")
         if missing:
             sys.exit(
-                f"{missing} is not installed: `rosdep install --from-paths src` and "
+                f"{missing} is not installed: `rosdep install --from-paths src "
+                "src/chute_ros/msg_defs --ignore-src` and "
                 "`pip install -r requirements/runtime.in` bring all that is needed"
             )
         raise

@@ -39,6 +39,8 @@ from chute_ros.transport.address import parse_address
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire import make_wire
 
+#: How a flight block is reported by a node that must leave arming alone.
+_NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
 #: COMPONENT_INFORMATION_BASIC.
 _INFORMATION: int = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
 
@@ -103,9 +105,9 @@ class MavlinkParachuteNode(DeviceNode):
                 decision, lambda link, token, now: link.deploy(token, force, now, device)
             )
         elif decision.action is not model.Action.NONE:
-            self.carry_out_flight_block(
-                decision, "arming on the ground is undone", "arming is left alone"
-            )
+            undone = self.values["disarm_when_blocked"]
+            blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
+            self.carry_out_flight_block(decision, blocked, "arming is left alone")
 
     def arm_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
         link.arm(token, request.arm, request.triggers, now)

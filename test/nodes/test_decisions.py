@@ -196,7 +196,8 @@ def test_a_flight_block_never_touches_a_vehicle_in_the_air(bench, supervisor):
 
 def test_a_flight_block_only_says_so_where_it_may_not_disarm(bench, supervisor):
     autopilot = grounded(bench, supervisor, disarm_when_blocked=False)
-    supervisor.report(supervisor.decide(Action.FLIGHT_BLOCK), Outcome.CONFIRMED)
+    report = supervisor.report(supervisor.decide(Action.FLIGHT_BLOCK), Outcome.CONFIRMED)
+    assert report.detail == "noted; arming is left alone, as disarm_when_blocked says"
     arm(bench, autopilot)
     supervisor.sees(armed=VehicleState.ARMED)
     beats = len(supervisor.vehicle)

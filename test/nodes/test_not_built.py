@@ -59,5 +59,5 @@ def test_it_says_exactly_how_to_build(node, tmp_path):
 def test_another_missing_package_is_named_with_its_remedy(node, package, tmp_path):
     (line,) = start_without(package, node, tmp_path)
     assert line.startswith(f"{package} is not installed: ")
-    assert "rosdep install --from-paths src" in line
+    assert "rosdep install --from-paths src src/chute_ros/msg_defs --ignore-src" in line
     assert "pip install -r requirements/runtime.in" in line

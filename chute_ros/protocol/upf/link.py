@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Hashable
 
 from chute_ros.errors import ParameterError
-from chute_ros.model import Armed, ParachuteState, VehicleState
+from chute_ros.model import Armed, ParachuteState, TriggerFlags, VehicleState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS, BusNode
 from chute_ros.protocol.dronecan.calls import ServiceCalls
 from chute_ros.protocol.dronecan.data_types import DataTypes
@@ -153,6 +153,11 @@ class UpfLink:
 
     def arm(self, token: int, arm: bool, triggers: int, now: float) -> None:
         """Arm (take-off first, where needed) or disarm. triggers: a UPF has none to choose."""
+        if triggers not in (0, TriggerFlags.FC):
+            why = f"triggers {triggers}: a UPF parachute has none to choose, need 0"
+            self.requests.refuse(token, f"{why}; nothing was sent")
+            self._drive(now)
+            return
         controller = self._target(token, 0, now)
         if controller is None:
             return

@@ -190,9 +190,23 @@ def test_request_that_the_document_does_not_know_is_the_callers_mistake(bench, t
 # -- arm: take-off first ----------------------------------------------------------------------
 
 
-def arm(story, on=True, token=1):
-    story.link.arm(token, on, 0, story.now)
+def arm(story, on=True, token=1, triggers=0):
+    story.link.arm(token, on, triggers, story.now)
     return story.step()
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_single_triggers_are_refused_as_it_has_none_to_choose(bench, on):
+    story = arm(standing_at(bench(), "ARMED"), on, triggers=16)
+    assert story.requests(SERVICE) == []
+    assert story.end(1).message == (
+        "triggers 16: a UPF parachute has none to choose, need 0; nothing was sent"
+    )
+
+
+def test_the_vehicles_own_trigger_is_the_one_that_it_has(bench):
+    story = arm(standing_at(bench(), "TAKEOFF"), triggers=4).after(1.0)
+    assert story.end(1).success
 
 
 def test_arming_a_ready_controller_takes_off_first(bench):
