@@ -33,8 +33,8 @@ WATCH_PARAMETERS = (
         "on_supervisor_lost",
         BLOCK_FLIGHT,
         "what then: hold goes on with what was decided last; block_flight keeps a vehicle that "
-        "stands on the ground there, and does nothing to one that flies; upf_can has nothing to keep "
-        "it with",
+        "stands on the ground there, and does nothing to one that flies; upf_can has nothing to "
+        "keep it with",
         choices=(HOLD, BLOCK_FLIGHT),
     ),
 )
