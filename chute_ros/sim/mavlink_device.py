@@ -65,12 +65,10 @@ class MavlinkDevice(Actor):
         decoder = self._decoders.setdefault(stream, FrameDecoder(self._verifier))
         frames = decoder.feed_datagram(data, now) if stream is None else decoder.feed(data, now)
         for frame in frames:
-            if frame.message.get_type() == "COMMAND_LONG":
-                self._command(frame)
-            elif frame.message.get_type() == "COMMAND_INT":
-                self._acknowledge(frame, dialect.MAV_RESULT_COMMAND_LONG_ONLY)
-            else:
+            if frame.message.get_type() not in ("COMMAND_LONG", "COMMAND_INT"):
                 self.heard(frame)
+            elif self._is_meant(frame.message):
+                self._command(frame)
 
     def stream_ended(self, stream: Hashable) -> None:
         if stream is None:
@@ -138,11 +136,20 @@ class MavlinkDevice(Actor):
 
     # -- commands -------------------------------------------------------------------------------
 
+    def _is_meant(self, command: Any) -> bool:
+        systems, components = (0, self.system_id), (0, self.component_id)
+        return command.target_system in systems and command.target_component in components
+
     def _command(self, frame: Frame) -> None:
         message = frame.message
-        if message.target_system not in (0, self.system_id):
+        if self.mute:
             return
-        if message.target_component not in (0, self.component_id) or self.mute:
+        handler = self.commands.get(message.command)
+        if message.get_type() == "COMMAND_INT" and handler is not None:
+            self._acknowledge(frame, dialect.MAV_RESULT_COMMAND_LONG_ONLY)
+            return
+        if handler is None:
+            self._acknowledge(frame, dialect.MAV_RESULT_UNSUPPORTED)
             return
         params: Params = (
             message.param1,
@@ -153,10 +160,7 @@ class MavlinkDevice(Actor):
             message.param6,
             message.param7,
         )
-        handler = self.commands.get(message.command)
-        if handler is None:
-            result = dialect.MAV_RESULT_UNSUPPORTED
-        elif not all(map(math.isfinite, params[:2])):
+        if not all(map(math.isfinite, params[:2])):
             result = dialect.MAV_RESULT_DENIED
         else:
             result = handler(params)
@@ -190,6 +194,8 @@ class MavlinkDevice(Actor):
         message_id, interval_us = int(params[0]), params[1]
         if message_id not in self.streams or interval_us < -1:
             return int(dialect.MAV_RESULT_DENIED)
+        if message_id == dialect.MAVLINK_MSG_ID_HEARTBEAT and interval_us == -1:
+            return int(dialect.MAV_RESULT_DENIED)  # it flows constantly
         self._due.pop(message_id, None)
         if interval_us == -1:
             self._intervals[message_id] = math.inf

@@ -20,6 +20,8 @@ _ALL_TRIGGERS = 0xFF
 #: The automatic trigger fires after falling faster than this for this long, m/s and s.
 ATS_SINK_SPEED = 10.0
 ATS_SINK_TIME = 0.3
+#: A height that was told is known for so long, s.
+HEIGHT_LASTS = 3.0
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class ParachuteDevice(MavlinkDevice):
         self.deployment = DeploymentTrigger.NONE
         self.errors = ErrorFlags(0)
         self.height = math.nan
+        self._height_at = -math.inf
         self._sinking_since = math.nan
         self.streams = {
             dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
@@ -71,7 +74,7 @@ class ParachuteDevice(MavlinkDevice):
         }
         self.arguments |= {
             "error": one_of(ErrorFlags.__members__),
-            "deploy": one_of(DeploymentTrigger.__members__),
+            "deploy": one_of({one.name: one for one in DeploymentTrigger if one}),
         }
 
     def reboot(self) -> None:
@@ -83,22 +86,28 @@ class ParachuteDevice(MavlinkDevice):
             self.deployment = DeploymentTrigger(self.settings.deployment)
 
     def heard(self, frame: Frame) -> None:
-        """The vehicle's autopilot tells height and sink speed, as on a real network."""
-        if frame.message.get_type() != "GLOBAL_POSITION_INT" or frame.component_id != 1:
+        """The vehicle's own autopilot tells height and sink speed, as on a real network."""
+        autopilot = (frame.system_id, frame.component_id) == (self.system_id, 1)
+        if frame.message.get_type() != "GLOBAL_POSITION_INT" or not autopilot:
             return
-        self.height = frame.message.relative_alt / 1000.0
-        self._automatic_trigger(frame.message.vz / 100.0)
+        before = self._height()
+        self.height, self._height_at = frame.message.relative_alt / 1000.0, self.now
+        self._automatic_trigger(before, frame.message.vz / 100.0)
+
+    def _height(self) -> float:
+        """The height that was told last, m; NaN: none was, or not lately."""
+        return self.height if self.now - self._height_at <= HEIGHT_LASTS else math.nan
 
     def safety(self) -> SafetyFlags:
         """PARACHUTE_SAFETY_FLAGS by settings and height."""
         flags = SafetyFlags(0)
-        height_known = not math.isnan(self.height)
+        height = self._height()
         cleared = self.settings.ground_cleared == "yes"
         if self.settings.ground_cleared == "auto":
-            cleared = not height_known or self.height >= self.settings.clear_height
+            cleared = not height < self.settings.clear_height
         if cleared:
             flags |= SafetyFlags.GROUND_CLEARED
-        if height_known and self.height < 0.3:
+        if height < 0.3:
             flags |= SafetyFlags.ON_GROUND
         return flags
 
@@ -177,11 +186,13 @@ class ParachuteDevice(MavlinkDevice):
             # On the vehicle's network the release is news; its own stream may be a second away.
             self._due[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS] = self.now
 
-    def _automatic_trigger(self, sink_speed: float) -> None:
+    def _automatic_trigger(self, before: float, sink_speed: float) -> None:
+        # As it passes the altitude: what was commanded above or below it holds until then.
         altitude = self.settings.ats_arm_altitude
-        if self.armed & TriggerFlags.ATS_AUTO_ARM and self.height >= altitude:
+        high = self.height >= altitude
+        if self.armed & TriggerFlags.ATS_AUTO_ARM and high and not before >= altitude:
             self.armed |= TriggerFlags.ATS
-        if self.armed & TriggerFlags.ATS_AUTO_DISARM and self.height < altitude:
+        if self.armed & TriggerFlags.ATS_AUTO_DISARM and not high and not before < altitude:
             self.armed &= ~TriggerFlags.ATS
         if sink_speed < ATS_SINK_SPEED:
             self._sinking_since = math.nan

@@ -149,7 +149,8 @@ def _device(limits: PreflightLimits, status: ParachuteStatus, day: int) -> list[
         told.append(f"its state is {status.state.name} (need READY, TAKEOFF or ARMED)")
     if status.deployed:
         told.append("it is released")
-    if status.error_flags:
+    # Where its node finds no fault in it, they are flags that do not apply to this product.
+    if status.error_flags and status.faults:
         told.append(f"errors {', '.join(flag_names(status.error_flags))} (need none)")
     told += _packed(limits, status.packed_date, day)
     self_arms = bool(status.armed_triggers & TriggerFlags.ATS_AUTO_ARM)

@@ -319,7 +319,7 @@ def test_a_mistake_is_told_in_one_line(simulator, arguments, said, fail):
         (
             PARACHUTE,
             ("--at", "5:deploy"),
-            "'' is nothing that deploy can take: need deploy=one of NONE, ",
+            "'' is nothing that deploy can take: need deploy=one of MANUAL, ",
         ),
         (PARACHUTE, ("--packed-date", "2024-13-01"), "packed date '2024-13-01' is no date YYYY-"),
         (PARACHUTE, ("--packed-date", "yesterday"), "packed date 'yesterday' is no date YYYY-MM"),

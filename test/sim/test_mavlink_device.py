@@ -95,6 +95,20 @@ def test_it_leaves_to_others_what_is_addressed_to_them(to):
     station = module()
     assert station.command(dialect.MAV_CMD_SET_PARACHUTE_ARM, 4, 4, to=to) == []
     assert station.device.armed == 0
+    other = dialect.MAVLink_command_int_message(*to, 0, REQUEST, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    station.forget()
+    station.send(other)
+    assert station.messages("COMMAND_ACK") == []
+
+
+def test_its_heartbeat_cannot_be_switched_off():
+    station = module()
+    assert station.command(SET, dialect.MAVLINK_MSG_ID_HEARTBEAT, -1) == [
+        dialect.MAV_RESULT_DENIED
+    ]
+    station.forget()
+    station.run(3.0)
+    assert len(station.messages("HEARTBEAT")) == 3
 
 
 def test_the_acknowledgement_names_who_asked():
@@ -110,6 +124,13 @@ def test_the_other_form_of_a_command_is_refused_as_such():
     message = dialect.MAVLink_command_int_message(1, 161, 0, REQUEST, 0, 0, 0, 0, 0, 0, 0, 0, 0)
     station.send(message)
     assert station.newest("COMMAND_ACK").result == dialect.MAV_RESULT_COMMAND_LONG_ONLY
+
+
+def test_a_command_that_it_does_not_know_is_so_in_both_forms():
+    station = module()
+    message = dialect.MAVLink_command_int_message(1, 161, 0, 30001, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    station.send(message)
+    assert station.newest("COMMAND_ACK").result == dialect.MAV_RESULT_UNSUPPORTED
 
 
 @pytest.mark.parametrize("stream", [None, "a stream"])

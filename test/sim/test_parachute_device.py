@@ -254,6 +254,33 @@ def test_it_arms_and_disarms_itself_by_height():
     assert status(station).arm_status == AUTO_ARM | AUTO_DISARM
 
 
+def test_what_was_disabled_stays_so_until_it_passes_the_altitude_again():
+    station = module(armed_triggers=int(AUTO_ARM | ATS), ats_arm_altitude=30)
+    station.send(position(60.0), sender=(1, 1))
+    assert station.command(DO_PARACHUTE, DISABLE) == [ACCEPTED]
+    fall(station, 60.0, 1.0)
+    assert status(station).arm_status == AUTO_ARM
+    assert status(station).deployment_status == DeploymentTrigger.NONE
+    for height in (20.0, 31.0):
+        station.send(position(height), sender=(1, 1))
+    assert status(station).arm_status == AUTO_ARM | ATS
+
+
+def test_the_height_of_another_vehicle_is_not_its_own():
+    station = module(armed_triggers=int(ATS | FC))
+    station.send(position(0.0), sender=(2, 1))
+    assert station.command(DO_PARACHUTE, RELEASE) == [ACCEPTED]
+
+
+def test_a_height_that_was_told_long_ago_is_not_known():
+    station = module(armed_triggers=int(FC))
+    station.send(position(5.0), sender=(1, 1))
+    station.run(2.9)
+    assert station.command(DO_PARACHUTE, RELEASE) == [NOT_NOW]
+    station.run(0.2)
+    assert station.command(DO_PARACHUTE, RELEASE) == [ACCEPTED]
+
+
 def test_without_auto_disarm_it_stays_armed_below():
     station = module(armed_triggers=int(AUTO_ARM), ats_arm_altitude=30)
     station.send(position(40.0), sender=(1, 1))

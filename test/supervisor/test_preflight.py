@@ -106,10 +106,10 @@ def test_when_all_is_well_it_arms() -> None:
         ({"state": ParachuteState.ABNORMAL}, "its state is ABNORMAL"),
         ({"deployed": True}, "it is released"),
         (
-            {"error_flags": ErrorFlags.LOW_POWER | ErrorFlags.IMU_ERROR},
+            {"error_flags": ErrorFlags.LOW_POWER | ErrorFlags.IMU_ERROR, "faults": ("IMU_ERROR",)},
             "errors IMU_ERROR, LOW_POWER (need none)",
         ),
-        ({"error_flags": ErrorFlags(1 << 30)}, "errors bit 30 (need none)"),
+        ({"error_flags": ErrorFlags(1 << 30), "faults": ("bit 30",)}, "errors bit 30 (need none)"),
         ({"packed_date": ""}, "no pack date (need one)"),
         ({"packed_date": "last spring"}, "no pack date (need one)"),
         ({"packed_date": "2025-06-30"}, "packed on 2025-06-30, 366 days ago (limit 365)"),
@@ -167,8 +167,14 @@ def test_a_wall_clock_that_was_never_set_is_named() -> None:
     assert "the wall clock says 1970-01-01 (need 2024-01-01 or later)" in told
 
 
+def test_flags_in_which_its_node_finds_no_fault_are_not_held_against_it() -> None:
+    """Given a parachute of which a flag does not apply (ignored_error_flags of its node)."""
+    assert reasons(with_device(error_flags=ErrorFlags.LOW_POWER, faults=())) == ()
+
+
 def test_a_device_that_is_lost_is_told_of_by_its_link_not_by_its_last_words() -> None:
-    story = with_device(error_flags=ErrorFlags.LOW_POWER, link_state=LinkState.LOST)
+    broken = {"error_flags": ErrorFlags.LOW_POWER, "faults": ("LOW_POWER",)}
+    story = with_device(**broken, link_state=LinkState.LOST)
     assert reasons(story) == ()
 
 
@@ -212,7 +218,8 @@ def test_a_vehicle_that_moves_is_not_armed() -> None:
 
 
 def test_every_reason_is_told_at_once() -> None:
-    story = with_device(state=ParachuteState.ABNORMAL, error_flags=ErrorFlags.GPS_ERROR)
+    broken = {"error_flags": ErrorFlags.GPS_ERROR, "faults": ("GPS_ERROR",)}
+    story = with_device(state=ParachuteState.ABNORMAL, **broken)
     story.at(0.1, i.ModeRequest(1, i.Mode.SHADOW, force=False), story.heartbeat(healthy=False))
     story.at(0.2, i.BlockRequest("upf_can", "33", True, "ABNORMAL"))
     story.at(3.0, i.ArmRequest(2, True, 0, 0))

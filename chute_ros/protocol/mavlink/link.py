@@ -68,6 +68,7 @@ class MavlinkLink:
         self._frames(self._inbox.update(now), now)
         self._devices.update(now)
         self.requests.update(now)
+        self._look_after_parachutes(now)
         if now >= self._heartbeats_until:
             self._heartbeats_until = -math.inf
         elif self._heartbeat_at <= now:
@@ -216,6 +217,7 @@ class MavlinkLink:
             else:
                 self._frame(frame, now)
         self._look_after_autopilot(now)
+        self._look_after_parachutes(now)
         self._drive(now)
 
     def _frame(self, frame: Frame, now: float) -> None:
@@ -277,6 +279,12 @@ class MavlinkLink:
                 self.requests.abandon(self._disarming, why, now)
         elif self.config.disarm_when_blocked and self._block.disarm_due(autopilot, now):
             self._disarm(autopilot, now)
+
+    def _look_after_parachutes(self, now: float) -> None:
+        """Ask for the status that does not come; a ground station may have switched it off."""
+        for parachute in self.parachutes.all():
+            if parachute.status_due(now):
+                self.requests.commands.send_once(goals.request_status(parachute), now)
 
     def _disarm(self, autopilot: AutopilotTracker, now: float) -> None:
         reason = self._block.reason

@@ -37,6 +37,10 @@ _STARTING_STATES = {
     dialect.MAV_STATE_BOOT: "starting",
     dialect.MAV_STATE_CALIBRATING: "calibrating",
 }
+#: Without a status for so long it is asked for, s: the stream nominally brings one each second.
+_STATUS_MISSED = 1.5
+#: And for the next of a doubtful one not more often than so, s.
+_ASK_AGAIN = 0.1
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
 
 
@@ -115,6 +119,9 @@ class ParachuteTracker:
         self._system_status = 0
         self._message: Any = None
         self._overdue = False
+        #: A status came that may be the first after a restart, or one from before that was delayed.
+        self._doubtful = False
+        self._asked = -math.inf
 
     @property
     def device(self) -> str:
@@ -147,6 +154,7 @@ class ParachuteTracker:
         """A PARACHUTE_STATUS of the device."""
         age = self._clock.observe(message.time_boot_ms)
         self.reboot_count += age is Age.RESTARTED
+        self._doubtful = age is Age.DOUBTFUL
         if age in (Age.OLD, Age.DOUBTFUL):
             # Delayed: it must not undo what a newer one said.
             return
@@ -163,6 +171,18 @@ class ParachuteTracker:
         """The status stream stopped: the newest is too old, though the link may live."""
         # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
         return now >= self.status_received + self._limits.status_timeout
+
+    def status_due(self, now: float) -> bool:
+        """It is to be asked for its status now (MAV_CMD_REQUEST_MESSAGE; the full protocol only
+        recommends the stream): none has come for too long, or one that the next one may confirm."""
+        if self.liveness.state is not LinkState.OK:
+            return False
+        wait = _ASK_AGAIN if self._doubtful else _STATUS_MISSED
+        known = self.liveness.first_heard if self._message is None else self.status_received
+        if now < max(known, self._asked) + wait:
+            return False
+        self._asked = now
+        return True
 
     def update(self, now: float) -> tuple[list[LinkChange], bool]:
         """Look at the clock: (what changed of the link, whether the picture changed)."""

@@ -315,3 +315,58 @@ def test_signed_end_to_end():
     far = Bench(None, Verifier(KEY, clock()))
     far.link.receive(raw, START)
     assert far.link.received_count == 1
+
+
+# -- a status that does not come ------------------------------------------------------------------
+
+
+def asked_for_status(bench):
+    """When a PARACHUTE_STATUS was asked for."""
+    return [
+        t
+        for t, message in bench.sent
+        if message.get_type() == "COMMAND_LONG"
+        and (message.command, message.param1) == (d.MAV_CMD_REQUEST_MESSAGE, 430.0)
+    ]
+
+
+def test_a_module_that_sends_no_status_is_asked_for_it():
+    """Given one without a stream, or whose stream a ground station has switched off."""
+    bench = Bench().hear(CHUTE, heartbeat()).stream(4.0, 0.5, CHUTE, heartbeat)
+    assert asked_for_status(bench) == pytest.approx([1.5, 3.0])
+    request = bench.commands(d.MAV_CMD_REQUEST_MESSAGE)[0]
+    assert (request.target_system, request.target_component) == CHUTE
+    bench.hear(CHUTE, status()).stream(5.0, 0.5, CHUTE, heartbeat)
+    assert len(asked_for_status(bench)) == 2
+    bench.stream(6.0, 0.5, CHUTE, heartbeat)
+    assert asked_for_status(bench)[2:] == pytest.approx([5.5])
+
+
+def test_one_that_streams_is_not_asked():
+    bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=1000))
+    for second in range(1, 10):
+        bench.at(second).hear(CHUTE, heartbeat(), status(boot_ms=1000 + 1000 * second))
+    assert asked_for_status(bench) == []
+
+
+def test_one_that_is_silent_is_not_asked():
+    bench = Bench().hear(CHUTE, heartbeat(), status()).at(1.0).hear(CHUTE, status(boot_ms=6000))
+    bench.at(60.0)
+    assert len(asked_for_status(bench)) <= 1
+
+
+def test_the_first_status_after_a_restart_is_followed_by_a_question():
+    """It may be one from before that was delayed; the next one tells, and may say "deployed"."""
+    bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=500_000))
+    bench.at(0.5).hear(CHUTE, status(boot_ms=100, deployed=2))
+    assert asked_for_status(bench) == [0.5]
+    assert not bench.last_status().deployed
+    bench.at(0.52).hear(CHUTE, status(boot_ms=120, deployed=2))
+    assert bench.last_status().deployed
+
+
+def test_a_flood_of_doubtful_statuses_is_not_answered_one_by_one():
+    bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=500_000))
+    for step in range(1, 100):
+        bench.at(0.5 + step * 0.01).hear(CHUTE, status(boot_ms=1000 - 10 * step))
+    assert len(asked_for_status(bench)) <= 11

@@ -36,9 +36,9 @@ def test_release_is_done_when_the_parachute_itself_says_deployed():
     assert bench.end(1).finished.message == (
         "PARACHUTE_STATUS says deployed after 0.30 s; acknowledged after 0.10 s"
     )
-    count = len(bench.commands())
+    count = len(bench.commands(RELEASE))
     bench.at(10.0)
-    assert len(bench.commands()) == count  # nothing more is sent
+    assert len(bench.commands(RELEASE)) == count  # nothing more is sent
 
 
 def test_release_whose_acknowledgement_was_lost_is_done_all_the_same():
