@@ -119,7 +119,7 @@ class ParachuteTracker:
         self._system_status = 0
         self._message: Any = None
         self._overdue = False
-        #: A status came that may be the first after a restart, or one from before that was delayed.
+        #: A status came that may be the first after a restart, or a delayed one from before.
         self._doubtful = False
         self._asked = -math.inf
 
@@ -174,7 +174,7 @@ class ParachuteTracker:
 
     def status_due(self, now: float) -> bool:
         """It is to be asked for its status now (MAV_CMD_REQUEST_MESSAGE; the full protocol only
-        recommends the stream): none has come for too long, or one that the next one may confirm."""
+        recommends the stream): none has come for too long, or a doubtful one."""
         if self.liveness.state is not LinkState.OK:
             return False
         wait = _ASK_AGAIN if self._doubtful else _STATUS_MISSED
