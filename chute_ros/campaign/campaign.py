@@ -143,8 +143,9 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     # Read before the processes part, so that they share it.
     shipped = _shipped(folder)
     shipped.read_all()
-    # No collection of garbage looks through it again (4 % of a flight).
-    gc.freeze()
+    # No collection of garbage looks through it again (4 % of a flight); PyPy's works otherwise.
+    if hasattr(gc, "freeze"):
+        gc.freeze()
     # Ctrl-C reaches every process of a terminal: ours ends them.
     ignores = (signal.SIGINT, signal.SIG_IGN)
     with multiprocessing.get_context("fork").Pool(jobs, signal.signal, ignores) as pool:

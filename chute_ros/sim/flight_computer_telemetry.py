@@ -150,11 +150,13 @@ def _shortest_f32(value: float) -> Decimal:
     bits = struct.unpack("<I", struct.pack("<f", value))[0]
     if bits & _MANTISSA:
         # Its neighbours are equally far: the nearest decimal of so many digits reads back as it,
-        # or none of so many does.
-        for digits in range(1, 10):
-            near = Context(digits, ROUND_HALF_DOWN).create_decimal_from_float(value)
-            if _rounded_to_f32(float(near)) == value:
-                return near
+        # or none of so many does; and that of one digit more is nearer. Most need eight or nine.
+        shortest = near = Context(9, ROUND_HALF_DOWN).create_decimal_from_float(value)
+        digits = 9
+        while digits and _rounded_to_f32(float(near)) == value:
+            shortest, digits = near, digits - 1
+            near = Context(max(1, digits), ROUND_HALF_DOWN).create_decimal_from_float(value)
+        return shortest
     exact = Fraction(value)
     low, high = (exact + _f32(bits - 1)) / 2, (exact + _f32(bits + 1)) / 2
     # What lies half way between two numbers reads as the one with the even last bit.

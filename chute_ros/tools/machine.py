@@ -19,5 +19,6 @@ def machine() -> str:
     return (
         f"{model}, {os.cpu_count()} cores; Linux {platform.release()}; "
         # Whose: one that was built without the compiler's profile is a fifth slower.
-        f"Python {platform.python_version()} of {sys.base_prefix}; ROS 2 {distribution}"
+        f"{platform.python_implementation()} {platform.python_version()} of {sys.base_prefix}; "
+        f"ROS 2 {distribution}"
     )

@@ -5,17 +5,21 @@ Source: Umbilical Reference, section 3; the other layouts were found in the fiel
 
 from __future__ import annotations
 
+import platform
 import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from operator import itemgetter
-from typing import Any
-
-import orjson
+from typing import TYPE_CHECKING, Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.umbilical.fields import TYPES, FieldType, Value, convert, problem_of
+
+if TYPE_CHECKING or platform.python_implementation() != "PyPy":
+    from orjson import loads
+else:  # orjson is not for PyPy, which can fly the campaign
+    from json import loads
 
 #: The layout of the reference, which is preferred where a line does not tell.
 REFERENCE_LAYOUT = "telem57_airbrake_state"
@@ -117,7 +121,7 @@ class Layout:
         if raw.translate(None, _PLAIN) or b"-0," in raw or raw.endswith(b"-0"):
             return None
         try:
-            values = orjson.loads(b"[%b]" % raw)
+            values = loads(b"[%b]" % raw)
             self._ranges.pack(*values)
         except (ValueError, OverflowError, struct.error):
             return None

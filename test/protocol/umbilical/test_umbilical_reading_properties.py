@@ -1,9 +1,11 @@
 """What holds for any bytes: nothing raises, nothing is mixed up, all is accounted for."""
 
+import json
 import math
 from collections import Counter
 from decimal import Context, Decimal
 
+import orjson
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -19,6 +21,7 @@ from umbilical_lines import (
     line,
 )
 
+from chute_ros.protocol.umbilical import layouts
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
 from chute_ros.protocol.umbilical.fields import convert, problem_of
 from chute_ros.protocol.umbilical.layouts import Problem
@@ -104,8 +107,14 @@ def by_problem_of(layout, text):
 
 
 def by_decode(layout, text):
-    result = layout.decode(text)
-    return result.reason if isinstance(result, Problem) else repr(list(result))
+    results = set()
+    for reader in (orjson.loads, json.loads):  # the second is PyPy's
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(layouts, "loads", reader)
+            result = layout.decode(text)
+        results.add(result.reason if isinstance(result, Problem) else repr(list(result)))
+    (only,) = results
+    return only
 
 
 # -- the stream ---------------------------------------------------------------------------------
