@@ -53,7 +53,9 @@ class UmbilicalNode(DeviceNode):
         self.files = DumpFiles(self.values["dump_folder"])
         self.at_end.callback(self._end_dump)
         link = UmbilicalLink(config_from(self.values), layouts)
-        self.loop = WireLoop(link, make_wire(address), self.deliver, link.wire_opened)
+        self.loop = WireLoop(
+            link, make_wire(address), self.deliver, link.wire_opened, link.not_written
+        )
         self._progress = ""
         # The flight computer's own log, told apart from ours by the logger's name.
         self._its_log = self.get_logger().get_child("flight_computer")

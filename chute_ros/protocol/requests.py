@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -208,6 +208,13 @@ class Requests(Generic[TransactionsT]):
                     self._close(token, running, running.loop.finished, now)
                     moved = True
         return send
+
+    def fail_untold(self, tokens: Collection[int], why: str) -> None:
+        """What these requests did has turned out not to have been done, before it was told."""
+        for at, event in enumerate(self._events):
+            if isinstance(event, RequestFinished) and event.finished.token in tokens:
+                failed = replace(event.finished, success=False, message=why, sent=False)
+                self._events[at] = replace(event, finished=failed)
 
     def take_events(self) -> list[Event]:
         """Reports and ends, oldest first; each is handed out once."""

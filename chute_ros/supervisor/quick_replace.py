@@ -10,8 +10,8 @@ from __future__ import annotations
 import platform
 from typing import TYPE_CHECKING
 
-# In the first case so that the names and types of the changes are checked all the same. PyPy, which
-# can fly the campaign, compiles __init__, but copies a __dict__ five times as slowly.
+# In the first case so that the names and types of the changes are checked all the same. PyPy,
+# which can fly the campaign, compiles __init__, but copies a __dict__ five times as slowly.
 if TYPE_CHECKING or platform.python_implementation() == "PyPy":
     from dataclasses import replace as replace
 else:

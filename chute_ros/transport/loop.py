@@ -71,6 +71,7 @@ class WireLoop(Generic[LinkT]):
     not block.
 
     opened: for a protocol that wants to know from when on (monotonic s) it can send.
+    not_written: for one that wants to know of a frame that the wire did not take.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class WireLoop(Generic[LinkT]):
         wire: Wire,
         deliver: Callable[[list[Any]], None],
         opened: Callable[[float], None] = lambda now: None,
+        not_written: Callable[[bytes], None] = lambda frame: None,
     ) -> None:
         self.link = link
         self.wire = wire
@@ -86,6 +88,7 @@ class WireLoop(Generic[LinkT]):
         self.last_run = time.monotonic()
         self._deliver = deliver
         self._opened = opened
+        self._not_written = not_written
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
         self._at_turns_end: deque[Callable[[LinkT, float], None]] = deque(maxlen=1)
         self._touching = threading.Lock()
@@ -253,18 +256,22 @@ class WireLoop(Generic[LinkT]):
 
     def _write(self, frame: bytes) -> None:
         if not self.wire.is_open:
-            self.send_errors += 1
+            self._failed(frame)
             return
         try:
             self.wire.write(frame)
         except BlockingIOError:
-            self.send_errors += 1
+            self._failed(frame)
         except (ConnectionError, ValueError) as error:
-            self.send_errors += 1
+            self._failed(frame)
             self._lost(f"{self.wire.describe()}: {error}", time.monotonic())
         except OSError:
             # No route, no buffer: the next frame may pass.
-            self.send_errors += 1
+            self._failed(frame)
+
+    def _failed(self, frame: bytes) -> None:
+        self.send_errors += 1
+        self._guarded(self._not_written, frame)
 
     def _reopen(self, now: float) -> None:
         self._reopen_at = now + REOPEN_INTERVAL

@@ -97,9 +97,12 @@ def release(parachute: ParachuteTracker, force: bool, now: float) -> MavlinkGoal
 def _why_not_released(parachute: ParachuteTracker) -> str:
     """What of the device's own status keeps a module from releasing on command."""
     hints = []
-    if not parachute.armed_triggers & (TriggerFlags.FC | TriggerFlags.OFFBOARD):
+    if not parachute.armed_triggers & TriggerFlags.FC:
         armed = ", ".join(flag_names(parachute.armed_triggers)) or "none"
-        hints.append(f"armed triggers: {armed}; need FC or OFFBOARD, which force arms on the way")
+        # Some modules go by FC alone, wherever the command comes from.
+        offboard = parachute.armed_triggers & TriggerFlags.OFFBOARD
+        need = "this module may need FC" if offboard else "need FC or OFFBOARD"
+        hints.append(f"armed triggers: {armed}; {need}, which force arms on the way")
     if not parachute.ground_cleared:
         hints.append("its own status does not say GROUND_CLEARED")
     return "; ".join(hints)

@@ -36,6 +36,8 @@ _FALLS_BEHIND = 0.5
 #: So many records in a row must say that a canopy is out which nobody fired from here: text
 #: without a checksum may be damaged.
 _TO_BELIEVE = 2
+#: What was fired on the ground is not packed and wired anew in less, s.
+_PACKED_AFTER = 300.0
 _FIX_3D = 3
 _MODES = {int(mode): mode for mode in FlightMode}
 _SITUATIONS = {mode: Situation[mode.name] for mode in FlightMode}
@@ -67,17 +69,25 @@ class FlightComputer:
         self._clock_moved_at = NAN
         self._paused = False
         self._was_fresh = False
+        #: The newest record said a mode of the ground, whether it was believed or not.
+        self._said_ground = False
+        #: When what was not known to fly was fired from here, s, by command.
+        self._fired_on_ground: dict[str, float] = {}
 
     # -- what comes ------------------------------------------------------------------------------
 
     def heard(self, record: Record, now: float) -> tuple[list[LinkChange], Age]:
         """A record came: (what changed of the link, what its clock says)."""
         # A clock of 0 is one that has just started here, not one that is missing.
-        age = self._clock.observe(max(1, int(record["ms_since_boot_cfc"])))
+        age = self._clock.observe(max(1, int(record["ms_since_boot_cfc"])), now)
         if age in (Age.OLD, Age.DOUBTFUL):
             return [], age
         if self._has_restarted(record):
             age = Age.RESTARTED
+        said_ground, self._said_ground = self._said_ground, _mode(record) in GROUND
+        if age is Age.NEW and self._flying and self._said_ground and not said_ground:
+            # Its clock runs on: text without a checksum may be damaged.
+            return [], Age.DOUBTFUL
         if age is Age.RESTARTED:
             self.restarts += 1
             self.restarted_in_flight = self._flying
@@ -104,10 +114,17 @@ class FlightComputer:
         """What it said before says nothing of what is at the cable's end when it is back."""
         self._cable_pulled = True
 
-    def fired(self, name: str) -> None:
+    def fired(self, name: str, now: float) -> None:
         """A command that fires the drogue or the main has left."""
         if self._flying:
             self._canopies.fired.add(name)
+        else:
+            self._fired_on_ground[name] = now
+
+    def not_fired(self, name: str) -> None:
+        """It had not left after all: the port took no more."""
+        self._canopies.fired.discard(name)
+        self._fired_on_ground.pop(name, None)
 
     def alive(self, now: float) -> list[LinkChange]:
         """It is heard, though a long work keeps it from sending telemetry."""
@@ -207,9 +224,11 @@ class FlightComputer:
         its records say so no more means nothing."""
         return self._flying and self.restarted_in_flight and self.surely_out(name)
 
-    def was_fired(self, name: str) -> bool:
-        """It surely came out in this flight, or was fired from here: not every firmware tells."""
-        return self.surely_out(name) or name in self._canopies.fired
+    def was_fired(self, name: str, now: float) -> bool:
+        """It surely came out in this flight, or was fired from here: not every firmware tells, nor
+        can one that is silent tell that it flies."""
+        lately = now - self._fired_on_ground.get(name, -math.inf) < _PACKED_AFTER
+        return self.surely_out(name) or name in self._canopies.fired or lately
 
     @property
     def armed(self) -> bool:

@@ -86,7 +86,9 @@ class Orders:
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
             # The same deploy may be ordered once more, as by a supervisor that took over.
-            over = self._computer.was_fired("drogue") and not self._requests.under_way("drogue")
+            over = self._computer.was_fired("drogue", now) and not self._requests.under_way(
+                "drogue"
+            )
             stage = DeployStage.MAIN if over else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 
@@ -130,7 +132,19 @@ class Orders:
         """A command has left: only what comes after that shows its effect."""
         self._sent_at[name] = now
         if name in CANOPIES:
-            self._computer.fired(name)
+            self._computer.fired(name, now)
+
+    def token_not_written(self, name: str) -> None:
+        """What seemed to have left has not: the port took no more. An order goes on trying."""
+        self._sent_at.pop(name, None)
+        if name in CANOPIES:
+            self._computer.not_fired(name)
+        text = f"{name} was not written: the port takes no more data; is anything at its end?"
+        self._notices.append(Notice(Severity.ERROR, text))
+        self._requests.fail_untold(
+            [token for token, (kind, _) in self._to_leave.items() if kind.command.name == name],
+            text,
+        )
 
     # -- what the flight computer says -----------------------------------------------------------
 

@@ -312,6 +312,15 @@ def test_a_refused_release_names_what_the_parachute_says_of_itself():
     assert "does not say GROUND_CLEARED" in message
 
 
+def test_a_refused_release_of_one_whose_offboard_trigger_alone_is_armed_names_the_other():
+    bench = Bench().hear(CHUTE, heartbeat(), status(armed=8, safety=1))
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED))
+    message = bench.end(1).finished.message
+    said = "armed triggers: OFFBOARD; this module may need FC, which force arms on the way"
+    assert said in message
+
+
 def test_a_refused_release_of_a_ready_parachute_adds_nothing():
     bench = Bench().hear(CHUTE, heartbeat(), status(armed=4, safety=1))
     bench.link.deploy(1, False, bench.now)

@@ -123,7 +123,7 @@ def test_so_may_one_with_a_mode_of_a_deployment(mode):
 def test_where_it_was_fired_from_here_one_record_is_enough():
     rocket = Rocket()
     rocket.says(0.0, COAST)
-    rocket.computer.fired("drogue")
+    rocket.computer.fired("drogue", 0.0)
     rocket.says(0.1, COAST, ssa_drogue_deployed="1")
     assert status(rocket, 0.1).deployed
 
@@ -142,8 +142,9 @@ def test_a_fault_that_follows_a_flight_is_one_in_flight():
     assert rocket.computer.situation(0.2) is Situation.LOST_IN_FLIGHT
     assert vehicle(rocket, 0.2).landed_state is LandedState.IN_AIR
     rocket.says(0.3, STANDBY)
-    rocket.says(0.4, FAULT)
-    assert rocket.computer.situation(0.4) is Situation.FAULT
+    rocket.says(0.4, STANDBY)
+    rocket.says(0.5, FAULT)
+    assert rocket.computer.situation(0.5) is Situation.FAULT
 
 
 # -- before anything, and silence ----------------------------------------------------------------

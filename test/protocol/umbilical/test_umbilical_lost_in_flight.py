@@ -25,6 +25,7 @@ from chute_ros.protocol.umbilical.modes import FlightMode
 def test_a_restart_is_believed_at_the_second_record_that_shows_it():
     rocket = Rocket()
     rocket.says(0.0, STANDBY, altitude="1")
+    rocket.says(0.1, STANDBY, altitude="1")
     rocket.restarts(1.0)
     assert rocket.says(1.0, STARTUP, altitude="2") == ([], Age.DOUBTFUL)
     assert rocket.computer.mode is FlightMode.STANDBY

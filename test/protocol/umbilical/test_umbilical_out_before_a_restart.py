@@ -127,18 +127,20 @@ def test_a_restart_whose_clock_is_ahead_of_the_one_before_is_seen_in_flight(befo
 def test_what_is_fired_after_such_a_restart_is_not_fired_again():
     rocket = launched_soon_after_its_start()
     rocket.says(2.6, STARTUP, altitude="80")
-    rocket.computer.fired("drogue")
+    rocket.computer.fired("drogue", 0.0)
     rocket.says(2.7, STARTUP, altitude="84", ssa_drogue_deployed="1")
     assert rocket.computer.came_out("drogue")
-    assert rocket.computer.was_fired("drogue")
+    assert rocket.computer.was_fired("drogue", 3.0)
 
 
 def test_a_clock_that_runs_on_is_no_restart():
     """It says Standby again by itself, as after a launch that was broken off."""
     rocket = Rocket()
     rocket.says(0.0, ASCENT, altitude="1")
-    assert rocket.says(0.5, STANDBY, altitude="1")[1] is Age.NEW
-    assert rocket.computer.situation(0.5) is Situation.STANDBY
+    rocket.says(0.5, STANDBY, altitude="1")
+    assert rocket.says(0.6, STANDBY, altitude="1")[1] is Age.NEW
+    assert rocket.computer.restarts == 0
+    assert rocket.computer.situation(0.6) is Situation.STANDBY
 
 
 def test_a_record_that_comes_late_is_no_restart():
