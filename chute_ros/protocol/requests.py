@@ -143,11 +143,12 @@ class Requests(Generic[TransactionsT]):
         """End whatever would make a parachute less ready."""
         self.abandon_where(lambda goal: goal.hinders_release, "a release was ordered", now)
 
-    def abandon_where(self, which: Callable[[Goal[Any]], bool], why: str, now: float) -> None:
-        """End the requests whose goal is one of those."""
-        for token, running in self._running.items():
-            if which(running.loop.goal):
-                self.abandon(token, why, now)
+    def abandon_where(self, which: Callable[[Goal[Any]], bool], why: str, now: float) -> bool:
+        """End the requests whose goal is one of those; whether there was any."""
+        found = [token for token, running in self._running.items() if which(running.loop.goal)]
+        for token in found:
+            self.abandon(token, why, now)
+        return bool(found)
 
     def refuse(self, token: int, why: str) -> None:
         """End a request before anything was sent."""

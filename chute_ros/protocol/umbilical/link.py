@@ -38,6 +38,8 @@ _SHOW_UNKNOWN_EACH = 10.0
 _MOST_SHOWN = 60
 #: Lines for the log a second, at most.
 MOST_TOLD = 50
+#: Counted: its clock leapt or ran back, or it ended a flight.
+DOUBTED = "record that is believed once the next one agrees"
 
 
 class UmbilicalLink:
@@ -273,7 +275,8 @@ class UmbilicalLink:
             return
         changes, age = self.computer.heard(record, now)
         if age in (Age.OLD, Age.DOUBTFUL):
-            self.counts["record whose clock ran back"] += 1
+            is_old = age is Age.OLD
+            self.counts["record older than one before" if is_old else DOUBTED] += 1
             return
         if age is Age.RESTARTED:
             where = " IN FLIGHT" if self.computer.restarted_in_flight else ""

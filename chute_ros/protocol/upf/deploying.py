@@ -54,11 +54,13 @@ class Deploying:
     def fire_triggers(self, token: int, now: float) -> None:
         """Past the controller, which has not released in time or is not there."""
         trigger = self._devices.trigger()
-        if trigger is None:
-            self._requests.refuse(token, "no trigger was ever heard; nothing was sent")
-        else:
-            self._requests.make_way_for_release(now)
+        self._requests.make_way_for_release(now)
+        if trigger is not None:
             self._by_trigger(token, trigger, now)
+            return
+        # TriggerLaunch needs to know of none, as one may listen that does not speak.
+        was = "TriggerLaunch was broadcast" if self._broadcast() else "nothing was sent"
+        self._requests.refuse(token, f"no trigger was ever heard; {was}")
 
     def update(self, now: float) -> bool:
         """Look at the clock; whether something was put among the calls."""
@@ -124,13 +126,15 @@ class Deploying:
             interval = self._config.effect.retry_interval
             self._last_resort.watch(token, None, now, interval)
 
-    def _broadcast(self) -> None:
-        """TriggerLaunch: for every trigger, or for ours alone where that can be said."""
+    def _broadcast(self) -> bool:
+        """TriggerLaunch: for every trigger, or for ours alone where that can be said; whether it
+        was."""
         kind = self._definitions.types.message(names.TRIGGER_LAUNCH)
         values = {"magic_number": kind.constants[names.MAGIC]}
         ours = self._config.trigger_node_id
         if ours and "node_id" not in kind.fields:
-            return  # TriggerService alone reaches only ours
+            return False  # TriggerService alone reaches only ours
         if ours:
             values["node_id"] = ours
         self._endpoint.broadcast(names.TRIGGER_LAUNCH, values, goals.FIRE_PRIORITY)
+        return True

@@ -16,7 +16,7 @@ from chute_ros.protocol.upf.errands import Errand, ErrandDone
 from chute_ros.protocol.upf.events import ErrandFinished
 from chute_ros.protocol.upf.roster import UpfDevices
 
-#: A controller that did not answer when its parameters were read is asked again after this, s.
+#: The parameters of a controller are read again after this, s: another tool may have changed them.
 READ_AGAIN = 10.0
 
 
@@ -124,5 +124,6 @@ class ErrandDesk:
             self._finished.append(ErrandFinished(token, done))
             return
         self._reading.discard(done.node_id)
-        if not done.success and len(done.parameters) < errands.MOST_PARAMETERS:
+        # A list that never ends is not begun again.
+        if done.success or len(done.parameters) < errands.MOST_PARAMETERS:
             self._read_again[done.node_id] = now + READ_AGAIN

@@ -42,6 +42,13 @@ _DEPLOYS = {False: "TYPE_DEPLOY", True: "TYPE_DEPLOY_FORCE"}
 DEPLOY_PREFIX = "TYPE_DEPLOY"
 #: Every request of ParachuteService.
 REQUESTS = (*_SHOWN_BY, *_DEPLOYS.values())
+_READIER, _LESS_READY = ("TYPE_TAKEOFF", "TYPE_ARM"), ("TYPE_DISARM", "TYPE_LAND")
+#: Which requests under way a newer one puts an end to, so that the older does not have the last
+#: word by being sent again.
+OPPOSITE: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(_READIER, _LESS_READY),
+    **dict.fromkeys(_LESS_READY, _READIER),
+}
 
 
 def read_answer(
@@ -86,18 +93,24 @@ def excluded(controller: Controller, type_name: str) -> str:
 
 
 def request(
-    controller: Controller, definitions: Definitions, type_name: str, now: float
+    controller: Controller,
+    definitions: Definitions,
+    type_name: str,
+    now: float,
+    even_if_shown: bool = False,
 ) -> UpfGoal:
-    """Take-off, arm, disarm or land, and its own status after it."""
+    """Take-off, arm, disarm or land, and its own status after it. even_if_shown: sent even where
+    it is so already, as an opposite one may be on its way."""
     wanted = _SHOWN_BY[type_name]
     names = " or ".join(state.name for state in wanted)
-    alive = controller.alive and not controller.overdue(now)
+    alive = controller.alive and not controller.overdue(now) and not even_if_shown
     return Goal(
         type_name,
         (_call(controller, definitions, type_name),),
         f"ParachuteStatus says {names}",
         lambda: (alive or controller.status_received > now) and controller.state in wanted,
-        hinders_release=type_name in ("TYPE_DISARM", "TYPE_LAND"),
+        hinders_release=type_name in _LESS_READY,
+        needs_acknowledgement=even_if_shown,
         hint=lambda: _why_not(controller, type_name),
     )
 

@@ -187,7 +187,8 @@ class UpfLink:
         controller = self._target(token, node_id, now)
         if controller is None:
             return
-        goal = goals.request(controller, self.definitions, type_name, now)
+        superseded = self._supersede(controller, type_name, now)
+        goal = goals.request(controller, self.definitions, type_name, now, superseded)
         shown = goal.shown is not None and goal.shown()
         why = "" if shown else goals.excluded(controller, type_name)
         if goal.hinders_release and self.requests.under_way(goals.DEPLOY):
@@ -197,6 +198,18 @@ class UpfLink:
         else:
             self.requests.begin(token, goal, now)
         self._drive(now)
+
+    def _supersede(self, controller: Controller, type_name: str, now: float) -> bool:
+        """End what is under way and wants the opposite; whether there was any."""
+        opposite = goals.OPPOSITE[type_name]
+
+        def ends(goal: goals.UpfGoal) -> bool:
+            return goal.name in opposite and goal.commands[0].server == controller.node_id
+
+        found = self.requests.abandon_where(ends, f"{type_name} was ordered", now)
+        if found:
+            self._drive(now)
+        return found
 
     def deploy(self, token: int, force: bool, now: float, node_id: int = 0) -> None:
         """Deploy through the controller; if it does not answer, or there is none, the trigger."""

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from chute_ros.model import ParachuteStatus
+from chute_ros.model import LinkState, ParachuteStatus
 from chute_ros.protocol.events import DeviceLinkChanged, Event, Notice, ParachuteChanged, Severity
 from chute_ros.protocol.liveness import LinkChange, first_alive
 from chute_ros.protocol.upf.config import UpfConfig
@@ -47,8 +47,18 @@ class UpfDevices:
         return first_alive(self.controllers.values())
 
     def only_controller(self) -> Controller | None:
-        """With several, nobody says which trigger is whose."""
-        return next(iter(self.controllers.values())) if len(self.controllers) == 1 else None
+        """With several, nobody says which trigger is whose. One that was lost before another was
+        heard first may be the same: it need not keep its node id."""
+        there = [one for one in self.controllers.values() if not self._came_back(one)]
+        return there[0] if len(there) == 1 else None
+
+    def _came_back(self, gone: Controller) -> bool:
+        """Under another node id, as far as can be told."""
+        lost = gone.liveness.state is LinkState.LOST
+        return lost and any(
+            other.alive and other.admitted > gone.liveness.last_heard
+            for other in self.controllers.values()
+        )
 
     def trigger(self) -> Trigger | None:
         """The first that is not lost, or the first."""
@@ -85,7 +95,8 @@ class UpfDevices:
 
     def parachute_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A ParachuteStatus came."""
-        controller = self._admit(node_id, self._config.controller_node_id, self.controllers)
+        wanted = self._config.controller_node_id
+        controller = self._admit(node_id, wanted, self.controllers, now)
         if controller is None:
             return
         jumps = controller.unknown_jumps
@@ -105,13 +116,13 @@ class UpfDevices:
                 if trigger.doubted:
                     trigger.believe()
                     self._has_fired(trigger, now)
-        self._events.append(ParachuteChanged(self.picture_of(controller, now)))
+        self._controller_changed(controller, now)
 
     def trigger_status(
         self, node_id: int, values: Mapping[str, Any], now: float, ordered: bool
     ) -> None:
         """A TriggerStatus came. ordered: a release is under way."""
-        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
+        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers, now)
         if trigger is not None:
             fired, doubted = trigger.launched, trigger.doubted
             expected = ordered or self._controller_says_out()
@@ -150,7 +161,7 @@ class UpfDevices:
             changes, picture_changed = controller.update(now)
             self._changed(controller, changes)
             if picture_changed:
-                self._events.append(ParachuteChanged(self.picture_of(controller, now)))
+                self._controller_changed(controller, now)
         for trigger in self.triggers.values():
             changes, picture_changed = trigger.update(now)
             self._changed(trigger, changes)
@@ -176,7 +187,9 @@ class UpfDevices:
     def _all(self) -> list[Device]:
         return [*self.controllers.values(), *self.triggers.values()]
 
-    def _admit(self, node_id: int, wanted: int, known: dict[int, DeviceT]) -> DeviceT | None:
+    def _admit(
+        self, node_id: int, wanted: int, known: dict[int, DeviceT], now: float
+    ) -> DeviceT | None:
         """The device with this node id, if it is ours."""
         found = known.get(node_id)
         if found is not None or node_id == 0:
@@ -193,6 +206,7 @@ class UpfDevices:
         else:
             made = Trigger(node_id, self._config, self.definitions)
             self.triggers[node_id] = made
+        made.admitted = now
         return known[node_id]
 
     def _changed(self, device: Device, changes: list[LinkChange]) -> None:
@@ -210,6 +224,11 @@ class UpfDevices:
         """What a trigger says is part of the picture of the only controller."""
         controller = self.only_controller()
         if controller is not None:
+            self._controller_changed(controller, now)
+
+    def _controller_changed(self, controller: Controller, now: float) -> None:
+        """Without a controller the trigger is the parachute, whoever else speaks."""
+        if not (self._config.without_controller and self.triggers):
             self._events.append(ParachuteChanged(self.picture_of(controller, now)))
 
     def _has_fired(self, trigger: Trigger, now: float) -> None:
@@ -218,7 +237,7 @@ class UpfDevices:
 
     def _trigger_changed(self, trigger: Trigger, now: float) -> None:
         self._events.append(TriggerChanged(trigger.node_id, trigger_picture(trigger, now)))
-        if self._config.without_controller and not self.controllers:
+        if self._config.without_controller:
             self._events.append(ParachuteChanged(trigger.parachute_status(now)))
 
 

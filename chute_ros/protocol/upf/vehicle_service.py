@@ -32,6 +32,9 @@ _ASK_AGAIN = 0.2
 _GONE_AFTER = 5.0
 #: A controller that asked for a block and goes on saying that it is READY does not want it, s.
 _BELIEVE_STATE_AFTER = 1.0
+#: States in which a controller lets fly (document: state 2 and those that follow it); one that has
+#: launched does not.
+_RELEASES = (ParachuteState.READY, ParachuteState.TAKEOFF, ParachuteState.ARMED)
 #: Requests that wait for their answer at the same time; a flood must not grow us.
 MOST_PENDING = 32
 
@@ -155,7 +158,7 @@ class VehicleService:
         if state in BLOCKING:
             if device not in self._blocks:
                 self._want(device, f"it is {state.name}", now)
-        elif device in self._blocks:
+        elif device in self._blocks and state in _RELEASES:
             # A request that was sent again may come after the release that followed it.
             entered = before is not state
             if entered or now - self._said_at[device] >= _BELIEVE_STATE_AFTER:

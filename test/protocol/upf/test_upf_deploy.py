@@ -435,11 +435,35 @@ def test_triggers_that_have_fired_are_not_fired_again_at_the_end_of_a_ladder(ben
     assert not fired_at(story.at(9.0))
 
 
-def test_without_a_trigger_there_is_nothing_to_fire(bench):
+def test_triggers_that_were_never_heard_may_listen(bench):
     story = fire(bench("").status("ARMED").clear())
     assert not story.end(1).success
-    assert story.end(1).message == "no trigger was ever heard; nothing was sent"
-    assert not fired_at(story.at(9.0))
+    assert story.end(1).message == "no trigger was ever heard; TriggerLaunch was broadcast"
+    assert len(story.messages(LAUNCH)) == 1
+
+
+def test_a_controller_that_came_back_under_another_node_id_is_the_only_one(bench):
+    """Its document lets the static node id be 0, and a device forgets what it was given."""
+    story = bench("").status("READY", 33).node_status(33).at(4.0)
+    for second in range(3):
+        story.status("ARMED", 125).node_status(125, uptime=5 + second).trigger_status()
+        story.after(1.0)
+    deploy(story.clear())
+    story.after(1.2).trigger_status("LAUNCHED")
+    assert story.end(1).success
+
+
+def test_of_two_that_were_heard_at_one_time_none_is_the_only_one(bench):
+    story = bench("").status("READY", 33).node_status(33).status("READY", 125).at(4.0)
+    story.status("ARMED", 125).node_status(125).trigger_status().after(1.0)
+    assert story.link.devices.only_controller() is None
+
+
+def test_without_controller_the_trigger_is_the_parachute_whoever_else_speaks(bench):
+    story = bench("", without_controller=True).trigger_status().at(1.0).status("READY", 33)
+    story.at(2.0).clear().trigger_out()
+    assert {one.device for one in story.pictures()} == {"34"}
+    assert story.picture().deployed
 
 
 def test_what_makes_it_less_ready_gives_way_to_the_triggers(bench):

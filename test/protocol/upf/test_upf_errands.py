@@ -1,7 +1,7 @@
 """What is asked of a device besides flying: over a link with simulated and made-up devices."""
 
 import pytest
-from upf_link_bench import flying, landed
+from upf_link_bench import BY_REQUEST, flying, landed
 
 from chute_ros.protocol.dronecan.calls import CallFinished
 from chute_ros.protocol.upf import errands
@@ -470,3 +470,17 @@ def test_errands_are_generators_that_know_no_bus():
         {"name": b"Enable Light"},
     ]
     assert {(call.server, call.service) for call in calls} == {(33, GET_SET)}
+
+
+@pytest.mark.parametrize("enabled", [False, True])
+def test_what_another_tool_has_set_is_known_soon(bench, enabled):
+    """Whoever sits at the bus with a GUI tool may switch the protection off."""
+    story = bench(parameters={**BY_REQUEST, p.ENABLE_PARACHUTE: not enabled}).ready()
+    value = {"name": p.ENABLE_PARACHUTE.encode(), "value": {"boolean_value": int(enabled)}}
+    tool = story.puppet(120)
+    tool.request(33, GET_SET, 1, value, 16)
+    for frame in tool.take_output():
+        story.devices.receive(frame, story.now)
+    story.after(11.0)
+    assert story.link.devices.controllers[33].never_deploys is not enabled
+    assert story.picture().healthy is enabled

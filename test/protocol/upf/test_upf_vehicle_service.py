@@ -225,10 +225,16 @@ def test_block_follows_the_state_when_its_request_was_lost(alone, state):
     assert len(story.asked()) == 1
 
 
-@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "ARMED", "LAUNCHED", "TOUCHDOWN"])
+@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "ARMED"])
 def test_release_follows_the_state_when_its_request_was_lost(alone, state):
     story = alone().status("ABNORMAL").at(0.1).status(state)
     assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
+
+
+@pytest.mark.parametrize("state", ["LAUNCHED", "TOUCHDOWN"])
+def test_one_whose_parachute_is_out_releases_nothing(alone, state):
+    story = alone().status("ABNORMAL").at(0.1).status(state).at(3.0).status(state)
+    assert story.asked() == [("FLIGHT_BLOCK", "33")]
 
 
 def test_state_without_a_name_changes_nothing(alone):
