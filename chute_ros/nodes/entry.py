@@ -41,6 +41,7 @@ def run(name: str, class_name: str) -> None:
     ctrl_c = CtrlC()
     ctrl_c.install()
     try:
+        _look_at_arguments(name)
         _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
         executor = NodeExecutor()
@@ -87,6 +88,21 @@ def _imported(module: str, class_name: str) -> Any:
                 "`pip install -r requirements/runtime.in` bring all that is needed"
             )
         raise
+
+
+def _look_at_arguments(name: str) -> None:
+    """What is not for ROS is for nobody: a node has parameters alone."""
+    from rclpy.utilities import remove_ros_args
+
+    others = remove_ros_args(sys.argv)[1:]
+    usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
+    if "--help" in others or "-h" in others:
+        print(f"usage: {usage}\nIts parameters, topics and services: README.md")
+        sys.exit(0)
+    if others:
+        text = f"unknown argument {others[0]}: what sets a node up follows --ros-args"
+        print(f"{name}: {text}\nusage: {usage}", file=sys.stderr)
+        sys.exit(2)
 
 
 def _init(name: str) -> None:

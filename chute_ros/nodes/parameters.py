@@ -69,9 +69,15 @@ class Parameter:
         return descriptor
 
 
+#: As like as that a name is another one misspelt, by difflib; what is less like may belong to
+#: another node that shares the file.
+_MISSPELT = 0.85
+
+
 def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
     """Declare all that node has and return name -> value; ParameterError for a value not allowed.
-    A name that it does not have is told: ROS would pass over it without a word."""
+    A name that it does not have is told, and stops it where it is one that it has, misspelt: ROS
+    would pass over it without a word."""
     values: dict[str, Any] = {}
     for parameter in parameters:
         try:
@@ -97,9 +103,22 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
 
 def _tell_unknown(node: Node, known: list[str]) -> None:
     for name in node._parameter_overrides:
-        if not node.has_parameter(name) and not name.startswith("qos_overrides."):
-            hint = what_was_meant(name, known)
-            node.get_logger().error(f"has no parameter {name}, its value is not used{hint}")
+        if node.has_parameter(name) or name.startswith("qos_overrides."):
+            continue
+        if near := is_misspelt(name, known):
+            # Whoever set it relies on it: the default may be the opposite.
+            raise ParameterError(
+                f"{node.get_fully_qualified_name()} has no parameter {name}: did you mean "
+                f"{near}? Correct its name, or leave it out"
+            )
+        hint = what_was_meant(name, known)
+        node.get_logger().error(f"has no parameter {name}, its value is not used{hint}")
+
+
+def is_misspelt(name: str, known: Iterable[str]) -> str:
+    """Which of those that are known this name surely was meant to be; empty: none."""
+    near = difflib.get_close_matches(name, known, 1, _MISSPELT)
+    return near[0] if near else ""
 
 
 def what_was_meant(name: str, known: Iterable[str]) -> str:

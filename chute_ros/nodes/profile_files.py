@@ -17,20 +17,25 @@ def load_profile(named: str, links: Sequence[str]) -> Profile:
 
     ParameterError if there is none; ProfileError lists what is wrong in it, with lines.
     """
+    if not named:
+        raise ParameterError(f"parameter profile is empty: need one of {_shipped()}, or a path")
     is_path = "/" in named or named.endswith((".yaml", ".yml"))
     path = given_path(named, "parameter profile") if is_path else _folder() / f"{named}.yaml"
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError, ValueError) as error:
-        shipped = ", ".join(sorted(file.stem for file in _folder().glob("*.yaml")))
         raise ParameterError(
             f"parameter profile is {named!r}: {path} cannot be read ({error}); need one of "
-            f"{shipped}, or the path of a file"
+            f"{_shipped()}, or the path of a file"
         ) from None
     try:
         return read_profile(text, str(path), links)
     except ProfileError as error:
         raise ProfileError(f"parameter profile is {named!r}:\n{error}") from None
+
+
+def _shipped() -> str:
+    return ", ".join(sorted(file.stem for file in _folder().glob("*.yaml")))
 
 
 def _folder() -> Path:

@@ -82,6 +82,8 @@ class PtyWire:
             return
         if os.path.lexists(self._link) and not self._link.is_symlink():
             raise FileExistsError(f"{self._link} is there and is no symbolic link")
+        if not self._link.parent.is_dir():
+            raise FileNotFoundError(f"the folder {self._link.parent} does not exist")
         # By replacing, so that a node never finds the name missing or half made.
         fresh = self._link.with_name(f"{self._link.name}.{os.getpid()}.new")
         fresh.symlink_to(self._path)

@@ -181,9 +181,12 @@ class _Progress:
 
 def positive(text: str) -> int:
     """1 or more."""
-    number = int(text)
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
     if number < 1:
-        raise argparse.ArgumentTypeError(f"{text}: need 1 or more")
+        raise argparse.ArgumentTypeError(f"{text}: need a whole number, 1 or more")
     return number
 
 

@@ -17,10 +17,12 @@ from rclpy.parameter import Parameter
 
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.nodes.parameters import is_misspelt
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.nodes.umbilical_node import UmbilicalNode
 from chute_ros.nodes.upf_can_node import UpfCanNode
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.tools.parameter_docs import NODES as NODE_PARAMETERS
 
 NODES = {"mavlink_parachute": MavlinkParachuteNode, "safety_supervisor": SafetySupervisorNode}
 CONFIG = Path(__file__).parents[2] / "config" / "mavlink_vehicle.yaml"
@@ -241,13 +243,36 @@ def test_the_file_is_taken_at_the_root_and_in_a_namespace(
         node.destroy_node()
 
 
-def test_a_name_that_no_parameter_has_is_told_with_the_one_that_was_meant(bench, capfd):
-    bench.add(SafetySupervisorNode, requird_links=["mavlink_parachute"], nonsense=1)
+def test_a_name_that_no_parameter_has_is_told(bench, capfd):
+    """It may be another node's that shares the file."""
+    bench.add(SafetySupervisorNode, call_timeout=1.0, nonsense=1)
     told = capfd.readouterr().err
-    assert (
-        "has no parameter requird_links, its value is not used: did you mean required_links?"
-    ) in told
+    text = "has no parameter call_timeout, its value is not used: did you mean kill_timeout?"
+    assert text in told
     assert "has no parameter nonsense, its value is not used" in told
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "meant"),
+    [
+        ("requird_links", ["mavlink_parachute"], "required_links"),
+        ("profil", "by_hand", "profile"),
+        ("mod", "SHADOW", "mode"),
+    ],
+)
+def test_a_name_that_is_misspelt_stops_the_start(bench, name, value, meant):
+    """Its owner relies on it: without it the supervisor would decide by the default."""
+    said = f"/safety_supervisor has no parameter {name}: did you mean {meant}\\?"
+    with pytest.raises(ParameterError, match=said):
+        bench.add(SafetySupervisorNode, **{name: value})
+
+
+def test_no_parameter_of_another_node_passes_for_a_misspelt_one():
+    """A file may set up all nodes at once."""
+    names = {node: {one.name for one in all_of_it} for node, all_of_it in NODE_PARAMETERS.items()}
+    for node, own in names.items():
+        others = set().union(*names.values()) - own
+        assert not [name for name in others if is_misspelt(name, own)], node
 
 
 def test_names_that_ros_itself_gives_meaning_are_not_told(bench, capfd):
@@ -318,3 +343,28 @@ def test_ctrl_c_as_the_link_has_just_begun_ends_the_node(namespace):
     )
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+
+
+# Arguments that are not for ROS
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--help"], 0, "usage: safety_supervisor --ros-args [-p PARAMETER:=VALUE]"),
+        (["--bogus"], 2, "unknown argument --bogus: what sets a node up follows --ros-args"),
+        (["-p", "mode:=SHADOW"], 2, "unknown argument -p: what sets a node up"),
+        (["--ros-args", "-p", "mode:=SHADOW", "--", "x"], 2, "unknown argument x"),
+    ],
+)
+def test_what_is_not_for_ros_starts_no_supervisor(arguments, code, said):
+    done = subprocess.run(
+        [sys.executable, "-m", "chute_ros.nodes.safety_supervisor", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert done.returncode == code
+    assert said in done.stdout + done.stderr
+    assert "decision" not in done.stdout + done.stderr

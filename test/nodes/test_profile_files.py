@@ -30,6 +30,11 @@ def test_a_name_that_is_none_says_which_there_are() -> None:
         load_profile("helicopter", LINKS)
 
 
+def test_an_empty_name_is_said_to_be_empty() -> None:
+    with pytest.raises(ParameterError, match=r"^parameter profile is empty: need one of by_hand"):
+        load_profile("", LINKS)
+
+
 def test_a_mistake_in_a_file_stops_the_start_with_its_line(bench, tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("profile: mine\nrules:\n  tilts:\n    action: FIRE\n")

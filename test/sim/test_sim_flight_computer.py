@@ -211,7 +211,10 @@ def test_help_names_every_action_and_layout_default():
         (("--speed", "-1"), "speed is -1.0: need 0.01 to 1000"),
         (("--cut", "30"), "cut is 30.0: need 0 to 1"),
         (("--heartbeat-timeout", "nan"), "heartbeat-timeout is nan: need 0 to 3600 s"),
-        (("--link", "/no/folder/link"), "--link '/no/folder/link': [Errno 2] No such file"),
+        (
+            ("--link", "/no/folder/link"),
+            "--link '/no/folder/link': the folder /no/folder does not exist",
+        ),
         (("--warp", "9"), "unrecognized arguments: --warp 9"),
     ],
 )

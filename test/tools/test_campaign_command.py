@@ -27,12 +27,13 @@ def run(monkeypatch, *arguments):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--flights", "0"], "argument --flights: 0: need 1 or more"),
-        (["--flights", "-5"], "argument --flights: -5: need 1 or more"),
-        (["--each", "0"], "argument --each: 0: need 1 or more"),
+        (["--flights", "0"], "argument --flights: 0: need a whole number, 1 or more"),
+        (["--flights", "-5"], "argument --flights: -5: need a whole number, 1 or more"),
+        (["--flights", "nan"], "argument --flights: nan: need a whole number, 1 or more"),
+        (["--each", "0"], "argument --each: 0: need a whole number, 1 or more"),
         (["--each", "1", "--resume", "/tmp/kept"], "argument --each: a campaign of each kind"),
-        (["--jobs", "0"], "argument --jobs: 0: need 1 or more"),
-        (["--jobs", "many"], "argument --jobs: invalid positive value: 'many'"),
+        (["--jobs", "0"], "argument --jobs: 0: need a whole number, 1 or more"),
+        (["--jobs", "many"], "argument --jobs: many: need a whole number, 1 or more"),
         (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
         (["--page", "/tmp"], "argument --page: /tmp: no file can be written there"),
         (["--replay", "/nowhere"], "argument --replay: /nowhere: need a seed, or a file: "),
