@@ -145,7 +145,7 @@ def sections(text):
     names = "Kill switch|A vehicle|Decoding|Decoding a line|Through the node"
     head, *found = re.split(rf"^##+ (?:{names})$", text, flags=re.M)
     assert len(found) == 5
-    assert re.search(r"^.+, \d+ cores; Linux \S+; (CPython|PyPy) 3\.\S+ of /\S+; ROS 2 \w+\.$", head, re.M)
+    assert re.search(r"^.+, \d+ cores; Linux \S+; Python 3\.\S+ of /\S+; ROS 2 \w+\.$", head, re.M)
     assert found[2].rstrip().endswith("## Umbilical telemetry")
     assert text.count("## Umbilical telemetry") == 1
     for section in found:

@@ -15,10 +15,11 @@ def machine() -> str:
             if line.startswith("model name"):
                 model = line.partition(":")[2].strip()
                 break
+    interpreter = platform.python_implementation().removeprefix("C")
     distribution = os.environ.get("ROS_DISTRO", "?")
     return (
         f"{model}, {os.cpu_count()} cores; Linux {platform.release()}; "
         # Whose: one that was built without the compiler's profile is a fifth slower.
-        f"{platform.python_implementation()} {platform.python_version()} of {sys.base_prefix}; "
+        f"{interpreter} {platform.python_version()} of {sys.base_prefix}; "
         f"ROS 2 {distribution}"
     )
