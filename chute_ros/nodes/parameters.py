@@ -71,7 +71,7 @@ class Parameter:
 
 #: As like as that a name is another one misspelt, by difflib; what is less like may belong to
 #: another node that shares the file.
-_MISSPELT = 0.85
+MISSPELT = 0.85
 
 
 def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
@@ -105,7 +105,7 @@ def _tell_unknown(node: Node, known: list[str]) -> None:
     for name in node._parameter_overrides:
         if node.has_parameter(name) or name.startswith("qos_overrides."):
             continue
-        if near := is_misspelt(name, known):
+        if near := nearest(name, known, MISSPELT):
             # Whoever set it relies on it: the default may be the opposite.
             raise ParameterError(
                 f"{node.get_fully_qualified_name()} has no parameter {name}: did you mean "
@@ -115,16 +115,16 @@ def _tell_unknown(node: Node, known: list[str]) -> None:
         node.get_logger().error(f"has no parameter {name}, its value is not used{hint}")
 
 
-def is_misspelt(name: str, known: Iterable[str]) -> str:
-    """Which of those that are known this name surely was meant to be; empty: none."""
-    near = difflib.get_close_matches(name, known, 1, _MISSPELT)
+def nearest(name: str, known: Iterable[str], alike: float = 0.6) -> str:
+    """The one of known that is most like this name; empty: none is as like it (0 to 1)."""
+    near = difflib.get_close_matches(name, known, 1, alike)
     return near[0] if near else ""
 
 
 def what_was_meant(name: str, known: Iterable[str]) -> str:
     """The end of a text that says that there is no such parameter; empty: none is like it."""
-    near = difflib.get_close_matches(name, known, 1)
-    return f": did you mean {near[0]}?" if near else ""
+    near = nearest(name, known)
+    return f": did you mean {near}?" if near else ""
 
 
 def liveness_from(values: Mapping[str, Any], name: str) -> LivenessLimits:

@@ -151,11 +151,12 @@ def _shortest_f32(value: float) -> Decimal:
     if bits & _MANTISSA:
         # Its neighbours are equally far: the nearest decimal of so many digits reads back as it,
         # or none of so many does; and that of one digit more is nearer. Most need eight or nine.
-        shortest = near = Context(9, ROUND_HALF_DOWN).create_decimal_from_float(value)
-        digits = 9
-        while digits and _rounded_to_f32(float(near)) == value:
-            shortest, digits = near, digits - 1
-            near = Context(max(1, digits), ROUND_HALF_DOWN).create_decimal_from_float(value)
+        shortest = Context(9, ROUND_HALF_DOWN).create_decimal_from_float(value)
+        for digits in range(8, 0, -1):
+            near = Context(digits, ROUND_HALF_DOWN).create_decimal_from_float(value)
+            if _rounded_to_f32(float(near)) != value:
+                break
+            shortest = near
         return shortest
     exact = Fraction(value)
     low, high = (exact + _f32(bits - 1)) / 2, (exact + _f32(bits + 1)) / 2

@@ -17,7 +17,7 @@ from rclpy.parameter import Parameter
 
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
-from chute_ros.nodes.parameters import is_misspelt
+from chute_ros.nodes.parameters import MISSPELT, nearest
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.nodes.umbilical_node import UmbilicalNode
 from chute_ros.nodes.upf_can_node import UpfCanNode
@@ -272,7 +272,7 @@ def test_no_parameter_of_another_node_passes_for_a_misspelt_one():
     names = {node: {one.name for one in all_of_it} for node, all_of_it in NODE_PARAMETERS.items()}
     for node, own in names.items():
         others = set().union(*names.values()) - own
-        assert not [name for name in others if is_misspelt(name, own)], node
+        assert not [name for name in others if nearest(name, own, MISSPELT)], node
 
 
 def test_names_that_ros_itself_gives_meaning_are_not_told(bench, capfd):

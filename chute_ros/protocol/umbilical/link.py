@@ -30,7 +30,7 @@ from chute_ros.protocol.umbilical.flight_computer import DEVICE, FlightComputer
 from chute_ros.protocol.umbilical.layouts import Layout
 from chute_ros.protocol.umbilical.memory import MemoryWorks, Step
 from chute_ros.protocol.umbilical.orders import Orders
-from chute_ros.protocol.umbilical.scheduler import HEARTBEAT, CommandScheduler
+from chute_ros.protocol.umbilical.scheduler import HEARTBEAT, Command, CommandScheduler
 from chute_ros.protocol.umbilical.stream import DumpBytes, Line, StreamReader
 
 #: A line that is nothing known is shown to a person at most each so many seconds.
@@ -66,8 +66,8 @@ class UmbilicalLink:
         self._show_unknown_at = 0.0
         self._told_since = -math.inf
         self._told = 0
-        #: Tokens to write, each with its command's name.
-        self._output: list[tuple[bytes, str]] = []
+        self._output: list[Command] = []
+        #: Of the commands that were handed out last the names, by their tokens.
         self._handed_out: dict[bytes, str] = {}
         self._events: list[UmbilicalEvent] = []
 
@@ -132,8 +132,8 @@ class UmbilicalLink:
     def take_output(self) -> list[bytes]:
         """Tokens to write, each in a write of its own; each is handed out once."""
         output, self._output = self._output, []
-        self._handed_out = dict(output)
-        return [token for token, _ in output]
+        self._handed_out = {command.token: command.name for command in output}
+        return [command.token for command in output]
 
     def take_events(self) -> list[UmbilicalEvent]:
         """What happened, oldest first; each is handed out once."""
@@ -304,4 +304,4 @@ class UmbilicalLink:
         for send in [*sends, *self._requests.drive(now)]:
             self.memory.token_sent(send.command, now)
             self.orders.token_sent(send.command.name, now)
-            self._output.append((send.command.token, send.command.name))
+            self._output.append(send.command)

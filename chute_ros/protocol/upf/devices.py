@@ -45,7 +45,6 @@ class Device:
     def __init__(self, node_id: int, config: UpfConfig, definitions: Definitions) -> None:
         self.node_id = node_id
         self.liveness = Liveness(config.liveness)
-        self.admitted = math.nan  # when it was heard first
         self.status_received = math.nan
         self.status_interval = math.nan  # s, between the two newest
         self.restart_count = 0

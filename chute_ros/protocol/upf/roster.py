@@ -56,7 +56,7 @@ class UpfDevices:
         """Under another node id, as far as can be told."""
         lost = gone.liveness.state is LinkState.LOST
         return lost and any(
-            other.alive and other.admitted > gone.liveness.last_heard
+            other.alive and other.liveness.first_heard > gone.liveness.last_heard
             for other in self.controllers.values()
         )
 
@@ -95,8 +95,7 @@ class UpfDevices:
 
     def parachute_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A ParachuteStatus came."""
-        wanted = self._config.controller_node_id
-        controller = self._admit(node_id, wanted, self.controllers, now)
+        controller = self._admit(node_id, self._config.controller_node_id, self.controllers)
         if controller is None:
             return
         jumps = controller.unknown_jumps
@@ -122,7 +121,7 @@ class UpfDevices:
         self, node_id: int, values: Mapping[str, Any], now: float, ordered: bool
     ) -> None:
         """A TriggerStatus came. ordered: a release is under way."""
-        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers, now)
+        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
         if trigger is not None:
             fired, doubted = trigger.launched, trigger.doubted
             expected = ordered or self._controller_says_out()
@@ -187,9 +186,7 @@ class UpfDevices:
     def _all(self) -> list[Device]:
         return [*self.controllers.values(), *self.triggers.values()]
 
-    def _admit(
-        self, node_id: int, wanted: int, known: dict[int, DeviceT], now: float
-    ) -> DeviceT | None:
+    def _admit(self, node_id: int, wanted: int, known: dict[int, DeviceT]) -> DeviceT | None:
         """The device with this node id, if it is ours."""
         found = known.get(node_id)
         if found is not None or node_id == 0:
@@ -206,7 +203,6 @@ class UpfDevices:
         else:
             made = Trigger(node_id, self._config, self.definitions)
             self.triggers[node_id] = made
-        made.admitted = now
         return known[node_id]
 
     def _changed(self, device: Device, changes: list[LinkChange]) -> None:
