@@ -42,4 +42,5 @@ class VehicleHearing:
     def tell_now(self, now: float) -> None:
         """The picture by now."""
         self.due, self._told_at = math.inf, now
-        self._tell(i.VehicleReport(self._merge.state(now), self._merge.disputed(now)), now)
+        merge = self._merge
+        self._tell(i.VehicleReport(merge.state(now), merge.disputed(now), merge.told_by(now)), now)

@@ -11,6 +11,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from chute_msgs.msg import VehicleState
@@ -92,7 +93,7 @@ class VehicleSources:
         self,
         node: Node,
         values: Mapping[str, Any],
-        tell: Callable[[model.VehicleState, frozenset[str]], object],
+        tell: Callable[[model.VehicleState, frozenset[str], Mapping[str, str]], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._node, self._values, self._tell, self._clock = node, values, tell, clock
@@ -145,7 +146,7 @@ class VehicleSources:
     # -- messages -------------------------------------------------------------------------------
 
     def _pass_on(self, message: VehicleState) -> None:
-        self._tell(messages.vehicle_state_from(message), frozenset())
+        self._tell(messages.vehicle_state_from(message), frozenset(), MappingProxyType({}))
 
     def _vehicle_state(self, message: VehicleState) -> None:
         now = self._clock()
@@ -190,7 +191,8 @@ class VehicleSources:
                 "jumped: in doubt, and half a sign where one would decide alone (docs/rules.md)"
             )
         self._disputed = disputed
-        self._tell(self._merge.state(self._told_at), disputed)
+        told_by = self._merge.told_by(self._told_at)
+        self._tell(self._merge.state(self._told_at), disputed, told_by)
 
 
 def _checked(sources: list[str]) -> list[str]:

@@ -7,15 +7,17 @@ word is fresh; when that is old, the first other one with a fresh word; when all
 newest. Old words keep their true age: the supervisor decides how old is too old.
 
 Two sources that tell otherwise of the same part at the same time dispute it: one of them lies, and
-nobody knows which. One that jumps as nothing that flies does disputes its own word. So it stays
-for a while, also where only one of them is left.
+mostly nobody knows which. Where one of them leapt as nothing that flies well does, and the other
+lives and did not, the doubt is the first one's alone. One that jumps as nothing at all does
+disputes its own word. So it stays for a while, also where only one of them is left.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from chute_ros.model import LinkState, VehicleState
@@ -40,6 +42,15 @@ _DISPUTES = {"vertical_speed": (0, 5.0), "attitude": (3, math.pi / 2.0), "accele
 #: By so much more a word may differ from the one before of its own source, each second: six
 #: times the gravity, m/s, and three turns, rad. A force is another at once, when the motors stop.
 _CHANGES = {"vertical_speed": 60.0, "attitude": 6.0 * math.pi, "acceleration": 1e6}
+#: What is told with its source: what was doubted of one source says nothing of another.
+_WITH_SOURCE = ("height", *_DISPUTES)
+#: A source leaps that differs by more from its own word before, and so much more each second: m/s
+#: and m/s^2 (three times the gravity), rad and rad/s (240 degrees). What flies well does not; what
+#: falls may, and so one that leaps without another that tells otherwise is in no doubt.
+_LEAPS = {"vertical_speed": (2.0, 30.0), "attitude": (math.pi / 6.0, 4.0 / 3.0 * math.pi)}
+#: One that leapt so long before they began to differ, s, had begun to lie: noise is near the truth
+#: now and then.
+_LEAPT_BEFORE = 1.0
 #: Two words are of the same time if they are at most so far apart, s.
 _SAME_TIME = 0.1
 #: And must differ for so long, s: the last word of one that dies with the motors proves nothing.
@@ -48,6 +59,8 @@ _DIFFER_FOR = 0.2
 _DIFFERENCE_PAUSES = 0.5
 #: So long it is remembered, s: as long as a fall may last.
 DISPUTED = 10.0
+
+_BY_THE_FIRST: Mapping[str, str] = MappingProxyType({})
 
 #: A link in order of preference: who hears the autopilot knows more of it than who lost it.
 _PREFERENCE = (LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.NEVER_SEEN)
@@ -59,6 +72,14 @@ class _Word:
 
     values: readings.Values
     received: float
+
+
+@dataclass
+class _Course:
+    """When a source last leapt, and last told another value of a part, monotonic s."""
+
+    leapt: float = -math.inf
+    changed: float = -math.inf
 
 
 @dataclass(frozen=True)
@@ -90,6 +111,8 @@ class VehicleMerge:
         self._vehicle = VehicleState()
         #: (Part, source) -> when another source last told otherwise.
         self._disputed: dict[tuple[str, str], float] = {}
+        #: (Part, source) -> how its words went on.
+        self._courses: dict[tuple[str, str], _Course] = {}
         #: (Part, two sources) -> since when they differ.
         self._differ: dict[tuple[str, frozenset[str]], _Difference] = {}
 
@@ -139,6 +162,18 @@ class VehicleMerge:
             and now - self._disputed.get((part, source), -math.inf) < DISPUTED
         )
 
+    def told_by(self, now: float) -> Mapping[str, str]:
+        """Part of _WITH_SOURCE -> source, where that is another than the first of the list."""
+        if len(self._sources) == 1:
+            return _BY_THE_FIRST
+        sources = {part: self._source(part, now) for part in _WITH_SOURCE}
+        others = {
+            part: source
+            for part, source in sources.items()
+            if source is not None and source != self._sources[0]
+        }
+        return MappingProxyType(others) if others else _BY_THE_FIRST
+
     def _store(
         self, source: str, part: str, values: readings.Values | None, received: float
     ) -> None:
@@ -151,8 +186,21 @@ class VehicleMerge:
             received = before.received
         word = _Word(values, received)
         if part in _DISPUTES:
+            if before is not None:
+                self._follow(part, source, before, word)
             self._compare(part, source, word)
         self._words[source][part] = word
+
+    def _follow(self, part: str, source: str, before: _Word, word: _Word) -> None:
+        """From one word of a source to its next."""
+        course = self._courses.setdefault((part, source), _Course())
+        if word.values != before.values:
+            course.changed = word.received
+        place, _ = _DISPUTES[part]
+        most, each_second = _LEAPS.get(part, (math.inf, 0.0))
+        difference = abs(word.values[place] - before.values[place])
+        if difference > most + each_second * abs(word.received - before.received):
+            course.leapt = word.received
 
     def _compare(self, part: str, source: str, word: _Word) -> None:
         """With the newest words of all sources, of this one as well."""
@@ -172,7 +220,16 @@ class VehicleMerge:
             elif difference > most:  # one that is not a number says nothing
                 since = self._differ[both] = _continued(self._differ.get(both), word)
                 if since.newest - since.begun >= _DIFFER_FOR:
-                    self._disputed[part, source] = self._disputed[part, other] = word.received
+                    for one in self._in_doubt(part, (source, other), since):
+                        self._disputed[part, one] = word.received
+
+    def _in_doubt(self, part: str, both: tuple[str, str], since: _Difference) -> Sequence[str]:
+        """Which of two sources that differ since then: the one that leapt, or both."""
+        courses = {one: self._courses.get((part, one), _Course()) for one in both}
+        leapt = [one for one in both if courses[one].leapt >= since.begun - _LEAPT_BEFORE]
+        # One whose value does not change goes on without a leap, and tells nothing.
+        lives = all(courses[one].changed > since.begun for one in both if one not in leapt)
+        return leapt if len(leapt) == 1 and lives else both
 
     def _source(self, part: str, now: float) -> str | None:
         """Whose word on this part counts; None: nobody knows."""

@@ -40,7 +40,7 @@ _HEARD_BEFORE = 1.0
 #: m/s of it: a second of free fall bends them by 0.4 m, one of ten times the gravity by 4 m.
 _SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
 #: Measurement -> the part of vehicle/state that tells it, where that has another name.
-_PARTS = {"tilt_deg": "attitude"}
+PARTS = {"tilt_deg": "attitude"}
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
 
@@ -71,7 +71,7 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     what was read of it, which may be what the heights tell in its place."""
     if value != state.measured(name).value:
         return ""
-    if _PARTS.get(name, name) in state.disputed:
+    if PARTS.get(name, name) in state.disputed:
         return "another source told otherwise"
     return state.measured(name).doubt(name, now)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from chute_ros.model import NAN, Decision, LinkState, Outcome, ParachuteStatus, VehicleState
 
@@ -39,10 +41,12 @@ class ParachuteReport:
 @dataclass(frozen=True)
 class VehicleReport:
     """A VehicleState came. disputed: its parts (vertical_speed, attitude, acceleration) that
-    another source has lately told otherwise."""
+    another source has lately told otherwise. told_by: those parts and height, where another source
+    than the first of vehicle_sources tells them, and which."""
 
     state: VehicleState
     disputed: frozenset[str] = frozenset()
+    told_by: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
 
 @dataclass(frozen=True)

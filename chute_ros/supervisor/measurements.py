@@ -15,6 +15,9 @@ from chute_ros.errors import ParameterError
 from chute_ros.model import VehicleState
 from chute_ros.supervisor.quick_replace import replace
 
+#: Of its rate a height may differ by so much from what the vertical speed tells: in a gap of lost
+#: messages a wrong height comes as far as one that flies.
+_BESIDE_SPEED = 0.5
 #: Samples in a row that must agree before a jump, or a clock that was set back, is believed.
 CONFIRMING_SAMPLES = 3
 #: Two messages may tell the same sample: what was measured less than this apart is one, s.
@@ -65,7 +68,7 @@ STANDARD_LIMITS: dict[str, Limits] = {
     "battery_remaining": Limits(0.0, 1.0, 0.5, 0.3, 10.0, 0.0),
 }
 
-HEIGHT = "height"
+HEIGHT, VERTICAL_SPEED = "height", "vertical_speed"
 #: What tells of a fall whichever way up it is.
 FALL_SIGNS = ("vertical_speed", "acceleration")
 #: A jump that was believed is doubted for so long, s: as long as a fall may last.
@@ -100,6 +103,16 @@ class Sample:
 
 
 @dataclass(frozen=True)
+class Doubts:
+    """What a source, which tells a measurement no more, has put in doubt; see Measured."""
+
+    source: str
+    doubted_at: float
+    jumped_at: float
+    before_jump: float
+
+
+@dataclass(frozen=True)
 class Measured:
     """What is known of one measurement. measured_at: monotonic s of the newest that was taken."""
 
@@ -120,6 +133,26 @@ class Measured:
     candidate: float = math.nan
     candidate_at: float = math.nan
     candidates: int = 0
+    #: Which of several sources tells it, empty: the first; and what others have put in doubt.
+    source: str = ""
+    others: tuple[Doubts, ...] = ()
+
+    def told_by(self, source: str) -> Measured:
+        """The same, told by this source from now on: what one that lied has put in doubt says
+        nothing of the words of another, and counts again when it comes back."""
+        if source == self.source:
+            return self
+        mine = Doubts(self.source, self.doubted_at, self.jumped_at, self.before_jump)
+        known = {one.source: one for one in (*self.others, mine)}
+        theirs = known.pop(source, Doubts(source, math.nan, math.nan, math.nan))
+        return replace(
+            self,
+            doubted_at=theirs.doubted_at,
+            jumped_at=theirs.jumped_at,
+            before_jump=theirs.before_jump,
+            source=source,
+            others=tuple(known.values()),
+        )
 
     def unusable(self, limits: Limits, now: float) -> str:
         """Why it cannot be used now; empty: it can."""
@@ -171,8 +204,9 @@ class Measured:
         """The value, or NaN where it cannot be used."""
         return math.nan if self.unusable(limits, now) else self.value
 
-    def with_sample(self, sample: Sample, limits: Limits) -> Measured:
-        """After one sample; the same one told again changes nothing."""
+    def with_sample(self, sample: Sample, limits: Limits, speed: float = math.nan) -> Measured:
+        """After one sample; the same one told again changes nothing. speed: unit/s with which it
+        changes, where another sensor tells it."""
         if not math.isfinite(sample.measured_at):
             return self
         for value, at in (
@@ -194,9 +228,9 @@ class Measured:
                 candidate_at=math.nan,
                 candidates=0,
             )
-        doubtful = self._doubtful(sample, limits)
+        doubtful = self._doubtful(sample, limits, speed)
         # A date that went back puts the value in no doubt.
-        leaps = bool(doubtful) and _jumps(self.value, self.measured_at, sample, limits)
+        leaps = bool(doubtful) and _jumps(self.value, self.measured_at, sample, limits, speed)
         if doubtful:
             agrees = not _jumps(self.candidate, self.candidate_at, sample, limits)
             candidates = self.candidates + 1 if agrees else 1
@@ -230,6 +264,8 @@ class Measured:
             doubted_at=self.doubted_at,
             jumped_at=jumped_at,
             before_jump=before_jump,
+            source=self.source,
+            others=self.others,
         )
 
     def _impossible(self, sample: Sample, limits: Limits) -> str:
@@ -239,7 +275,7 @@ class Measured:
             return f"{sample.value:g} is out of {limits.minimum:g} to {limits.maximum:g}"
         return ""
 
-    def _doubtful(self, sample: Sample, limits: Limits) -> str:
+    def _doubtful(self, sample: Sample, limits: Limits, speed: float) -> str:
         if math.isnan(self.measured_at):
             return ""
         if sample.measured_at < self.measured_at - _JITTER:
@@ -247,15 +283,21 @@ class Measured:
         # After a silence nobody knows what lay between: only what follows closely can jump.
         if sample.measured_at - self.measured_at > limits.max_age:
             return ""
-        if _jumps(self.value, self.measured_at, sample, limits):
+        if _jumps(self.value, self.measured_at, sample, limits, speed):
             step = sample.value - self.value
             return f"jumped by {step:+g} in {sample.measured_at - self.measured_at:.3f} s"
         return ""
 
 
-def _jumps(value: float, at: float, sample: Sample, limits: Limits) -> bool:
-    allowed = limits.jump + limits.rate * abs(sample.measured_at - at)
-    return abs(sample.value - value) > allowed
+def _jumps(
+    value: float, at: float, sample: Sample, limits: Limits, speed: float = math.nan
+) -> bool:
+    passed = sample.measured_at - at
+    step = sample.value - value
+    if abs(step) > limits.jump + limits.rate * abs(passed):
+        return True
+    # What is not a number denies nothing.
+    return abs(step - speed * passed) > limits.jump + limits.rate * _BESIDE_SPEED * abs(passed)
 
 
 def samples_of(

@@ -10,7 +10,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.machine import Stage, Stimulus
-from chute_ros.supervisor.measurements import samples_of
+from chute_ros.supervisor.measurements import HEIGHT, VERTICAL_SPEED, samples_of
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.requests import Requests
 
@@ -92,10 +92,19 @@ class Reports(Requests):
         state, new = self.state, one.state
         limits = self.config.profile.limits
         samples = samples_of(new, self.now, state.home)
-        measurements = {
-            name: state.measured(name).with_sample(sample, limits[name])
-            for name, sample in samples.items()
+        before = {
+            name: state.measured(name).told_by(one.told_by.get(flight.PARTS.get(name, name), ""))
+            for name in samples
         }
+        measurements = {
+            name: before[name].with_sample(sample, limits[name])
+            for name, sample in samples.items()
+            if name != HEIGHT
+        }
+        known = measurements[VERTICAL_SPEED]
+        told = VERTICAL_SPEED not in one.disputed and not known.doubt(VERTICAL_SPEED, self.now)
+        speed = known.usable(limits[VERTICAL_SPEED], self.now) if told else math.nan
+        measurements[HEIGHT] = before[HEIGHT].with_sample(samples[HEIGHT], limits[HEIGHT], speed)
         was_disarmed = state.vehicle.armed is Armed.DISARMED
         self.state = replace(
             state,

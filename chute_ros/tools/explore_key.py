@@ -39,6 +39,8 @@ LEFT_OUT = frozenset(
         "clock_least",
         "clock_least_before",
         "same_since",  # no value here stays the same
+        "source",  # here one source tells all
+        "others",
         "sent_at",
         "details",
         "earlier",

@@ -34,7 +34,7 @@ class Listener(Node):
         values = {**declare(self, VEHICLE_PARAMETERS), "vehicle_state_age": 2.5}
         self.sources = VehicleSources(self, values, self.hear, lambda: self.now)
 
-    def hear(self, state, disputed):
+    def hear(self, state, disputed, told_by):
         self.told.append(state)
         self.disputed = disputed
 
