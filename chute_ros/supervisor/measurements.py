@@ -250,7 +250,7 @@ class Measured:
         nearer = abs(sample.value - self.candidate) < abs(sample.value - self.value)
         jumped_at, before_jump = self.jumped_at, self.before_jump
         candidate = Sample(self.candidate, self.candidate_at)
-        if leaps or (nearer and _jumps(self.value, self.measured_at, candidate, limits)):
+        if leaps or (nearer and _jumps(self.value, self.measured_at, candidate, limits, speed)):
             # A jump back to what it was before ends what the first one has put in doubt.
             back = abs(sample.value - before_jump) <= limits.jump
             jumped_at, before_jump = (

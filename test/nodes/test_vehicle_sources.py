@@ -30,13 +30,13 @@ class Listener(Node):
     def __init__(self, **options):
         super().__init__("listener", **options)
         self.now = 100.0
-        self.told, self.disputed = [], frozenset()
+        self.told, self.disputed, self.told_by = [], frozenset(), None
         values = {**declare(self, VEHICLE_PARAMETERS), "vehicle_state_age": 2.5}
         self.sources = VehicleSources(self, values, self.hear, lambda: self.now)
 
     def hear(self, state, disputed, told_by):
         self.told.append(state)
-        self.disputed = disputed
+        self.disputed, self.told_by = disputed, told_by
 
 
 @pytest.fixture
@@ -169,6 +169,7 @@ def test_sources_that_contradict_each_other_are_told_and_logged_once(bench, list
         bench.publish(upside_down, "imu")
         bench.until(lambda heard=heard: len(node.told) > heard + 1, "the IMU is told")
     assert node.disputed == {"attitude"}
+    assert node.told_by == {"acceleration": "imu"}
     assert capfd.readouterr().err.count("attitude is told otherwise by another source") == 1
 
 

@@ -298,3 +298,131 @@ def test_one_that_tumbles_disputes_nothing():
         if hundredth % 10 == 0:
             one.hear("vehicle/state", {"attitude": (0.0, 0.0, 0.0, tilt)}, now)
         assert one.disputed(now) == frozenset()
+
+
+# -- which of them lies ---------------------------------------------------------------------------
+
+
+def tilted(tilt):
+    return {"attitude": (0.0, 0.0, 0.0, tilt)}
+
+
+def live(seconds, tilts, imu_tilts, start=10.0, one=None):
+    """The autopilot at 10 Hz and the IMU at 50 Hz; tilts by the s since the start, rad."""
+    one = one or merge("vehicle/state", "imu")
+    for n in range(round(seconds * 50)):
+        passed = n / 50.0
+        if n % 5 == 0:
+            one.hear("vehicle/state", tilted(tilts(passed)), start + passed)
+        one.hear("imu", tilted(imu_tilts(passed)), start + passed)
+    return one, start + seconds
+
+
+def upright(passed):
+    """One that lives: its noise is never twice the same."""
+    return 0.02 + 0.01 * math.sin(50.0 * passed)
+
+
+def turned_after(seconds, by=math.pi - 0.1):
+    return lambda passed: upright(passed) + (by if passed >= seconds else 0.0)
+
+
+def told_by_the_imu(one, now):
+    """0.5 s after the autopilot's last word."""
+    one.hear("imu", tilted(0.1), now + 0.5)
+    assert one.told_by(now + 0.5) == {"attitude": "imu"}
+    return one.disputed(now + 0.5)
+
+
+def test_the_one_that_leapt_is_in_doubt_alone():
+    """Given an autopilot whose attitude turns at once, 0.5 s before its power goes."""
+    one, now = live(1.0, turned_after(0.5), upright)
+    assert one.told_by(now) == {}
+    assert one.disputed(now) == {"attitude"}
+    assert told_by_the_imu(one, now) == frozenset()
+
+
+def test_a_second_source_that_leapt_stays_in_doubt_once_it_is_left_alone():
+    one, now = live(1.0, upright, turned_after(0.5))
+    assert one.disputed(now) == frozenset()
+    assert told_by_the_imu(one, now) == {"attitude"}
+
+
+def test_one_that_leapt_back_is_in_doubt_no_less():
+    lies = lambda passed: upright(passed) + (3.0 if 0.3 <= passed < 0.7 else 0.0)  # noqa: E731
+    one, now = live(1.0, upright, lies)
+    assert told_by_the_imu(one, now) == {"attitude"}
+
+
+def test_beside_one_whose_value_does_not_change_both_are_in_doubt():
+    """It may have stuck, and the other one may fall."""
+    one, now = live(1.0, turned_after(0.5), lambda _: 0.02)
+    assert one.disputed(now) == {"attitude"}
+    assert told_by_the_imu(one, now) == {"attitude"}
+
+
+def test_where_both_or_none_leapt_both_are_in_doubt():
+    one, now = live(1.0, turned_after(0.5), turned_after(0.6, by=-math.pi))
+    assert one.disputed(now) == {"attitude"}
+    assert told_by_the_imu(one, now) == {"attitude"}
+    one, now = live(1.5, upright, lambda passed: upright(passed) + 2.5 * passed)
+    assert one.disputed(now) == {"attitude"}
+    assert told_by_the_imu(one, now) == {"attitude"}
+
+
+@pytest.mark.parametrize(("earlier", "both"), [(0.6, False), (0.9, True)])
+def test_noise_is_near_the_truth_now_and_then(earlier, both):
+    """Given a leap that another leap took back; then it differs without one."""
+
+    def noise(passed):
+        if passed < 0.1:
+            return upright(passed) + 1.4
+        return upright(passed) + min(0.45 * 10.0 * max(0.0, passed - earlier), 3.0)
+
+    one, now = live(earlier + 0.9, noise, upright)
+    assert told_by_the_imu(one, now) == (frozenset({"attitude"}) if both else frozenset())
+
+
+@pytest.mark.parametrize(
+    ("part", "before", "after", "leapt"),
+    [
+        # 30 degrees and 240 degrees a second, for 0.1 s.
+        ("attitude", (0.0, 0.0, 0.0, 1.65), (0.0, 0.0, 0.0, 0.7), True),
+        ("attitude", (0.0, 0.0, 0.0, 1.65), (0.0, 0.0, 0.0, 0.72), False),
+        # 2 m/s and 30 m/s^2.
+        ("vertical_speed", (0.0,), (-5.1,), True),
+        ("vertical_speed", (0.0,), (-4.9,), False),
+        # A force is another at once.
+        ("acceleration", (9.8,), (0.1,), False),
+    ],
+)
+def test_a_leap_is_more_than_what_flies_well_does(part, before, after, leapt):
+    """Given two that agreed, and differ soon after the first has changed."""
+    others = {"attitude": TURNED, "vertical_speed": (20.0,), "acceleration": (20.0,)}[part]
+    one = merge("vehicle/state", "imu")
+    one.hear("vehicle/state", {part: before}, 9.9)
+    one.hear("vehicle/state", {part: after}, 10.0)
+    for n in range(1, 20):
+        one.hear("vehicle/state", {part: after}, 10.0 + n / 20.0)
+        almost = (*others[:-1], others[-1] - n / 1000.0)
+        one.hear("imu", {part: almost}, 10.0 + n / 20.0)
+    assert one.disputed(11.0) == {part}
+    one.hear("imu", {part: others}, 12.0)
+    assert one.told_by(12.0) == {part: "imu"}
+    assert one.disputed(12.0) == (frozenset() if leapt else {part})
+
+
+def test_who_tells_a_part_is_named_where_it_is_not_the_first():
+    alone = merge("odometry")
+    alone.hear("odometry", {"height": (12.0,), "attitude": LEVEL}, 10.0)
+    assert alone.told_by(10.0) == {}
+    one = merge("vehicle/state", "odometry", "imu")
+    assert one.told_by(10.0) == {}
+    one.hear("odometry", {"height": (12.0,), "vertical_speed": (0.0,), "position": None}, 10.0)
+    one.hear("imu", {"attitude": LEVEL, "acceleration": (9.8,)}, 10.0)
+    told = {"height": "odometry", "vertical_speed": "odometry"}
+    assert one.told_by(10.0) == {**told, "attitude": "imu", "acceleration": "imu"}
+    one.hear("vehicle/state", {"attitude": LEVEL, "battery": (12.0, 0.5)}, 10.1)
+    assert one.told_by(10.1) == {**told, "acceleration": "imu"}
+    one.hear("imu", {"attitude": LEVEL}, 10.4)
+    assert one.told_by(10.51)["attitude"] == "imu"
