@@ -85,8 +85,8 @@ class VehicleSources:
     """Subscribes to what the parameters name and tells what the vehicle is by then.
 
     values: the node's parameters, VEHICLE_PARAMETERS among them, and vehicle_state_age (s): a
-    source of the autopilot that is silent for longer has lost it. tell(state, disputed) is called
-    by the node's executor. clock: monotonic seconds.
+    source of the autopilot that is silent for longer has lost it. tell(state, disputed, told_by),
+    as inputs.VehicleReport has them, is called by the node's executor. clock: monotonic seconds.
     """
 
     def __init__(

@@ -48,9 +48,9 @@ _WITH_SOURCE = ("height", *_DISPUTES)
 #: and m/s^2 (three times the gravity), rad and rad/s (240 degrees). What flies well does not; what
 #: falls may, and so one that leaps without another that tells otherwise is in no doubt.
 _LEAPS = {"vertical_speed": (2.0, 30.0), "attitude": (math.pi / 6.0, 4.0 / 3.0 * math.pi)}
-#: One that leapt so long before they began to differ, s, had begun to lie: noise is near the truth
-#: now and then.
-_LEAPT_BEFORE = 1.0
+#: One that leapt so shortly before they began to differ, or after it, s, is the one that lies:
+#: noise is near the truth now and then. A leap of later says nothing of how it began.
+_LEAPT_THEN = 1.0
 #: Two words are of the same time if they are at most so far apart, s.
 _SAME_TIME = 0.1
 #: And must differ for so long, s: the last word of one that dies with the motors proves nothing.
@@ -59,8 +59,6 @@ _DIFFER_FOR = 0.2
 _DIFFERENCE_PAUSES = 0.5
 #: So long it is remembered, s: as long as a fall may last.
 DISPUTED = 10.0
-
-_BY_THE_FIRST: Mapping[str, str] = MappingProxyType({})
 
 #: A link in order of preference: who hears the autopilot knows more of it than who lost it.
 _PREFERENCE = (LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.NEVER_SEEN)
@@ -76,10 +74,12 @@ class _Word:
 
 @dataclass
 class _Course:
-    """When a source last leapt, and last told another value of a part, monotonic s."""
+    """When a source last leapt, and last told another value of a part, monotonic s; how long that
+    was after the value before it, s."""
 
     leapt: float = -math.inf
     changed: float = -math.inf
+    pause: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -164,15 +164,12 @@ class VehicleMerge:
 
     def told_by(self, now: float) -> Mapping[str, str]:
         """Part of _WITH_SOURCE -> source, where that is another than the first of the list."""
-        if len(self._sources) == 1:
-            return _BY_THE_FIRST
-        sources = {part: self._source(part, now) for part in _WITH_SOURCE}
-        others = {
-            part: source
-            for part, source in sources.items()
-            if source is not None and source != self._sources[0]
-        }
-        return MappingProxyType(others) if others else _BY_THE_FIRST
+        told = {}
+        for part in _WITH_SOURCE if len(self._sources) > 1 else ():  # most vehicles have one
+            source = self._source(part, now)
+            if source is not None and source != self._sources[0]:
+                told[part] = source
+        return MappingProxyType(told)
 
     def _store(
         self, source: str, part: str, values: readings.Values | None, received: float
@@ -186,21 +183,24 @@ class VehicleMerge:
             received = before.received
         word = _Word(values, received)
         if part in _DISPUTES:
-            if before is not None:
+            if before is not None and part in _LEAPS:
                 self._follow(part, source, before, word)
             self._compare(part, source, word)
         self._words[source][part] = word
 
     def _follow(self, part: str, source: str, before: _Word, word: _Word) -> None:
         """From one word of a source to its next."""
-        course = self._courses.setdefault((part, source), _Course())
-        if word.values != before.values:
-            course.changed = word.received
         place, _ = _DISPUTES[part]
-        most, each_second = _LEAPS.get(part, (math.inf, 0.0))
         difference = abs(word.values[place] - before.values[place])
-        if difference > most + each_second * abs(word.received - before.received):
+        if not difference > 0.0:
+            return
+        course = self._courses.setdefault((part, source), _Course())
+        pause = abs(word.received - course.changed)
+        most, each_second = _LEAPS[part]
+        # What follows a pause closely was held up with it, and how old it is nobody knows.
+        if difference > most + each_second * max(pause, course.pause):
             course.leapt = word.received
+        course.changed, course.pause = word.received, pause
 
     def _compare(self, part: str, source: str, word: _Word) -> None:
         """With the newest words of all sources, of this one as well."""
@@ -226,7 +226,7 @@ class VehicleMerge:
     def _in_doubt(self, part: str, both: tuple[str, str], since: _Difference) -> Sequence[str]:
         """Which of two sources that differ since then: the one that leapt, or both."""
         courses = {one: self._courses.get((part, one), _Course()) for one in both}
-        leapt = [one for one in both if courses[one].leapt >= since.begun - _LEAPT_BEFORE]
+        leapt = [one for one in both if abs(courses[one].leapt - since.begun) <= _LEAPT_THEN]
         # One whose value does not change goes on without a leap, and tells nothing.
         lives = all(courses[one].changed > since.begun for one in both if one not in leapt)
         return leapt if len(leapt) == 1 and lives else both

@@ -16,7 +16,8 @@ from chute_ros.model import VehicleState
 from chute_ros.supervisor.quick_replace import replace
 
 #: Of its rate a height may differ by so much from what the vertical speed tells: in a gap of lost
-#: messages a wrong height comes as far as one that flies.
+#: messages a wrong height comes as far as one that flies. A speed of more than as much denies no
+#: height: that of one that stands would be denied by a speed that lies.
 _BESIDE_SPEED = 0.5
 #: Samples in a row that must agree before a jump, or a clock that was set back, is believed.
 CONFIRMING_SAMPLES = 3
@@ -149,7 +150,8 @@ class Measured:
             self,
             doubted_at=theirs.doubted_at,
             jumped_at=theirs.jumped_at,
-            before_jump=theirs.before_jump,
+            # Who tells what the one before told before it jumped has not jumped.
+            before_jump=self.before_jump if math.isnan(theirs.jumped_at) else theirs.before_jump,
             source=source,
             others=tuple(known.values()),
         )
@@ -256,6 +258,8 @@ class Measured:
             jumped_at, before_jump = (
                 (math.nan, math.nan) if back else (sample.measured_at, self.value)
             )
+        elif math.isnan(jumped_at):
+            before_jump = math.nan
         return Measured(
             value=sample.value,
             measured_at=sample.measured_at,
@@ -296,8 +300,9 @@ def _jumps(
     step = sample.value - value
     if abs(step) > limits.jump + limits.rate * abs(passed):
         return True
+    rate = limits.rate * _BESIDE_SPEED
     # What is not a number denies nothing.
-    return abs(step - speed * passed) > limits.jump + limits.rate * _BESIDE_SPEED * abs(passed)
+    return abs(speed) <= rate and abs(step - speed * passed) > limits.jump + rate * abs(passed)
 
 
 def samples_of(

@@ -10,9 +10,13 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.machine import Stage, Stimulus
-from chute_ros.supervisor.measurements import HEIGHT, VERTICAL_SPEED, samples_of
+from chute_ros.supervisor.measurements import HEIGHT, VERTICAL_SPEED, Measured, samples_of
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.requests import Requests
+
+#: A vertical speed and that of the heights differ by so much if one of them is wrong, m/s: a fall
+#: that began within the second of the heights is seen late by them.
+_SPEEDS_DIFFER = 10.0
 
 
 class Reports(Requests):
@@ -93,18 +97,22 @@ class Reports(Requests):
         limits = self.config.profile.limits
         samples = samples_of(new, self.now, state.home)
         before = {
+            # What nobody tells just now has not changed its source.
             name: state.measured(name).told_by(one.told_by.get(flight.PARTS.get(name, name), ""))
-            for name in samples
+            if math.isfinite(sample.measured_at)
+            else state.measured(name)
+            for name, sample in samples.items()
         }
         measurements = {
             name: before[name].with_sample(sample, limits[name])
             for name, sample in samples.items()
             if name != HEIGHT
         }
-        known = measurements[VERTICAL_SPEED]
-        told = VERTICAL_SPEED not in one.disputed and not known.doubt(VERTICAL_SPEED, self.now)
-        speed = known.usable(limits[VERTICAL_SPEED], self.now) if told else math.nan
-        measurements[HEIGHT] = before[HEIGHT].with_sample(samples[HEIGHT], limits[HEIGHT], speed)
+        told, speed = samples[HEIGHT], math.nan
+        # A smaller step is possible whatever the speed is.
+        if abs(told.value - before[HEIGHT].value) > limits[HEIGHT].jump:
+            speed = self._believed_speed(measurements[VERTICAL_SPEED], one.disputed)
+        measurements[HEIGHT] = before[HEIGHT].with_sample(told, limits[HEIGHT], speed)
         was_disarmed = state.vehicle.armed is Armed.DISARMED
         self.state = replace(
             state,
@@ -118,6 +126,15 @@ class Reports(Requests):
         if was_disarmed and new.armed is Armed.ARMED:
             height = flight.measured(self.config, self.state, "height", self.now)
             self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
+
+    def _believed_speed(self, speed: Measured, disputed: frozenset[str]) -> float:
+        """A vertical speed by which a height can be denied, m/s; NaN: there is none. One that the
+        heights until now deny is as likely to be wrong as the next of them."""
+        if VERTICAL_SPEED in disputed or speed.doubt(VERTICAL_SPEED, self.now):
+            return math.nan
+        told = speed.usable(self.config.profile.limits[VERTICAL_SPEED], self.now)
+        by_heights = flight.climb_rate(self.config, self.state, self.now)
+        return math.nan if abs(told - by_heights) > _SPEEDS_DIFFER else told
 
     def _note_height_told(self) -> None:
         """Keep the heights of the last second, at most ten of them, all since one was doubted:

@@ -370,12 +370,12 @@ def test_where_both_or_none_leapt_both_are_in_doubt():
     assert told_by_the_imu(one, now) == {"attitude"}
 
 
-@pytest.mark.parametrize(("earlier", "both"), [(0.6, False), (0.9, True)])
+@pytest.mark.parametrize(("earlier", "both"), [(0.9, False), (1.2, True)])
 def test_noise_is_near_the_truth_now_and_then(earlier, both):
     """Given a leap that another leap took back; then it differs without one."""
 
     def noise(passed):
-        if passed < 0.1:
+        if passed < 0.4:
             return upright(passed) + 1.4
         return upright(passed) + min(0.45 * 10.0 * max(0.0, passed - earlier), 3.0)
 
@@ -400,7 +400,9 @@ def test_a_leap_is_more_than_what_flies_well_does(part, before, after, leapt):
     """Given two that agreed, and differ soon after the first has changed."""
     others = {"attitude": TURNED, "vertical_speed": (20.0,), "acceleration": (20.0,)}[part]
     one = merge("vehicle/state", "imu")
-    one.hear("vehicle/state", {part: before}, 9.9)
+    for n in range(5):
+        almost = (*before[:-1], before[-1] + n / 1e6)
+        one.hear("vehicle/state", {part: almost}, 9.5 + n / 10.0)
     one.hear("vehicle/state", {part: after}, 10.0)
     for n in range(1, 20):
         one.hear("vehicle/state", {part: after}, 10.0 + n / 20.0)

@@ -43,7 +43,12 @@ def heights(*samples: tuple[float, float]) -> Measured:
         (17.9, -10.0, True),
         (18.1, -10.0, False),
         # And never more than without.
-        (-34.1, -40.0, False),
+        (-34.1, -29.9, False),
+        # A speed of more than half the rate denies nothing.
+        (-0.1, 29.9, True),
+        (0.0, -30.1, True),
+        (33.9, -30.1, True),
+        (22.1, -30.0, False),
     ],
 )
 def test_a_height_changes_as_the_vertical_speed_tells(
@@ -99,7 +104,7 @@ def test_what_one_source_put_in_doubt_says_nothing_of_another_and_counts_when_it
     other = jumped.told_by("imu")
     assert (other.source, other.value, other.count) == ("imu", 60.2, 2)
     assert math.isnan(other.doubted_at)
-    assert math.isnan(other.before_jump)
+    assert math.isnan(other.jumped_at)
     assert other.doubt("height", 0.3) == ""
     on = other.with_sample(Sample(60.3, 0.3), HEIGHT)
     assert on.source == "imu"

@@ -61,15 +61,14 @@ class Case:
 
 def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: Any) -> list[Case]:
     """Cases of a rule that needs something besides one of these signs of falling. (Heights that
-    are told must not deny the sink; nor a tilt beside a silent autopilot.)"""
-    deniable = ("vertical_speed", "tilt") if less is LOST else ("vertical_speed",)
-    without = {name: {**less, "height": math.nan} for name in deniable}
+    are told must not deny the sink.)"""
+    without_heights = {"vertical_speed": {**less, "height": math.nan}}
     return [
         Case(
             profile,
             rule,
-            {**without.get(name, less), name: over},
-            {**without.get(name, less), name: under},
+            {**without_heights.get(name, less), name: over},
+            {**without_heights.get(name, less), name: under},
             hold,
             2,
         )
