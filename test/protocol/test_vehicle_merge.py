@@ -414,6 +414,49 @@ def test_a_leap_is_more_than_what_flies_well_does(part, before, after, leapt):
     assert one.disputed(12.0) == (frozenset() if leapt else {part})
 
 
+@pytest.mark.parametrize("held_up", [False, True])
+def test_words_that_were_held_up_together_show_no_leap(held_up):
+    """Given an IMU that drifts away, and an autopilot that banks by 37 degrees while its words are
+    held up for a second; then it tells the one from before and the newest at once."""
+    one = merge("vehicle/state", "imu")
+    for n in range(50 * 27):
+        now = 10.0 + n / 50.0
+        bank = lambda at: upright(at) + (0.65 if at > 25.5 else 0.0)  # noqa: E731
+        one.hear("imu", tilted(min(upright(now) + 0.15 * (now - 10.0), 2.9)), now)
+        if n % 5 or (25.0 <= now < 26.0 and held_up):
+            continue
+        if held_up and n == 800:
+            one.hear("vehicle/state", tilted(bank(25.0)), now + 0.0005)
+        one.hear("vehicle/state", tilted(bank(now)), now + 0.001)
+    assert one.disputed(37.0) == {"attitude"}
+    assert told_by_the_imu(one, 37.0) == {"attitude"}
+
+
+def test_a_leap_long_after_they_began_to_differ_says_nothing():
+    """Given an IMU that drifted away 2 s ago, beside which the true one leaps for a moment."""
+
+    def glitch(passed):
+        return upright(passed) + (1.2 if 3.0 <= passed < 3.3 else 0.0)
+
+    one, now = live(4.0, glitch, lambda passed: upright(passed) + min(2.0 * passed, 3.0))
+    assert one.disputed(now) == {"attitude"}
+    assert told_by_the_imu(one, now) == {"attitude"}
+    assert told_by_the_imu(one, now + 9.0) == {"attitude"}
+
+
+@pytest.mark.parametrize("yaw", [lambda n: n / 100.0, lambda _: math.nan])
+def test_one_whose_tilt_has_stuck_does_not_live_by_its_yaw(yaw):
+    one = merge("vehicle/state", "imu")
+    for n in range(100):
+        now = 10.0 + n / 50.0
+        if n % 5 == 0:
+            stuck = (0.0, 0.0, float(yaw(n)), 0.1)
+            one.hear("vehicle/state", {"attitude": stuck}, now)
+        one.hear("imu", tilted(turned_after(11.0)(now)), now)
+    assert one.disputed(12.0) == {"attitude"}
+    assert told_by_the_imu(one, 12.0) == {"attitude"}
+
+
 def test_who_tells_a_part_is_named_where_it_is_not_the_first():
     alone = merge("odometry")
     alone.hear("odometry", {"height": (12.0,), "attitude": LEVEL}, 10.0)

@@ -8,11 +8,13 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import pytest
-from story import Story, shipped
+from story import START, Story, shipped
 
+from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits, Measured, Sample
 
+LOST = {"link_state": LinkState.LOST}
 #: A height that may change by 60 m/s and by 10 m besides.
 HEIGHT = Limits(-500.0, 500.0, rate=60.0, jump=10.0, max_age=1.0, stuck_after=5.0)
 
@@ -141,3 +143,118 @@ def test_a_report_names_who_tells_a_part(part: str, name: str) -> None:
     story.at(story.t + 0.05, story.heartbeat(), told)
     sources = {one: story.state.measured(one).source for one in STANDARD_LIMITS}
     assert sources == {one: "imu" if one == name else "" for one in STANDARD_LIMITS}
+
+
+# -- a speed that lies denies no height -----------------------------------------------------------
+
+
+def told_beside_a_lie(
+    profile: str, speed: float, every: float, gap: float = 0.0, falls: bool = False
+) -> Story:
+    """Heights that are true, and a speed that has jumped so long ago that nothing doubts it any
+    more; then a gap, and a vehicle that leans over and sinks with a part of its thrust."""
+    story = Story(shipped(profile)).ready().fly(3.0, every, height=150.0)
+    story.fly(15.0, every, height=150.0, vertical_speed=speed)
+    for _ in range(round(gap / every)):
+        story.at(story.t + every, story.heartbeat())
+    height, sinking = 150.0, 0.0
+    for step in range(round(4.0 / every)):
+        told = {"height": height, "vertical_speed": speed}
+        if falls:
+            sinking = min(sinking + 4.0 * every, 18.0)
+            height -= sinking * every
+            told |= {"tilt": min(5.0 + 75.0 * step * every, 80.0), "acceleration": 6.0}
+        story.at(story.t + every, story.heartbeat(), story.told(**told))
+    return story
+
+
+LIES = [
+    ("multirotor", 140.0, 0.1, 0.0),
+    ("multirotor", 90.0, 0.2, 0.0),
+    ("multirotor", 50.0, 0.1, 0.9),
+    ("multirotor", 29.0, 0.1, 0.9),
+    ("fixed_wing", 110.0, 0.2, 0.0),
+]
+
+
+@pytest.mark.parametrize(("profile", "speed", "every", "gap"), LIES)
+def test_by_a_speed_that_lies_downwards_one_that_flies_well_is_not_ended(
+    profile: str, speed: float, every: float, gap: float
+) -> None:
+    """Its heights alone deny the sink: were they not believed, nothing would."""
+    story = told_beside_a_lie(profile, -speed, every, gap)
+    assert story.state.measured("vertical_speed").value == pytest.approx(-speed, abs=0.1)
+    assert story.fired() == []
+    assert story.state.measured("height").rejected == ""
+
+
+@pytest.mark.parametrize(("profile", "speed", "every", "gap"), LIES)
+def test_by_a_speed_that_lies_upwards_a_fall_is_not_hidden(
+    profile: str, speed: float, every: float, gap: float
+) -> None:
+    story = told_beside_a_lie(profile, speed, every, gap, falls=True)
+    assert story.fired()[:1] == ["KILL"]
+    assert story.newest(Action.KILL).rule == "excess tilt"
+
+
+@pytest.mark.parametrize(("sinks", "taken"), [(0.0, True), (8.0, True), (12.0, False)])
+def test_a_speed_that_the_heights_until_then_deny_denies_none_after_them(
+    sinks: float, taken: bool
+) -> None:
+    """Given a speed of -20 m/s, a gap of 0.4 s, and a height that is 20 m higher after it."""
+    story = Story(shipped("multirotor")).ready().fly(1.0, height=100.0)
+    for step in range(30):
+        told = {"height": 100.0 - sinks * step * 0.05, "vertical_speed": -20.0}
+        story.fly(story.t + 0.05, **told)
+    for _ in range(300):
+        told["height"] -= sinks * 0.05
+        story.fly(story.t + 0.05, **told)
+    assert story.state.measured("vertical_speed").doubt("vertical_speed", START + story.t) == ""
+    story.at(
+        story.t + 0.4, story.heartbeat(), story.told(**{**told, "height": told["height"] + 15})
+    )
+    assert (story.state.measured("height").rejected == "") is taken
+
+
+# -- who tells nothing ----------------------------------------------------------------------------
+
+
+def test_a_doubt_stands_while_nobody_tells_the_part() -> None:
+    """Given an IMU whose tilt has jumped, of which three of four words cannot be read: the part is
+    told by nobody then, and its last value is still young."""
+    story = Story(shipped("multirotor")).ready().fly(1.0)
+    gone = {"attitude_age": math.nan, "tilt": math.nan}
+    for step in range(150):
+        tilt = 0.0 if step < 25 else 143.0
+        told = story.told(tilt=tilt, **LOST, vertical_speed=math.nan, height=math.nan)
+        if step > 30 and step % 4:
+            told = replace(told, state=replace(told.state, **gone))
+        else:
+            told = replace(told, told_by=MappingProxyType({"attitude": "imu"}))
+        story.at(story.t + 0.02, story.heartbeat(), told)
+    assert story.state.measured("tilt_deg").source == "imu"
+    assert "it jumped" in story.state.measured("tilt_deg").doubt("tilt_deg", START + story.t)
+    assert story.fired() == []
+
+
+def test_who_tells_what_was_told_before_a_jump_has_not_jumped() -> None:
+    """Given a height that jumped, and another source that tells what it told before."""
+    jumped = heights((100.0, 0.0), (60.0, 0.1), (60.1, 0.15), (60.2, 0.2))
+    other = jumped.told_by("odometry")
+    for at in (0.3, 0.35, 0.4):
+        other = other.with_sample(Sample(100.0 - at, at), HEIGHT)
+    assert other.value == 99.6
+    assert not other.has_jumped(0.4)
+    assert math.isnan(other.before_jump)
+    further = jumped.told_by("odometry")
+    for at in (0.3, 0.35, 0.4):
+        further = further.with_sample(Sample(120.0 - at, at), HEIGHT)
+    assert (further.jumped_at, further.before_jump) == (0.4, 60.2)
+
+
+def test_what_another_told_before_its_jump_counts_for_the_change_alone() -> None:
+    jumped = heights((100.0, 0.0), (60.0, 0.1), (60.1, 0.15), (60.2, 0.2))
+    other = jumped.told_by("odometry").with_sample(Sample(61.0, 0.3), HEIGHT)
+    for at in (0.4, 0.45, 0.5):
+        other = other.with_sample(Sample(100.0 - at, at), HEIGHT)
+    assert (other.jumped_at, other.before_jump) == (0.5, 61.0)
