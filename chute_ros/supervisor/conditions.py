@@ -39,6 +39,8 @@ class Finding(NamedTuple):
     doubted: bool = False
     expected: bool = True
     presumed: bool = False
+    #: It does not hold, but goes on to where it did until the rule's counter was full.
+    lingers: bool = False
 
     @property
     def text(self) -> str:
@@ -76,7 +78,8 @@ def _measurement(
     def told() -> str:
         return f"{name} {value:.2f} ({condition.limits}{f'; in doubt: {doubt}' if doubt else ''})"
 
-    return Finding(holds, told, samples, bool(doubt))
+    lingers = not holds and condition.lingers(value)
+    return Finding(holds, told, samples, bool(doubt), lingers=lingers)
 
 
 def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:

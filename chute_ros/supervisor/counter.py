@@ -49,6 +49,8 @@ class RuleEvidence:
     shown: tuple[float, ...] = ()
     #: For each condition the samples that had come at the last look; -1: it rests on none.
     seen: tuple[int, ...] = ()
+    #: For each condition: it held as the counter was full; empty: none may go on to hold.
+    kept: tuple[bool, ...] = ()
     #: Enough conditions held, each of them shown by enough samples.
     sure: bool = False
     #: It was acted on and is not done with yet.
@@ -102,10 +104,15 @@ class RuleEvidence:
         enough = rule.needed - _WEIGHTS_ROUNDING
         rule_holds = True if weight >= enough else None if possible >= enough else False
         is_sure, shown_now, seen_now = sure >= enough, tuple(shown), tuple(now_seen)
-        same = rule_holds is self.holds and is_sure is self.sure
+        kept: tuple[bool, ...] = ()
+        if rule.has_until and self.level >= rule.hold - _ROUNDING:
+            kept = tuple([bool(look.holds) for look in found])
+        same = rule_holds is self.holds and is_sure is self.sure and kept == self.kept
         if same and seen_now == self.seen and shown_now == self.shown:
             return self
-        return replace(self, holds=rule_holds, shown=shown_now, seen=seen_now, sure=is_sure)
+        return replace(
+            self, holds=rule_holds, shown=shown_now, seen=seen_now, sure=is_sure, kept=kept
+        )
 
     def fulfilled(self, rule: Rule) -> bool:
         """It holds now, has for long enough, and enough samples showed it."""

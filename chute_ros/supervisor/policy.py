@@ -40,14 +40,20 @@ class Judged(NamedTuple):
 
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
+    before = state.rule(rule.name)
     findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
+    if any(before.kept) and len(before.kept) == len(findings):
+        findings = tuple(
+            one._replace(holds=True) if kept and one.lingers else one
+            for one, kept in zip(findings, before.kept, strict=True)
+        )
     # Beside a sign in doubt, what is only taken to be so is no whole one either.
     weak = any(one.doubted and one.holds for one in findings)
     found = [
         Look(one.holds, one.samples, one.doubted or (weak and one.presumed), one.expected)
         for one in findings
     ]
-    evidence = state.rule(rule.name).seeing(rule, found)
+    evidence = before.seeing(rule, found)
     return Judged(rule, evidence, findings)
 
 

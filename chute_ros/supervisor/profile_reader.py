@@ -49,6 +49,7 @@ _RULE_KEYS = (
     *("doubted", "action", "clears"),
 )
 _CONDITION_KEYS = ("measurement", "link", "autopilot", "device")
+_LIMIT_KEYS = ("above", "below", "until", "if_unknown")
 _PROFILE_KEYS = (
     *("profile", "minimum_height", "below_minimum", "moving_speed", "landed_hold"),
     *("measurements", "rules"),
@@ -200,7 +201,7 @@ def _member(reader: _ProfileLines, where: Where, what: str, kind: type[_Kind]) -
 def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | None:
     entries = reader.mapping(
         where,
-        (*_CONDITION_KEYS, "above", "below", "if_unknown", "is", "counted", "weight"),
+        (*_CONDITION_KEYS, *_LIMIT_KEYS, "is", "counted", "weight"),
         f"a condition of {what}",
     )
     kinds = [key for key in _CONDITION_KEYS if key in entries]
@@ -215,7 +216,7 @@ def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | No
         text = f"a condition of {what} needs one of {', '.join(_CONDITION_KEYS)}"
         reader.wrong(where.line, f"{text}; it has {', '.join(kinds) or 'none'}")
         return None
-    for key in ("above", "below", "if_unknown"):
+    for key in _LIMIT_KEYS:
         if key in entries:
             reader.wrong(entries[key].line, f"{key} belongs to a measurement: remove it here")
     if "is" in entries and kinds != ["link"]:
@@ -253,7 +254,7 @@ def _measurement(
         reader.wrong(entries["is"].line, "`is` belongs to a link: use above or below")
     if "above" not in entries and "below" not in entries:
         reader.wrong(where.line, f"{name} in {what} has no limit: add above or below")
-    limits = {
+    limits: dict[str, float] = {
         key: reader.number(entries[key], f"{key} of {name} in {what}")
         for key in ("above", "below")
         if key in entries
@@ -263,7 +264,20 @@ def _measurement(
     if_unknown = False
     if "if_unknown" in entries:
         if_unknown = reader.truth(entries["if_unknown"], f"if_unknown of {name} in {what}")
+    if "until" in entries:
+        limits["until"] = _until(reader, f"until of {name} in {what}", entries["until"], limits)
     return MeasurementCondition(name, weight=weight, if_unknown=if_unknown, **limits)
+
+
+def _until(reader: _ProfileLines, what: str, where: Where, limits: dict[str, float]) -> float:
+    """The limit that ends what another limit began: on its other side."""
+    until = reader.number(where, what)
+    if len(limits) == 2:
+        reader.wrong(where.line, f"{what} belongs to one limit: remove above, below or it")
+    elif not limits.get("above", math.inf) > until > limits.get("below", -math.inf):
+        text = "less than above" if "above" in limits else "more than below"
+        reader.wrong(where.line, f"{what} is {until:g}: need {text}")
+    return until
 
 
 def _check_deploy(reader: _ProfileLines, what: str, line: int, rule: Rule) -> None:

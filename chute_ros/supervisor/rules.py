@@ -73,6 +73,9 @@ class MeasurementCondition:
     weight: float = 1.0
     #: Where nothing usable tells, it is taken to hold: a second sign that may be missing.
     if_unknown: bool = False
+    #: Once the rule's counter is full, it goes on to hold until it is beyond this; NaN: it does
+    #: not.
+    until: float = math.nan
     counted: ClassVar[bool] = True
 
     @cached_property
@@ -80,7 +83,14 @@ class MeasurementCondition:
         """What is asked for, in words; made once, as it is told at every update."""
         above = [f"above {self.above:g}"] if not math.isnan(self.above) else []
         below = [f"below {self.below:g}"] if not math.isnan(self.below) else []
-        return " and ".join(above + below)
+        until = f", then until {self.until:g}" if not math.isnan(self.until) else ""
+        return " and ".join(above + below) + until
+
+    def lingers(self, value: float) -> bool:
+        """Where it has held for long enough, it is not over yet by this value."""
+        if math.isnan(self.until):
+            return False
+        return not (value <= self.until if math.isnan(self.below) else value >= self.until)
 
 
 @dataclass(frozen=True)
@@ -167,6 +177,12 @@ class Rule:
     def asks_for_a_kill(self) -> bool:
         """One of its conditions is that any device asks for one."""
         return DeviceCondition(DeviceFact.ASKS_FOR_KILL) in self.conditions
+
+    @cached_property
+    def has_until(self) -> bool:
+        """One of its conditions may go on to hold."""
+        conditions = (one for one in self.conditions if isinstance(one, MeasurementCondition))
+        return any(not math.isnan(one.until) for one in conditions)
 
     @cached_property
     def silences(self) -> frozenset[str]:

@@ -174,7 +174,7 @@ def _rule(state: State, rule: Rule) -> Hashable:
     level = round(evidence.level, 3)
     unknown = min(round(evidence.unknown, 3), UNKNOWN_STANDS)
     sure = evidence.holds, evidence.sure
-    return sure, level, shown, evidence.latched, new, unknown
+    return sure, level, shown, evidence.latched, evidence.kept, new, unknown
 
 
 def _number(pending: Pending | None) -> tuple[int, int]:

@@ -227,7 +227,7 @@ PROFILE_KEYS = (
 )
 RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, doubted, action, clears"
 CONDITION_KEYS = (
-    "measurement, link, autopilot, device, above, below, if_unknown, is, counted, weight"
+    "measurement, link, autopilot, device, above, below, until, if_unknown, is, counted, weight"
 )
 LIMIT_KEYS = "minimum, maximum, rate, jump, max_age, stuck_after"
 FLYING = "its states may be IN_FLIGHT and KILLING"

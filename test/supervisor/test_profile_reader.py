@@ -116,6 +116,21 @@ def test_what_is_written_is_what_is_read() -> None:
     assert silent.clears is Clears.NEVER
 
 
+def test_a_condition_may_go_on_until_another_limit() -> None:
+    one = read(WHOLE.replace("below: -12.5", "below: -12.5, until: -3")).rules[0].conditions[0]
+    assert isinstance(one, MeasurementCondition)
+    assert one.until == -3.0
+    assert one.limits == "below -12.5, then until -3"
+    assert one.lingers(-3.1)
+    assert not one.lingers(-3.0)
+    one = read(WHOLE.replace("below: -12.5", "above: 9, until: 5")).rules[0].conditions[0]
+    assert isinstance(one, MeasurementCondition)
+    assert one.limits == "above 9, then until 5"
+    assert one.lingers(5.1)
+    assert not one.lingers(5.0)
+    assert not MeasurementCondition("tilt_deg", below=3.0).lingers(2.0)
+
+
 def test_without_needed_all_conditions_must_hold() -> None:
     assert read(WHOLE.replace("    needed: 3\n", "")).rules[0].needed == pytest.approx(5.5)
 
@@ -127,6 +142,16 @@ def test_without_needed_all_conditions_must_hold() -> None:
         ("leak: 0.25", "doubted: -0.1", 22, "doubted of rule 'falls' is -0.1: need 0 to 1"),
         ("rebooted}", "rebooted, counted: 2}", 18, "counted of rebooted in rule 'falls' is 2"),
         ("abnormal,", "abnormal, counted: false,", 19, "counted belongs to the autopilot"),
+        ("abnormal,", "abnormal, until: 3,", 19, "until belongs to a measurement: remove it here"),
+        ("below: -12.5", "below: -12.5, until: -12.5", 15, "is -12.5: need more than below"),
+        ("below: -12.5", "above: -12.5, until: -12.5", 15, "is -12.5: need less than above"),
+        ("below: -12.5", "below: -12.5, until: soon", 15, "until of vertical_speed in rule"),
+        (
+            "above: 60,",
+            "above: 60, until: 50,",
+            16,
+            "until of tilt_deg in rule 'falls' belongs",
+        ),
         ("profile: mine\n", "", 1, "profile is missing: a profile needs its name and its rules"),
         ("profile: mine", "profile: 7", 1, "profile is 7: need words"),
         ("profile: mine", "profile: ''", 1, "profile is '': need words"),
