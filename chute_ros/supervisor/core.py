@@ -115,7 +115,7 @@ class _Update(Deploying):
         deaf = late >= self.config.vehicle_state_age / 2.0
         for rule in self.config.profile.rules if deaf else ():
             if not all(one.counted for one in rule.conditions) and rule.name in rules:
-                rules[rule.name] = replace(rules[rule.name], level=0.0, holds=False)
+                rules[rule.name] = replace(rules[rule.name], level=0.0, holds=False, kept=())
         unseen = late * _CLIMBS_UNSEEN >= self.config.profile.minimum_height
         self.state = replace(
             self.state,

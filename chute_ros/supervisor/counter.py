@@ -105,7 +105,7 @@ class RuleEvidence:
         rule_holds = True if weight >= enough else None if possible >= enough else False
         is_sure, shown_now, seen_now = sure >= enough, tuple(shown), tuple(now_seen)
         kept: tuple[bool, ...] = ()
-        if rule.has_until and self.level >= rule.hold - _ROUNDING:
+        if rule.has_until and self.full(rule):
             kept = tuple([bool(look.holds) for look in found])
         same = rule_holds is self.holds and is_sure is self.sure and kept == self.kept
         if same and seen_now == self.seen and shown_now == self.shown:
@@ -116,7 +116,11 @@ class RuleEvidence:
 
     def fulfilled(self, rule: Rule) -> bool:
         """It holds now, has for long enough, and enough samples showed it."""
-        return self.sure and self.level >= rule.hold - _ROUNDING
+        return self.sure and self.full(rule)
+
+    def full(self, rule: Rule) -> bool:
+        """Its counter has gone up to the rule's hold."""
+        return self.level >= rule.hold - _ROUNDING
 
     def cleared(self) -> bool:
         """Its counter has leaked to nothing."""

@@ -42,7 +42,7 @@ def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Jud
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     before = state.rule(rule.name)
     findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
-    if any(before.kept) and len(before.kept) == len(findings):
+    if before.full(rule) and any(before.kept) and len(before.kept) == len(findings):
         findings = tuple(
             one._replace(holds=True) if kept and one.lingers else one
             for one, kept in zip(findings, before.kept, strict=True)

@@ -89,6 +89,38 @@ def test_what_has_been_kept_is_kept_with_its_counter() -> None:
     assert evidence.level == pytest.approx(0.45)
 
 
+@pytest.mark.parametrize(("slept", "goes_on"), [(0.1, True), (2.0, False)])
+def test_a_counter_that_was_emptied_has_kept_nothing(slept: float, goes_on: bool) -> None:
+    """Given a supervisor that sleeps for longer than half of the silence that it waits for."""
+    name = "autopilot lost and falling"
+    story = flying().fly(1.6, **IMU_ALONE, acceleration=2.0)
+    told = {**IMU_ALONE, **LOST, "acceleration": 5.0}
+    story._update((story.heartbeat(), story.told(**told)), story.t + slept)
+    evidence = story.state.rule(name)
+    assert (evidence.level > 0.0, evidence.kept != ()) == (goes_on, goes_on)
+    assert (evidence.holds is not False) is goes_on
+    story.fly(story.t + 2.0, **told)
+    assert bool(story.fired()) is goes_on
+
+
+def test_a_counter_that_leaks_has_kept_nothing() -> None:
+    """Given two signs, of which the second ends for a moment while the first goes on."""
+    both = replace(
+        FALLS,
+        conditions=(*FALLS.conditions, MeasurementCondition("tilt_deg", above=45.0)),
+        needed=2.0,
+    )
+    story = Story(with_rules(both)).flying()
+    story.fly(story.t + 0.7, acceleration=3.0, tilt=60.0)
+    story.fly(story.t + 0.05, acceleration=7.0, tilt=60.0)
+    assert story.state.rule(both.name).holds is True
+    story.fly(story.t + 0.05, acceleration=7.0, tilt=10.0)
+    assert story.state.rule(both.name).holds is False
+    story.fly(story.t + 0.05, acceleration=7.0, tilt=60.0)
+    evidence = story.state.rule(both.name)
+    assert (evidence.holds, evidence.kept) == (False, ())
+
+
 def test_where_nothing_is_told_nothing_goes_on() -> None:
     story = Story(with_rules(FALLS)).flying()
     story.fly(story.t + 0.7, acceleration=3.0)
