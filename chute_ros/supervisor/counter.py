@@ -21,18 +21,23 @@ _WEIGHTS_ROUNDING = 1e-9
 #: A counter stands still for so long while nothing can be said, s: a gap in the messages of a
 #: vehicle that falls must not undo what was counted.
 UNKNOWN_STANDS = 3.0
+#: A sign goes on (`until`) for so long after it last held by its own limit, s: an autopilot counts
+#: as lost 2.5 s after a fall has begun, and a force that is always told too small is no fall.
+LINGERS = 5.0
 
 
 class Look(NamedTuple):
     """A condition as it was found. holds None: it cannot be said. samples: so many of what it
     rests on have come so far; -1: none come. doubted: it counts only the rule's part of it.
     expected False: what cannot be said has not been for long, and keeps nothing that was counted.
+    lingers: it holds only as it goes on.
     """
 
     holds: bool | None
     samples: int = -1
     doubted: bool = False
     expected: bool = True
+    lingers: bool = False
 
 
 @dataclass(frozen=True)
@@ -49,8 +54,8 @@ class RuleEvidence:
     shown: tuple[float, ...] = ()
     #: For each condition the samples that had come at the last look; -1: it rests on none.
     seen: tuple[int, ...] = ()
-    #: For each condition: it held as the counter was full; empty: none may go on to hold.
-    kept: tuple[bool, ...] = ()
+    #: For each condition: for how long it may still go on to hold, s; empty: none may.
+    kept: tuple[float, ...] = ()
     #: Enough conditions held, each of them shown by enough samples.
     sure: bool = False
     #: It was acted on and is not done with yet.
@@ -60,7 +65,7 @@ class RuleEvidence:
 
     def counted(self, rule: Rule, passed: float) -> RuleEvidence:
         """passed s later, while nothing new was seen."""
-        if self.holds is False and self.level == 0.0 == self.unknown:
+        if self.holds is False and self.level == 0.0 == self.unknown and not self.kept:
             return self  # most rules stand so at most updates
         unknown = self.unknown + passed if self.holds is None else 0.0
         level = self.level
@@ -72,9 +77,13 @@ class RuleEvidence:
             # What cannot be said is no good sample: it leaks only once it has been so for long.
             level -= rule.leak * min(passed, max(0.0, unknown - UNKNOWN_STANDS))
         level = min(max(level, 0.0), rule.hold)
-        if level == self.level and unknown == self.unknown:
+        kept = self.kept
+        if kept:
+            emptied = level <= 0.0 and not self.full(rule)
+            kept = () if emptied else tuple([max(0.0, left - passed) for left in kept])
+        if level == self.level and unknown == self.unknown and kept == self.kept:
             return self
-        return replace(self, level=level, unknown=unknown)
+        return replace(self, level=level, unknown=unknown, kept=kept)
 
     def seeing(self, rule: Rule, found: Sequence[Look]) -> RuleEvidence:
         """After the conditions were looked at. found: each of them, in their order."""
@@ -83,7 +92,7 @@ class RuleEvidence:
         last = self.seen if known else (-1,) * len(found)
         shown, now_seen = [], []
         weight = possible = sure = 0.0
-        for condition, (holds, seen, doubted, expected), count, old in zip(
+        for condition, (holds, seen, doubted, expected, _), count, old in zip(
             rule.conditions, found, before, last, strict=True
         ):
             counts = condition.weight * (rule.doubted if doubted else 1.0)
@@ -104,15 +113,31 @@ class RuleEvidence:
         enough = rule.needed - _WEIGHTS_ROUNDING
         rule_holds = True if weight >= enough else None if possible >= enough else False
         is_sure, shown_now, seen_now = sure >= enough, tuple(shown), tuple(now_seen)
-        kept: tuple[bool, ...] = ()
-        if rule.has_until and self.full(rule):
-            kept = tuple([bool(look.holds) for look in found])
+        kept = self._kept(rule, found, shown) if rule.has_until else ()
         same = rule_holds is self.holds and is_sure is self.sure and kept == self.kept
         if same and seen_now == self.seen and shown_now == self.shown:
             return self
         return replace(
             self, holds=rule_holds, shown=shown_now, seen=seen_now, sure=is_sure, kept=kept
         )
+
+    def _kept(
+        self, rule: Rule, found: Sequence[Look], shown: Sequence[float]
+    ) -> tuple[float, ...]:
+        """What holds by its own limit, in no doubt, in enough samples, as the counter is full,
+        goes on from now. What is beyond its last limit is over; the others are as they were."""
+        full = self.full(rule)
+        before = self.kept if len(self.kept) == len(found) else (0.0,) * len(found)
+        kept = []
+        for (holds, seen, doubted, _, lingers), count, left in zip(
+            found, shown, before, strict=True
+        ):
+            if holds and not lingers:
+                sure = full and not doubted and seen >= 0 and count >= rule.samples
+                kept.append(LINGERS if sure else left)
+            else:
+                kept.append(0.0 if holds is False else left)
+        return tuple(kept) if any(kept) else ()
 
     def fulfilled(self, rule: Rule) -> bool:
         """It holds now, has for long enough, and enough samples showed it."""

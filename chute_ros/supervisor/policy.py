@@ -42,15 +42,21 @@ def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Jud
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     before = state.rule(rule.name)
     findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
-    if before.full(rule) and any(before.kept) and len(before.kept) == len(findings):
+    if len(before.kept) == len(findings):  # otherwise none is kept, or it is another rule's
         findings = tuple(
-            one._replace(holds=True) if kept and one.lingers else one
-            for one, kept in zip(findings, before.kept, strict=True)
+            one._replace(holds=True) if left > 0.0 and one.lingers else one
+            for one, left in zip(findings, before.kept, strict=True)
         )
     # Beside a sign in doubt, what is only taken to be so is no whole one either.
     weak = any(one.doubted and one.holds for one in findings)
     found = [
-        Look(one.holds, one.samples, one.doubted or (weak and one.presumed), one.expected)
+        Look(
+            one.holds,
+            one.samples,
+            one.doubted or (weak and one.presumed),
+            one.expected,
+            bool(one.holds) and one.lingers,
+        )
         for one in findings
     ]
     evidence = before.seeing(rule, found)

@@ -73,8 +73,8 @@ class MeasurementCondition:
     weight: float = 1.0
     #: Where nothing usable tells, it is taken to hold: a second sign that may be missing.
     if_unknown: bool = False
-    #: Once the rule's counter is full, it goes on to hold until it is beyond this; NaN: it does
-    #: not.
+    #: Once the rule's counter is full, it goes on to hold until it is beyond this (or LINGERS
+    #: have passed); NaN: it does not.
     until: float = math.nan
     counted: ClassVar[bool] = True
 

@@ -173,8 +173,9 @@ def _rule(state: State, rule: Rule) -> Hashable:
     new = tuple(a != b for a, b in zip(evidence.seen, come, strict=False))
     level = round(evidence.level, 3)
     unknown = min(round(evidence.unknown, 3), UNKNOWN_STANDS)
+    kept = tuple(round(left, 3) for left in evidence.kept)
     sure = evidence.holds, evidence.sure
-    return sure, level, shown, evidence.latched, evidence.kept, new, unknown
+    return sure, level, shown, evidence.latched, kept, new, unknown
 
 
 def _number(pending: Pending | None) -> tuple[int, int]:
