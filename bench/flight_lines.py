@@ -26,11 +26,13 @@ class FlightLines:
 
     def restart(self) -> None:
         """The next line is the first of a flight."""
-        self._coming = itertools.cycle(self._cut)
+        self._coming = itertools.cycle(enumerate(self._cut))
 
-    def next(self, ms: int) -> bytes:
-        """The next line with its end; ms: the device's clock."""
-        return f"$TELEM,{next(self._coming)},{ms}\n".encode()
+    def next(self, ms: int) -> tuple[bytes, bool]:
+        """The next line with its end, and whether it is the first of a flight; ms: the device's
+        clock."""
+        number, cut = next(self._coming)
+        return f"$TELEM,{cut},{ms}\n".encode(), number == 0
 
 
 def fly(layout: Layout) -> list[str]:

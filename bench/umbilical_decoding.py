@@ -118,7 +118,7 @@ def _measure(layout: Layout, layouts: list[Layout], batches: int) -> dict[str, T
     # The link leaves out its first line as well.
     for _ in range(LINES_TO_RECOGNISE + 1):
         now += step
-        line = lines.next(int(now * 1000.0))
+        line = lines.next(int(now * 1000.0))[0]
         for peer in peers.values():
             peer.feed(line, now)
 
@@ -126,7 +126,7 @@ def _measure(layout: Layout, layouts: list[Layout], batches: int) -> dict[str, T
         start = now
         for _ in range(batches):
             clock = [start + n * step for n in range(1, BATCH + 1)]
-            yield [(at, lines.next(int(at * 1000.0))) for at in clock], BATCH
+            yield [(at, lines.next(int(at * 1000.0))[0]) for at in clock], BATCH
             start = clock[-1]
 
     return take_turns(layout.name, peers, coming(), _MAY_MISS)
