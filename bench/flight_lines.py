@@ -24,6 +24,10 @@ class FlightLines:
         self._cut = [body.rpartition(",")[0] for body in bodies]
         self.restart()
 
+    def __len__(self) -> int:
+        """Lines of one flight."""
+        return len(self._cut)
+
     def restart(self) -> None:
         """The next line is the first of a flight."""
         self._coming = itertools.cycle(enumerate(self._cut))
