@@ -128,10 +128,9 @@ class Bus:
         return self._channel(plug, "out", spoil), self._channel(plug, "in", spoil)
 
     def _channel(self, plug: Plug, which: str, spoil: Spoil | None) -> Channel[bytes]:
-        chance = random.Random(f"{self._seed} {plug.name} {which}")
-        medium = self._medium
+        seed, medium = f"{self._seed} {plug.name} {which}", self._medium
         ways = (plug.way,)
-        return Channel(self.world, chance, medium.nature, ways, spoil or medium.spoil)
+        return Channel(self.world, seed, medium.nature, ways, spoil or medium.spoil)
 
     def carry(self, source: Plug, frames: Sequence[bytes], now: float) -> None:
         """What source said has got to the bus: take it to everybody else."""

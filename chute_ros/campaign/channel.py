@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Generic, TypeVar
 
 from chute_ros.campaign.world import World
@@ -54,20 +54,26 @@ class Nature:
 
 
 class Channel(Generic[MessageT]):
-    """One direction over some ways. spoil: makes a damaged message of a whole one; None: nobody
-    takes it for one."""
+    """One direction over some ways. seed: of its chances; spoil: makes a damaged message of a
+    whole one; None: nobody takes it for one."""
 
     def __init__(
         self,
         world: World,
-        chance: random.Random,
+        seed: str,
         nature: Nature,
         ways: tuple[Way, ...],
         spoil: Callable[[MessageT, random.Random], MessageT | None] | None = None,
     ) -> None:
-        self._world, self._chance, self._nature = world, chance, nature
+        self._world, self._seed, self._nature = world, seed, nature
         self._ways, self._spoil = ways, spoil
         self._newest = 0.0
+
+    @cached_property
+    def _chance(self) -> random.Random:
+        """Begun with the first thing that happens: on most ways nothing does, and a text is made
+        a seed slowly."""
+        return random.Random(self._seed)
 
     def send(
         self, messages: Sequence[MessageT], deliver: Callable[[Sequence[MessageT], float], None]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -117,7 +116,7 @@ class Ros:
         key, sent = (source.name, to.name, kind), self.world.now
         channel = self._channels.get(key)
         if channel is None:
-            chance = random.Random(f"{self._seed} {source.name} {to.name} {kind.__name__}")
+            seed = f"{self._seed} {source.name} {to.name} {kind.__name__}"
             ways = (source.outward, to.inward)
-            channel = self._channels[key] = Channel(self.world, chance, _NATURE, ways)
+            channel = self._channels[key] = Channel(self.world, seed, _NATURE, ways)
         channel.send((message,), lambda ones, now: to.deliver(ones[0], stamp, take, sent, now))

@@ -16,6 +16,8 @@ from chute_ros.sim.rocket import GRAVITY, Rocket
 
 _INFINITE_F32 = 0x7F80_0000
 _MANTISSA = 0x007F_FFFF
+#: To the nearest decimal of so many digits.
+_NEAREST = {digits: Context(digits, ROUND_HALF_DOWN) for digits in range(1, 10)}
 
 
 def rust_text(value: float, bits: int) -> str:
@@ -151,9 +153,9 @@ def _shortest_f32(value: float) -> Decimal:
     if bits & _MANTISSA:
         # Its neighbours are equally far: the nearest decimal of so many digits reads back as it,
         # or none of so many does; and that of one digit more is nearer. Most need eight or nine.
-        shortest = Context(9, ROUND_HALF_DOWN).create_decimal_from_float(value)
+        shortest = _NEAREST[9].create_decimal_from_float(value)
         for digits in range(8, 0, -1):
-            near = Context(digits, ROUND_HALF_DOWN).create_decimal_from_float(value)
+            near = _NEAREST[digits].create_decimal_from_float(value)
             if _rounded_to_f32(float(near)) != value:
                 break
             shortest = near

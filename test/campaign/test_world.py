@@ -89,7 +89,7 @@ def sent(messages: int, every: float, in_order: bool = True, **spell: float) -> 
     world, arrived = World(), []
     spells = [Spell(0.0, **{"end": math.inf, **spell})]
     nature = Nature(0.001, in_order, overtaken=0.05)
-    channel: Channel[int] = Channel(world, random.Random(4), nature, (spells, []))
+    channel: Channel[int] = Channel(world, "4", nature, (spells, []))
     for number in range(messages):
         world.post(
             number * every,
