@@ -53,8 +53,8 @@ def add_options(options: argparse.ArgumentParser) -> None:
     options.add_argument(
         "--rounds",
         type=at_least(int, 2),
-        default=100,
-        help="limits that pass, idle and under load (default: 100)",
+        default=300,
+        help="limits that pass, idle and under load (default: 300)",
     )
     options.add_argument(
         "--deploys",

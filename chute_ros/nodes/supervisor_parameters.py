@@ -80,6 +80,13 @@ PARAMETERS = (
         0.0,
         60.0,
     ),
+    Parameter(
+        "low_kill_to_deploy_delay",
+        0.2,
+        "nor longer than this where the vehicle is below the low_height of its profile, s",
+        0.0,
+        60.0,
+    ),
     Parameter("deploy_timeout", 8.0, "how long a deploy may take to be confirmed, s", 0.1, 60.0),
     Parameter("kill_timeout", 6.0, "how long a kill may take to be confirmed, s", 0.1, 60.0),
     Parameter(
@@ -201,6 +208,7 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         deploy_ladder=tuple(Rung.parse(text) for text in _given(values["deploy_ladder"])),
         ladder_step_timeout=values["ladder_step_timeout"],
         kill_to_deploy_delay=values["kill_to_deploy_delay"],
+        low_kill_to_deploy_delay=values["low_kill_to_deploy_delay"],
         deploy_timeout=values["deploy_timeout"],
         kill_timeout=values["kill_timeout"],
         resend_interval=values["resend_interval"],

@@ -81,6 +81,8 @@ class SupervisorConfig:
     link_limits: Mapping[str, LinkLimits] = field(default_factory=lambda: _NO_LIMITS)
     #: The parachute is released this long after the kill, confirmed or not (as ArduPilot does).
     kill_to_deploy_delay: float = 0.5
+    #: And not longer than this where the vehicle is low (Profile.low_height).
+    low_kill_to_deploy_delay: float = 0.2
     #: How long the last step of a deploy may take until its confirmation.
     deploy_timeout: float = 8.0
     #: A kill without confirmation is given up, as seen by its caller, after this.
@@ -109,10 +111,9 @@ class SupervisorConfig:
     profile: Profile = field(default=Profile("device requests only", DEVICE_RULES))
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.kill_to_deploy_delay <= 60.0:
-            raise ParameterError(
-                f"kill_to_deploy_delay is {self.kill_to_deploy_delay}: need 0 to 60 s"
-            )
+        for name in ("kill_to_deploy_delay", "low_kill_to_deploy_delay"):
+            if not 0.0 <= getattr(self, name) <= 60.0:
+                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 60 s")
         for name in (
             "deploy_timeout",
             "kill_timeout",

@@ -52,7 +52,7 @@ class Deploying(Policy):
                 self.send_again("kill")
             waited = self.now - kill.decided_at
             why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
-            limit = f"limit {self.config.kill_to_deploy_delay:g} s"
+            limit = f"limit {round(self.state.deploy_due - kill.decided_at, 2):g} s"
             self.move(Stimulus.DEPLOY_DUE, why)
             self._fire(f"{why} ({limit})")
 

@@ -162,6 +162,16 @@ def _seen_not_to_fall(config: SupervisorConfig, state: State) -> bool:
     return bool(told) and not any(falls[name] for name in told)
 
 
+def height_left(config: SupervisorConfig, state: State, falls: bool, now: float) -> float:
+    """The height, m; where it is told no more, what a body without drag that falls (falls) since
+    it was told has left of it. NaN: it was not told, or is not known otherwise."""
+    height = measured(config, state, HEIGHT, now)
+    if not math.isnan(height) or state.rebooted or not falls:
+        return height
+    passed = now - state.measured(HEIGHT).measured_at
+    return state.measured(HEIGHT).value - GRAVITY / 2.0 * passed**2
+
+
 def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
     """The height, m, also one that does not change any more: it may be that low. NaN: absent."""
     height = measured(config, state, "height", now)

@@ -51,8 +51,8 @@ _RULE_KEYS = (
 _CONDITION_KEYS = ("measurement", "link", "autopilot", "device")
 _LIMIT_KEYS = ("above", "below", "until", "if_unknown")
 _PROFILE_KEYS = (
-    *("profile", "minimum_height", "below_minimum", "moving_speed", "landed_hold"),
-    *("measurements", "rules"),
+    *("profile", "minimum_height", "below_minimum", "low_height", "moving_speed"),
+    *("landed_hold", "measurements", "rules"),
 )
 
 
@@ -91,6 +91,9 @@ def _profile(reader: _ProfileLines, where: Where) -> Profile:
     if "minimum_height" in entries:
         height = reader.number(entries["minimum_height"], "minimum_height", 0.0, 100_000.0)
         profile = replace(profile, minimum_height=height)
+    if "low_height" in entries:
+        height = reader.number(entries["low_height"], "low_height", 0.0, 100_000.0)
+        profile = replace(profile, low_height=height)
     if "landed_hold" in entries:
         hold = reader.number(entries["landed_hold"], "landed_hold", 0.0, 60.0)
         profile = replace(profile, landed_hold=hold)

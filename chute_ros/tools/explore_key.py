@@ -85,6 +85,7 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         state.killed_standing,
         _left(flight.height_since_kill(config, state, now), config.profile.minimum_height),
         _known(state.killed_sinking),
+        _left(flight.height_left(config, state, True, now), -config.profile.low_height),
         _since(state.down_since, now, flight.down_after_kill_at(config, state) - state.down_since),
         round(state.armed_height, 3),
         _known(state.took_off_height),

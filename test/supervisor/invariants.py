@@ -35,6 +35,7 @@ class Watch:
         self.moved_at = -math.inf
         self.killed_at = math.nan
         self.forced = False
+        self.low = False
 
     def copy(self) -> Watch:
         """One that goes on from here another way."""
@@ -55,6 +56,7 @@ class Watch:
         self.state = State(epoch=self.state.epoch + 4, started_at=self.now, mode=self.state.mode)
         self.killed_at = math.nan
         self.forced = False
+        self.low = False
 
     def _looks_at_all_that_changes(self, before: State, inputs: tuple[i.Input, ...]) -> None:
         """A rule that is not looked at, as nothing has changed, would be what it was."""
@@ -85,11 +87,14 @@ class Watch:
         going_on = before.stage in (Stage.KILLING, Stage.DEPLOYING)
         if K in done and (math.isnan(self.killed_at) or not going_on):
             self.killed_at = self.now
+        ordered = self.state.deploy_rule and not before.deploy_rule
+        if ordered:
+            left = flight.height_left(self.config, self.state, True, self.now)
+            self.low = left < self.config.profile.low_height
         self._kill_first(before, done)
         self._confirmed_is_not_told_again(before, inputs, done)
         self._released_stays_released(before, inputs, done)
         self._no_delay(before, inputs, done)
-        ordered = self.state.deploy_rule and not before.deploy_rule
         if ordered and self.state.deploy_rule != "operator":
             self._rule_may_deploy(before)
         return self.outputs
@@ -108,7 +113,9 @@ class Watch:
             kill = self.state.kill
             assert kill is not None
             waited = self.now - self.killed_at + 1e-9
-            assert kill.confirmed or waited >= self.config.kill_to_deploy_delay
+            delays = [self.config.kill_to_deploy_delay]
+            delays += [self.config.low_kill_to_deploy_delay] if self.low else []
+            assert kill.confirmed or waited >= min(delays)
 
     def _confirmed_is_not_told_again(
         self, before: State, inputs: Sequence[i.Input], done: list[Action]

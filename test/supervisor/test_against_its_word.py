@@ -288,7 +288,8 @@ def test_a_tumble_is_seen_although_it_is_upright_again_and_again(name: str, turn
 
 
 def test_a_vehicle_that_falls_below_the_minimum_while_the_kill_is_awaited_gets_no_deploy() -> None:
-    story = Story(shipped("multirotor", kill_to_deploy_delay=2.0)).flying().fly(2.0, height=30.0)
+    waits = {"kill_to_deploy_delay": 2.0, "low_kill_to_deploy_delay": 2.0}
+    story = Story(shipped("multirotor", **waits)).flying().fly(2.0, height=30.0)
     story.fall(5.0, 30.0)
     assert story.fired() == ["KILL"]
     assert any("after the kill: height" in text for text in story.alarms())

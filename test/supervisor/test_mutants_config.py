@@ -19,21 +19,27 @@ TIMES = (
 )
 
 
+DELAYS = ("kill_to_deploy_delay", "low_kill_to_deploy_delay")
+
+
 def refusal(**settings: Any) -> str:
     with pytest.raises(ParameterError) as caught:
         SupervisorConfig(**settings)
     return str(caught.value)
 
 
+@pytest.mark.parametrize("name", DELAYS)
 @pytest.mark.parametrize("delay", [0.0, 60.0])
-def test_the_delay_from_the_kill_to_the_deploy_may_reach_its_limits(delay: float) -> None:
-    assert SupervisorConfig(kill_to_deploy_delay=delay).kill_to_deploy_delay == delay
+def test_the_delay_from_the_kill_to_the_deploy_may_reach_its_limits(
+    name: str, delay: float
+) -> None:
+    assert getattr(SupervisorConfig(**{name: delay}), name) == delay
 
 
+@pytest.mark.parametrize("name", DELAYS)
 @pytest.mark.parametrize("delay", [-0.1, 60.1, float("nan")])
-def test_a_delay_past_its_limits_is_told_in_full(delay: float) -> None:
-    said = f"kill_to_deploy_delay is {delay}: need 0 to 60 s"
-    assert refusal(kill_to_deploy_delay=delay) == said
+def test_a_delay_past_its_limits_is_told_in_full(name: str, delay: float) -> None:
+    assert refusal(**{name: delay}) == f"{name} is {delay}: need 0 to 60 s"
 
 
 @pytest.mark.parametrize("name", TIMES)

@@ -77,6 +77,11 @@ def wrong(text: str) -> str:
     return "nothing is wrong"
 
 
+@pytest.mark.parametrize(("line", "low"), [("", 0.0), ("low_height: 35.5\n", 35.5)])
+def test_a_low_height_is_read_and_nothing_is_low_without_one(line: str, low: float) -> None:
+    assert read(WHOLE.replace("moving_speed", f"{line}moving_speed")).low_height == low
+
+
 def test_what_is_written_is_what_is_read() -> None:
     profile = read(WHOLE)
     assert profile.name == "mine"
@@ -164,6 +169,7 @@ def test_without_needed_all_conditions_must_hold() -> None:
         ("minimum_height: 12", "minimum_height: =", 2, "'=': need a number"),
         ("minimum_height: 12", "minimum_height: [1]", 2, "'a list': need a number"),
         ("minimum_height", "minimum_hight", 2, "no 'minimum_hight': did you mean minimum_height?"),
+        ("minimum_height: 12", "low_height: -1", 2, "low_height is -1: need 0 to 100000"),
         ("below_minimum: nothing", "below_minimum: kil", 3, "(did you mean kill?)"),
         ("below_minimum: nothing", "below_minimum: 3", 3, "need deploy or kill or nothing"),
         ("moving_speed: 3.5", "moving_speed: 0", 4, "is 0: need 0.1 to 100"),
