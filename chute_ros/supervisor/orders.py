@@ -73,9 +73,9 @@ class Orders(Steps):
         )
 
     def _wait_for_kill(self, rule: str) -> tuple[float, str]:
-        """For how long the deploy waits for the kill at most, s, and why shorter than elsewhere;
-        empty: it does not. Lines in propellers that may still turn are a risk, and the ground
-        that comes first is none. Only what a rule has seen to fall is taken to fall on, unheard."""
+        """How long the deploy waits for the kill at most, s; and why less than elsewhere, empty:
+        it does not. Lines above motors that may still turn are a risk, the ground that comes first
+        is none. Only what a rule has seen to fall is taken to fall on, unheard."""
         config = self.config
         falls, limit = rule != OPERATOR, config.profile.low_height
         left = flight.height_left(config, self.state, falls, self.now)

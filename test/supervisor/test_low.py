@@ -46,7 +46,8 @@ def test_what_falls_low_is_released_before_the_half_second_is_over(
 
 def test_the_reason_tells_the_height_and_what_is_low() -> None:
     (told,) = [one for one in falls_from(32.0).newest(D).reasons if "m are left" in one]
-    assert told.startswith("at most 0.2 s for the kill: 2") and told.endswith("(low: 30 m)")
+    assert told.startswith("at most 0.2 s for the kill: 2")
+    assert told.endswith("(low: 30 m)")
 
 
 @pytest.mark.parametrize(

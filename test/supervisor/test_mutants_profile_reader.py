@@ -223,7 +223,8 @@ FACTS = "lost or rebooted or disarmed or emergency or killed_aloft"
 MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate")
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED"
 PROFILE_KEYS = (
-    "profile, minimum_height, below_minimum, low_height, moving_speed, landed_hold, measurements, rules"
+    "profile, minimum_height, below_minimum, low_height, moving_speed, landed_hold, "
+    "measurements, rules"
 )
 RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, doubted, action, clears"
 CONDITION_KEYS = (
