@@ -126,9 +126,12 @@ class Device:
         return float(value) if isinstance(value, (int, float)) else NAN
 
 
-#: So many statuses in a row must say "launched". Of two, where 30 % of all frames were damaged,
-#: one flight in some thousand had its motors stopped.
+#: So many statuses in a row must say "launched" that nobody ordered. Of two, where 30 % of all
+#: frames were damaged, one flight in some thousand had its motors stopped.
 SAYINGS = 3
+#: And so many of one that was: a damaged one right after the order, which was damaged as well,
+#: would end it.
+SAYINGS_ORDERED = 2
 
 
 class Trigger(Device):
@@ -143,18 +146,18 @@ class Trigger(Device):
         self._doubted_values: Mapping[str, Any] | None = None
 
     def status_message(
-        self, values: Mapping[str, Any], now: float, expected: bool
+        self, values: Mapping[str, Any], now: float, sayings: int
     ) -> list[LinkChange]:
-        """A TriggerStatus. expected: a release is under way, or the controller says it is out.
+        """A TriggerStatus. sayings: so many in a row must say "launched" until it is believed.
 
-        A single frame has no checksum behind an slcan adapter, and damage must open no parachute:
-        "launched" that nothing led to expect is left aside until the trigger has said so again and
-        again.
+        A single frame has no checksum behind an slcan adapter, and damage must open no parachute,
+        nor keep one closed: what the controller does not say as well is left aside until the
+        trigger has said so again.
         """
         news = self._says_launched(values) and not self.launched
         self._sayings = self._sayings + 1 if news else 0
         self._doubted_values = None
-        if news and not expected and self._sayings < SAYINGS:
+        if news and self._sayings < sayings:
             self._doubted_values, values = values, self.values
         return self.take_status(names.TRIGGER_STATUS, values, now)
 

@@ -16,7 +16,13 @@ from chute_ros.protocol.events import DeviceLinkChanged, Event, Notice, Parachut
 from chute_ros.protocol.liveness import LinkChange, first_alive
 from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.definitions import Definitions
-from chute_ros.protocol.upf.devices import Controller, Device, Trigger
+from chute_ros.protocol.upf.devices import (
+    SAYINGS,
+    SAYINGS_ORDERED,
+    Controller,
+    Device,
+    Trigger,
+)
 from chute_ros.protocol.upf.events import TriggerChanged
 
 DeviceT = TypeVar("DeviceT", bound=Device)
@@ -124,16 +130,17 @@ class UpfDevices:
         trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
         if trigger is not None:
             fired, doubted = trigger.launched, trigger.doubted
-            expected = ordered or self._controller_says_out()
-            self._changed(trigger, trigger.status_message(values, now, expected))
+            sayings = SAYINGS_ORDERED if ordered else SAYINGS
+            sayings = 1 if self._controller_says_out() else sayings
+            self._changed(trigger, trigger.status_message(values, now, sayings))
             if trigger.launched and not fired:
                 self._has_fired(trigger, now)
                 self._controllers_changed(now)
                 return
             self._trigger_changed(trigger, now)
-            if trigger.doubted:
+            if trigger.doubted and not ordered:
                 self.counts["launched that nobody ordered, not believed yet"] += 1
-            if trigger.doubted and not doubted:
+            if trigger.doubted and not doubted and not ordered:
                 text = f"trigger {node_id} says that it has fired, not by an order from here"
                 until = "it goes on saying so, or its controller does"
                 self.notice(Severity.WARNING, f"{text}: believed once {until}")

@@ -82,7 +82,7 @@ def test_deploy_whose_answers_are_lost_is_done_by_the_status(bench):
 
 
 def test_deploy_is_done_when_a_trigger_says_so(bench):
-    story = deploy(armed(bench(""))).at(0.3).trigger_status("LAUNCHED")
+    story = deploy(armed(bench(""))).at(0.3).trigger_fired()
     assert story.end(1).success
 
 
@@ -176,7 +176,7 @@ def test_triggers_are_fired_again_until_one_says_that_it_has(bench):
     story = deploy(armed(bench(""))).at(2.0)
     assert 4 <= len(story.messages(LAUNCH)) <= 5
     assert len(story.requests(TRIGGER)) == len(story.messages(LAUNCH))
-    story.trigger_status("LAUNCHED")
+    story.trigger_fired()
     assert story.end(1).success
     count = len(story.messages(LAUNCH))
     assert len(story.at(9.0).messages(LAUNCH)) == count
@@ -222,7 +222,7 @@ def test_controller_that_accepts_and_then_falls_silent_is_gone_round(bench):
     story.answer_result(story.requests(SERVICE)[0], "SUCCESS").at(1.4).trigger_status()
     assert not fired_at(story), "its last status is not too old yet"
     assert fired_at(story.at(1.8))
-    assert story.trigger_status("LAUNCHED").end(1).success
+    assert story.trigger_fired().end(1).success
 
 
 def test_controller_that_accepts_and_goes_on_speaking_is_not_gone_round(bench):
@@ -279,7 +279,7 @@ def test_controller_that_falls_silent_is_gone_round_for_each_deploy(bench):
     assert story.notices().count(text) == 1, "of the first its silence says nothing yet"
     story.at(1.8)
     assert story.notices().count(text) == 2
-    story.trigger_status("LAUNCHED")
+    story.trigger_fired()
     assert (story.end(1).success, story.end(2).success) == (True, True)
 
 
@@ -361,14 +361,14 @@ def test_trigger_is_fired_where_there_is_no_controller(bench):
 def test_trigger_that_does_not_hear_is_asked_again(bench):
     story = deploy(bench("").trigger_status().clear()).at(1.5)
     assert len(story.requests(TRIGGER, "TYPE_LAUNCH")) >= 4
-    assert story.trigger_status("LAUNCHED").end(1).success
+    assert story.trigger_fired().end(1).success
 
 
 def test_every_trigger_is_fired_again_and_again_where_there_is_no_controller(bench):
     story = deploy(bench("").trigger_status().trigger_status(node_id=36).clear()).at(1.5)
     assert len(story.messages(LAUNCH)) >= 4
     assert len(story.requests(TRIGGER)) > 1.5 * len(story.messages(LAUNCH)), "both are asked"
-    assert story.trigger_status("LAUNCHED", 36).end(1).success
+    assert story.trigger_fired(36).end(1).success
 
 
 def test_trigger_that_refuses_is_asked_until_time_is_up(bench):
@@ -424,7 +424,7 @@ def test_triggers_are_fired_at_once_and_again_until_one_says_that_it_has(bench):
     assert story.requests(SERVICE) == []
     story.at(1.5)
     assert len(story.messages(LAUNCH)) >= 4
-    assert story.trigger_status("LAUNCHED").end(1).success
+    assert story.trigger_fired().end(1).success
     count = len(story.messages(LAUNCH))
     assert len(story.at(9.0).messages(LAUNCH)) == count
 
@@ -449,7 +449,7 @@ def test_a_controller_that_came_back_under_another_node_id_is_the_only_one(bench
         story.status("ARMED", 125).node_status(125, uptime=5 + second).trigger_status()
         story.after(1.0)
     deploy(story.clear())
-    story.after(1.2).trigger_status("LAUNCHED")
+    story.after(1.2).trigger_fired()
     assert story.end(1).success
 
 
@@ -480,7 +480,7 @@ def test_a_deploy_that_is_overdue_when_the_triggers_are_ordered_goes_on_as_well(
     fire(story, token=2)
     assert "the controller does not answer: firing the triggers directly" in story.notices()
     assert len(story.messages(LAUNCH)) == 2
-    story.trigger_status("LAUNCHED")
+    story.trigger_fired()
     assert (story.end(1).success, story.end(2).success) == (True, True)
 
 

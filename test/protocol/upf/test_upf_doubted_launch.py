@@ -112,14 +112,32 @@ def test_one_of_several_controllers_does_not_speak_for_a_trigger(bench):
 
 
 @pytest.mark.parametrize("config", [{}, {"without_controller": True}])
-def test_first_is_believed_when_a_deploy_is_under_way(bench, config):
+def test_second_is_believed_when_a_deploy_is_under_way(bench, config):
     story = flying(bench, **config)
     story.link.deploy(1, False, story.now)
     story.after(0.05).trigger_status("LAUNCHED")
+    assert story.ends(1) == []
+    assert not story.picture().deployed
+    story.after(0.1).trigger_status("LAUNCHED")
     assert story.end(1).success
     assert story.picture().deployed
     assert story.after(0.2).trigger_status("LAUNCHED").picture().deployed, "and stays so"
     assert not story.link.counts[COUNT]
+
+
+@pytest.mark.parametrize("config", [{}, {"without_controller": True}])
+def test_one_damaged_status_after_an_order_does_not_end_it(bench, config):
+    """Given an order that was lost on its way."""
+    story = flying(bench, **config)
+    story.link.deploy(1, True, story.now)
+    story.clear()
+    damaged(story.after(0.02)).after(0.1).trigger_status()
+    story.after(0.3)
+    assert story.ends(1) == []
+    assert not any("has fired" in text for text in story.notices())
+    again = "flyfire.TriggerService" if config else "flyfire.ParachuteService"
+    assert story.requests(again), "it is sent again"
+    assert story.trigger_fired().end(1).success
 
 
 @pytest.mark.parametrize("config", [{}, {"without_controller": True}])

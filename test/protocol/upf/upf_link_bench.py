@@ -22,7 +22,7 @@ from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import parameters as p
 from chute_ros.protocol.upf.config import UpfConfig
 from chute_ros.protocol.upf.definitions import Definitions
-from chute_ros.protocol.upf.devices import SAYINGS
+from chute_ros.protocol.upf.devices import SAYINGS, SAYINGS_ORDERED
 from chute_ros.protocol.upf.events import ErrandFinished
 from chute_ros.protocol.upf.link import UpfLink
 from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
@@ -217,6 +217,12 @@ class Bench:
     def trigger_out(self, node_id: int = TRIGGER) -> Bench:
         """A trigger says that it has fired so often that it is believed of itself."""
         for _ in range(SAYINGS):
+            self.trigger_status("LAUNCHED", node_id)
+        return self
+
+    def trigger_fired(self, node_id: int = TRIGGER) -> Bench:
+        """A trigger says so often enough that it has fired as it was ordered to."""
+        for _ in range(SAYINGS_ORDERED):
             self.trigger_status("LAUNCHED", node_id)
         return self
 
