@@ -17,6 +17,8 @@ from chute_ros.supervisor.requests import Requests
 #: A vertical speed and that of the heights differ by so much if one of them is wrong, m/s: a fall
 #: that began within the second of the heights is seen late by them.
 _SPEEDS_DIFFER = 10.0
+#: A vehicle that was not heard as it was killed may be so much later, s.
+_HEARD_AFTER_KILL = 1.0
 
 
 class Reports(Requests):
@@ -122,10 +124,25 @@ class Reports(Requests):
             measurements=MappingProxyType({**state.measurements, **measurements}),
         )
         self._note_height_told()
+        self._note_height_of_kill()
         self._note_reboots(new)
         if was_disarmed and new.armed is Armed.ARMED:
             height = flight.measured(self.config, self.state, "height", self.now)
             self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
+
+    def _note_height_of_kill(self) -> None:
+        """Height and speed, where they were not known as it was killed: it has fallen since, so
+        that no more is counted on than is left."""
+        state = self.state
+        known = not math.isnan(state.killed_height + state.killed_sinking)
+        if known or state.stage is not Stage.KILLING or not state.killed_in_flight:
+            return
+        height = flight.height_not_jumped_to(self.config, state, self.now)
+        sinking = -flight.measured(self.config, state, VERTICAL_SPEED, self.now)
+        heard = not math.isnan(height + sinking)
+        if heard and self.now <= state.killed_at + _HEARD_AFTER_KILL:
+            sinking = max(sinking, 0.0)
+            self.state = replace(state, killed_height=height, killed_sinking=sinking)
 
     def _believed_speed(self, speed: Measured, disputed: frozenset[str]) -> float:
         """A vertical speed by which a height can be denied, m/s; NaN: there is none. One that the

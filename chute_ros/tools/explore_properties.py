@@ -116,6 +116,8 @@ class Properties:
         """The memory after the update; ViolationError: a property does not hold."""
         self.exercised["raises"] += 1
         memory = self._reported(memory, inputs)
+        if any(isinstance(one, i.VehicleReport) for one in inputs):
+            memory = self._told_after_kill(memory, after, now)
         reset = after.started_at != before.started_at
         took_off = after.stage is Stage.IN_FLIGHT and before.stage is not Stage.IN_FLIGHT
         if reset or took_off:
@@ -160,6 +162,17 @@ class Properties:
                 if number in memory.deploy_numbers:
                     memory = replace(memory, deploy_confirmed=True)
         return memory
+
+    def _told_after_kill(self, memory: Memory, after: State, now: float) -> Memory:
+        """Who was not heard as it was killed may tell its height in the second after it."""
+        if not now <= memory.first_killed_at + 1.0 or math.isnan(memory.kill_height):
+            return memory
+        told = after.vehicle
+        if not told.height > memory.kill_height:
+            return memory
+        return replace(
+            memory, kill_height=told.height, kill_sinking=max(-told.vertical_speed, 0.0)
+        )
 
     def _answers(
         self,

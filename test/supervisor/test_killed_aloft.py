@@ -51,6 +51,47 @@ def test_what_is_silent_since_its_motors_were_stopped_high_is_deployed(profile: 
     assert any("killed aloft" in reason and "70.2" not in reason for reason in deploy.reasons)
 
 
+@pytest.mark.parametrize(
+    ("later", "told", "deploys"),
+    [
+        (0.1, {}, True),
+        (1.0, {}, True),
+        (1.1, {}, False),
+        (0.1, {"height": math.nan}, False),
+        (0.1, {"vertical_speed": math.nan}, False),
+        # It is 11 m high then, and may be lower than 10 m once it counts as silent.
+        (0.1, {"height": 11.0}, False),
+    ],
+)
+def test_one_that_was_not_heard_as_it_was_killed_is_counted_from_its_next_word(
+    later: float, told: dict[str, float], deploys: bool
+) -> None:
+    """Given a node that was started anew, and a kill before it hears of the vehicle."""
+    story = silence(Story(shipped("multirotor")).flying().fly(2.0, height=80.0), 3.5)
+    story.at(3.5, i.KillRequest(1, "operator", "a person saw it"))
+    assert math.isnan(story.state.killed_height)
+    silence(story, 3.5 + later - 0.05)
+    falls = {"height": 79.0, "vertical_speed": -2.0, "acceleration": 1.0, **told}
+    story.at(3.5 + later, story.told(**falls))
+    silence(story, 8.0)
+    assert story.fired() == ["KILL", "DEPLOY"][: 1 + deploys]
+
+
+def test_what_was_told_after_a_kill_does_not_change_what_was_told_at_it() -> None:
+    story = killed("multirotor", 80.0)
+    kept = story.state.killed_height, story.state.killed_sinking
+    story.at(2.1, story.told(height=79.9, vertical_speed=-1.0, acceleration=0.5))
+    assert (story.state.killed_height, story.state.killed_sinking) == kept
+
+
+def test_one_that_was_killed_as_it_stood_is_not_in_the_air_by_a_height_told_later() -> None:
+    story = Story(shipped("multirotor")).ready()
+    story.at(2.0, i.KillRequest(1, "operator", "on the ground"))
+    story.at(2.1, story.told(**DOWN, height=50.0, vertical_speed=0.0))
+    assert math.isnan(story.state.killed_height)
+    assert "DEPLOY" not in silence(story, 6.0).fired()
+
+
 def test_it_waits_until_the_newest_measurements_are_too_old_and_no_longer() -> None:
     story = silence(killed("multirotor", 80.0), 2.0 + WAITS - 0.1)
     assert story.fired() == ["KILL"]
