@@ -38,7 +38,7 @@ PARAMETERS = (
     Parameter("call_tries", 3, "how often a request is sent at most", 1, 7),
     Parameter(
         "effect_timeout",
-        1.5,
+        0.5,
         "from acknowledgement to effect, then the request is tried again, s",
         0.05,
         60.0,

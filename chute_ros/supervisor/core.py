@@ -15,7 +15,7 @@ from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.deploying import Deploying, step_deadline
+from chute_ros.supervisor.deploying import Deploying, release_due, step_deadline
 from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.measurements import on_earth
 from chute_ros.supervisor.orders import ON_GROUND
@@ -72,7 +72,7 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     if state.kill is not None:
         deadlines.append(state.kill.decided_at + config.kill_timeout)
     if state.stage is Stage.KILLING and state.deploy_rule:
-        deadlines.append(state.deploy_due)
+        deadlines.append(release_due(config, state, now))
     if state.deploy is not None:
         deadlines.append(step_deadline(config, state, state.deploy))
     deadlines.append(state.alarm_at)

@@ -20,6 +20,18 @@ def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> floa
     return step.decided_at + config.ladder_step_timeout
 
 
+def release_due(config: SupervisorConfig, state: State, now: float) -> float:
+    """When a deploy that waits for its kill waits no longer, monotonic s. Sooner where the vehicle
+    is low: lines above motors that may still turn are a risk, the ground that comes first is none.
+    That it falls on unheard is assumed only where a rule that deploys has acted."""
+    if state.kill is None:
+        return state.deploy_due
+    deploys = (one.name for one in config.profile.rules if one.action is Action.DEPLOY)
+    falls = any(state.rule(name).latched for name in deploys)
+    low = flight.low_at(config, state, falls, now)
+    return min(state.deploy_due, max(low, state.kill.decided_at + config.low_kill_to_deploy_delay))
+
+
 class Deploying(Policy):
     """What follows a deploy that was ordered."""
 
@@ -38,7 +50,7 @@ class Deploying(Policy):
         self.end_kill()
         if self.state.stage is not Stage.KILLING or not self.state.deploy_rule:
             return
-        if kill.confirmed or self.now >= self.state.deploy_due:
+        if kill.confirmed or self.now >= release_due(self.config, self.state, self.now):
             low = too_low(self.config, self.state, self.now)
             if low and self.state.deploy_rule != OPERATOR:
                 # It was high enough when the kill left; a canopy needs the height now.
@@ -52,9 +64,21 @@ class Deploying(Policy):
                 self.send_again("kill")
             waited = self.now - kill.decided_at
             why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
-            limit = f"limit {round(self.state.deploy_due - kill.decided_at, 2):g} s"
+            limit = self._limit(kill)
             self.move(Stimulus.DEPLOY_DUE, why)
             self._fire(f"{why} ({limit})")
+
+    def _limit(self, kill: Pending) -> str:
+        """For how long this deploy waits for its kill, in words."""
+        config, height = self.config, self.state.measured("height")
+        low = self.now >= release_due(config, self.state, self.now) < self.state.deploy_due
+        if kill.confirmed or not low:
+            return f"limit {config.kill_to_deploy_delay:g} s"
+        told = f"{height.value:.1f} m told {self.now - height.measured_at:.2f} s ago"
+        limit = (
+            f"limit {config.low_kill_to_deploy_delay:g} s below {config.profile.low_height:g} m"
+        )
+        return f"{limit}: {told}"
 
     def look_at_deploy(self) -> None:
         """Confirmed, one step further, or at the end of the ladder."""

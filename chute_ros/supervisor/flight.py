@@ -36,6 +36,8 @@ _CLIMB_OVER = 0.4
 _FALLS_AFTER = 1.0
 #: A vehicle was heard until a kill if it was at most so long before it, s.
 _HEARD_BEFORE = 1.0
+#: Height and speed are of the same time if the speed is at most so much newer, s.
+_SAME_TIME = 0.2
 #: The heights lie so near to a climb with the rate that they tell, m, and so much more for each
 #: m/s of it: a second of free fall bends them by 0.4 m, one of ten times the gravity by 4 m.
 _SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
@@ -162,14 +164,30 @@ def _seen_not_to_fall(config: SupervisorConfig, state: State) -> bool:
     return bool(told) and not any(falls[name] for name in told)
 
 
-def height_left(config: SupervisorConfig, state: State, falls: bool, now: float) -> float:
-    """The height, m; where it is told no more, what a body without drag that falls (falls) since
-    it was told has left of it. NaN: it was not told, or is not known otherwise."""
-    height = measured(config, state, HEIGHT, now)
-    if not math.isnan(height) or state.rebooted or not falls:
-        return height
-    passed = now - state.measured(HEIGHT).measured_at
-    return state.measured(HEIGHT).value - GRAVITY / 2.0 * passed**2
+def low_at(config: SupervisorConfig, state: State, falls: bool, now: float) -> float:
+    """Since when a vehicle in flight is below the low height of its profile, or from when on it
+    may be, monotonic s; infinity: it is not, as far as anybody knows. falls: what was told last is
+    where a fall without drag began. Of a height that has just jumped the lower one counts."""
+    known, limit = state.measured(HEIGHT), config.profile.low_height
+    height = min(known.value, known.before_jump) if known.has_jumped(now) else known.value
+    # Far below the take-off it says nothing of the ground beneath.
+    tells = not state.rebooted and height >= -limit
+    if not state.airborne or not tells or limit <= 0.0:
+        return math.inf
+    ground = above_its_ground(state, height)
+    above = height - limit if math.isnan(ground) else max(height, ground) - limit
+    if not falls:
+        usable = not math.isnan(measured(config, state, HEIGHT, now))
+        return known.measured_at if usable and above < 0.0 else math.inf
+    # What claims to come from the future came just now.
+    told_at = min(known.measured_at, now)
+    if above < 0.0:
+        return told_at
+    speed = state.measured("vertical_speed")
+    # A speed of later has what was fallen since in it.
+    sank = speed.value < 0.0 and speed.measured_at <= told_at + _SAME_TIME
+    sinking = -speed.value if sank else 0.0
+    return told_at + (math.sqrt(sinking**2 + 2.0 * GRAVITY * above) - sinking) / GRAVITY
 
 
 def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:

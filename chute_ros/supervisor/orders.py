@@ -61,30 +61,15 @@ class Orders(Steps):
             self._to_killing("; ".join(reasons))
             self.fire(Action.KILL, rule, reasons)
         still_in = tuple(r for r in self.config.ladder if not out_already(self.state, r))
-        wait, low = self._wait_for_kill(rule)
         self.state = replace(
             self.state,
             deploy_rule=rule,
-            deploy_reasons=(*reasons, low) if low else reasons,
-            deploy_due=since + wait,
+            deploy_reasons=reasons,
+            deploy_due=since + self.config.kill_to_deploy_delay,
             # Where all are out as far as is known, none of them is trusted to be.
             deploy_ladder=still_in,
             deploys=(),
         )
-
-    def _wait_for_kill(self, rule: str) -> tuple[float, str]:
-        """How long the deploy waits for the kill at most, s; and why less than elsewhere, empty:
-        it does not. Lines above motors that may still turn are a risk, the ground that comes first
-        is none. Only what a rule has seen to fall is taken to fall on, unheard."""
-        config = self.config
-        falls, limit = rule != OPERATOR, config.profile.low_height
-        left = flight.height_left(config, self.state, falls, self.now)
-        wait = config.kill_to_deploy_delay
-        # Far below the take-off it says nothing of the ground beneath.
-        if not -limit <= left < limit or config.low_kill_to_deploy_delay >= wait:
-            return wait, ""
-        wait = config.low_kill_to_deploy_delay
-        return wait, f"at most {wait:g} s for the kill: {left:.1f} m are left (low: {limit:g} m)"
 
     def _join_deploy(self, rule: str, reasons: tuple[str, ...]) -> None:
         """A rule's deploy that a person wants as well is theirs: no height holds it back."""

@@ -232,7 +232,8 @@ class Profile:
     #: m above take-off.
     minimum_height: float = 0.0
     below_minimum: BelowMinimum = BelowMinimum.DEPLOY
-    #: m above take-off. What falls from below it has no time to wait long for a kill; 0: nothing.
+    #: m above home, or above where it took off if that is lower. What falls from below it has no
+    #: time to wait long for a kill; 0: nothing is low.
     low_height: float = 0.0
     #: Faster than this (m/s, up or down), no landed state is believed.
     moving_speed: float = 2.0

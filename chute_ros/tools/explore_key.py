@@ -14,6 +14,7 @@ from chute_ros.model import Action
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
+from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
 from chute_ros.supervisor.rules import MeasurementCondition, Rule
@@ -85,7 +86,9 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         state.killed_standing,
         _left(flight.height_since_kill(config, state, now), config.profile.minimum_height),
         _known(state.killed_sinking),
-        _left(flight.height_left(config, state, True, now), -config.profile.low_height),
+        _until(flight.low_at(config, state, True, now), now),
+        state.deploy_rule == OPERATOR,
+        bool(state.deploys) and state.deploys[0].decision.rule == OPERATOR,
         _since(state.down_since, now, flight.down_after_kill_at(config, state) - state.down_since),
         round(state.armed_height, 3),
         _known(state.took_off_height),
@@ -103,6 +106,11 @@ def _known(value: float) -> float | None:
 def _left(height: float, minimum: float) -> float:
     """Of a height, m, above the minimum; -1: it is not known, or below it."""
     return round(height - minimum, 3) if height >= minimum else -1.0
+
+
+def _until(when: float, now: float) -> float | None:
+    """Time that is left, s; 0: none; None: it does not come."""
+    return None if math.isinf(when) else round(max(when - now, 0.0), 3)
 
 
 def _since(when: float, now: float, limit: float) -> float:

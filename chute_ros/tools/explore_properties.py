@@ -25,8 +25,7 @@ PROPERTIES = {
     "kill first": "a deploy leaves only after a kill that was decided since the start, the reset "
     "or the take-off",
     "delay": "the first step of a deploy leaves only once that kill is confirmed, or "
-    "kill_to_deploy_delay after it, or low_kill_to_deploy_delay where the vehicle was low as the "
-    "deploy was ordered",
+    "kill_to_deploy_delay after it, or low_kill_to_deploy_delay where the vehicle may be low",
     "ground": "no rule deploys from a stage on the ground, nor a vehicle that says undisputedly "
     "that it stands or is disarmed, unless it does so since a kill in flight, or says disarmed "
     "since its autopilot started anew in flight",
@@ -71,8 +70,6 @@ class Memory:
     kill_sinking: float = math.nan
     #: When that was.
     first_killed_at: float = math.nan
-    #: The vehicle was low as the deploy was ordered, or may have fallen there unheard.
-    low: bool = False
     deploy_numbers: frozenset[tuple[int, int]] = frozenset()
     deploy_confirmed: bool = False
     newest: tuple[int, int] = (0, 0)
@@ -86,7 +83,6 @@ class Memory:
             since,
             self.kill_confirmed,
             self.kill_standing,
-            self.low,
             self.deploy_confirmed,
             round(left, 3) if left >= config.profile.minimum_height else None,
         )
@@ -131,8 +127,6 @@ class Properties:
             self._expect("deployed", kept, f"DEPLOYED became {after.stage.name}")
         self._answers(before, after, inputs, outputs)
         self._orders(memory, before, after, outputs, now)
-        if after.deploy_rule and not before.deploy_rule:
-            memory = replace(memory, low=self._low(after, now))
         if after.stage is Stage.IN_FLIGHT or before.stage is Stage.IN_FLIGHT:
             self._at_once(before, after, outputs, now)
         for output in outputs:
@@ -271,7 +265,8 @@ class Properties:
             if not memory.deploy_numbers:
                 waited = now - memory.killed_at + _EPSILON
                 delays = [self.config.kill_to_deploy_delay]
-                delays += [self.config.low_kill_to_deploy_delay] if memory.low else []
+                low = self._low(after, now)
+                delays += [self.config.low_kill_to_deploy_delay] if low else []
                 fine = memory.kill_confirmed or waited >= min(delays)
                 self._expect("delay", fine, f"{waited:.2f} s after the kill")
             self._expect("confirmed", not memory.deploy_confirmed, str(decision.targets))
@@ -296,7 +291,6 @@ class Properties:
             decision,
             now,
             frozenset({number}),
-            low=memory.low,
             deploy_confirmed=memory.deploy_confirmed,
             newest=memory.newest,
         )
@@ -316,9 +310,13 @@ class Properties:
         )
 
     def _low(self, state: State, now: float) -> bool:
-        """By what was told last, and a fall since then."""
-        passed = now - state.vehicle_received
-        return state.vehicle.height - 9.81 / 2.0 * passed**2 < self.config.profile.low_height
+        """By the height that was taken last, and a fall since then."""
+        height, speed = state.measured("height"), state.measured("vertical_speed").value
+        passed = max(now - height.measured_at, 0.0)
+        sinking = 0.0 if math.isnan(speed) else max(-speed, 0.0)
+        fallen = sinking * passed + 9.81 / 2.0 * passed**2
+        lowest = min(height.value, height.before_jump)
+        return state.airborne and lowest - fallen < self.config.profile.low_height + _EPSILON
 
     def _stands(self, state: State, now: float) -> bool:
         """What was told last says that it stands or is disarmed, and no number contradicts."""

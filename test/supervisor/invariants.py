@@ -35,7 +35,6 @@ class Watch:
         self.moved_at = -math.inf
         self.killed_at = math.nan
         self.forced = False
-        self.low = False
 
     def copy(self) -> Watch:
         """One that goes on from here another way."""
@@ -56,7 +55,6 @@ class Watch:
         self.state = State(epoch=self.state.epoch + 4, started_at=self.now, mode=self.state.mode)
         self.killed_at = math.nan
         self.forced = False
-        self.low = False
 
     def _looks_at_all_that_changes(self, before: State, inputs: tuple[i.Input, ...]) -> None:
         """A rule that is not looked at, as nothing has changed, would be what it was."""
@@ -88,9 +86,6 @@ class Watch:
         if K in done and (math.isnan(self.killed_at) or not going_on):
             self.killed_at = self.now
         ordered = self.state.deploy_rule and not before.deploy_rule
-        if ordered:
-            left = flight.height_left(self.config, self.state, True, self.now)
-            self.low = left < self.config.profile.low_height
         self._kill_first(before, done)
         self._confirmed_is_not_told_again(before, inputs, done)
         self._released_stays_released(before, inputs, done)
@@ -114,8 +109,16 @@ class Watch:
             assert kill is not None
             waited = self.now - self.killed_at + 1e-9
             delays = [self.config.kill_to_deploy_delay]
-            delays += [self.config.low_kill_to_deploy_delay] if self.low else []
+            delays += [self.config.low_kill_to_deploy_delay] if self._may_be_low() else []
             assert kill.confirmed or waited >= min(delays)
+
+    def _may_be_low(self) -> bool:
+        height, speed = self.state.measured("height"), self.state.measured("vertical_speed").value
+        passed = max(self.now - height.measured_at, 0.0)
+        sinking = 0.0 if math.isnan(speed) else max(-speed, 0.0)
+        lowest = min(height.value, height.before_jump)
+        left = lowest - sinking * passed - 9.81 / 2.0 * passed**2
+        return self.state.airborne and left < self.config.profile.low_height + 1e-6
 
     def _confirmed_is_not_told_again(
         self, before: State, inputs: Sequence[i.Input], done: list[Action]

@@ -88,12 +88,14 @@ PROFILES = st.builds(
     below_minimum=st.sampled_from(BelowMinimum),
     moving_speed=st.sampled_from([0.1, 2.0, 20.0]),
     landed_hold=st.sampled_from([0.0, 0.3, 5.0]),
+    low_height=st.sampled_from([0.0, 30.0, 70.0]),
 )
 CONFIGS = st.builds(
     SupervisorConfig,
     deploy_links=st.just((LINK, UPF)),
     deploy_ladder=st.sampled_from([(), (Rung(UPF, "trigger"),), (Rung(LINK), Rung(LINK, "2"))]),
     kill_to_deploy_delay=st.sampled_from([0.0, 0.5, 3.0]),
+    low_kill_to_deploy_delay=st.sampled_from([0.0, 0.2, 5.0]),
     ladder_step_timeout=st.sampled_from([0.3, 2.0]),
     require_vehicle_state=st.booleans(),
     profile=st.one_of(PROFILES, st.sampled_from([shipped("multirotor").profile])),

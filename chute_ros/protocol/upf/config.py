@@ -45,7 +45,8 @@ class UpfConfig:
     liveness: LivenessLimits = field(default=LivenessLimits(1.5, 3.0))
     status_timeout: float = 1.5
     calls: CallLimits = field(default=CallLimits())
-    effect: EffectLimits = field(default=EffectLimits())
+    #: A controller that acknowledges a deploy may not have reached its trigger: told again soon.
+    effect: EffectLimits = field(default=EffectLimits(0.5, 0.25, 5.0))
     #: A deploy that the controller has not acknowledged by then goes to the triggers directly.
     last_resort: bool = True
     last_resort_after: float = 1.0
