@@ -30,6 +30,7 @@ class Event(enum.Enum):
 
     SILENCE = "no leader was heard for the lease's time"
     HEARS_MORE = "the leader hears fewer links than this one"
+    KNOWS_MORE = "the leader knows of no flight, and this one does"
     OUTRANKED = "another leads with the better claim"
     OVERSLEPT = "this one did not look for longer than the lease's time"
     REFUSED = "a device has seen a newer leader"
@@ -39,6 +40,7 @@ class Event(enum.Enum):
 TRANSITIONS: dict[tuple[Role, Event], Role] = {
     (Role.FOLLOWING, Event.SILENCE): Role.LEADING,
     (Role.FOLLOWING, Event.HEARS_MORE): Role.LEADING,
+    (Role.FOLLOWING, Event.KNOWS_MORE): Role.LEADING,
     (Role.LEADING, Event.OUTRANKED): Role.FOLLOWING,
     (Role.LEADING, Event.OVERSLEPT): Role.FOLLOWING,
     (Role.LEADING, Event.REFUSED): Role.FOLLOWING,
@@ -178,6 +180,12 @@ class Lease:
         if not other.leading:
             return lease, None
         if self.role is Role.FOLLOWING:
+            # One that it has followed knows all that it knows; a reset makes that nothing.
+            if other.empty and not own.empty and self.leader != other.name:
+                if own.links_heard >= other.links_heard and now >= self.stand_back_until:
+                    return lease._moved(Event.KNOWS_MORE, now), Event.KNOWS_MORE
+                if now < self.waiting_since:
+                    return lease, None  # it has just begun, and may come to hear as many
             since = math.nan
             if own.links_heard > other.links_heard:
                 since = now if math.isnan(self.hears_more_since) else self.hears_more_since

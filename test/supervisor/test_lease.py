@@ -209,6 +209,62 @@ def test_a_leader_that_hears_less_than_a_follower_loses_the_lease() -> None:
     assert (first.role, event) == (Role.FOLLOWING, Event.OUTRANKED)
 
 
+def knows(name: str, rank: int, empty: bool, links_heard: int, leading: bool) -> Claim:
+    return Claim(name, rank, epoch_above(7, rank), leading, empty, links_heard)
+
+
+@pytest.mark.parametrize(
+    ("leader_knows", "knows_itself", "hears", "takes_over"),
+    [
+        (False, True, 2, True),
+        (False, True, 3, True),
+        # It has just begun, and does not hear as many yet; or never will.
+        (False, True, 1, False),
+        (False, False, 2, False),
+        (True, True, 2, False),
+        (True, False, 2, False),
+    ],
+)
+def test_one_that_starts_again_and_knows_of_a_flight_takes_over_from_one_that_does_not(
+    leader_knows: bool, knows_itself: bool, hears: int, takes_over: bool
+) -> None:
+    """Given two supervisors that were both away as the vehicle fell."""
+    lease = Lease.begin(FIRST, T)
+    own = knows("a", 0, not knows_itself, hears, leading=False)
+    other = knows("b", 1, not leader_knows, 2, leading=True)
+    lease, event = lease.heard(FIRST, own, other, T + 0.1)
+    assert (event is Event.KNOWS_MORE) is takes_over
+    assert (lease.role is Role.LEADING) is takes_over
+    undecided = not leader_knows and knows_itself and hears < 2
+    assert (lease.leader == "b") is (not takes_over and not undecided)
+
+
+def test_until_it_hears_as_many_it_waits_for_as_long_as_it_listens() -> None:
+    lease = Lease.begin(FIRST, T)
+    deaf = knows("a", 0, False, 1, leading=False)
+    other = knows("b", 1, True, 2, leading=True)
+    lease, event = lease.heard(FIRST, deaf, other, T + 3.9)
+    assert (lease.leader, event) == ("", None)
+    later, event = lease.heard(FIRST, replace(deaf, links_heard=2), other, T + 3.95)
+    assert (later.role, event) == (Role.LEADING, Event.KNOWS_MORE)
+    lease, event = lease.heard(FIRST, deaf, other, T + 4.0)
+    assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
+
+
+def test_one_that_was_refused_stands_back_all_the_same() -> None:
+    lease, _ = leading(FIRST).refused(12, T)
+    own, other = knows("a", 0, False, 2, leading=False), knows("b", 1, True, 2, leading=True)
+    lease, event = lease.heard(FIRST, own, other, T + 1.0)
+    assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
+
+
+def test_a_leader_that_is_reset_keeps_its_lease() -> None:
+    lease = following(SECOND)
+    flown, reset = knows("b", 1, False, 2, leading=False), knows("a", 0, True, 2, leading=True)
+    lease, event = lease.heard(SECOND, flown, reset, T + 0.1)
+    assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "a", None)
+
+
 @pytest.mark.parametrize(("leader", "own"), [(2, 2), (2, 1), (0, 0)])
 def test_a_leader_that_hears_as_much_keeps_it(leader: int, own: int) -> None:
     lease, event = claims(following(SECOND), leader, own, range(1, 50))

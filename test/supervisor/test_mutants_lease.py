@@ -129,6 +129,7 @@ def test_the_table_once_more() -> None:
     assert told == {
         "FOLLOWING SILENCE LEADING",
         "FOLLOWING HEARS_MORE LEADING",
+        "FOLLOWING KNOWS_MORE LEADING",
         "LEADING OUTRANKED FOLLOWING",
         "LEADING OVERSLEPT FOLLOWING",
         "LEADING REFUSED FOLLOWING",
