@@ -190,7 +190,7 @@ class SupervisorHost:
         self.lease, event = self.lease.heard(self._lease_config, self._own(now), told.claim, now)
         if event is not None:
             self._happened(event, now)
-        if self.lease.leader == told.claim.name and told.state:
+        if told.claim.leading and self.lease.leader == told.claim.name and told.state:
             self.state = handover.followed(self.state, told.state, now)
             self._experienced = True
         self._ros.world.stir(self)

@@ -142,7 +142,7 @@ class LeaseKeeper:
         self.lease, event = self.lease.heard(self.config, self._own(now), other, now)
         if event is not None:
             self._happened(event)
-        if self.lease.leader == message.name and message.state:
+        if message.leading and self.lease.leader == message.name and message.state:
             self._follow_claim(message, now)
         if trouble := self.trouble(now):
             self._complain(trouble)

@@ -71,7 +71,7 @@ class Deploying(Policy):
     def _limit(self, kill: Pending) -> str:
         """For how long this deploy waits for its kill, in words."""
         config, height = self.config, self.state.measured("height")
-        low = self.now >= release_due(config, self.state, self.now) < self.state.deploy_due
+        low = release_due(config, self.state, self.now) < self.state.deploy_due
         if kill.confirmed or not low:
             return f"limit {config.kill_to_deploy_delay:g} s"
         told = f"{height.value:.1f} m told {self.now - height.measured_at:.2f} s ago"
