@@ -83,7 +83,7 @@ PARAMETERS = (
     Parameter(
         "low_kill_to_deploy_delay",
         0.2,
-        "nor longer than this where the vehicle is below the low_height of its profile, s",
+        "no longer than this it waits below the low_height of the profile, in flight, s",
         0.0,
         60.0,
     ),
