@@ -92,7 +92,7 @@ PARAMETERS = (
     Parameter(
         "resend_interval",
         0.1,
-        "a decision that nobody reported on is sent again after, s",
+        "a decision without any report is sent again after (at first what fires sooner), s",
         0.02,
         60.0,
     ),

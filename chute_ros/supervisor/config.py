@@ -90,7 +90,8 @@ class SupervisorConfig:
     #: A parachute that says released is believed at once; its node's report is awaited this long,
     #: only to tell the caller how it went.
     report_wait: float = 0.5
-    #: A decision that nobody has reported on is sent again after this.
+    #: A decision that nobody has reported on is sent again after this; a kill or a deploy sooner
+    #: at first.
     resend_interval: float = 0.1
     #: An alarm that does not stop is said again after this.
     alarm_interval: float = 2.0

@@ -23,6 +23,7 @@ from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
+from chute_ros.supervisor.steps import Slot
 
 #: What people ask for, besides a kill, which devices want as well.
 _PERSONS = (i.ArmRequest, i.DeployRequest, i.ResetRequest, i.ModeRequest)
@@ -345,12 +346,19 @@ class _Update(Deploying):
         return state.stage is Stage.KILLING and ended and on_ground
 
     def _send_again(self) -> None:
-        for slot in self.slots:
-            pending = self.pending(slot)
-            if pending is None or pending.decision.shadow or not self._worth_sending(pending):
-                continue
-            if self.now >= pending.resend_at(self.config):
+        waiting = {slot: one for slot in self.slots if (one := self._unheard(slot)) is not None}
+        due = {slot for slot, one in waiting.items() if self.now >= one.resend_at(self.config)}
+        # A node that is started anew must not see the deploy first.
+        kill_too = any(isinstance(slot, int) for slot in due)
+        for slot in waiting:
+            if slot in due or (slot == "kill" and kill_too):
                 self.send_again(slot)
+
+    def _unheard(self, slot: Slot) -> Pending | None:
+        """What is on its way, and worth to be sent again."""
+        one = self.pending(slot)
+        heard = one is None or one.decision.shadow or not self._worth_sending(one)
+        return None if heard else one
 
     def _worth_sending(self, pending: Pending) -> bool:
         """Somebody has not reported: a node that is alive, or any while it can still help."""

@@ -20,6 +20,9 @@ _STEPS = frozenset({Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED})
 _NOT_NOW = frozenset({Outcome.FAILED, Outcome.REFUSED})
 #: A flight block that nobody reports on is sent at least so often, s.
 _RAREST_RESEND = 1.0
+#: A kill or a deploy is sent again after so long at first, s: of those that a bad way loses the
+#: kill must not be later than the deploy that follows it after 0.2 s.
+_SOONEST_RESEND = 0.02
 #: A device that asks for a kill is taken to want it for so long, s.
 ASK_LASTS = 1.0
 
@@ -89,11 +92,12 @@ class Pending:
         return tuple(t for t in self.targets if not self.of(t) & _STEPS)
 
     def resend_at(self, config: SupervisorConfig) -> float:
-        """When to send it again. A flight block that stays without a report: ever more rarely."""
+        """When to send it again: ever more rarely, as long as it stays without a report. What
+        fires goes from _SOONEST_RESEND to resend_interval, another from there to its rarest."""
+        slower = (self.sent_at - self.decided_at) / 4
         if self.decision.action in (Action.KILL, Action.DEPLOY):
-            return self.sent_at + config.resend_interval
-        slower = min((self.sent_at - self.decided_at) / 4, _RAREST_RESEND)
-        return self.sent_at + max(config.resend_interval, slower)
+            return self.sent_at + min(max(_SOONEST_RESEND, slower), config.resend_interval)
+        return self.sent_at + max(config.resend_interval, min(slower, _RAREST_RESEND))
 
     def newest_details(self) -> str:
         """What was reported last, in words."""

@@ -78,9 +78,20 @@ def test_who_has_failed_or_not_reported_or_not_begun(
     assert one.not_begun() == not_begun
 
 
-def test_a_kill_and_a_deploy_are_sent_again_steadily_and_a_flight_block_ever_more_rarely() -> None:
-    for action in (Action.KILL, Action.DEPLOY):
-        assert replace(pending(action), sent_at=90.0).resend_at(TWO) == 90.25
+@pytest.mark.parametrize("action", [Action.KILL, Action.DEPLOY])
+@pytest.mark.parametrize(
+    ("sent_at", "then"),
+    [(10.0, 10.02), (10.08, 10.1), (10.4, 10.5), (10.9, 11.125), (11.0, 11.25), (90.0, 90.25)],
+)
+def test_a_kill_and_a_deploy_are_sent_again_soon_at_first(
+    action: Action, sent_at: float, then: float
+) -> None:
+    one = replace(pending(action), sent_at=sent_at)
+    assert one.resend_at(TWO) == pytest.approx(then)
+    assert one.resend_at(replace(TWO, resend_interval=0.01)) == pytest.approx(sent_at + 0.01)
+
+
+def test_a_flight_block_is_sent_again_ever_more_rarely() -> None:
     block = pending(Action.FLIGHT_BLOCK)
     for sent_at, then in [(10.0, 10.25), (11.0, 11.25), (12.0, 12.5), (14.0, 15.0), (90.0, 91.0)]:
         assert replace(block, sent_at=sent_at).resend_at(TWO) == then
