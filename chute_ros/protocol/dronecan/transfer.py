@@ -30,6 +30,7 @@ HIGHEST_NODE_ID = 127
 _HIGHEST_PRIORITY = 31
 #: A frame that was overtaken comes at most so late (s): within it a transfer that has the id of
 #: one of the last so many is the same again; after it, only one that has the id of the newest.
+#: And a message whose id is up to so many before the newest one's tells of a state that is over.
 #: Longer would make a device that restarted, and counts from 0 again, go unheard.
 _OVERTAKEN = 0.1
 _REMEMBERED = 8
@@ -124,6 +125,14 @@ class _Session:
             return now - self.done[-1][1] < TRANSFER_TIMEOUT
         return any(one == transfer_id and now - at < _OVERTAKEN for one, at in self.done)
 
+    def is_old_news(self, transfer_id: int, now: float) -> bool:
+        """It left before the newest complete one, which has overtaken it."""
+        if not self.done:
+            return False
+        newest, at = self.done[-1]
+        behind = (newest - transfer_id) % TRANSFER_IDS
+        return 0 < behind <= _REMEMBERED and now - at < _OVERTAKEN
+
 
 _SessionKey = tuple[Kind, int, int, int]
 
@@ -192,6 +201,8 @@ class Assembler:
                 anew = newest and tail & _END and session.said not in (b"", chunk)
                 if not anew:
                     return self._drop("transfers that came twice")
+            if head.kind is Kind.MESSAGE and session.is_old_news(head.transfer_id, now):
+                return self._drop("messages that a newer one has overtaken")
             if tail & _TOGGLE:
                 return self._drop("toggle bit wrong")
             if not tail & _END and len(chunk) < _FRAME_PAYLOAD:

@@ -171,6 +171,32 @@ def test_an_older_transfer_that_is_late_once_more_does_not_count_twice():
     assert ear.counts == {"transfers that came twice": 2}
 
 
+@pytest.mark.parametrize("newest", [2, 8, 31, 0, 1])
+@pytest.mark.parametrize(("behind", "heard"), [(1, 0), (8, 0), (9, 1), (31, 1)])
+def test_a_message_that_a_newer_one_has_overtaken_is_no_news(newest, behind, heard):
+    ear = Ear()
+    assert len(ear.hear(single(transfer_id=newest)[1], 10.0)) == 1
+    late = single(transfer_id=(newest - behind) % TRANSFER_IDS)[1]
+    assert len(ear.hear(late, 10.099)) == heard
+    assert ear.counts == ({} if heard else {"messages that a newer one has overtaken": 1})
+    if not heard:
+        assert len(ear.hear(late, 10.101)) == 1, "who restarted is heard from then on"
+
+
+def test_an_overtaken_message_of_several_frames_does_not_end_the_newer_one():
+    ear = Ear()
+    _, old = status(transfer_id=4)
+    before, whole = status(transfer_id=5)
+    newer, frames = status(transfer_id=6)
+    assert ear.hear([*whole, frames[0], *old, *frames[1:]], 1.0) == [before, newer]
+
+
+def test_an_overtaken_answer_counts_all_the_same():
+    ear = Ear()
+    newer, older = (information(transfer_id=number) for number in (5, 4))
+    assert ear.hear([*newer[1], *older[1]], 1.0) == [newer[0], older[0]]
+
+
 def test_a_device_that_restarted_and_counts_from_0_again_is_heard():
     ear = Ear()
     for number in range(3):
