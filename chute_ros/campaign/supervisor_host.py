@@ -106,7 +106,11 @@ class SupervisorHost:
         self._published: tuple[object, ...] = ()
         self._deadline = now
         self._hearing = VehicleHearing(
-            self._vehicle_sources, self.config.vehicle_state_age, self._vehicle_told
+            self._vehicle_sources,
+            self.config.vehicle_state_age,
+            self._vehicle_told,
+            state.vehicle.link_state,
+            now,
         )
         self._stamps: dict[str, float] = {}
         self._callers.clear()

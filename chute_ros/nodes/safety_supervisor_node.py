@@ -102,7 +102,10 @@ class SafetySupervisorNode(SuiteNode):
             self, self.config, self.wall, self._recorder, self._health, self._turn
         )
         self._vehicle_sources = VehicleSources(
-            self, self.values, lambda *told: self._turn(inputs.VehicleReport(*told))
+            self,
+            self.values,
+            lambda *told: self._turn(inputs.VehicleReport(*told)),
+            before=self.state.vehicle.link_state,
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().warning(

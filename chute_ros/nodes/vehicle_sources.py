@@ -87,6 +87,7 @@ class VehicleSources:
     values: the node's parameters, VEHICLE_PARAMETERS among them, and vehicle_state_age (s): a
     source of the autopilot that is silent for longer has lost it. tell(state, disputed, told_by),
     as inputs.VehicleReport has them, is called by the node's executor. clock: monotonic seconds.
+    before: how the autopilot was heard before a restart (NEVER_SEEN: not, or nobody knows).
     """
 
     def __init__(
@@ -95,10 +96,12 @@ class VehicleSources:
         values: Mapping[str, Any],
         tell: Callable[[model.VehicleState, frozenset[str], Mapping[str, str]], object],
         clock: Callable[[], float] = time.monotonic,
+        before: model.LinkState = model.LinkState.NEVER_SEEN,
     ) -> None:
         self._node, self._values, self._tell, self._clock = node, values, tell, clock
         sources = _checked(values["vehicle_sources"])
         self._merge = VehicleMerge(sources, values["vehicle_state_age"])
+        self._merge.recall(before, clock())
         self._told_at = -math.inf
         self._refused: set[str] = set()
         self._disputed: frozenset[str] = frozenset()

@@ -116,6 +116,14 @@ class VehicleMerge:
         #: (Part, two sources) -> since when they differ.
         self._differ: dict[tuple[str, frozenset[str]], _Difference] = {}
 
+    def recall(self, link_state: LinkState, now: float) -> None:
+        """How the autopilot was heard before a restart: one that was, and is silent from now
+        (monotonic s) on, is lost; without this it would be one that was never seen."""
+        if link_state is not LinkState.NEVER_SEEN:
+            for source in self._sources:
+                if source in AUTOPILOTS:
+                    self._words[source][readings.AUTOPILOT] = _Word((link_state, 0), now)
+
     def hear(self, source: str, parts: readings.Parts, now: float) -> None:
         """A message of source came now and says this."""
         for part, values in parts.items():

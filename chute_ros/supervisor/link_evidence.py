@@ -155,10 +155,13 @@ class LinkEvidence:
 
     def with_status(self, status: ParachuteStatus, now: float) -> LinkEvidence:
         """After a device told its picture. A lost one's "released" is neither taken nor taken
-        back."""
+        back, but for one that it has just said: by its own clock this picture is newer."""
         devices, released_at = dict(self.devices), self.released_at
-        if status.link_state is not LinkState.OK and status.device in devices:
-            status = replace(status, deployed=devices[status.device].deployed)
+        before = devices.get(status.device)
+        if status.link_state is not LinkState.OK and before is not None:
+            said = status.deployed and status.uptime > before.uptime
+            status = replace(status, deployed=before.deployed or said)
+            released_at = now if said else released_at
         elif status.link_state is not LinkState.OK:
             status = replace(status, deployed=False)
         elif status.deployed:

@@ -30,6 +30,8 @@ class StubLink(Node):
         self.outcomes = [Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED]
         self.arm_requests, self.arm_succeeds = [], True
         self.flying = False
+        #: It tells of the vehicle.
+        self.telling = True
         #: It does not hear decisions.
         self.deaf = False
         #: Numbers of the decisions that it acted on.
@@ -54,6 +56,10 @@ class StubLink(Node):
                 device_healthy=self.healthy,
             )
             self._beats.publish(stamped(self, message))
+        if self.telling:
+            self._tell_vehicle()
+
+    def _tell_vehicle(self):
         vehicle = VehicleState(
             source="1/1",
             link_state=int(LinkState.OK),

@@ -1,6 +1,7 @@
 """A supervisor without a standby is killed in flight and started again; what it left in a file."""
 
 import json
+import math
 import signal
 import stat
 
@@ -8,6 +9,9 @@ import pytest
 from chute_msgs.msg import SafetyState
 from chute_msgs.srv import Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Quaternion, Vector3
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import Imu
 from supervisor_bench import Scene
 
 from chute_ros.model import Action, Outcome
@@ -58,6 +62,31 @@ def test_the_deploy_that_follows_the_kill_is_not_lost(pair):
     pair.bench.until(lambda: pair.acted(Action.DEPLOY), "the deploy leaves")
     assert pair.acted(Action.DEPLOY) == [(pair.epoch("a"), pair.acted(Action.DEPLOY)[0][1])]
     assert "goes on where it stopped in flight: KILLING" in pair.processes.tail("a", 40)
+
+
+def test_an_autopilot_that_falls_silent_meanwhile_is_lost_and_not_never_seen(pair):
+    """Given an IMU that outlives it, and tells the fall from the restart on."""
+    sources = {"profile": "multirotor", "vehicle_sources": ["vehicle/state", "imu"]}
+    flying(pair, **sources)
+    the_file(pair)
+    node = pair.bench.client
+    on_its_side = Quaternion(w=math.sqrt(0.5), x=math.sqrt(0.5), y=0.0, z=0.0)
+    imus = node.create_publisher(Imu, f"{pair.bench.namespace}/imu", qos_profile_sensor_data)
+
+    def fall():
+        message = Imu(orientation=on_its_side, linear_acceleration=Vector3(z=7.0))
+        message.header.frame_id = "base_link"
+        imus.publish(message)
+
+    pair.link.telling = False
+    kill_and_start_again(pair, **sources)
+    timer = node.create_timer(0.05, fall)
+    # Of a vehicle that was never seen high enough, the motors alone are stopped.
+    kills = pair.bench.until(
+        lambda: [one for one in pair.decisions if one.action == Action.KILL], "a kill is decided"
+    )
+    node.destroy_timer(timer)
+    assert kills[0].rule == "autopilot lost and falling"
 
 
 @pytest.mark.parametrize(

@@ -75,6 +75,38 @@ def test_a_source_that_hears_its_autopilot_no_more_has_lost_it_after_the_limit()
     assert one.state(13.2).link_state is LinkState.OK
 
 
+@pytest.mark.parametrize("said", [None, LinkState.NEVER_SEEN, LinkState.STALE])
+def test_an_autopilot_that_was_heard_before_a_restart_is_lost_and_not_never_seen(said):
+    """Nor does its node find it, which was started anew as well."""
+    one = merge("imu", "vehicle/state")
+    one.recall(LinkState.OK, 10.0)
+    one.hear("imu", {"acceleration": (1.0,)}, 10.0)
+    if said is not None:
+        one.hear_state(VehicleState(link_state=said), 11.0)
+    assert one.state(12.5).link_state is (LinkState.OK if said is None else said)
+    assert one.state(12.5).system_status == 0
+    assert one.state(12.6).link_state is LinkState.LOST
+    one.hear_state(VehicleState(link_state=LinkState.OK, system_status=4), 13.0)
+    assert (one.state(13.0).link_state, one.state(13.0).system_status) == (LinkState.OK, 4)
+
+
+@pytest.mark.parametrize(
+    ("sources", "before", "link_state"),
+    [
+        (("vehicle/state", "imu"), LinkState.LOST, LinkState.LOST),
+        (("vehicle/state", "imu"), LinkState.NEVER_SEEN, LinkState.NEVER_SEEN),
+        (("mavros", "imu"), LinkState.OK, LinkState.OK),
+        (("odometry", "imu"), LinkState.LOST, LinkState.OK),
+    ],
+)
+def test_what_was_known_of_the_autopilot_before_a_restart_is_where_it_begins(
+    sources, before, link_state
+):
+    one = merge(*sources)
+    one.recall(before, 10.0)
+    assert one.state(10.0).link_state is link_state
+
+
 def test_when_all_are_old_the_newest_counts_and_stays_as_old_as_it_is():
     one = merge("imu", "odometry")
     one.hear("odometry", {"attitude": TILTED}, 10.0)

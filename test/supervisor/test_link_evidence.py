@@ -1,6 +1,7 @@
 """Each link is never seen, ok, stale, lost or regained, by limits of its own."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -168,6 +169,20 @@ def test_a_lost_device_cannot_say_that_it_is_released() -> None:
         evidence = known.with_status(status(deployed=True, state=LinkState.LOST), 4.0)
         assert evidence.deployed == set()
         assert math.isnan(evidence.released_at)
+
+
+@pytest.mark.parametrize(("uptime", "released"), [(20.9, False), (21.0, False), (21.1, True)])
+def test_what_a_lost_device_says_by_its_own_clock_just_now_is_so(
+    uptime: float, released: bool
+) -> None:
+    """Its heartbeats were lost on the way, and its newest status was not."""
+    known = LinkEvidence().with_status(replace(status(), uptime=21.0), 3.0)
+    told = replace(status(deployed=True, state=LinkState.LOST), uptime=uptime)
+    evidence = known.with_status(told, 9.0)
+    assert evidence.deployed == ({"1/161"} if released else set())
+    assert math.isnan(evidence.released_at) is not released
+    later = replace(status(state=LinkState.LOST), uptime=30.0)
+    assert evidence.with_status(later, 10.0).deployed == evidence.deployed, "not taken back"
 
 
 def test_made_up_devices_do_not_grow_it_and_the_known_ones_go_on_being_heard() -> None:

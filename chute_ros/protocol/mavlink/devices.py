@@ -22,7 +22,7 @@ from chute_ros.protocol.mavlink.autopilot import AutopilotTracker, is_autopilot
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
-from chute_ros.protocol.mavlink.roster import Roster
+from chute_ros.protocol.mavlink.roster import MOST_DEVICES, Roster
 
 Ids = tuple[int, int]
 
@@ -37,6 +37,10 @@ class Devices:
         self.autopilots: Roster[AutopilotTracker] = Roster(
             "autopilot", config.autopilot_system_id, config.autopilot_component_id
         )
+        #: By their PARACHUTE_STATUS, and not yet by a heartbeat.
+        self._unproven: dict[Ids, ParachuteTracker] = {}
+        #: By the type in their heartbeat they are something else.
+        self._others: set[Ids] = set()
         self._config = config
         self._events: list[Event] = []
 
@@ -45,6 +49,18 @@ class Devices:
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Where requests without a device go: the first that is not lost, or the first."""
         return first_alive(self.parachutes.all())
+
+    def to_release(self, device: str) -> ParachuteTracker | None:
+        """Where a release goes; device: its name, or empty. As long as no heartbeat of a parachute
+        was heard, to the one that says what only a parachute does, if all that do are of one
+        system: heartbeats come once a second, and after a restart of ours the ground may come
+        before the next that is whole."""
+        chosen = self.parachutes.named(device) if device else self.chosen_parachute()
+        one_system = len({system_id for system_id, _ in self._unproven}) == 1
+        if chosen is None and not self.parachutes.all() and one_system:
+            fitting = (one for one in self._unproven.values() if device in ("", one.device))
+            chosen = next(fitting, None)
+        return chosen
 
     def chosen_autopilot(self) -> AutopilotTracker | None:
         """The first autopilot of ours that is not lost, or the first."""
@@ -73,8 +89,12 @@ class Devices:
             self._from_autopilot(message, ids, now)
         elif message.type == dialect.MAV_TYPE_PARACHUTE:
             self._parachute_heartbeat(message, ids, now)
-        elif is_autopilot(message):
-            self._autopilot_heartbeat(message, ids, now)
+        else:
+            self._unproven.pop(ids, None)
+            if len(self._others) < MOST_DEVICES:
+                self._others.add(ids)
+            if is_autopilot(message):
+                self._autopilot_heartbeat(message, ids, now)
 
     def update(self, now: float) -> None:
         """Look at the clock."""
@@ -114,11 +134,13 @@ class Devices:
             return
         parachute = self.parachutes.get(*ids)
         if parachute is None:
-            config = self._config
-            parachute = ParachuteTracker(*ids, config.parachute_liveness, config.status)
+            parachute = self._unproven.pop(ids, None) or self._tracker(ids)
             self.parachutes.add(*ids, parachute)
         self._changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
         self._events.append(ParachuteChanged(parachute.status(now)))
+
+    def _tracker(self, ids: Ids) -> ParachuteTracker:
+        return ParachuteTracker(*ids, self._config.parachute_liveness, self._config.status)
 
     def _autopilot_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
         if not self.autopilots.admits(*ids):
@@ -131,10 +153,11 @@ class Devices:
         self._vehicle_changed(now)
 
     def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:
-        parachute = self.parachutes.get(*ids)
+        parachute, kind = self.parachutes.get(*ids), message.get_type()
         if parachute is None:
+            if kind == "PARACHUTE_STATUS":
+                self._unproven_status(message, ids, now)
             return
-        kind = message.get_type()
         if kind == "PARACHUTE_STATUS":
             reboots = parachute.reboot_count
             parachute.parachute_status(message, now)
@@ -144,6 +167,14 @@ class Devices:
             self._events.append(ParachuteChanged(parachute.status(now)))
         elif kind == "COMPONENT_INFORMATION_BASIC":
             parachute.component_information(message)
+
+    def _unproven_status(self, message: Any, ids: Ids, now: float) -> None:
+        if ids in self._others or not self.parachutes.fits(*ids):
+            return
+        if ids not in self._unproven and len(self._unproven) < MOST_DEVICES:
+            self._unproven[ids] = self._tracker(ids)
+        if ids in self._unproven:
+            self._unproven[ids].parachute_status(message, now)
 
     def _from_autopilot(self, message: Any, ids: Ids, now: float) -> None:
         autopilot = self.autopilots.get(*ids)

@@ -118,7 +118,7 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
-        parachute = self._target(token, device)
+        parachute = self._devices.to_release(device) or self._target(token, device)
         if parachute is not None:
             self.requests.make_way_for_release(now)
             self._begin(token, goals.release(parachute, force, now), now)
@@ -189,7 +189,7 @@ class MavlinkLink:
 
     def has_parachute(self) -> bool:
         """A device was heard that can be told to deploy."""
-        return self.chosen_parachute() is not None
+        return self._devices.to_release("") is not None
 
     def has_autopilot(self) -> bool:
         """One was heard that can be told to stop the motors."""

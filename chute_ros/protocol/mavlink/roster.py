@@ -41,6 +41,12 @@ class Roster(Generic[DeviceT]):
         self._ours: dict[tuple[int, int], DeviceT] = {}
         self._other_systems: set[int] = set()
 
+    def fits(self, system_id: int, component_id: int) -> bool:
+        """May a device with these ids be ours, as far as is known?"""
+        # A command to system 0 would go to every vehicle.
+        named = system_id != 0 and self.system_id in (0, system_id)
+        return named and self.component_id in (0, component_id)
+
     def admits(self, system_id: int, component_id: int) -> bool:
         """Is a device with these ids ours? If no system was named, the first one heard is."""
         if system_id == 0 or self.component_id not in (0, component_id):

@@ -64,6 +64,71 @@ def test_a_deploy_need_not_wait_once_a_parachute_was_heard():
     assert bench.link.has_parachute(), "one that is lost is told all the same"
 
 
+def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
+    """Given that our process was started anew, and that its heartbeats are damaged: a deploy that
+    waits need not wait for them, and its own status ends it."""
+    bench = Bench().hear(PILOT, copter()).hear(CHUTE, status())
+    assert bench.link.has_parachute()
+    assert bench.link.chosen_parachute() is None, "its link is its heartbeats"
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    (order,) = bench.commands(RELEASE)
+    assert (order.target_system, order.target_component) == CHUTE
+    bench.at(0.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
+    assert bench.end(1).finished.success
+    assert not [e for e in bench.events if isinstance(e, ParachuteChanged)]
+    bench.at(0.2).hear(CHUTE, heartbeat())
+    assert bench.last_status().deployed, "what it said before its heartbeat is not forgotten"
+
+
+@pytest.mark.parametrize(
+    ("device", "known"), [("1/161", True), ("1/162", True), ("1/163", False), ("2/161", False)]
+)
+def test_also_the_one_that_is_named(device, known):
+    bench = Bench().hear(CHUTE, status()).hear(SECOND, status())
+    bench.link.deploy(1, False, bench.now, device)
+    bench.collect()
+    sent = [f"{one.target_system}/{one.target_component}" for one in bench.commands(RELEASE)]
+    assert sent == ([device] if known else [])
+    assert known or f"no parachute '{device}' was heard" in bench.end(1).finished.message
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        pytest.param([(CHUTE, heartbeat(d.MAV_TYPE_GIMBAL))], id="by its heartbeat a gimbal"),
+        pytest.param([((2, 161), status())], id="another vehicle's as well"),
+        pytest.param([((1, 200), heartbeat())], id="another is known by its heartbeat"),
+    ],
+)
+@pytest.mark.parametrize("first", [True, False])
+def test_but_not_in_doubt(others, first):
+    bench = Bench() if first else Bench().hear(CHUTE, status())
+    for ids, message in others:
+        bench.hear(ids, message)
+    if first:
+        bench.hear(CHUTE, status())
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    assert all((o.target_system, o.target_component) == (1, 200) for o in bench.commands(RELEASE))
+
+
+@pytest.mark.parametrize(
+    "ids", [(0, 161), (2, 161), (1, 162)], ids=["everybody", "another system", "another component"]
+)
+def test_nor_another_than_the_parameters_name(ids):
+    bench = Bench(parachute_system_id=1, parachute_component_id=161).hear(ids, status())
+    assert not bench.link.has_parachute()
+
+
+def test_made_up_devices_do_not_grow_what_waits_for_a_heartbeat():
+    bench = Bench()
+    for component in range(1, 100):
+        bench.hear((1, component), status())
+        bench.hear((1, 100 + component), heartbeat(d.MAV_TYPE_GIMBAL))
+    assert len(bench.link._devices._unproven) == len(bench.link._devices._others) == 16
+
+
 def test_a_kill_need_not_wait_once_an_autopilot_was_heard():
     bench = Bench().hear(CHUTE, heartbeat())
     assert not bench.link.has_autopilot(), "a parachute is none"

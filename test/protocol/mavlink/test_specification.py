@@ -64,7 +64,8 @@ def test_connection_distinguished_by_component_id():
 def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
     bench = Bench().hear(PARACHUTE, status())
     assert bench.link.chosen_parachute() is None
-    bench.link.deploy(1, False, bench.now)
+    assert bench.events == []
+    bench.link.arm(1, True, 0, bench.now)
     bench.collect()
     assert "no parachute was heard on this link" in bench.end(1).finished.message
     assert bench.commands() == []
