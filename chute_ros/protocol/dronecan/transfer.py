@@ -34,6 +34,9 @@ _HIGHEST_PRIORITY = 31
 #: Longer would make a device that restarted, and counts from 0 again, go unheard.
 _OVERTAKEN = 0.1
 _REMEMBERED = 8
+#: uavcan.protocol.NodeStatus. Each is heard, however late: that two nodes have one id, and count
+#: apart from each other, shows in their uptimes.
+_NODE_STATUS = 341
 
 
 class Kind(enum.Enum):
@@ -201,7 +204,8 @@ class Assembler:
                 anew = newest and tail & _END and session.said not in (b"", chunk)
                 if not anew:
                     return self._drop("transfers that came twice")
-            if head.kind is Kind.MESSAGE and session.is_old_news(head.transfer_id, now):
+            tells_a_state = head.kind is Kind.MESSAGE and head.type_id != _NODE_STATUS
+            if tells_a_state and session.is_old_news(head.transfer_id, now):
                 return self._drop("messages that a newer one has overtaken")
             if tail & _TOGGLE:
                 return self._drop("toggle bit wrong")

@@ -175,12 +175,22 @@ def test_an_older_transfer_that_is_late_once_more_does_not_count_twice():
 @pytest.mark.parametrize(("behind", "heard"), [(1, 0), (8, 0), (9, 1), (31, 1)])
 def test_a_message_that_a_newer_one_has_overtaken_is_no_news(newest, behind, heard):
     ear = Ear()
-    assert len(ear.hear(single(transfer_id=newest)[1], 10.0)) == 1
-    late = single(transfer_id=(newest - behind) % TRANSFER_IDS)[1]
+    assert len(ear.hear(status(transfer_id=newest)[1], 10.0)) == 1
+    late = status(transfer_id=(newest - behind) % TRANSFER_IDS)[1]
     assert len(ear.hear(late, 10.099)) == heard
-    assert ear.counts == ({} if heard else {"messages that a newer one has overtaken": 1})
+    dropped = {"messages that a newer one has overtaken": 1, "frames without their beginning": 1}
+    assert ear.counts == ({} if heard else dropped)
     if not heard:
         assert len(ear.hear(late, 10.101)) == 1, "who restarted is heard from then on"
+
+
+def test_each_node_status_is_heard_as_two_nodes_may_have_one_id():
+    ear = Ear()
+    for n in range(20):
+        one, another = (20 + n) % TRANSFER_IDS, (15 + n) % TRANSFER_IDS
+        assert len(ear.hear(single(transfer_id=one)[1], 10.0 + n)) == 1
+        assert len(ear.hear(single(transfer_id=another)[1], 10.05 + n)) == 1
+    assert ear.counts == {}
 
 
 def test_an_overtaken_message_of_several_frames_does_not_end_the_newer_one():
