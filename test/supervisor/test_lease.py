@@ -258,6 +258,14 @@ def test_one_that_was_refused_stands_back_all_the_same() -> None:
     assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
 
 
+def test_until_it_has_stood_back_and_then_it_leads_from_now_on() -> None:
+    lease, _ = leading(FIRST).refused(12, T)
+    own, other = knows("a", 0, False, 2, leading=False), knows("b", 1, True, 2, leading=True)
+    now = lease.stand_back_until
+    lease, event = lease.heard(FIRST, own, other, now)
+    assert (lease.role, event, lease.waiting_since) == (Role.LEADING, Event.KNOWS_MORE, now)
+
+
 def test_a_leader_that_is_reset_keeps_its_lease() -> None:
     lease = following(SECOND)
     flown, reset = knows("b", 1, False, 2, leading=False), knows("a", 0, True, 2, leading=True)

@@ -78,3 +78,27 @@ def test_it_is_looked_at_again_when_it_grows_stale_lost_or_is_regained() -> None
     assert regained[:3] == (8.9, 9.4, 9.0)
     released = LinkEvidence(released_at=5.0).deadlines(LIMITS)
     assert released[3] == 6.0, "its word counts no longer than its node may be silent"
+
+
+def clocks(*told: tuple[float, float]) -> LinkEvidence:
+    return heard(*((t, beat(seq=n, difference=d)) for n, (t, d) in enumerate(told)))
+
+
+def test_a_clock_is_judged_by_the_smallest_difference_of_this_spell_and_the_one_before() -> None:
+    first = clocks((10.0, 0.5), (10.5, 0.3), (10.9, 0.4))
+    assert (first.clock_spell_since, first.clock_least) == (10.0, 0.3)
+    assert math.isnan(first.clocks_differ_by), "one spell is not enough"
+    second = clocks((10.0, 0.5), (10.5, 0.3), (11.0, 0.6), (11.9, 0.7))
+    assert (second.clock_spell_since, second.clock_least) == (11.0, 0.6)
+    assert second.clocks_differ_by == 0.3
+    third = clocks((10.0, 0.5), (10.5, 0.3), (11.0, 0.6), (12.0, 0.8))
+    assert (third.clock_least_before, third.clock_least, third.clocks_differ_by) == (0.6, 0.8, 0.6)
+
+
+@pytest.mark.parametrize(("pause", "known"), [(2.9, True), (3.0, False), (3.5, False)])
+def test_what_was_heard_before_a_long_silence_says_nothing_of_a_clock(
+    pause: float, known: bool
+) -> None:
+    after = clocks((10.0, 0.5), (10.0 + pause, 0.6))
+    assert after.clock_least == 0.6
+    assert after.clock_least_before == 0.5 if known else math.isnan(after.clock_least_before)
