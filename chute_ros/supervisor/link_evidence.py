@@ -156,16 +156,12 @@ class LinkEvidence:
     def with_status(self, status: ParachuteStatus, now: float) -> LinkEvidence:
         """After a device told its picture. A lost one's "released" is neither taken nor taken
         back, but for one that it has just said: by its own clock this picture is newer."""
-        devices, released_at = dict(self.devices), self.released_at
-        before = devices.get(status.device)
-        if status.link_state is not LinkState.OK and before is not None:
-            said = status.deployed and status.uptime > before.uptime
+        devices, said = dict(self.devices), status.deployed
+        if status.link_state is not LinkState.OK:
+            before = devices.get(status.device, ParachuteStatus(status.device))
+            said = said and status.uptime > before.uptime
             status = replace(status, deployed=before.deployed or said)
-            released_at = now if said else released_at
-        elif status.link_state is not LinkState.OK:
-            status = replace(status, deployed=False)
-        elif status.deployed:
-            released_at = now
+        released_at = now if said else self.released_at
         if status.device not in devices and len(devices) >= MOST_DEVICES:
             return self
         devices[status.device] = status

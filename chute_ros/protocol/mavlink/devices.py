@@ -50,17 +50,21 @@ class Devices:
         """Where requests without a device go: the first that is not lost, or the first."""
         return first_alive(self.parachutes.all())
 
+    def target(self, device: str) -> ParachuteTracker | None:
+        """The parachute with this name; empty: the chosen one."""
+        return self.parachutes.named(device) if device else self.chosen_parachute()
+
     def to_release(self, device: str) -> ParachuteTracker | None:
         """Where a release goes; device: its name, or empty. As long as no heartbeat of a parachute
         was heard, to the one that says what only a parachute does, if all that do are of one
         system: heartbeats come once a second, and after a restart of ours the ground may come
         before the next that is whole."""
-        chosen = self.parachutes.named(device) if device else self.chosen_parachute()
-        one_system = len({system_id for system_id, _ in self._unproven}) == 1
-        if chosen is None and not self.parachutes.all() and one_system:
-            fitting = (one for one in self._unproven.values() if device in ("", one.device))
-            chosen = next(fitting, None)
-        return chosen
+        if self.parachutes.all():
+            return self.target(device)
+        if len({system_id for system_id, _ in self._unproven}) != 1:
+            return None
+        fitting = (one for one in self._unproven.values() if device in ("", one.device))
+        return next(fitting, None)
 
     def chosen_autopilot(self) -> AutopilotTracker | None:
         """The first autopilot of ours that is not lost, or the first."""

@@ -253,7 +253,7 @@ class MavlinkLink:
 
     def _target(self, token: int, device: str) -> ParachuteTracker | None:
         """The parachute meant; None, and the request refused, if there is none."""
-        target = self.parachutes.named(device) if device else self.chosen_parachute()
+        target = self._devices.target(device)
         if target is None:
             known = ", ".join(p.device for p in self.parachutes.all()) or "none"
             what = f"no parachute {device!r}" if device else "no parachute"

@@ -43,14 +43,11 @@ class Roster(Generic[DeviceT]):
 
     def fits(self, system_id: int, component_id: int) -> bool:
         """May a device with these ids be ours, as far as is known?"""
-        # A command to system 0 would go to every vehicle.
-        named = system_id != 0 and self.system_id in (0, system_id)
-        return named and self.component_id in (0, component_id)
+        return self._possible(system_id, component_id) and self.system_id in (0, system_id)
 
     def admits(self, system_id: int, component_id: int) -> bool:
         """Is a device with these ids ours? If no system was named, the first one heard is."""
-        if system_id == 0 or self.component_id not in (0, component_id):
-            # A command to system 0 would go to every vehicle.
+        if not self._possible(system_id, component_id):
             return False
         if self.system_id == 0:
             self.system_id = system_id
@@ -61,6 +58,10 @@ class Roster(Generic[DeviceT]):
         full = len(self._ours) >= MOST_DEVICES and (system_id, component_id) not in self._ours
         self.refused_count += full
         return not full
+
+    def _possible(self, system_id: int, component_id: int) -> bool:
+        # A command to system 0 would go to every vehicle.
+        return system_id != 0 and self.component_id in (0, component_id)
 
     def get(self, system_id: int, component_id: int) -> DeviceT | None:
         """The device with these ids, if it is ours and was heard."""
