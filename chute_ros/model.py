@@ -205,6 +205,10 @@ class VehicleState:
     landed_state_age: float = NAN
     height: float = NAN  # m above take-off
     height_age: float = NAN
+    altitude: float = NAN  # m above mean sea level; no change of home moves it
+    altitude_age: float = NAN
+    pressure: float = NAN  # Pa, static
+    pressure_age: float = NAN
     vertical_speed: float = NAN  # m/s, up positive
     vertical_speed_age: float = NAN
     roll: float = NAN  # rad
@@ -212,7 +216,14 @@ class VehicleState:
     yaw: float = NAN  # rad
     tilt: float = NAN  # rad, 0 upright to pi
     attitude_age: float = NAN
-    acceleration: float = NAN  # m/s^2, length of the specific force
+    #: rad, between the vertical axes of the vehicle and of the attitude that it was commanded.
+    attitude_error: float = NAN
+    attitude_error_age: float = NAN
+    target_vertical_speed: float = NAN  # m/s, up positive, as commanded
+    below_target: float = NAN  # m, the commanded height less that of the vehicle
+    target_age: float = NAN
+    acceleration: float = NAN  # m/s^2, length of the specific force; of several the middle one
+    acceleration_spread: float = NAN  # m/s^2, by how much several accelerometers differ
     acceleration_age: float = NAN
     latitude: float = NAN  # degrees
     longitude: float = NAN  # degrees
@@ -224,6 +235,8 @@ class VehicleState:
     uptime: float = NAN  # s
     reboot_count: int = 0
     rebooted_in_flight: bool = False
+    #: Why this vehicle must not take off, as its source says it, in words.
+    faults: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,8 @@ class Summary:
     device_healthy: bool
     age: float
     details: Any
+    #: Why the device is not healthy, in words.
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -347,6 +349,7 @@ class DeviceNode(SuiteNode, ABC):
         message = LinkHeartbeat(
             link_state=int(summary.link_state),
             device_healthy=summary.device_healthy,
+            reasons=list(summary.reasons),
             age=summary.age,
         )
         message.header.stamp = self.stamp()

@@ -66,6 +66,7 @@ def vehicle_state_from(message: VehicleState) -> model.VehicleState:
     for name, value in values.items():
         if name.endswith("_age") and value < 0.0:
             values[name] = model.NAN
+    values["faults"] = tuple(values["faults"])
     return model.VehicleState(**values)
 
 

@@ -68,6 +68,7 @@ class SupervisorInputs:
             message.device_healthy,
             message.seq,
             difference,
+            tuple(message.reasons),
         )
 
     def _parachute(self, message: ParachuteStatus) -> inputs.Input:

@@ -118,7 +118,8 @@ class SupervisorServices:
 
     async def _kill(self, request: Any, response: Any) -> Any:
         reason = request.reason or "no reason given"
-        end = await self._ask(lambda t: inputs.KillRequest(t, "operator", reason))
+        kill_only = request.kill_only
+        end = await self._ask(lambda t: inputs.KillRequest(t, "operator", reason, kill_only))
         response.success, response.accepted = end.success, end.accepted
         response.message = end.message
         return response

@@ -147,7 +147,8 @@ class VehicleMerge:
                 continue
             givers.add(source)
             word = self._words[source][part]
-            fields.update(zip(names, word.values, strict=True))
+            # Of one accelerometer nobody tells by how much another differs.
+            fields.update(zip(names, word.values, strict=False))
             fields[f"{part}_age"] = now - word.received
         link_state, system_status = self._autopilot(now)
         return VehicleState(
@@ -158,6 +159,7 @@ class VehicleMerge:
             uptime=self._vehicle.uptime,
             reboot_count=self._vehicle.reboot_count,
             rebooted_in_flight=self._vehicle.rebooted_in_flight,
+            faults=self._vehicle.faults,
             **fields,
         )
 

@@ -28,6 +28,8 @@ class LinkHeartbeat:
     seq: int
     #: The wall clock here less the stamp of the heartbeat, s; NaN: not known.
     clock_difference: float = NAN
+    #: Why device_healthy is not so, in words.
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,8 @@ class KillRequest:
     token: int
     by: str
     reason: str
+    #: A person wants no deploy to follow.
+    kill_only: bool = False
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,8 @@ class LinkEvidence:
     heard: float = math.nan
     reported: LinkState = LinkState.NEVER_SEEN
     device_healthy: bool = False
+    #: Why not, as its node says it.
+    reasons: tuple[str, ...] = ()
     seq: int = 0
     #: Monotonic s since when it was heard without a break, after it was lost; NaN: never lost.
     regained_at: float = math.nan
@@ -135,6 +137,7 @@ class LinkEvidence:
             heard=now,
             reported=one.link_state,
             device_healthy=one.device_healthy,
+            reasons=one.reasons,
             seq=one.seq,
             regained_at=regained_at,
             lost_count=lost_count,

@@ -52,6 +52,7 @@ def _faults(evidence: LinkEvidence) -> str:
     devices = sorted(evidence.devices.items())
     faults = [f"{name} {fault}" for name, status in devices for fault in status.faults]
     faults += [f"{device} is released" for device in sorted(evidence.deployed)]
+    faults += [reason for reason in evidence.reasons if reason not in faults]
     return f" ({'; '.join(faults)})" if faults else ""
 
 
@@ -83,6 +84,7 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
         reasons.append(text)
     if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):
         reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
+    reasons += [f"vehicle: {fault}" for fault in state.vehicle.faults]
     return tuple(reasons)
 
 

@@ -65,7 +65,7 @@ def by_name(parts):
     return {
         name: value
         for part, values in parts.items()
-        for name, value in zip(readings.PARTS[part], values, strict=True)
+        for name, value in zip(readings.PARTS[part], values, strict=False)
     }
 
 
