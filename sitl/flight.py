@@ -1,0 +1,155 @@
+"""What the stories are made of: get ready, go up, and say what must come of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+from chute_ros.supervisor.machine import Stage
+from sitl.autopilots import ARDUPLANE, PX4, Autopilot
+from sitl.judge import Expectation, Verdict, Want, events_of, judge
+from sitl.record import Seen, read
+from sitl.truth import GROUND, truth_of
+from sitl.vehicle import Setup, StoryError, Vehicle
+
+_READY_WITHIN = 90.0
+#: Heartbeats and links of a vehicle that was just put together settle.
+_CLIMB_RATE = 1.5  # m/s, no slower
+
+
+class Flight:
+    """One run of a story on a vehicle of its own."""
+
+    def __init__(self, autopilot: Autopilot, setup: Setup, folder: Path) -> None:
+        self.vehicle = Vehicle(autopilot, setup, folder)
+        self.kind = autopilot.kind
+        self.expected = Expectation()
+        self.verdict = Verdict()
+        self.pilot, self.station = self.vehicle.pilot, self.vehicle.station
+        self._folder = folder
+
+    # -- on the ground --------------------------------------------------------------------------
+
+    def get_ready(self) -> None:
+        """The supervisor says READY, and the parachute is armed."""
+        vehicle = self.vehicle
+        vehicle.must("READY", _READY_WITHIN, lambda: vehicle.stage(Stage.READY))
+        vehicle.arm_parachute()
+
+    def change_mode(self, name: str, seconds: float = 20.0) -> None:
+        """The autopilot is in this mode."""
+        self.vehicle.again(
+            f"mode {name}",
+            seconds,
+            lambda: self.pilot.mode(name),
+            lambda: self.pilot.in_mode(name),
+        )
+
+    def arm(self) -> None:
+        """The motors are armed, as soon as the autopilot can."""
+        self.vehicle.again("armed", 60.0, self.pilot.arm, self.station.armed)
+
+    def set(self, name: str, value: float) -> float:
+        """A parameter of the autopilot, and it says that it has it; when it was sent."""
+        sent: list[float] = []
+        self.vehicle.again(
+            f"parameter {name}",
+            10.0,
+            lambda: sent.append(self.pilot.set(name, value)),
+            lambda: name in self.vehicle.bench.parameters,
+        )
+        return sent[-1]
+
+    # -- up and down ----------------------------------------------------------------------------
+
+    def go_up(self, height: float) -> None:
+        """Ready, armed, in the air at this height, and the supervisor knows it."""
+        self.get_ready()
+        if self.kind == PX4:
+            self.set("MIS_TAKEOFF_ALT", height)
+            self.set("MPC_TKO_SPEED", 3.0)
+        self.change_mode(self.pilot.ready_to_climb())
+        self.arm()
+        self.climb(height)
+        self.vehicle.must("IN_FLIGHT", 10.0, lambda: self.vehicle.stage(Stage.IN_FLIGHT))
+        self.vehicle.rest(2.0)
+
+    def climb(self, height: float) -> None:
+        """An armed one goes up."""
+        vehicle = self.vehicle
+        if self.kind != PX4:
+            vehicle.again(
+                "it takes off",
+                20.0,
+                lambda: self.pilot.take_off(height),
+                lambda: vehicle.height() > 1.0,
+                3.0,
+            )
+        near = min(0.9 * height, height - 1.0)
+        seconds = 20.0 + height / _CLIMB_RATE
+        vehicle.must(f"it climbs to {height:g} m", seconds, lambda: vehicle.height() > near)
+
+    def come_down(self) -> None:
+        """Land, disarmed by itself, and the supervisor says so."""
+        vehicle = self.vehicle
+        mode = {ARDUPLANE: "QLAND"}.get(self.kind, "LAND")
+        self.change_mode(mode)
+        vehicle.must("it lands", 120.0, lambda: vehicle.height() < GROUND)
+        vehicle.must("it disarms", 30.0, lambda: not self.station.armed())
+        vehicle.rest(3.0)
+
+    # -- what must come of it -------------------------------------------------------------------
+
+    def expect(self, want: Want, since: float = math.nan, within: float = math.nan,
+               cause: str = "failure") -> None:  # fmt: skip
+        """From since on."""
+        self.expected = Expectation(want, since, within, cause)
+
+    def fail_motors(self, mask: int, thrust: float = 0.0) -> float:
+        """They fail now; when."""
+        if self.kind == PX4:
+            number = 420
+            sent = self.pilot.fail_motors(mask, thrust)
+            self.vehicle.must("the failure is injected", 3.0,
+                              lambda: self.vehicle.bench.accepted(number))  # fmt: skip
+            return sent
+        self.set("SIM_ENGINE_MUL", thrust)
+        return self.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
+
+    def see_it_out(self, seconds: float, after: float = 2.0) -> None:
+        """Until it is on the ground, or for so long; and a little more."""
+        since = time.monotonic()
+        vehicle = self.vehicle
+        vehicle.until(seconds, lambda: vehicle.height() < GROUND and time.monotonic() > since + 1)
+        vehicle.rest(after)
+
+    # -- the end --------------------------------------------------------------------------------
+
+    def close(self) -> Verdict:
+        """Take it apart; what came of it."""
+        vehicle = self.vehicle
+        ports = [vehicle.ports.bench, vehicle.ports.bench_end]
+        if self.kind == PX4:
+            ports += [vehicle.simulator.truth_port(), vehicle.ports.truth_end]
+        safety = vehicle.watch.safety
+        vehicle.close()
+        self.verdict.wrong += [f"error: {one}" for one in vehicle.keeper.findings]
+        record = self.read_record()
+        events = events_of(record, ports)
+        judge(self.expected, events, truth_of(record, ports), self.verdict)
+        (self._folder / "story.txt").write_text(
+            "\n".join(
+                [f"{at:.3f} {text}" for at, text in vehicle.stages]
+                + [f"{at:.3f} {who}: {text}" for at, who, text in events.said]
+                + [f"alarms: {list(safety.alarms)}", f"rules: {safety.decision_rule}"]
+            )
+        )
+        return self.verdict
+
+    def read_record(self) -> list[Seen]:
+        """All that the router saw."""
+        return list(read(self.vehicle.record))
+
+
+__all__ = ["Flight", "StoryError"]
