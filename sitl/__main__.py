@@ -19,6 +19,8 @@ from chute_ros.tools.isolation import isolated_ros
 from faults.ending import take_down_when_ended
 from sitl import stories
 from sitl.autopilots import WHAT_TO_GIVE, Autopilot, recognise
+from sitl.hangar import Hangar
+from sitl.judge import Verdict
 from sitl.network import enter_own_network
 from sitl.page import Flown, with_autopilot
 
@@ -63,40 +65,40 @@ def main() -> None:
 def fly_all(
     autopilot: Autopilot, picked: list[stories.Story], runs: int, folder: Path
 ) -> list[Flown]:
-    """Each story so many times."""
-    flown = []
-    for run in range(1, runs + 1):
-        for story in picked:
-            place = folder / f"{autopilot.kind}_{story.name}_{run}"
-            place.mkdir(parents=True, exist_ok=True)
-            began = time.monotonic()
-            one = fly_one(autopilot, story, place)
-            flown.append(one)
-            told = "; ".join(one.verdict.wrong) or "right"
-            seen = "; ".join([*one.verdict.happened,
-                              *(f"{name} {took:.2f} s" for name, took in one.verdict.times.items())])
-            print(
-                f"{autopilot.kind} {one.version}  {story.name} {run}/{runs} "
-                f"({time.monotonic() - began:.0f} s): {seen}: {told}",
-                flush=True,
-            )  # fmt: skip
-    return flown
+    """Each story so many times; stories with the same setup on one vehicle, if it lasts."""
+    with Hangar(autopilot, folder) as hangar:
+        return [
+            fly_one(hangar, story, f"{story.name} {run}/{runs}")
+            for run in range(1, runs + 1)
+            for story in picked
+        ]
 
 
-def fly_one(autopilot: Autopilot, story: stories.Story, place: Path) -> Flown:
+def fly_one(hangar: Hangar, story: stories.Story, what: str) -> Flown:
     """One run of a story."""
-    from sitl.flight import Flight
-
-    flight = Flight(autopilot, story.setup, place)
-    version = autopilot.version
+    began = time.monotonic()
+    verdict = Verdict()
+    notes = hangar.folder / f"{hangar.autopilot.kind}_{what.replace(' ', '_').replace('/', '_')}.txt"
     try:
-        version = flight.vehicle.version()
-        story.fly(flight)
+        flight = hangar.flight(story.setup)
+        try:
+            story.fly(flight)
+        except ChuteError as error:
+            flight.verdict.wrong.append(f"error: {error}")
+            hangar.scrap()
+        verdict = flight.end(notes)
+        if story.spoils:
+            hangar.scrap()
     except ChuteError as error:
-        flight.verdict.wrong.append(f"error: {error}")
-    finally:
-        verdict = flight.close()
-    return Flown(autopilot.kind, version, story.name, story.text, verdict)
+        verdict.wrong.append(f"error: {error}")
+        hangar.scrap()
+    times = [f"{name} {took:.2f} s" for name, took in verdict.times.items()]
+    print(
+        f"{hangar.autopilot.kind} {hangar.version}  {what} ({time.monotonic() - began:.0f} s): "
+        f"{'; '.join([*verdict.happened, *times])}: {'; '.join(verdict.wrong) or 'right'}",
+        flush=True,
+    )
+    return Flown(hangar.autopilot.kind, hangar.version, story.name, story.text, verdict)
 
 
 @contextlib.contextmanager

@@ -7,11 +7,11 @@ import time
 from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
-from sitl.autopilots import ARDUPLANE, PX4, Autopilot
+from sitl.autopilots import ARDUPLANE, PX4
 from sitl.judge import Expectation, Verdict, Want, events_of, judge
-from sitl.record import Seen, read
+from sitl.record import read
 from sitl.truth import GROUND, truth_of
-from sitl.vehicle import Setup, StoryError, Vehicle
+from sitl.vehicle import StoryError, Vehicle
 
 _READY_WITHIN = 90.0
 #: Heartbeats and links of a vehicle that was just put together settle.
@@ -19,15 +19,15 @@ _CLIMB_RATE = 1.5  # m/s, no slower
 
 
 class Flight:
-    """One run of a story on a vehicle of its own."""
+    """One run of a story on a vehicle that stands there."""
 
-    def __init__(self, autopilot: Autopilot, setup: Setup, folder: Path) -> None:
-        self.vehicle = Vehicle(autopilot, setup, folder)
-        self.kind = autopilot.kind
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.kind = vehicle.autopilot.kind
+        self._began = time.monotonic()
         self.expected = Expectation()
         self.verdict = Verdict()
         self.pilot, self.station = self.vehicle.pilot, self.vehicle.station
-        self._folder = folder
 
     # -- on the ground --------------------------------------------------------------------------
 
@@ -53,6 +53,7 @@ class Flight:
     def set(self, name: str, value: float) -> float:
         """A parameter of the autopilot, and it says that it has it; when it was sent."""
         sent: list[float] = []
+        self.vehicle.bench.parameters.pop(name, None)
         self.vehicle.again(
             f"parameter {name}",
             10.0,
@@ -126,30 +127,23 @@ class Flight:
 
     # -- the end --------------------------------------------------------------------------------
 
-    def close(self) -> Verdict:
-        """Take it apart; what came of it."""
+    def end(self, notes: Path) -> Verdict:
+        """What came of it. notes: where the words of all go."""
         vehicle = self.vehicle
-        ports = [vehicle.ports.bench, vehicle.ports.bench_end]
-        if self.kind == PX4:
-            ports += [vehicle.simulator.truth_port(), vehicle.ports.truth_end]
-        safety = vehicle.watch.safety
-        vehicle.close()
-        self.verdict.wrong += [f"error: {one}" for one in vehicle.keeper.findings]
-        record = self.read_record()
+        findings = vehicle.keeper.findings
+        self.verdict.wrong += [f"error: {one}" for one in findings]
+        findings.clear()
+        record = [one for one in read(vehicle.record) if one.at >= self._began]
+        ports = vehicle.truth_ports()
         events = events_of(record, ports)
         judge(self.expected, events, truth_of(record, ports), self.verdict)
-        (self._folder / "story.txt").write_text(
-            "\n".join(
-                [f"{at:.3f} {text}" for at, text in vehicle.stages]
-                + [f"{at:.3f} {who}: {text}" for at, who, text in events.said]
-                + [f"alarms: {list(safety.alarms)}", f"rules: {safety.decision_rule}"]
-            )
-        )
+        said = [(at, f"{who}: {text}") for at, who, text in events.said]
+        lines = sorted([*said, *(one for one in vehicle.stages if one[0] >= self._began)])
+        safety = vehicle.watch.safety
+        last = [f"expected: {self.expected}", f"verdict: {self.verdict}", f"rule: {safety.decision_rule}",
+                *safety.alarms]  # fmt: skip
+        notes.write_text("\n".join([*(f"{at:.3f} {text}" for at, text in lines), *last]))
         return self.verdict
-
-    def read_record(self) -> list[Seen]:
-        """All that the router saw."""
-        return list(read(self.vehicle.record))
 
 
 __all__ = ["Flight", "StoryError"]

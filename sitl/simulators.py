@@ -53,6 +53,9 @@ _QUADPLANE = {
     "Q_A_RAT_YAW_P": 0.2, "Q_A_RAT_YAW_I": 0.02, "RC1_TRIM": 1500, "RTL_ALTITUDE": 40,
 }  # fmt: skip
 
+#: No log; a motor failure that is injected stops the motor in the two modes above 0, and only that.
+_PX4 = {"MAV_SYS_ID": 1, "NAV_DLL_ACT": 0, "SDLOG_MODE": -1, "CA_FAILURE_MODE": 1, "FD_ACT_EN": 0}
+
 
 class SimulatorError(ChuteError):
     """The simulator ended, or did not do what a story needs. The text shows its last words."""
@@ -167,7 +170,7 @@ class Simulator:
 
     def _px4(self, home: Path) -> tuple[list[str], dict[str, str]]:
         build = self.autopilot.path.parent.parent
-        values = {"MAV_SYS_ID": 1, "NAV_DLL_ACT": 0, "SDLOG_MODE": -1, **self.settings}
+        values = {**_PX4, **self.settings}
         names = {f"PX4_PARAM_{name}": f"{value:g}" for name, value in values.items()}
         return [
             str(self.autopilot.path),

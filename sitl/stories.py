@@ -19,6 +19,8 @@ class Story:
     fly: Callable[[Flight], None]
     setup: Setup = Setup()
     kinds: tuple[str, ...] = KINDS
+    #: What it leaves behind is not fit for another story.
+    spoils: bool = False
 
 
 def every() -> dict[str, Story]:

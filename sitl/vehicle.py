@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_msgs.srv import Arm, Deploy, Kill
+from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -22,7 +23,7 @@ from sitl.autopilots import PX4, Autopilot, version_text
 from sitl.pilot import Pilot
 from sitl.simulators import Simulator, ports_for
 from sitl.station import GROUND_STATION, Station
-from sitl.truth import Truth
+from sitl.truth import GROUND, Truth
 
 NAMESPACE = "/sitl"
 NODE, SUPERVISOR = "mavlink_parachute", "safety_supervisor"
@@ -139,6 +140,27 @@ class Vehicle:
                 self.must(what, 0.0, done)
             self.until(pause, done)
 
+    def renew(self) -> bool:
+        """Make it ready for another story on the ground; False: it needs a new life."""
+        if self.autopilot.kind == PX4 or self.height() > GROUND:
+            return False  # PX4 lies as it fell, and stays terminated
+        try:
+            self.pilot.let_go()
+            self.pilot.stop_flying()
+            self.pilot.set("SIM_ENGINE_FAIL", 0)
+            self.again("disarmed", 5.0, lambda: self.pilot.disarm(True),
+                       lambda: not self.station.armed())  # fmt: skip
+            self.keeper.kill("parachute")
+            self.start_parachute()
+            self.rest(3.0)  # it is heard, and the estimators forget the impact
+            self.again("reset", 10.0, self._ask_reset, lambda: self.stage(Stage.READY), 2.0)
+        except ChuteError:
+            return False
+        return True
+
+    def _ask_reset(self) -> None:
+        self.ask(self.watch.reset, Trigger.Request())
+
     # -- what it is -----------------------------------------------------------------------------
 
     def version(self) -> str:
@@ -151,6 +173,13 @@ class Vehicle:
             lambda: "AUTOPILOT_VERSION" in self.bench.newest,
         )
         return version_text(self.bench.newest["AUTOPILOT_VERSION"])
+
+    def truth_ports(self) -> list[int]:
+        """Of the router, those of the bench: the vehicle's devices hear nothing of them."""
+        ports = [self.ports.bench, self.ports.bench_end]
+        if self.autopilot.kind == PX4:
+            ports += [self.simulator.truth_port(), self.ports.truth_end]
+        return ports
 
     def stage(self, *stages: Stage) -> bool:
         """The supervisor says that it is in one of these."""
@@ -207,20 +236,21 @@ class Vehicle:
         texts = [",".join(map(str, one)) for one in networks]
         self.keeper.start("router", "sitl.router", str(self.record), *texts)
         values = {"connection": f"udpout:127.0.0.1:{ports.node}", **setup.node}
-        chute = list(setup.parachute)
         if setup.signed:
             self._key.write_text(_KEY.hex())
             os.chmod(self._key, 0o600)
             values["signing_key_file"] = str(self._key)
-            chute += ["--signing-key-file", str(self._key)]
-        self.start_parachute(chute)
+        self.start_parachute()
         self.keeper.start(NODE, f"chute_ros.nodes.{NODE}", *_ros(values))
         self.keeper.start(SUPERVISOR, f"chute_ros.nodes.{SUPERVISOR}", *_ros(setup.supervisor))
 
-    def start_parachute(self, options: list[str]) -> None:
-        """A parachute's simulator with these options."""
-        where = ("--connection", f"udpout:127.0.0.1:{self.ports.parachute}")
-        self.keeper.start("parachute", "chute_ros.sim.sim_mavlink_parachute", *where, *options)
+    def start_parachute(self) -> None:
+        """A parachute that is not released."""
+        options = ["--connection", f"udpout:127.0.0.1:{self.ports.parachute}"]
+        if self.setup.signed:
+            options += ["--signing-key-file", str(self._key)]
+        module = "chute_ros.sim.sim_mavlink_parachute"
+        self.keeper.start("parachute", module, *options, *self.setup.parachute)
 
     def _see_truth(self) -> None:
         name = "HIL_STATE_QUATERNION" if self.autopilot.kind == PX4 else "SIM_STATE"
