@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUPLANE, PX4
-from sitl.judge import Expectation, Verdict, Want, events_of, judge
-from sitl.record import read
+from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, judge
+from sitl.record import Seen, read
 from sitl.truth import GROUND, truth_of
 from sitl.vehicle import StoryError, Vehicle
 
@@ -24,7 +25,9 @@ class Flight:
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self.kind = vehicle.autopilot.kind
-        self._began = time.monotonic()
+        self.began = time.monotonic()
+        #: Looks at the record, once it is whole; what is wrong goes into the verdict.
+        self.afterwards: list[Callable[[Sequence[Seen]], None]] = []
         self.expected = Expectation()
         self.verdict = Verdict()
         self.pilot, self.station = self.vehicle.pilot, self.vehicle.station
@@ -61,6 +64,29 @@ class Flight:
             lambda: name in self.vehicle.bench.parameters,
         )
         return sent[-1]
+
+    def get(self, name: str) -> float:
+        """A parameter of the autopilot."""
+        bench = self.vehicle.bench
+        bench.parameters.pop(name, None)
+        self.vehicle.again(
+            f"parameter {name}", 5.0, lambda: bench.request(name), lambda: name in bench.parameters
+        )
+        return bench.parameters[name]
+
+    def upload_mission(self, height: float) -> None:
+        """The autopilot has the pilot's mission."""
+        self.vehicle.again(
+            "the mission is uploaded",
+            15.0,
+            lambda: self.pilot.upload(height),
+            lambda: self.station.mission_ack == 0,
+            4.0,
+        )
+
+    def released(self) -> bool:
+        """The parachute is out."""
+        return any(one.deployed for one in self.vehicle.watch.parachutes.values())
 
     # -- up and down ----------------------------------------------------------------------------
 
@@ -133,12 +159,14 @@ class Flight:
         findings = vehicle.keeper.findings
         self.verdict.wrong += [f"error: {one}" for one in findings]
         findings.clear()
-        record = [one for one in read(vehicle.record) if one.at >= self._began]
+        record = list(read(vehicle.record, self.began, NUMBERS))
         ports = vehicle.truth_ports()
         events = events_of(record, ports)
         judge(self.expected, events, truth_of(record, ports), self.verdict)
+        for look in self.afterwards:
+            look(record)
         said = [(at, f"{who}: {text}") for at, who, text in events.said]
-        lines = sorted([*said, *(one for one in vehicle.stages if one[0] >= self._began)])
+        lines = sorted([*said, *(one for one in vehicle.stages if one[0] >= self.began)])
         safety = vehicle.watch.safety
         last = [f"expected: {self.expected}", f"verdict: {self.verdict}", f"rule: {safety.decision_rule}",
                 *safety.alarms]  # fmt: skip

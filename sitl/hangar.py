@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import TracebackType
 
-from sitl.autopilots import Autopilot
+from sitl.autopilots import PX4, Autopilot
 from sitl.flight import Flight
 from sitl.vehicle import Setup, Vehicle
 
@@ -50,4 +50,6 @@ class Hangar:
         folder.mkdir(parents=True)
         vehicle = self._vehicle = Vehicle(self.autopilot, setup, folder)
         self.version = vehicle.version()
+        if setup.line_rate and self.autopilot.kind == PX4:
+            vehicle.simulator.slow_down()
         return vehicle

@@ -12,10 +12,18 @@ from sitl.pilot import FORCE
 from sitl.record import Seen
 from sitl.truth import Truth
 
+#: A heartbeat comes once a second: motors that are off are told of so much later at most, s.
+_TOLD_WITHIN = 1.5
 #: Below it a parachute helps nobody: nothing may be released there (minimum_height of the profile
 #: is 10 m; what falls while it is decided comes off), m.
 TOO_LOW = 6.0
 _NODE = 191
+#: The messages of a record that are looked at.
+NUMBERS = frozenset(
+    getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+    for name in ("HEARTBEAT", "COMMAND_LONG", "COMMAND_ACK", "PARACHUTE_STATUS", "STATUSTEXT",
+                 "SIM_STATE", "HIL_STATE_QUATERNION")
+)  # fmt: skip
 _ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 
 
@@ -64,7 +72,7 @@ class Events:
     out: float
     #: Kills that the node ordered: (when, command).
     kills: list[tuple[float, str]]
-    #: Heartbeats of the autopilot: (when, armed).
+    #: Heartbeats of the autopilot: (when, armed and not terminated).
     armed: list[tuple[float, bool]]
     #: STATUSTEXT: (when, component, text).
     said: list[tuple[float, int, str]]
@@ -91,7 +99,8 @@ def events_of(record: Sequence[Seen], truth_ports: Sequence[int]) -> Events:
             if message.deployment_status and math.isnan(out):
                 out = seen.at
         elif seen.name == "HEARTBEAT" and seen.component == 1:
-            armed.append((seen.at, bool(message.base_mode & _ARMED)))
+            terminated = message.system_status == dialect.MAV_STATE_FLIGHT_TERMINATION
+            armed.append((seen.at, bool(message.base_mode & _ARMED) and not terminated))
         elif seen.name == "STATUSTEXT":
             said.append((seen.at, seen.component, message.text))
     return Events(releases, out, kills, armed, said)
@@ -168,6 +177,9 @@ def _release(expected: Expectation, events: Events, truth: Truth, verdict: Verdi
         verdict.wrong.append(f"missed: not released; {expected.cause} at {fell:.0f} m, {ended}")
     elif took > expected.within:
         verdict.wrong.append(f"late: released after {took:.2f} s, need {expected.within:g} s")
+    off = events.disarmed_after(expected.since)
+    if not math.isnan(took) and not off < events.out + _TOLD_WITHIN:
+        verdict.wrong.append("false: released over motors that were not stopped")
 
 
 def _by_truth(expected: Expectation, events: Events, truth: Truth, verdict: Verdict) -> None:

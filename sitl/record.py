@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.protocol.mavlink.frames import FrameDecoder
+from sitl.routing import message_id
 
 #: Monotonic time s, port, length of the frame that follows.
 _HEAD = struct.Struct("<dHH")
@@ -43,15 +44,18 @@ class Seen:
     message: Any
 
 
-def read(path: Path) -> Iterator[Seen]:
-    """The messages of a record that the dialect knows, in their order."""
+def read(path: Path, since: float, numbers: frozenset[int]) -> Iterator[Seen]:
+    """The messages of these numbers since then, in their order."""
     data = path.read_bytes()
     decoder = FrameDecoder()
     position = 0
     while position + _HEAD.size <= len(data):
         at, port, length = _HEAD.unpack_from(data, position)
         position += _HEAD.size
-        for frame in decoder.feed_datagram(data[position : position + length], at):
+        raw = data[position : position + length]
+        position += length
+        if at < since or len(raw) < length or message_id(raw) not in numbers:
+            continue
+        for frame in decoder.feed_datagram(raw, at):
             name = frame.message.get_type()
             yield Seen(at, port, frame.system_id, frame.component_id, name, frame.message)
-        position += length

@@ -35,7 +35,7 @@ _ARDUPILOT = {
 _COPTER = {
     "FRAME_CLASS": 1, "FRAME_TYPE": 0, "RC3_TRIM": 1000, "ATC_RAT_YAW_P": 0.3,
     "ATC_RAT_YAW_I": 0.02, "MOT_THST_EXPO": 0.65, "MOT_THST_HOVER": 0.39, "MOT_BAT_VOLT_MIN": 9.6,
-    "MOT_BAT_VOLT_MAX": 12.8, "FENCE_ENABLE": 0,
+    "MOT_BAT_VOLT_MAX": 12.8, "FENCE_ENABLE": 0, "AUTO_OPTIONS": 3,
 }  # fmt: skip
 _QUADPLANE = {
     "Q_ENABLE": 1, "Q_FRAME_CLASS": 1, "Q_FRAME_TYPE": 1, "Q_GUIDED_MODE": 1, "RC3_TRIM": 1000,
@@ -131,6 +131,14 @@ class Simulator:
         self.end()
         self.process = self._start()
 
+    def slow_down(self) -> None:
+        """PX4's line to the companion computer at the rate that it has; once it has started."""
+        local = str(14580 + self.instance)
+        mavlink = [str(self.autopilot.path.parent / "px4-mavlink"), "--instance", str(self.instance)]
+        more = ("-r", str(self.line_rate), "-m", "onboard", "-o", str(self.ports.line))
+        for command in (("stop", "-u", local), ("start", "-x", "-u", local, *more)):
+            subprocess.run([*mavlink, *command], check=True, timeout=10.0, capture_output=True)
+
     def _start(self) -> subprocess.Popen[bytes]:
         home = self.folder / "autopilot"
         home.mkdir(exist_ok=True)
@@ -154,7 +162,8 @@ class Simulator:
             values |= {"FRAME_CLASS": 2, "FRAME_TYPE": 0}
         if self.line_rate:
             # The port's own limit: 10 bits a byte.
-            values |= {"SIM_BAUDLIMIT_EN": 1, "SERIAL1_BAUD": self.line_rate * 10 // 1000}
+            baud = self.line_rate * 10
+            values |= {"SIM_BAUDLIMIT_EN": 1, "SERIAL1_BAUD": 57 if baud == 57600 else baud}
         values |= self.settings
         defaults = home / "defaults.parm"
         defaults.write_text("".join(f"{name} {value}\n" for name, value in values.items()))

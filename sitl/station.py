@@ -11,9 +11,17 @@ from typing import Any
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.signing import Signer
+from sitl.routing import message_id
 
 GROUND_STATION = (255, 190)
 _MOST = 65536
+#: What a story may ask for.
+_HEEDED = frozenset(
+    getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+    for name in ("HEARTBEAT", "SYS_STATUS", "PARAM_VALUE", "MISSION_REQUEST_INT", "MISSION_REQUEST",
+                 "MISSION_ACK", "COMMAND_ACK", "SIM_STATE", "HIL_STATE_QUATERNION", "STATUSTEXT",
+                 "AUTOPILOT_VERSION", "HOME_POSITION")
+)  # fmt: skip
 
 
 class Station:
@@ -62,6 +70,9 @@ class Station:
                 data = self._socket.recv(_MOST)
             except (BlockingIOError, ConnectionError):
                 return
+            # The router sends one frame a datagram. PX4 sends a thousand a second.
+            if message_id(data) not in _HEEDED:
+                continue
             for frame in self._decoder.feed_datagram(data, now):
                 if frame.component_id == 1:
                     self._take(frame, now)
@@ -93,8 +104,12 @@ class Station:
         self.parameters.pop(name, None)
         self.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
         sent = time.monotonic()
-        self.send(dialect.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
+        self.request(name)
         return sent
+
+    def request(self, name: str) -> None:
+        """PARAM_REQUEST_READ."""
+        self.send(dialect.MAVLink_param_request_read_message(1, 1, name.encode(), -1))
 
     def stream(self, name: str, rate: float, make: Callable[[], Any]) -> None:
         """Send what make gives at this rate, Hz, until it is stopped."""

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
 from sitl.judge import Want
-from sitl.record import read
+from sitl.record import Seen
 from sitl.stories import Story
 from sitl.vehicle import Setup
 
 #: Of a blocked vehicle: so high it may hop before it is disarmed, m.
 HOP = 1.0
 _WATCHED = 6.0  # s, each way
-_BLOCKED = Setup(parachute=("--error", "BATTERY"))
+_BLOCKED = Setup(parachute=("--error", "LOW_POWER"))
 #: Ways that motors come to turn, by autopilot.
 _WAYS: dict[str, tuple[str, ...]] = {
     ARDUCOPTER: ("command", "force", "command and take-off", "force and take-off", "mission",
@@ -31,56 +32,63 @@ _WAYS: dict[str, tuple[str, ...]] = {
 
 def _block(flight: Flight) -> None:
     vehicle = flight.vehicle
+    flight.expect(Want.NO_RELEASE)
     vehicle.must("BLOCKED", 60.0, lambda: vehicle.stage(Stage.BLOCKED))
     _wait_for_position(flight)
     for way in _WAYS[flight.kind]:
         began = time.monotonic()
         _TRY[way](flight)
-        vehicle.rest(_WATCHED)
+        vehicle.until(_WATCHED, lambda: vehicle.height() > 3.0)
         _stand_still(flight)
-        vehicle.rest(1.0)
         highest = vehicle.truth.highest(began)
-        took, armed = _undone(flight, began)
-        flight.verdict.happened.append(
-            f"{way}: " + (f"up to {highest:.1f} m" if armed else "refused by the autopilot")
-        )
-        if not math.isnan(took):
-            flight.verdict.times[f"{way}: armed to disarmed"] = took
+        flight.afterwards.append(partial(_judge, flight, way, began, time.monotonic(), highest))
         if highest > HOP:
-            flight.verdict.wrong.append(f"missed: {way}: blocked, and {highest:.1f} m up")
             return
-        if armed and math.isnan(took):
-            flight.verdict.wrong.append(f"missed: {way}: blocked, and stayed armed")
-    flight.expect(Want.NO_RELEASE)
+        vehicle.rest(1.0)
 
 
 def _wait_for_position(flight: Flight) -> None:
     """Until it could be armed, as far as the autopilot is concerned."""
     bit = dialect.MAV_SYS_STATUS_PREARM_CHECK
+    station = flight.station
 
     def could() -> bool:
-        return bool(int(flight.station.get("SYS_STATUS", "onboard_control_sensors_health", 0)) & bit)
+        if flight.kind == PX4:
+            return bool(int(station.get("SYS_STATUS", "onboard_control_sensors_health", 0)) & bit)
+        return any("is using GPS" in text for _, text in station.said)
 
     flight.vehicle.must("the autopilot would arm", 90.0, could)
     flight.vehicle.rest(3.0)
 
 
-def _undone(flight: Flight, began: float) -> tuple[float, bool]:
-    """From the first sign of armed motors to the last of disarmed ones, s; whether any came."""
+def _judge(flight: Flight, way: str, began: float, ended: float, highest: float,
+           record: Sequence[Seen]) -> None:  # fmt: skip
     ports = flight.vehicle.truth_ports()
+    some = [one for one in record
+            if began <= one.at <= ended and one.port not in ports and one.component == 1]  # fmt: skip
+    took, armed = _undone(some)
+    verdict = flight.verdict
+    told = f"up to {highest:.1f} m" if armed else "refused by the autopilot"
+    verdict.happened.append(f"{way}: {told}")
+    if highest > HOP:
+        verdict.wrong.append(f"missed: {way}: blocked, and {highest:.1f} m up")
+    elif armed and math.isnan(took):
+        verdict.wrong.append(f"missed: {way}: blocked, and stayed armed")
+    elif armed:
+        verdict.times[f"{way}: armed to disarmed"] = took
+
+
+def _undone(record: Sequence[Seen]) -> tuple[float, bool]:
+    """From the first sign of armed motors to the last of disarmed ones, s; whether any came."""
     first = last = math.nan
-    for seen in read(flight.vehicle.record):
-        if seen.at < began or seen.port in ports or seen.component != 1:
-            continue
+    for seen in record:
         armed = seen.name == "HEARTBEAT" and seen.message.base_mode & 128
         ack = seen.name == "COMMAND_ACK" and seen.message.command == 400 and not seen.message.result
-        if armed or ack:
+        if armed or (ack and math.isnan(first)):
             first = seen.at if math.isnan(first) else first
             last = math.nan if armed else last
-        if ack and seen.at > first:
-            last = seen.at
-        if seen.name == "HEARTBEAT" and not armed and seen.at > first and math.isnan(last):
-            last = seen.at
+        elif ack or (seen.name == "HEARTBEAT" and not armed and math.isnan(last)):
+            last = seen.at if not math.isnan(first) else math.nan
     return last - first, not math.isnan(first)
 
 
@@ -103,13 +111,7 @@ def _command(force: bool, take_off: bool) -> Callable[[Flight], None]:
 
 
 def _mission(flight: Flight) -> None:
-    flight.vehicle.again(
-        "the mission is uploaded",
-        15.0,
-        lambda: flight.pilot.upload(15.0),
-        lambda: flight.station.mission_ack == 0,
-        4.0,
-    )
+    flight.upload_mission(15.0)
     flight.pilot.mode("MISSION" if flight.kind == PX4 else "AUTO")
     flight.vehicle.rest(0.5)
     flight.pilot.arm()
@@ -170,7 +172,7 @@ STORIES = (
         "block-no-spool-up",
         "the same, with COM_SPOOLUP_TIME 0 and MPC_TKO_RAMP_T 0",
         _block,
-        Setup(parachute=("--error", "BATTERY"),
+        Setup(parachute=("--error", "LOW_POWER"),
               settings={"COM_SPOOLUP_TIME": 0, "MPC_TKO_RAMP_T": 0}),
         (PX4,),
         spoils=True,

@@ -66,7 +66,7 @@ def _station(order: str) -> Callable[[Flight], None]:
         flight.go_up(_HEIGHT)
         pilot = flight.pilot
         since = pilot.terminate() if order == "termination" else pilot.disarm(force=True)
-        flight.vehicle.until(1.0, lambda: not flight.station.armed())
+        flight.vehicle.rest(1.0)
         if flight.vehicle.height() > _HEIGHT - 8.0 and flight.vehicle.truth.now.climb > -3.0:
             flight.expect(Want.NOTHING, since)
             said = flight.station.said[-1][1] if flight.station.said else ""

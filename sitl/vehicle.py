@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.signing import Signer, SigningClock
+from chute_ros.protocol.mavlink.signing import EPOCH_2015, UNITS_PER_SECOND, Signer, SigningClock
 from chute_ros.supervisor.machine import Stage
 from faults.soak_processes import Keeper
 from faults.soak_watch import Watch, ready
@@ -208,6 +208,13 @@ class Vehicle:
             why = "no answer" if answer is None else answer.message
             self.rest(1.0)
         raise StoryError(f"safety/arm: {why}")
+
+    def give_key(self) -> None:
+        """The autopilot signs, and hears only what is signed; but for its first port, the bench."""
+        key = list(_KEY)
+        stamp = int((time.time() - EPOCH_2015) * UNITS_PER_SECOND)
+        self.bench.send(dialect.MAVLink_setup_signing_message(1, 1, key, stamp))
+        self.rest(0.5)
 
     def ask_kill(self, **fields: Any) -> tuple[float, Any]:
         """safety/kill: when it was called, and the future of its answer."""
