@@ -78,7 +78,9 @@ def fly_one(hangar: Hangar, story: stories.Story, what: str) -> Flown:
     """One run of a story."""
     began = time.monotonic()
     verdict = Verdict()
-    notes = hangar.folder / f"{hangar.autopilot.kind}_{what.replace(' ', '_').replace('/', '_')}.txt"
+    notes = (
+        hangar.folder / f"{hangar.autopilot.kind}_{what.replace(' ', '_').replace('/', '_')}.txt"
+    )
     try:
         flight = hangar.flight(story.setup)
         try:

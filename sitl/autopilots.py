@@ -56,7 +56,9 @@ def recognise(path: Path) -> Autopilot:
         kind, _, version = found[0].decode().partition(" ")
         if kind in KINDS:
             return Autopilot(kind, path, version.removeprefix("V"))
-        raise AutopilotError(f"sitl: {path} is {found[0].decode()}: need one of {', '.join(KINDS)}")
+        raise AutopilotError(
+            f"sitl: {path} is {found[0].decode()}: need one of {', '.join(KINDS)}"
+        )
     if _PX4 in words:
         if not (path.parent.parent / "etc" / "init.d-posix" / "rcS").is_file():
             raise AutopilotError(

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from chute_ros.model import Action
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUPLANE, PX4
 from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, judge
@@ -165,13 +166,23 @@ class Flight:
         judge(self.expected, events, truth_of(record, ports), self.verdict)
         for look in self.afterwards:
             look(record)
+        self.verdict.happened += self._decided()
         said = [(at, f"{who}: {text}") for at, who, text in events.said]
         lines = sorted([*said, *(one for one in vehicle.stages if one[0] >= self.began)])
-        safety = vehicle.watch.safety
-        last = [f"expected: {self.expected}", f"verdict: {self.verdict}", f"rule: {safety.decision_rule}",
-                *safety.alarms]  # fmt: skip
+        last = [f"expected: {self.expected}", f"verdict: {self.verdict}"]
+        last += vehicle.watch.safety.alarms
+        lines += [(at, f"decision {Action(one.action).name} {one.rule}: {'; '.join(one.reasons)}")
+                  for at, one in vehicle.watch.decisions.values() if at >= self.began]  # fmt: skip
+        lines.sort()
         notes.write_text("\n".join([*(f"{at:.3f} {text}" for at, text in lines), *last]))
         return self.verdict
+
+    def _decided(self) -> list[str]:
+        """The rules that killed and deployed."""
+        every = self.vehicle.watch.decisions.values()
+        rules = {one.rule: None for at, one in every
+                 if at >= self.began and one.action in (Action.KILL, Action.DEPLOY)}  # fmt: skip
+        return [f"by {', '.join(rules)}"] if rules else []
 
 
 __all__ = ["Flight", "StoryError"]

@@ -131,7 +131,9 @@ def judge(expected: Expectation, events: Events, truth: Truth, verdict: Verdict)
         if there.height < TOO_LOW:
             verdict.wrong.append(f"false: released at {there.height:.1f} m")
         if out < since:
-            verdict.wrong.append(f"false: released {since - out:.2f} s before the {expected.cause}")
+            verdict.wrong.append(
+                f"false: released {since - out:.2f} s before the {expected.cause}"
+            )
     before = [one for one in events.kills if one[0] < since]
     if before and expected.want is not Want.NOTHING:
         verdict.wrong.append(f"false: killed {since - before[0][0]:.2f} s before it was needed")

@@ -1,7 +1,8 @@
 """A MAVLink router on loopback that records each frame: python -m sitl.router RECORD PORT[,PORT] ...
 
 Each argument after the record is a network of its own: frames that come to one of its ports, from
-anyone, are routed to all who were heard on any of its ports.
+anyone, are routed to all who were heard on any of its ports. A port with a t before it is one of
+TCP, for one serial line at a time.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import signal
 import socket
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,17 +26,46 @@ _MOST = 65536
 class Network:
     """Ports that frames are passed on between."""
 
-    def __init__(self, ports: list[int], recorder: Recorder) -> None:
-        self.sockets = {port: _socket(port) for port in ports}
-        self._recorder = recorder
+    def __init__(self, texts: list[str], recorder: Recorder, selector: selectors.BaseSelector):
+        self._recorder, self._selector = recorder, selector
         self._routes = Routes()
         self._splitters: dict[End, FrameSplitter] = {}
+        self._sockets: dict[int, socket.socket] = {}
+        for text in texts:
+            port = int(text.lstrip("t"))
+            if text.startswith("t"):
+                one = socket.create_server(("127.0.0.1", port))
+                self._watch(one, self._accept, port)
+            else:
+                one = self._sockets[port] = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+                one.bind(("127.0.0.1", port))
+                self._watch(one, self._take, port)
 
-    def take(self, port: int) -> None:
-        """Pass on what waits on this port."""
+    def _watch(self, one: socket.socket, take: Callable[[socket.socket, int], None], port: int):
+        one.setblocking(False)
+        self._selector.register(one, selectors.EVENT_READ, (take, port))
+
+    def _accept(self, server: socket.socket, port: int) -> None:
+        one, _ = server.accept()
+        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._sockets[port] = one
+        self._watch(one, self._take_stream, port)
+
+    def _take_stream(self, one: socket.socket, port: int) -> None:
+        try:
+            data = one.recv(_MOST)
+        except ConnectionError:
+            data = b""
+        if not data:  # the autopilot has ended
+            self._selector.unregister(one)
+            one.close()
+            return
+        self._pass_on((port, None), data)
+
+    def _take(self, one: socket.socket, port: int) -> None:
         while True:
             try:
-                data, address = self.sockets[port].recvfrom(_MOST)
+                data, address = one.recvfrom(_MOST)
             except BlockingIOError:
                 return
             except ConnectionError:
@@ -47,20 +78,16 @@ class Network:
         for frame in splitter.feed(data):
             self._routes.hear(source, frame)
             self._recorder.write(now, source[0], frame)
-            for end in self._routes.ways(source, frame, self._splitters):
-                _send(self.sockets[end[0]], frame, end[1])
-
-
-def _socket(port: int) -> socket.socket:
-    one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    one.bind(("127.0.0.1", port))
-    one.setblocking(False)
-    return one
+            for port, address in self._routes.ways(source, frame, self._splitters):
+                _send(self._sockets[port], frame, address)
 
 
 def _send(one: socket.socket, frame: bytes, address: Any) -> None:
     try:
-        one.sendto(frame, address)
+        if address is None:
+            one.send(frame)
+        else:
+            one.sendto(frame, address)
     except OSError:
         pass  # a process that has ended; its successor has another port
 
@@ -72,14 +99,12 @@ def main() -> None:
     selector = selectors.DefaultSelector()
     with Recorder(Path(sys.argv[1])) as recorder:
         for text in sys.argv[2:]:
-            network = Network([int(port) for port in text.split(",")], recorder)
-            for port, one in network.sockets.items():
-                selector.register(one, selectors.EVENT_READ, (network, port))
+            Network(text.split(","), recorder, selector)
         print("routing", flush=True)
         while True:
             for key, _ in selector.select():
-                network, port = key.data
-                network.take(port)
+                take, port = key.data
+                take(key.fileobj, port)
 
 
 if __name__ == "__main__":

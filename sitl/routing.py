@@ -67,8 +67,7 @@ def target(frame: bytes) -> tuple[int, int]:
     payload = frame[10 : 10 + frame[1]] if frame[0] == _MAGIC_V2 else frame[6 : 6 + frame[1]]
     # MAVLink 2 leaves out zeros at the end.
     system, component = (
-        payload[place] if 0 <= place < len(payload) else 0
-        for place in _places(message_id(frame))
+        payload[place] if 0 <= place < len(payload) else 0 for place in _places(message_id(frame))
     )
     return system, component
 

@@ -29,7 +29,7 @@ _ARDUPILOT = {
     # The bench's port; the companion computer's; the parachute's, where it hangs on the autopilot.
     "SERIAL0_BAUD": 921, "SERIAL0_PROTOCOL": 2, "SERIAL1_BAUD": 921, "SERIAL1_PROTOCOL": 2,
     "SERIAL2_BAUD": 57, "SERIAL2_PROTOCOL": 2,
-    "MAV1_OPTIONS": 2, "MAV3_OPTIONS": 8,
+    "MAV1_OPTIONS": 2, "MAV3_OPTIONS": 8, "MAV3_POSITION": 4,
     "LOG_BACKEND_TYPE": 0, "ARMING_RUDDER": 2, "BATT_MONITOR": 4, "FS_GCS_ENABLE": 0,
 }  # fmt: skip
 _COPTER = {
@@ -134,7 +134,11 @@ class Simulator:
     def slow_down(self) -> None:
         """PX4's line to the companion computer at the rate that it has; once it has started."""
         local = str(14580 + self.instance)
-        mavlink = [str(self.autopilot.path.parent / "px4-mavlink"), "--instance", str(self.instance)]
+        mavlink = [
+            str(self.autopilot.path.parent / "px4-mavlink"),
+            "--instance",
+            str(self.instance),
+        ]
         more = ("-r", str(self.line_rate), "-m", "onboard", "-o", str(self.ports.line))
         for command in (("stop", "-u", local), ("start", "-x", "-u", local, *more)):
             subprocess.run([*mavlink, *command], check=True, timeout=10.0, capture_output=True)
@@ -168,13 +172,16 @@ class Simulator:
         defaults = home / "defaults.parm"
         defaults.write_text("".join(f"{name} {value}\n" for name, value in values.items()))
         model = {ARDUCOPTER: "hexa" if self.hexa else "quad", ARDUPLANE: "quadplane"}
-        ends = (self.ports.bench, self.ports.line, self.ports.chute_line)
+        # The simulator limits the rate of streams only, not of datagrams.
+        line = "tcpclient" if self.line_rate else "udpclient"
+        ends = (("udpclient", self.ports.bench), (line, self.ports.line),
+                ("udpclient", self.ports.chute_line))  # fmt: skip
         return [
             str(self.autopilot.path),
             *("--model", model[self.autopilot.kind], "--speedup", "1", "--wipe"),
             *("--home", f"{LATITUDE},{LONGITUDE},{ALTITUDE},0", "--defaults", str(defaults)),
-            *(part for number, port in enumerate(ends)
-              for part in (f"--serial{number}", f"udpclient:127.0.0.1:{port}")),
+            *(part for number, (kind, port) in enumerate(ends)
+              for part in (f"--serial{number}", f"{kind}:127.0.0.1:{port}")),
         ], {}  # fmt: skip
 
     def _px4(self, home: Path) -> tuple[list[str], dict[str, str]]:

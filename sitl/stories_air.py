@@ -91,9 +91,11 @@ _WINGS = (
 def _through(flight: Flight, steps: tuple[Step, ...], height: float) -> None:
     flight.go_up(height)
     flight.pilot.sticks(0.0, 0.0, 0.0, 0.0)
+    flight.vehicle.rest(2.0)
     for step in steps:
         if step.mode in ("AUTO", "MISSION"):
             flight.upload_mission(height)
+            flight.vehicle.rest(2.0)
         flight.pilot.sticks(*step.sticks)
         flight.pilot.mode(step.mode)
         if not flight.vehicle.until(2.0, lambda step=step: flight.pilot.in_mode(step.mode)):

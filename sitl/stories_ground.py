@@ -83,7 +83,9 @@ def _undone(record: Sequence[Seen]) -> tuple[float, bool]:
     first = last = math.nan
     for seen in record:
         armed = seen.name == "HEARTBEAT" and seen.message.base_mode & 128
-        ack = seen.name == "COMMAND_ACK" and seen.message.command == 400 and not seen.message.result
+        ack = (
+            seen.name == "COMMAND_ACK" and seen.message.command == 400 and not seen.message.result
+        )
         if armed or (ack and math.isnan(first)):
             first = seen.at if math.isnan(first) else first
             last = math.nan if armed else last

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import PX4
 from sitl.flight import Flight
@@ -65,12 +65,16 @@ def _station(order: str) -> Callable[[Flight], None]:
     def fly(flight: Flight) -> None:
         flight.go_up(_HEIGHT)
         pilot = flight.pilot
-        since = pilot.terminate() if order == "termination" else pilot.disarm(force=True)
-        flight.vehicle.rest(1.0)
-        if flight.vehicle.height() > _HEIGHT - 8.0 and flight.vehicle.truth.now.climb > -3.0:
+        if order == "termination":
+            number, since = dialect.MAV_CMD_DO_FLIGHTTERMINATION, pilot.terminate()
+        else:
+            number = dialect.MAV_CMD_COMPONENT_ARM_DISARM
+            since = pilot.disarm(force=True)
+        flight.vehicle.must("an answer", 3.0, lambda: number in flight.station.results)
+        if not flight.station.accepted(number):
             flight.expect(Want.NOTHING, since)
-            said = flight.station.said[-1][1] if flight.station.said else ""
-            flight.verdict.happened.append(f"the autopilot refused it ({said})")
+            flight.verdict.happened.append("the autopilot refused it")
+            flight.vehicle.rest(3.0)
             flight.come_down()
             return
         flight.expect(Want.RELEASE, since, SEEN, "order")

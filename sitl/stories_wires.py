@@ -57,7 +57,9 @@ def _fight(flight: Flight) -> None:
         def ask() -> object:
             wanted.append(wanted.pop(0))
             number = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
-            return dialect.MAVLink_command_long_message(1, 1, number, 0, wanted[0], 1e6, *[0.0] * 5)
+            return dialect.MAVLink_command_long_message(
+                1, 1, number, 0, wanted[0], 1e6, *[0.0] * 5
+            )
 
         flight.station.stream("fight", 3.0, ask)
     else:

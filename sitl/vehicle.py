@@ -1,4 +1,4 @@
-"""A vehicle on loopback: a real autopilot's simulator, the real nodes, a parachute, a ground station."""
+"""A vehicle on loopback: an autopilot's simulator, the real nodes, a parachute, a ground station."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ class Vehicle:
         raise StoryError(f"safety/arm: {why}")
 
     def give_key(self) -> None:
-        """The autopilot signs, and hears only what is signed; but for its first port, the bench."""
+        """The autopilot signs, and hears only what is signed, but on its first port, the bench."""
         key = list(_KEY)
         stamp = int((time.time() - EPOCH_2015) * UNITS_PER_SECOND)
         self.bench.send(dialect.MAVLink_setup_signing_message(1, 1, key, stamp))
@@ -232,11 +232,13 @@ class Vehicle:
 
     def _start_processes(self) -> None:
         ports, setup = self.ports, self.setup
-        ends = (ports.node, ports.parachute, ports.station)
+        slow = setup.line_rate and self.autopilot.ardupilot
+        line = f"t{ports.line}" if slow else str(ports.line)
+        networks: list[tuple[object, ...]] = [(line, ports.node, ports.station)]
         if setup.wiring == FORWARDS:
-            networks = [(ports.line, ports.node, ports.station), (ports.chute_line, ports.parachute)]
+            networks.append((ports.chute_line, ports.parachute))
         else:
-            networks = [(ports.line, *ends)]
+            networks[0] += (ports.parachute,)
         networks.append((ports.bench, ports.bench_end))
         if self.autopilot.kind == PX4:
             networks.append((self.simulator.truth_port(), ports.truth_end))
