@@ -27,9 +27,11 @@ GRAVITY = 9.81  # m/s^2
 Moment = tuple[float, float, float, float]
 #: Moments are kept for so long, and this far apart at least, s.
 KEPT_FOR, _APART = 3.0, 0.08
-#: Between the least and the most of a sensor that lives, and the usual distance from the middle of
-#: one that does not send noise: m/s^2, m/s.
-_FORCE_LIVES, _FORCE_STEADY, _SPEED_LIVES, _SPEED_STEADY = 0.02, 3.0, 0.003, 3.0
+#: Between the least and the most of a sensor that lives, m/s^2 and m/s; and the usual step of a
+#: speed that is no noise, m/s.
+_FORCE_LIVES, _SPEED_LIVES, _SPEED_STEADY = 0.02, 0.003, 3.0
+#: Moments further apart say nothing of what lay between, s.
+_GAP = 0.35
 #: A sink is denied if it differs by so much, m/s, and this part of itself, from the barometer's.
 _SINK_DIFFERS, _OF_SINK = 2.0, 0.5
 #: Speeded up by so much more than was felt, m/s, in this time at least, s.
@@ -41,8 +43,9 @@ _FALLS_FOR, _NO_SPEED = 0.25, 2.0
 #: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
 #: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
 _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
-#: Carried in full: between these, m/s^2, for so long, s.
-_CARRIED, _CARRIED_FOR = (7.8, 11.8), 0.5
+#: Carried in full: on the average between these, m/s^2, for so long, s, each so near to gravity,
+#: m/s^2, as motors shake.
+_CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
 #: Faster than that it may have reached the last speed of its fall, m/s; and one that lies on its
 #: side while it is carried along its axis speeds up by more than this in that time, m/s.
 _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
@@ -70,7 +73,7 @@ def denials(motion: tuple[Moment, ...], baro_rate: float) -> Mapping[str, str]:
 
 
 def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, str]:
-    """Measurement -> in words that what it claims was commanded, which is no accident. Degrees from
+    """Measurement -> in words that what it claims was commanded: no accident. Degrees from
     the commanded attitude, and m/s of sink beyond the commanded one; NaN: not known."""
     told = {}
     if attitude_error <= _FOLLOWS:
@@ -100,10 +103,12 @@ def _sink_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
 def _not_felt(motion: tuple[Moment, ...]) -> str:
     """It speeded up downwards, and no force was missing."""
     known = [one for one in motion if not any(map(math.isnan, one))]
-    if len(known) < 2 or known[-1] is not motion[-1] or not _force_lives(known):
+    if not _carried(motion):
         return ""
     felt, best, over = 0.0, 0.0, 0.0
     for after, before in _backwards(known):
+        if after[0] - before[0] > _GAP:
+            break  # nobody knows what was felt meanwhile
         # A force to the side carries nothing, so that upwards it counts as none.
         felt += min(after[2] * after[3] - GRAVITY, 0.0) * (after[0] - before[0])
         passed = known[-1][0] - before[0]
@@ -142,20 +147,24 @@ def _fall_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
 
 def _tilt_denied(motion: tuple[Moment, ...]) -> str:
     """Carried in full, and not speeding up: it does not lie on its side."""
-    known = [one for one in _last(motion, _CARRIED_FOR) if not any(map(math.isnan, one))]
-    if len(known) < 4 or known[-1] is not motion[-1] or not _force_lives(known):
+    known = _carried(motion)
+    if not known or known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
         return ""
-    least, most = _CARRIED
-    force, change = fmean([one[2] for one in known]), known[-1][1] - known[0][1]
-    carried = least <= force <= most and known[-1][1] >= -_FLOWN_SINK
-    if not carried or change < -_SPEEDS_UP:
-        return ""
+    force = fmean([one[2] for one in known])
     return f"a force of {force:.1f} m/s^2 carries it, and its vertical speed stays"
 
 
-def _force_lives(known: list[Moment]) -> bool:
-    forces = [one[2] for one in known]
-    return _lives(forces, _FORCE_LIVES, _FORCE_STEADY)
+def _carried(motion: tuple[Moment, ...]) -> list[Moment]:
+    """The newest moments, if an accelerometer that lives tells in all of them that the vehicle is
+    carried in full; empty: it does not."""
+    newest = _last(motion, _CARRIED_FOR) if motion else []
+    known = [one for one in newest if not any(map(math.isnan, one))]
+    if len(known) < 4 or known[-1] is not motion[-1]:
+        return []
+    forces, (least, most) = [one[2] for one in known], _CARRIED
+    in_full = all(abs(force - GRAVITY) <= _SHAKES for force in forces)
+    lives = max(forces) - min(forces) >= _FORCE_LIVES
+    return known if in_full and lives and least <= fmean(forces) <= most else []
 
 
 def _speed_lives(motion: tuple[Moment, ...]) -> bool:
@@ -165,13 +174,6 @@ def _speed_lives(motion: tuple[Moment, ...]) -> bool:
     steps = [abs(after - before) for after, before in zip(speeds[1:], speeds, strict=False)]
     # One that sends noise differs by much from one to the next, and back again.
     return max(speeds) - min(speeds) >= _SPEED_LIVES and fmean(steps) <= _SPEED_STEADY
-
-
-def _lives(values: list[float], least: float, most: float) -> bool:
-    middle = fmean(values)
-    return (
-        max(values) - min(values) >= least and fmean([abs(one - middle) for one in values]) <= most
-    )
 
 
 def _backwards(moments: list[Moment]) -> Iterator[tuple[Moment, Moment]]:
