@@ -3,55 +3,19 @@
 import math
 
 import pytest
+from autopilot_bench import Told, attitude, imu, position
 from link_bench import copter, heartbeat, landed
 
 from chute_ros.model import Armed, LandedState, LinkState
-from chute_ros.protocol.liveness import LivenessLimits
-from chute_ros.protocol.mavlink.autopilot import (
-    AutopilotTracker,
-    is_autopilot,
-)
+from chute_ros.protocol.mavlink.autopilot import is_autopilot
 from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR
 
 NAN, INF = math.nan, math.inf
 
 
-class Told:
-    """An autopilot whose messages come over the wire's bytes."""
-
-    def __init__(self) -> None:
-        self.tracker = AutopilotTracker(1, 1, LivenessLimits(2.5, 5.0))
-        self._encoder, self._decoder = FrameEncoder(1, 1), FrameDecoder()
-
-    def hear(self, *messages, now: float = 0.0) -> "Told":
-        for message in messages:
-            (frame,) = self._decoder.feed_datagram(self._encoder.encode(message, now), now)
-            if frame.message.get_type() == "HEARTBEAT":
-                self.tracker.heartbeat(frame.message, now)
-            else:
-                self.tracker.message(frame.message, now)
-        return self
-
-    def at(self, now: float = 0.0):
-        return self.tracker.vehicle_state(now)
-
-
-def position(boot_ms=1000, lat=0, lon=0, relative=0, vz=0):
-    return d.MAVLink_global_position_int_message(boot_ms, lat, lon, 0, relative, 0, 0, vz, 0)
-
-
-def attitude(boot_ms=1000, roll=0.0, pitch=0.0, yaw=0.0):
-    return d.MAVLink_attitude_message(boot_ms, roll, pitch, yaw, 0.0, 0.0, 0.0)
-
-
 def quaternion(w, x, y, z):
     return d.MAVLink_attitude_quaternion_message(1000, w, x, y, z, 0.0, 0.0, 0.0)
-
-
-def imu(x, y, z, boot_ms=1000):
-    return d.MAVLink_scaled_imu_message(boot_ms, x, y, z, 0, 0, 0, 0, 0, 0)
 
 
 def highres(x, y, z):
