@@ -8,12 +8,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from chute_ros.model import Armed, LandedState, VehicleState
+from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.optional_streams import OptionalStreams
 from chute_ros.protocol.mavlink.readings import Readings
-from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR, StreamWatch
+from chute_ros.protocol.mavlink.sensors import FURTHER_ACCELEROMETERS, PRESSURE
+from chute_ros.protocol.mavlink.stream_rate import StreamRate
+from chute_ros.protocol.mavlink.stream_watch import Ask, StreamWatch
 from chute_ros.protocol.mavlink.targets import Vehicle
 from chute_ros.protocol.mavlink.vehicle_readers import VehicleReaders
 
@@ -64,18 +67,23 @@ def is_autopilot(heartbeat: Any) -> bool:
 
 
 class AutopilotTracker:
-    """Follows one autopilot."""
+    """Follows one autopilot. needed_rate: of each message that the rules need, Hz."""
 
-    def __init__(self, system_id: int, component_id: int, limits: LivenessLimits) -> None:
+    def __init__(
+        self, system_id: int, component_id: int, limits: LivenessLimits, needed_rate: float
+    ) -> None:
         self.system_id = system_id
         self.component_id = component_id
         self.liveness = Liveness(limits)
         self.reboot_count = 0
         self.rebooted_in_flight = False
         self._system_status = 0
-        self._streams = StreamWatch()
+        self._streams = StreamWatch(needed_rate)
+        self._optional = OptionalStreams()
+        #: Of each message that is read, by name.
+        self._rates: dict[str, StreamRate] = {}
         self._clock = BootClock()
-        self._readings = Readings(self._heard)
+        self._readings = Readings(self._streams.heard)
         self._readers = VehicleReaders(self._readings, self._clock)
         self._in_flight_before = False
 
@@ -117,22 +125,39 @@ class AutopilotTracker:
         )
         changes = self.liveness.heard(now)
         if changes:
-            self._streams.begin()
+            self._begin_streams()
         return changes
 
     def ask_anew(self) -> None:
         """It is to be asked for other intervals from now on."""
-        self._streams = StreamWatch()
+        self._streams.fill_stores()
+        self._begin_streams()
 
-    def messages_due(self, interval: float, now: float) -> tuple[int, ...]:
-        """The messages to ask for now, so that each comes each interval (s)."""
-        return self._streams.due(interval, now)
+    def messages_due(self, interval: float, now: float) -> tuple[Ask, ...]:
+        """What to ask for now, so that each needed message comes each interval (s)."""
+        needed = self._streams.due(interval, now)
+        if needed:
+            return needed
+        targets = self._readers.targets.vehicle.target_messages
+        wanted = {**PRESSURE, **targets, **FURTHER_ACCELEROMETERS}
+        if self._streams.line_is_slow(now):
+            return self._optional.give_up(wanted, now)
+        return self._optional.due(wanted, self._rates, interval, now)
 
     def message(self, message: Any, now: float) -> bool:
         """Any other message of the autopilot; True: the vehicle's picture changed."""
         if message.get_type() in _CLOCKS:
             self._watch_clock(message.time_boot_ms)
-        return self._readers.read(message, now)
+        self._streams.received(len(message.get_msgbuf()))
+        if not self._readers.read(message, now):
+            return False
+        self._rates.setdefault(message.get_type(), StreamRate()).heard(now)
+        return True
+
+    def rates(self, now: float) -> dict[str, float]:
+        """Hz of each message that is read and came at least twice, by name."""
+        rates = {name: stream.rate(now) for name, stream in self._rates.items()}
+        return {name: rate for name, rate in rates.items() if not math.isnan(rate)}
 
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture at now, each part with its age."""
@@ -181,11 +206,18 @@ class AutopilotTracker:
             uptime=self._clock.uptime,
             reboot_count=self.reboot_count,
             rebooted_in_flight=self.rebooted_in_flight,
+            faults=self._faults(now),
         )
 
-    def _heard(self, part: str, now: float) -> None:
-        if part in ASKED_FOR:
-            self._streams.heard(part, now)
+    def _faults(self, now: float) -> tuple[str, ...]:
+        # Of one that is not heard that is the reason, not its rates.
+        heard = self.liveness.state is LinkState.OK
+        return tuple(self._streams.faults(now)) if heard else ()
+
+    def _begin_streams(self) -> None:
+        self._streams.begin()
+        self._optional.begin()
+        self._rates.clear()
 
     def _watch_clock(self, boot_ms: int) -> None:
         age = self._clock.observe(boot_ms)
@@ -199,6 +231,6 @@ class AutopilotTracker:
             return
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
-        self._streams.begin()
+        self._begin_streams()
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         self._readings.forget("armed", "landed_state")

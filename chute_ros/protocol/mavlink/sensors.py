@@ -12,8 +12,15 @@ import math
 from typing import Any
 
 from chute_ros.model import Reading
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.readings import Readings
 
+#: The messages of sensors that are asked for besides SCALED_IMU: message id -> name.
+PRESSURE = {dialect.MAVLINK_MSG_ID_SCALED_PRESSURE: "SCALED_PRESSURE"}
+FURTHER_ACCELEROMETERS = {
+    dialect.MAVLINK_MSG_ID_SCALED_IMU2: "SCALED_IMU2",
+    dialect.MAVLINK_MSG_ID_SCALED_IMU3: "SCALED_IMU3",
+}
 STANDARD_GRAVITY = 9.80665  # m/s^2
 #: Pa in a hPa.
 _HPA = 100.0

@@ -83,6 +83,20 @@ _ABOVE_HOME = (
     dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
 )
 
+_OF_AN_AEROPLANE = {
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: "ATTITUDE_TARGET",
+    dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: "NAV_CONTROLLER_OUTPUT",
+}
+_OF_PX4 = {
+    dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: "ATTITUDE_TARGET",
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: "POSITION_TARGET_LOCAL_NED",
+    dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: "LOCAL_POSITION_NED",
+}
+_OF_OTHERS = {
+    **_OF_PX4,
+    dialect.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: "POSITION_TARGET_GLOBAL_INT",
+}
+
 
 @dataclass(frozen=True)
 class Vehicle:
@@ -101,6 +115,13 @@ class Vehicle:
     def arduplane(self) -> bool:
         """ArduPilot on an aeroplane, a quadplane too."""
         return self.autopilot == _ARDUPILOT and self.kind in _AEROPLANES
+
+    @property
+    def target_messages(self) -> dict[int, str]:
+        """The messages with targets that are read of it, most useful first."""
+        if self.arduplane:
+            return _OF_AN_AEROPLANE
+        return _OF_PX4 if self.px4 else _OF_OTHERS
 
 
 class Targets:

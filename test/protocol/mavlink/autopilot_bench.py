@@ -12,7 +12,7 @@ class Told:
     """What its tracker makes of them."""
 
     def __init__(self) -> None:
-        self.tracker = AutopilotTracker(1, 1, LivenessLimits(2.5, 5.0))
+        self.tracker = AutopilotTracker(1, 1, LivenessLimits(2.5, 5.0), 5.0)
         self._encoder, self._decoder = FrameEncoder(1, 1), FrameDecoder()
 
     def hear(self, *messages, now: float = 0.0) -> Told:
