@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from campaign_bench import SHIPPED, fired, flown, rocket, scenario
 
-from chute_ros.campaign.blind import Need, blinded
+from chute_ros.campaign.blind import Need, Seen, blinded
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, judge
@@ -162,10 +162,10 @@ def test_what_falls_like_one_that_flies_well_cannot_be_known(
     """Given an autopilot that lost its power at 1 s, and the ground at 8 s."""
     lies = SensorFault(sensor, how, 1.5, 6.0, "imu")
     alone = scenario(Failure.POWER, lies, vehicle_sources=sources)
-    assert blinded(alone, 0.0, Need(1.0, 8.0), light_until=light_until) == cause
+    assert blinded(alone, 0.0, Need(1.0, 8.0), Seen(light_until=light_until)) == cause
     # An autopilot that has its power tells more.
     told = replace(alone, failure=Failure.MOTOR)
-    assert blinded(told, 0.0, Need(1.0, 8.0), light_until=light_until) == ""
+    assert blinded(told, 0.0, Need(1.0, 8.0), Seen(light_until=light_until)) == ""
 
 
 @pytest.mark.parametrize(("how", "cause"), [("jumps", LEFT), ("gone", "")])
@@ -189,11 +189,11 @@ def test_where_no_line_of_a_flight_computer_came_whole_nothing_was_told() -> Non
     falls = rocket(Failure.NO_DROGUE)
     often = [n * 0.9 for n in range(-10, 10)]
     rests = [at for at in often if not 2.0 < at < 5.0]
-    assert blinded(falls, 0.0, need, often) == ""
-    assert blinded(falls, 0.0, need, rests) == cause
+    assert blinded(falls, 0.0, need, Seen(often)) == ""
+    assert blinded(falls, 0.0, need, Seen(rests)) == cause
     assert blinded(falls, 0.0, need) == cause
     # Before it there was time enough.
-    assert blinded(falls, 0.0, Need(-6.0, 8.0), rests) == ""
+    assert blinded(falls, 0.0, Need(-6.0, 8.0), Seen(rests)) == ""
     # Of an aircraft nobody asks for lines.
     assert blinded(scenario(Failure.MOTOR), 0.0, need) == ""
 
