@@ -50,7 +50,7 @@ def _is_for_devices(data: bytes) -> bool:
 
 
 def _heights_are_true(scenario: Scenario) -> bool:
-    """Those above home are above the ground. Elsewhere a parachute is set up to go by nobody's."""
+    """Those above home are above the ground; elsewhere a parachute has a sensor of its own."""
     moves = any(isinstance(one, HomeMove) for one in scenario.faults)
     autopilot = scenario.autopilot
     stays = autopilot.homing is Homing.STAYS and not autopilot.home_drift
@@ -71,18 +71,23 @@ def _is_for(node: UpfDevice) -> Callable[[bytes], bool]:
 
 
 class ReleasedParachute(ParachuteDevice):
-    """Its release acts on the vehicle, whoever hears of it. true_height: m."""
+    """Its release acts on the vehicle, whoever hears of it. true_height: above ground, m; feels:
+    it goes by that, and not by the height that it is told."""
 
     def __init__(
         self,
         settings: ParachuteSettings,
         out: Callable[[], None],
         true_height: Callable[[], float],
+        feels: bool,
     ) -> None:
         super().__init__(settings, [])
-        self._out, self._true_height = out, true_height
+        self._out, self._true_height, self._feels = out, true_height, feels
         #: When it first refused a release because the height that it is told is wrong, virtual s.
         self.misled_at = math.nan
+
+    def _height(self) -> float:
+        return self._true_height() if self._feels else super()._height()
 
     def _release(self) -> int:
         result = super()._release()
@@ -121,12 +126,12 @@ class Aircraft(Rig):
         self.add_device(plug, self.autopilot.reboot)
         on_mavlink = scenario.vehicle is not Vehicle.UPF
         if on_mavlink:
-            settings = ParachuteSettings(
-                armed_triggers=0 if scenario.arms else _ARMED_TRIGGERS,
-                ground_cleared="auto" if _heights_are_true(scenario) else "yes",
-            )
+            settings = ParachuteSettings(armed_triggers=0 if scenario.arms else _ARMED_TRIGGERS)
             parachute = ReleasedParachute(
-                settings, partial(self._out, MAVLINK_NODE), lambda: self.model.clearance
+                settings,
+                partial(self._out, MAVLINK_NODE),
+                lambda: self.model.clearance,
+                feels=not _heights_are_true(scenario),
             )
             self.add_device(Plug(bus, "parachute", parachute, _is_for_devices), parachute.reboot)
             if scenario.vehicle is Vehicle.MAVLINK:

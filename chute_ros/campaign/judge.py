@@ -15,8 +15,8 @@ from chute_ros.model import Action
 _REFUSED = "the only parachute refused: by the wrong height that it was told, it stood"
 #: What a person orders has happened by then, s.
 _PERSON_WAITS = 6.0
-#: A kill that a deploy follows within this was decided for its sake, s.
-_SAME_DECISION = 0.6
+#: Lower than this nothing is released, m above take-off.
+_LOWEST = 10.0
 #: A canopy that is out must carry within this, or an alarm and the next parachute follow, s.
 _CARRIES_WITHIN = 3.0
 
@@ -89,10 +89,10 @@ def _never(flown: Flown) -> Judged | None:
                 return Judged(Count.NOT_TOLD, lied)
             text = f"{one.decision.action.name} {one.at - flown.up:.2f} s after it was up"
             return Judged(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")
-    deploys = [at for at, one in flown.decided if one.action is Action.DEPLOY]
-    if flown.opened_by_kill + _SAME_DECISION < min(deploys, default=math.inf):
-        text = f"a kill alone opened a parachute {flown.opened_by_kill - flown.up:.2f} s after"
-        return Judged(Count.FALSE, f"{text} it was up: the autopilot ordered that itself")
+    opened = flown.opened_by_kill
+    if opened < known or (not math.isnan(opened) and flown.release_height < _LOWEST):
+        text = f"a kill alone opened a parachute {opened - flown.up:.2f} s after it was up"
+        return Judged(Count.FALSE, f"{text}, at {flown.release_height:.1f} m")
     decided = [one.action for _, one in flown.decided if one.action in fires]
     if decided and decided[0] is Action.DEPLOY:
         return Judged(Count.OUT_OF_ORDER, "no kill was decided before the deploy")
