@@ -10,13 +10,14 @@ from pathlib import Path
 from chute_ros.model import Action
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUPLANE, PX4
-from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, judge
+from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, held_up, judge
 from sitl.record import Seen, read
 from sitl.truth import GROUND, truth_of
 from sitl.vehicle import StoryError, Vehicle
 
 _READY_WITHIN = 90.0
-#: Heartbeats and links of a vehicle that was just put together settle.
+#: Processes that start take the machine for themselves, s.
+_SETTLES = 12.0
 _CLIMB_RATE = 1.5  # m/s, no slower
 
 
@@ -164,6 +165,8 @@ class Flight:
         ports = vehicle.truth_ports()
         events = events_of(record, ports)
         judge(self.expected, events, truth_of(record, ports), self.verdict)
+        settled = [one for one in record if one.at >= self.began + _SETTLES]
+        self.verdict.held_up = held_up(settled)
         for look in self.afterwards:
             look(record)
         self.verdict.happened += self._decided()

@@ -6,6 +6,7 @@ import enum
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from sitl.pilot import FORCE
@@ -60,6 +61,8 @@ class Verdict:
     happened: list[str] = field(default_factory=list)
     times: dict[str, float] = field(default_factory=dict)
     wrong: list[str] = field(default_factory=list)
+    #: The longest time that this machine kept the node or the simulator from running, s.
+    held_up: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -209,3 +212,15 @@ _JUDGES = {
     Want.NO_RELEASE: _no_release,
     Want.BY_TRUTH: _by_truth,
 }
+
+
+def held_up(record: Sequence[Seen]) -> float:
+    """The longest pause of what comes evenly, over its interval, s: the simulator's truth, 25 times a
+    second, and the node's heartbeat, each second."""
+    worst = 0.0
+    truth = [one.at for one in record if one.name in ("SIM_STATE", "HIL_STATE_QUATERNION")]
+    beats = [one.at for one in record if one.name == "HEARTBEAT" and one.component == _NODE]
+    for times, interval in ((truth, 0.04), (beats, 1.0)):
+        gaps = [after - before for before, after in pairwise(times)]
+        worst = max([worst, *(gap - interval for gap in gaps)])
+    return worst

@@ -21,6 +21,8 @@ class Story:
     kinds: tuple[str, ...] = KINDS
     #: What it leaves behind is not fit for another story.
     spoils: bool = False
+    #: Processes start anew in it, and are silent meanwhile.
+    restarts: bool = False
 
 
 def every() -> dict[str, Story]:

@@ -180,5 +180,5 @@ STORIES = (
         spoils=True,
     ),
     Story("restart-ground", "the autopilot starts anew on the ground", _restarts_on_the_ground,
-          spoils=True),
+          spoils=True, restarts=True),
 )  # fmt: skip

@@ -114,9 +114,9 @@ def _signed(flight: Flight) -> None:
 STORIES = (
     Story("rates", "message rates on a fast line; one motor dead at 40 m", _rates),
     Story("node-anew", "mavlink_parachute is killed in flight; 6 s later one motor dead",
-          _node_anew(NODE)),
+          _node_anew(NODE), restarts=True),
     Story("supervisor-anew", "safety_supervisor is killed in flight; 6 s later one motor dead",
-          _node_anew(SUPERVISOR)),
+          _node_anew(SUPERVISOR), restarts=True),
     Story("fight", "a ground station asks for other rates all the time; one motor dead", _fight,
           spoils=True),
     Story("slow-57600", "a serial line of 57600 baud; one motor dead", _slow,

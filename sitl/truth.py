@@ -38,7 +38,7 @@ class Truth:
             self._add(at, message.alt, -message.vd, _tilt(message.roll, message.pitch),
                       math.hypot(message.vn, message.ve))  # fmt: skip
         elif name == "HIL_STATE_QUATERNION":
-            w, x, y, z = message.attitude_quaternion
+            _, x, y, _ = message.attitude_quaternion
             up = max(-1.0, min(1.0, 1.0 - 2.0 * (x * x + y * y)))
             self._add(at, message.alt / 1000.0, -message.vz / 100.0, math.degrees(math.acos(up)),
                       math.hypot(message.vx, message.vy) / 100.0)  # fmt: skip

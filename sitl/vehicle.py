@@ -99,7 +99,7 @@ class Vehicle:
 
     def turn(self) -> None:
         """One look at everything."""
-        self.watch.spin(0.005)
+        self.watch.spin(0.02)
         for one in {self.station, self.bench, self.truth_end}:
             one.turn()
         self.pilot.turn()
