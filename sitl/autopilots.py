@@ -1,4 +1,4 @@
-"""Which autopilot a simulator binary is, told by words that it holds, and which version, told by it."""
+"""Which autopilot a simulator binary is, by words that it holds, and which version, by its own."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ sitl: no autopilot to fly. Give the simulator binary of one, or of several:
     make sitl AUTOPILOT="/path/to/arducopter /path/to/arduplane /path/to/px4"
 
 ArduCopter, ArduPlane (flown as a quadplane): the executable for the board SITL, as ArduPilot's
-documentation of its simulator has it (build/sitl/bin/arducopter). PX4: bin/px4 in the build folder
-of a POSIX build with the SIH simulator (its etc/ folder lies beside bin/), as PX4's documentation of
-SIH has it. Nothing of them is part of this project. docs/real_autopilots.md: what comes of it."""
+documentation of its simulator has it (build/sitl/bin/arducopter). PX4: bin/px4 in the folder of a
+POSIX build with the SIH simulator (its etc/ folder lies beside bin/), as PX4's documentation of
+SIH has it. Nothing of them is part of this project. What comes of it: docs/real_autopilots.md."""
 
 
 class AutopilotError(ChuteError):

@@ -1,4 +1,4 @@
-"""Keeps the vehicle that stories are flown on: the same one for as long as it is fit for the next."""
+"""Keeps the vehicle that stories are flown on, for as long as it is fit for the next."""
 
 from __future__ import annotations
 

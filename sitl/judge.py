@@ -215,8 +215,8 @@ _JUDGES = {
 
 
 def held_up(record: Sequence[Seen]) -> float:
-    """The longest pause of what comes evenly, over its interval, s: the simulator's truth, 25 times a
-    second, and the node's heartbeat, each second."""
+    """The longest pause of what comes evenly, over its interval, s: the simulator's truth, 25
+    times a second, and the node's heartbeat, each second."""
     worst = 0.0
     truth = [one.at for one in record if one.name in ("SIM_STATE", "HIL_STATE_QUATERNION")]
     beats = [one.at for one in record if one.name == "HEARTBEAT" and one.component == _NODE]

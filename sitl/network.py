@@ -1,4 +1,4 @@
-"""A network of this process's own with nothing but loopback: a simulator opens ports to everyone."""
+"""A network of this process alone, only loopback: a simulator opens ports to everyone."""
 
 from __future__ import annotations
 

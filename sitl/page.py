@@ -14,20 +14,23 @@ from sitl.judge import Verdict
 _HEAD = """\
 # Real autopilots
 
-Written by `make sitl AUTOPILOT="PATH ..."`, which flies simulator binaries of ArduCopter, ArduPlane
-(as a quadplane) and PX4 that you have; each autopilot's part is written alone. The numbers belong to
-the machine that made them: {machine}.
+Written by `make sitl AUTOPILOT="PATH ..."`, which flies simulator binaries of ArduCopter,
+ArduPlane (as a quadplane) and PX4 that you have; each autopilot's part is written alone. The
+numbers belong to the machine that made them: {machine}.
 
 The autopilot runs in its own simulator, on loopback, in real time. With it run the real nodes
 (`mavlink_parachute`, `safety_supervisor`, parameters as delivered but for what a story says), a
 simulated parachute, a router (what is addressed goes where the addressee was heard, as with
-mavlink-router) and a ground station. What happened is judged by the simulator's own state, never by
-the supervisor's picture. A fall that only a parachute helps must end with a release, in time (one
-motor dead, or an operator's call, to the release: 1.0 s and 0.3 s); any other flight must see no
-kill and no release; a blocked vehicle must not rise. A run that did not is named under its story.
+mavlink-router) and a ground station. What happened is judged by the simulator's own state, never
+by the supervisor's picture. A fall that only a parachute helps must end with a release, in time
+(one motor dead to the release: 1.0 s; an operator's call to the release: 0.3 s); any other flight
+must see no kill and no release; a blocked vehicle must not rise. What of a run is not so stands in
+the last column, in bold.
 
-To run it: give the executable that a build of ArduPilot for the board SITL makes
-(`arducopter`, `arduplane`), or `bin/px4` in the folder of a PX4 build for POSIX with the SIH simulator.
+A run in which the node or the simulator was held up by other load of the machine is flown again.
+
+To run it, give the executable that a build of ArduPilot for the board SITL makes (`arducopter`,
+`arduplane`), or `bin/px4` in the folder of a PX4 build for POSIX with the SIH simulator.
 ArduPilot's and PX4's own documentation of their simulators says how to get one.
 `make sitl AUTOPILOT=PATH STORIES="motor-30 block" RUNS=1` flies some stories;
 `python3 -m sitl --list` names all.

@@ -99,7 +99,7 @@ class Pilot:
         return self.bench.set_parameter(name, float(value), _REAL32)
 
     def fail_motors(self, mask: int, thrust: float = 0.0) -> float:
-        """Motors of this mask (bit 0: the first) have only this part of their thrust from now on."""
+        """Motors of this mask (bit 0: the first) have this part of their thrust from now on."""
         if self.kind == PX4:
             unit, off = dialect.FAILURE_UNIT_SYSTEM_MOTOR, dialect.FAILURE_TYPE_OFF
             number = dialect.MAV_CMD_INJECT_FAILURE

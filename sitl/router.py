@@ -1,6 +1,6 @@
-"""A MAVLink router on loopback that records each frame: python -m sitl.router RECORD PORT[,PORT] ...
+"""A MAVLink router on loopback that records each frame: python -m sitl.router RECORD PORTS ...
 
-Each argument after the record is a network of its own: frames that come to one of its ports, from
+Each of PORTS (PORT[,PORT]) is a network of its own: frames that come to one of its ports, from
 anyone, are routed to all who were heard on any of its ports. A port with a t before it is one of
 TCP, for one serial line at a time.
 """
@@ -49,6 +49,8 @@ class Network:
         one, _ = server.accept()
         one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._sockets[port] = one
+        # A line has its other end from the start; the end of a datagram is known once it is heard.
+        self._splitters[port, None] = FrameSplitter()
         self._watch(one, self._take_stream, port)
 
     def _take_stream(self, one: socket.socket, port: int) -> None:

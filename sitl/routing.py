@@ -1,7 +1,7 @@
 """Which end of a MAVLink network gets a frame.
 
-As mavlink-router does it: what is addressed goes where its addressee was heard, what is not goes to
-all; never back to where it came from.
+As mavlink-router does it: what is addressed goes where its addressee was heard, what is not goes
+to all; never back to where it came from.
 """
 
 from __future__ import annotations

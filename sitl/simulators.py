@@ -53,7 +53,7 @@ _QUADPLANE = {
     "Q_A_RAT_YAW_P": 0.2, "Q_A_RAT_YAW_I": 0.02, "RC1_TRIM": 1500, "RTL_ALTITUDE": 40,
 }  # fmt: skip
 
-#: No log; a motor failure that is injected stops the motor in the two modes above 0, and only that.
+#: No log. An injected motor failure stops the motor in CA_FAILURE_MODE 1 and 2 only.
 _PX4 = {"MAV_SYS_ID": 1, "NAV_DLL_ACT": 0, "SDLOG_MODE": -1, "CA_FAILURE_MODE": 1, "FD_ACT_EN": 0}
 
 

@@ -18,8 +18,9 @@ _MOST = 65536
 #: What a story may ask for.
 _HEEDED = frozenset(
     getattr(dialect, f"MAVLINK_MSG_ID_{name}")
-    for name in ("HEARTBEAT", "SYS_STATUS", "PARAM_VALUE", "MISSION_REQUEST_INT", "MISSION_REQUEST",
-                 "MISSION_ACK", "COMMAND_ACK", "SIM_STATE", "HIL_STATE_QUATERNION", "STATUSTEXT",
+    for name in ("HEARTBEAT", "SYS_STATUS", "PARAM_VALUE", "MISSION_REQUEST_INT",
+                 "MISSION_REQUEST", "MISSION_ACK", "COMMAND_ACK", "SIM_STATE",
+                 "HIL_STATE_QUATERNION", "STATUSTEXT",
                  "AUTOPILOT_VERSION", "HOME_POSITION")
 )  # fmt: skip
 

@@ -98,10 +98,10 @@ def _through(flight: Flight, steps: tuple[Step, ...], height: float) -> None:
             flight.vehicle.rest(2.0)
         flight.pilot.sticks(*step.sticks)
         flight.pilot.mode(step.mode)
-        if not flight.vehicle.until(2.0, lambda step=step: flight.pilot.in_mode(step.mode)):
-            if step.mode != "FLIP":  # it is over before a heartbeat tells of it
-                flight.verdict.happened.append(f"{step.mode} was refused")
-                continue
+        changed = flight.vehicle.until(2.0, lambda step=step: flight.pilot.in_mode(step.mode))
+        if not changed and step.mode != "FLIP":  # over before a heartbeat tells of it
+            flight.verdict.happened.append(f"{step.mode} was refused")
+            continue
         flight.vehicle.rest(step.seconds)
         if flight.vehicle.watch.decisions and flight.released():
             return

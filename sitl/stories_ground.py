@@ -64,8 +64,8 @@ def _wait_for_position(flight: Flight) -> None:
 def _judge(flight: Flight, way: str, began: float, ended: float, highest: float,
            record: Sequence[Seen]) -> None:  # fmt: skip
     ports = flight.vehicle.truth_ports()
-    some = [one for one in record
-            if began <= one.at <= ended and one.port not in ports and one.component == 1]  # fmt: skip
+    while_tried = [one for one in record if began <= one.at <= ended]
+    some = [one for one in while_tried if one.port not in ports and one.component == 1]
     took, armed = _undone(some)
     verdict = flight.verdict
     told = f"up to {highest:.1f} m" if armed else "refused by the autopilot"

@@ -1,5 +1,5 @@
-"""How it is wired: through the autopilot, on a slow line, signed, under a ground station that fights;
-and processes that start anew in flight."""
+"""How it is wired: through the autopilot, on a slow line, signed, with a ground station that asks
+for other rates; and processes that start anew in flight."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A vehicle on loopback: an autopilot's simulator, the real nodes, a parachute, a ground station."""
+"""A vehicle on loopback: an autopilot's simulator, the real nodes, a parachute, a station."""
 
 from __future__ import annotations
 
