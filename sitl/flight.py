@@ -97,7 +97,6 @@ class Flight:
         self.get_ready()
         if self.kind == PX4:
             self.set("MIS_TAKEOFF_ALT", height)
-            self.set("MPC_TKO_SPEED", 3.0)
         self.change_mode(self.pilot.ready_to_climb())
         self.arm()
         self.climb(height)
