@@ -19,6 +19,7 @@ _READY_WITHIN = 90.0
 #: Processes that start take the machine for themselves, s.
 _SETTLES = 12.0
 _CLIMB_RATE = 1.5  # m/s, no slower
+_STILL = 0.3  # m/s, a hover
 
 
 class Flight:
@@ -101,7 +102,9 @@ class Flight:
         self.arm()
         self.climb(height)
         self.vehicle.must("IN_FLIGHT", 10.0, lambda: self.vehicle.stage(Stage.IN_FLIGHT))
-        self.vehicle.rest(2.0)
+        # What still climbs must fall longer until its fall shows.
+        self.vehicle.until(10.0, lambda: abs(self.vehicle.truth.now.climb) < _STILL)
+        self.vehicle.rest(1.0)
 
     def climb(self, height: float) -> None:
         """An armed one goes up."""
