@@ -72,23 +72,20 @@ class Ports:
 
     #: The companion computer's line of the autopilot.
     line: int
-    #: A line of its own for the bench: truth, faults. No node is on it.
+    #: A line of its own for the bench: truth, faults. No node is on it. 0: see bench_port.
     bench: int
-    #: Truth of PX4.
-    truth: int
     #: The parachute's port of the autopilot, where it is wired to it.
     chute_line: int
     node: int
     parachute: int
     station: int
     bench_end: int
-    truth_end: int
 
 
 def ports_for(autopilot: Autopilot) -> Ports:
     """In a network of our own any will do; PX4 has its own for its lines."""
-    lines = (19000, 19001, 19002, 19003) if autopilot.ardupilot else (14549, 14550, 0, 19003)
-    return Ports(*lines, 19010, 19011, 19012, 19013, 19014)
+    lines = (19000, 19001, 19003) if autopilot.ardupilot else (14549, 0, 19003)
+    return Ports(*lines, 19010, 19011, 19012, 19013)
 
 
 @dataclass
@@ -114,9 +111,9 @@ class Simulator:
         """What it writes."""
         return self.folder / "autopilot.log"
 
-    def truth_port(self) -> int:
-        """Where PX4 sends its truth."""
-        return 19410 + self.instance
+    def bench_port(self) -> int:
+        """Where it sends its truth, and takes faults from; of PX4, where its SIH shows itself."""
+        return self.ports.bench or 19410 + self.instance
 
     def check(self) -> None:
         """SimulatorError if it has ended."""

@@ -84,10 +84,6 @@ class Vehicle:
             made.callback(self.station.close)
             self.bench = Station(self.ports.bench_end, _BENCH)
             made.callback(self.bench.close)
-            self.truth_end = self.bench
-            if autopilot.kind == PX4:
-                self.truth_end = Station(self.ports.truth_end, _BENCH)
-                made.callback(self.truth_end.close)
             self.pilot = Pilot(autopilot.kind, self.station, self.bench)
             self._made = made.pop_all()
 
@@ -100,8 +96,8 @@ class Vehicle:
     def turn(self) -> None:
         """One look at everything."""
         self.watch.spin(0.02)
-        for one in {self.station, self.bench, self.truth_end}:
-            one.turn()
+        self.station.turn()
+        self.bench.turn()
         self.pilot.turn()
         self.simulator.check()
         self.keeper.note_troubles(self.keeper.look())
@@ -176,10 +172,7 @@ class Vehicle:
 
     def truth_ports(self) -> list[int]:
         """Of the router, those of the bench: the vehicle's devices hear nothing of them."""
-        ports = [self.ports.bench, self.ports.bench_end]
-        if self.autopilot.kind == PX4:
-            ports += [self.simulator.truth_port(), self.ports.truth_end]
-        return ports
+        return [self.simulator.bench_port(), self.ports.bench_end]
 
     def stage(self, *stages: Stage) -> bool:
         """The supervisor says that it is in one of these."""
@@ -239,9 +232,7 @@ class Vehicle:
             networks.append((ports.chute_line, ports.parachute))
         else:
             networks[0] += (ports.parachute,)
-        networks.append((ports.bench, ports.bench_end))
-        if self.autopilot.kind == PX4:
-            networks.append((self.simulator.truth_port(), ports.truth_end))
+        networks.append((self.simulator.bench_port(), ports.bench_end))
         texts = [",".join(map(str, one)) for one in networks]
         self.keeper.start("router", "sitl.router", str(self.record), *texts)
         values = {"connection": f"udpout:127.0.0.1:{ports.node}", **setup.node}
@@ -263,10 +254,10 @@ class Vehicle:
 
     def _see_truth(self) -> None:
         name = "HIL_STATE_QUATERNION" if self.autopilot.kind == PX4 else "SIM_STATE"
-        at = self.truth_end.heard_at.get(name, 0.0)
+        at = self.bench.heard_at.get(name, 0.0)
         if at > self._truth_at:
             self._truth_at = at
-            self.truth.take(at, name, self.truth_end.newest[name])
+            self.truth.take(at, name, self.bench.newest[name])
         elif (name == "SIM_STATE" and self.bench.newest
                 and time.monotonic() - max(at, self._asked_at) > 1.0):  # fmt: skip
             self._asked_at = time.monotonic()
