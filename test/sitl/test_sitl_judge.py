@@ -66,7 +66,7 @@ def test_a_release_in_time_over_stopped_motors_is_right():
         ([], "missed: not released"),
         ([kill(1.1), out(1.2), beat(1.2, False)], "late: released after 1.20 s, need 1 s"),
         ([out(-0.5), beat(0.0, False)], "false: released 0.50 s before the failure"),
-        ([kill(0.8), out(0.9), beat(1.0, True)], "over motors that were not stopped"),
+        ([kill(0.8), out(0.9), beat(2.5, True)], "over motors that were not stopped"),
         ([kill(-0.2), out(0.9), beat(1.0, False)], "false: killed 0.20 s before it was needed"),
     ],
 )
