@@ -47,7 +47,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
     return Details(
         tuple(map(parachute, link.parachutes.all())),
         link.vehicle_state(now),
-        tuple(link.doubts()),
+        tuple(link.doubts(now)),
         link.received_count,
         link.sent_count,
         Counter(link.counts),

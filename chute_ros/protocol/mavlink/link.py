@@ -204,9 +204,9 @@ class MavlinkLink:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
 
-    def doubts(self) -> list[str]:
+    def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
-        return self._devices.doubts()
+        return self._devices.doubts(now)
 
     # -- inside ----------------------------------------------------------------------------------
 
