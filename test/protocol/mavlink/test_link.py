@@ -276,8 +276,8 @@ def test_block_undoes_arming_on_the_ground():
     (order,) = bench.commands()
     assert (order.command, order.param1, order.param2) == (DISARM, 0, 0)
     assert bench.texts() == [
-        "flight blocked: parachute lost",
-        "disarming, flight blocked: parachute lost",
+        "parachute lost: flight blocked",
+        "parachute lost: flight blocked, disarming",
     ]
     assert bench.notices() == [
         "autopilot armed while flight is blocked (parachute lost): disarming"
@@ -313,7 +313,7 @@ def test_block_switched_off_by_parameter():
     bench.link.flight_block("x", bench.now)
     bench.at(1.0).hear(PILOT, copter(armed=True))
     assert bench.commands() == []
-    assert bench.texts() == ["flight blocked: x"]
+    assert bench.texts() == ["x: flight blocked"]
 
 
 @pytest.mark.parametrize(
@@ -376,7 +376,7 @@ def test_signed_end_to_end():
     assert len([e for e in bench.events if isinstance(e, ParachuteChanged)]) == 2
 
     bench.link.deploy(1, False, bench.now)
-    (raw,) = bench.link.take_output()
+    raw, *_ = bench.link.take_output()
     far = Bench(None, Verifier(KEY, clock()))
     far.link.receive(raw, START)
     assert far.link.received_count == 1
