@@ -209,6 +209,11 @@ class MavlinkLink:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
 
+    def autopilot_rates(self, now: float) -> dict[str, float]:
+        """Hz of each message that is read of our autopilot."""
+        autopilot = self._devices.chosen_autopilot()
+        return {} if autopilot is None else autopilot.rates(now)
+
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
         return self._devices.doubts(now)
