@@ -7,10 +7,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.tellers import may_count, outlives
+from chute_ros.campaign.truth import SOFT
 from chute_ros.protocol.vehicle_merge import FRESH, IMU, VEHICLE_STATE
+from chute_ros.sim.flight import GRAVITY
 
 #: What the chain may take where all goes well: to see the fall (the slowest rule that sees it),
 #: the kill's `kill_to_deploy_delay`, and the release, s. A rocket must fall for 3 s first, so that
@@ -33,7 +36,17 @@ _TOLD_BY = {
     "speed": ("vertical_speed",),
     "tilt": ("tilt_deg",),
     "force": ("acceleration",),
+    "pressure": ("pressure", "climb_rate"),
+    "estimator": (
+        *("height", "climb_rate", "vertical_speed", "tilt_deg"),
+        *("attitude_error", "sink_beyond_target"),
+    ),
 }
+#: One of these that is wrong is a fault of one origin.
+_Lie = SensorFault | EstimatorFault
+#: A descent is told by its attitude or its force as well, if they differ by so much from those of
+#: one that flies: rad, m/s^2.
+_TELLING_TILT, _TELLING_FORCE = 0.9, 4.0
 _NO_POWER = {
     Failure.POWER: "the autopilot had no power, and nothing else tells of the vehicle",
     Failure.COMPUTER_POWER: "the flight computer had no power, and nothing else fires the drogue",
@@ -47,6 +60,17 @@ class Need:
 
     begin: float
     end: float
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What decides besides the scenario, virtual s. told: when lines of a rocket's flight computer
+    came whole; light_until: when less than half of its weight last carried an aircraft in its
+    fall; unclear: from when until when it fell past where it took off, high above the ground."""
+
+    told: Sequence[float] = ()
+    light_until: float = math.nan
+    unclear: tuple[float, float] = (math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -66,27 +90,35 @@ def enough_time(scenario: Scenario) -> float:
     # another source that knows it is preferred.
     sinking = next(one for one in scenario.vehicle_sources if one != IMU)
     waits = outlives(scenario) and sinking == VEHICLE_STATE
-    return _ENOUGH_TIME + (FRESH if waits else 0.0)
+    return _ENOUGH_TIME + (FRESH if waits else 0.0) + _until_it_sinks(scenario)
+
+
+def _until_it_sinks(scenario: Scenario) -> float:
+    """How long it comes down no faster than softly, as what is flown may, s."""
+    way = scenario.descent or scenario.unheld
+    if way is None or way.sink <= SOFT:
+        return 0.0
+    return -way.settles * math.log(1.0 - SOFT / way.sink)
 
 
 def blinded(
     scenario: Scenario,
     up: float,
     need: Need,
-    told: Sequence[float] = (),
-    light_until: float = math.nan,
+    seen: Seen = Seen(),
 ) -> str:
-    """Which faults left no time in a row that is enough; empty: there was. All in virtual s. told:
-    when lines of a rocket's flight computer came whole; light_until: when less than half of its
-    weight last carried an aircraft in its fall."""
+    """Which faults left no time in a row that is enough; empty: there was. All in virtual s."""
     failed_at = up + scenario.failure_at
     silent = scenario.failure in _NO_POWER and not outlives(scenario)
     if silent and failed_at < need.end:
         return _NO_POWER[scenario.failure]
     drawn = [replace(one, begin=up + one.begin, end=up + one.end) for one in _all_hidden(scenario)]
     if scenario.vehicle is Vehicle.ROCKET:
-        drawn += _gaps(told, need)
-    drawn += _as_in_flight(scenario, up, light_until)
+        drawn += _gaps(seen.told, need)
+    drawn += _as_in_flight(scenario, up, seen.light_until)
+    drawn += _one_against_one(scenario, up)
+    if not math.isnan(seen.unclear[0]):
+        drawn.append(_Hidden(*seen.unclear, "it fell past the height at which it took off"))
     hidden = [one for one in drawn if one.begin < min(one.end, need.end)]
     free, best = need.begin, 0.0
     for one in sorted(hidden, key=lambda one: one.begin):
@@ -104,7 +136,7 @@ def misled(scenario: Scenario, up: float, at: float, reasons: str) -> str:
     lied = [
         one
         for one in scenario.faults
-        if isinstance(one, SensorFault)
+        if isinstance(one, _Lie)
         and one.how != "gone"
         and may_count(scenario, one)
         and up + one.begin <= at <= up + one.end + _LASTS
@@ -115,14 +147,14 @@ def misled(scenario: Scenario, up: float, at: float, reasons: str) -> str:
     return f"sensors {', '.join(sorted(names))} were wrong at once" if names else ""
 
 
-def _together(one: SensorFault, other: SensorFault) -> tuple[float, float] | None:
+def _together(one: _Lie, other: _Lie) -> tuple[float, float] | None:
     """From when until when what both of them tell is wrong, s; None: it never is, or they are one.
     What a sensor told last still counts for a while."""
     begin, end = max(one.begin, other.begin), min(one.end, other.end) + _LASTS
     return (begin, end) if one.sensor != other.sensor and begin < end else None
 
 
-def _name(one: SensorFault) -> str:
+def _name(one: _Lie) -> str:
     return f"{one.source} {one.sensor}".strip()
 
 
@@ -131,7 +163,7 @@ def _all_hidden(scenario: Scenario) -> list[_Hidden]:
     sensors = [
         one
         for one in scenario.faults
-        if isinstance(one, SensorFault)
+        if isinstance(one, _Lie)
         and may_count(scenario, one)
         and (one.source or not outlives(scenario))
     ]
@@ -176,6 +208,24 @@ def _as_in_flight(scenario: Scenario, up: float, light_until: float) -> list[_Hi
         )
         for one in scenario.faults
         if isinstance(one, SensorFault) and (one.source, one.sensor) == (IMU, "tilt")
+    ]
+
+
+def _one_against_one(scenario: Scenario, up: float) -> list[_Hidden]:
+    """Where a descent is told by the estimator and by the pressure alone, as its attitude and its
+    force are those of one that flies, and one of the two tells what is not so. Virtual s."""
+    way = scenario.descent if scenario.failure in (Failure.SINK, Failure.STALL) else None
+    if way is None or way.tilt > _TELLING_TILT or abs(way.force - GRAVITY) > _TELLING_FORCE:
+        return []
+    return [
+        _Hidden(
+            up + one.begin,
+            up + one.end + _LASTS,
+            "the estimator and the pressure told otherwise, and nothing else tells a level sink",
+        )
+        for one in scenario.faults
+        if isinstance(one, EstimatorFault)
+        or (isinstance(one, SensorFault) and one.sensor == "pressure" and one.how != "gone")
     ]
 
 

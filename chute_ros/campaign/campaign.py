@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flight, Flown
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
-from chute_ros.campaign.scenario import Failure, Scenario, draw
+from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
 
 #: Flights that one process flies before it tells of them.

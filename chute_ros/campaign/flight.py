@@ -10,7 +10,15 @@ from chute_ros.campaign.device_node import Acted
 from chute_ros.campaign.person import Call
 from chute_ros.campaign.rig import Rig
 from chute_ros.campaign.rocket import RocketRig
-from chute_ros.campaign.scenario import ClockJump, Fault, Scenario, Stop, Vehicle, WayFault
+from chute_ros.campaign.scenario import (
+    ClockJump,
+    Fault,
+    HomeMove,
+    Scenario,
+    Stop,
+    Vehicle,
+    WayFault,
+)
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import Truth
 from chute_ros.model import Action, Decision
@@ -59,6 +67,14 @@ class Flown:
     answer: str = ""
     #: When less than half of its weight last carried it in its fall.
     light_until: float = math.nan
+    #: When a second parachute came out, as the first one did not carry; when that was in time.
+    released_another: float = math.nan
+    another: Truth = Truth()
+    #: When the autopilot released a parachute that nobody had ordered.
+    opened_by_kill: float = math.nan
+    #: From when until when it fell past the height of its take-off, high above the ground.
+    unclear: tuple[float, float] = (math.nan, math.nan)
+    alarmed: tuple[tuple[float, str], ...] = ()
 
 
 def _end_of(fault: Fault) -> float:
@@ -66,7 +82,7 @@ def _end_of(fault: Fault) -> float:
         return fault.spell.end
     if isinstance(fault, Stop):
         return fault.at + fault.lasts
-    return fault.at if isinstance(fault, ClockJump) else fault.end
+    return fault.at if isinstance(fault, (ClockJump, HomeMove)) else fault.end
 
 
 class Flight:
@@ -100,6 +116,8 @@ class Flight:
             rig.world.run(self._took_off + _UP_WITHIN, lambda: not math.isnan(self.up))
         if not math.isnan(self.up):
             last = max([scenario.failure_at, *map(_end_of, scenario.faults)])
+            if scenario.manoeuvre is not None:
+                last = max(last, scenario.manoeuvre.begin + scenario.manoeuvre.lasts + 2.0)
             last = max(
                 last, scenario.apogee_at + 1.0, scenario.person.at if scenario.person else 0.0
             )
@@ -150,11 +168,15 @@ class Flight:
         now = rig.world.now
         if now > rig.landed + 1.0:
             return True
-        if not math.isnan(rig.released):
+        if not math.isnan(rig.released) and self._is_carried():
             return now > max(
                 rig.released + _FOLLOWED_RELEASE, quiet if self.scenario.burn else 0.0
             )
         return now > quiet and not rig.truth.falls
+
+    def _is_carried(self) -> bool:
+        """By the canopy that is out; otherwise it falls on to the ground."""
+        return not self.rig.another.falls or not math.isnan(self.rig.released_another)
 
     def _flown(self) -> Flown:
         rig = self.rig
@@ -163,7 +185,8 @@ class Flight:
         again = sum(node.ordered_again for node in rig.nodes.values())
         for host in rig.supervisors:
             deploys = [at for at, one in host.decided if one.action is Action.DEPLOY]
-            again += sum(at > host.knew_release for at in deploys)
+            # Once it is known that the first one does not carry, the next one is for that.
+            again += sum(at > host.knew_release and not at >= rig.another.at for at in deploys)
         decided = sorted(
             (one for host in rig.supervisors for one in host.decided), key=lambda one: one[0]
         )
@@ -190,6 +213,11 @@ class Flight:
             rig.refused_at(),
             "" if answer is None else f"{answer.success}: {answer.message}",
             rig.light_until(),
+            rig.released_another,
+            rig.another,
+            rig.opened_by_kill(),
+            rig.unclear(),
+            tuple(sorted(one for host in rig.supervisors for one in host.alarmed)),
         )
 
 

@@ -6,7 +6,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from chute_ros.campaign.blind import Need, blinded, enough_time, misled
+from chute_ros.campaign.blind import Need, Seen, blinded, enough_time, misled
 from chute_ros.campaign.flight import Flown
 from chute_ros.campaign.scenario import Vehicle
 from chute_ros.campaign.truth import SOFT, SOFT_UNDER_DROGUE
@@ -15,6 +15,10 @@ from chute_ros.model import Action
 _REFUSED = "the only parachute refused: by the wrong height that it was told, it stood"
 #: What a person orders has happened by then, s.
 _PERSON_WAITS = 6.0
+#: Lower than this nothing is released, m above take-off.
+_LOWEST = 10.0
+#: A canopy that is out must carry within this, or an alarm and the next parachute follow, s.
+_CARRIES_WITHIN = 3.0
 
 
 class Count(enum.Enum):
@@ -58,7 +62,13 @@ def judge(flown: Flown) -> Judged:
     """The gravest that is true of it."""
     if flown.grounded:
         return Judged(Count.GROUNDED, flown.grounded)
-    return _never(flown) or _fallen(flown) or _ordered(flown) or Judged(Count.RIGHT)
+    return (
+        _never(flown)
+        or _fallen(flown)
+        or _not_carried(flown)
+        or _ordered(flown)
+        or Judged(Count.RIGHT)
+    )
 
 
 def _never(flown: Flown) -> Judged | None:
@@ -79,6 +89,10 @@ def _never(flown: Flown) -> Judged | None:
                 return Judged(Count.NOT_TOLD, lied)
             text = f"{one.decision.action.name} {one.at - flown.up:.2f} s after it was up"
             return Judged(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")
+    opened = flown.opened_by_kill
+    if opened < known or (not math.isnan(opened) and flown.release_height < _LOWEST):
+        text = f"a kill alone opened a parachute {opened - flown.up:.2f} s after it was up"
+        return Judged(Count.FALSE, f"{text}, at {flown.release_height:.1f} m")
     decided = [one.action for _, one in flown.decided if one.action in fires]
     if decided and decided[0] is Action.DEPLOY:
         return Judged(Count.OUT_OF_ORDER, "no kill was decided before the deploy")
@@ -106,13 +120,36 @@ def _fallen(flown: Flown) -> Judged | None:
     if not truth.leeway >= enough:
         return Judged(Count.NO_TIME, f"{truth.leeway:.2f} s were left (need {enough:g} s)")
     need = Need(truth.at, truth.latest)
-    if blind := blinded(scenario, flown.up, need, flown.told, flown.light_until):
+    if blind := blinded(scenario, flown.up, need, _seen(flown)):
         return Judged(Count.NOT_TOLD, blind)
     if flown.refused <= truth.latest:
         return Judged(Count.NOT_TOLD, _REFUSED)
     if math.isnan(flown.released):
         return Judged(Count.MISSED, f"{truth.leeway:.2f} s were left")
     return Judged(Count.LATE, f"{flown.released - truth.latest:.2f} s after the last moment")
+
+
+def _not_carried(flown: Flown) -> Judged | None:
+    """What came out does not carry: somebody must be told, and the next parachute must follow."""
+    scenario, out = flown.scenario, flown.released
+    if not flown.another.falls or flown.landing_speed <= SOFT:
+        return None
+    due = flown.another.at + _CARRIES_WITHIN
+    if blind := blinded(scenario, flown.up, Need(flown.another.at, due), _seen(flown)):
+        return Judged(Count.NOT_TOLD, blind)
+    if flown.landed < due:
+        return Judged(Count.NO_TIME, f"{flown.landed - out:.2f} s from its release to the ground")
+    if not any(out < at <= due for at, _ in flown.alarmed):
+        return Judged(Count.MISSED, "the canopy did not carry, and nobody was alarmed")
+    if scenario.vehicle is not Vehicle.BOTH or flown.released_another <= flown.another.latest:
+        return None
+    if flown.another.leeway < _CARRIES_WITHIN:
+        return Judged(Count.NO_TIME, f"{flown.another.leeway:.2f} s were left for another")
+    return Judged(Count.MISSED, "the canopy did not carry, and no other followed in time")
+
+
+def _seen(flown: Flown) -> Seen:
+    return Seen(flown.told, flown.light_until, flown.unclear)
 
 
 def _ordered(flown: Flown) -> Judged | None:
@@ -128,7 +165,7 @@ def _ordered(flown: Flown) -> Judged | None:
         done |= bool(kills) and kills[0] <= latest
     if done or latest - due < enough_time(scenario):
         return None
-    if blind := blinded(scenario, flown.up, Need(due, latest), flown.told):
+    if blind := blinded(scenario, flown.up, Need(due, latest), Seen(flown.told)):
         return Judged(Count.NOT_TOLD, blind)
     if person.does == "deploy" and flown.refused <= latest:
         return Judged(Count.NOT_TOLD, _REFUSED)

@@ -12,7 +12,14 @@ from chute_ros.campaign.bus import Plug
 from chute_ros.campaign.channel import Way
 from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.ros import Process, Ros
-from chute_ros.campaign.scenario import ClockJump, Fault, Scenario, Stalls, Stop, WayFault
+from chute_ros.campaign.scenario import (
+    ClockJump,
+    Fault,
+    Scenario,
+    Stalls,
+    Stop,
+    WayFault,
+)
 from chute_ros.campaign.second_source import SecondSource
 from chute_ros.campaign.sensors import SensorFault, Sensors
 from chute_ros.campaign.shipped import Shipped
@@ -43,6 +50,9 @@ class Rig(ABC):
         self._restart: dict[str, Callable[[float], None]] = {}
         self.truth = Truth()
         self.released = self.release_height = self.landed = self.landing_speed = math.nan
+        #: When a second parachute came out, as the first one did not carry; since when and until
+        #: when that would have helped.
+        self.released_another, self.another = math.nan, Truth()
         for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
             config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
             process = self.process(name)
@@ -112,15 +122,25 @@ class Rig(ABC):
         """When less than half of its weight last carried it in its fall, virtual s; NaN: never."""
         return math.nan
 
+    def opened_by_kill(self) -> float:
+        """When its autopilot released a parachute unordered, virtual s; NaN: never."""
+        return math.nan
+
+    def unclear(self) -> tuple[float, float]:
+        """From when until when it fell past the height at which it took off, and the ground was
+        elsewhere, virtual s; NaN: it did not."""
+        return math.nan, math.nan
+
     # -- faults ----------------------------------------------------------------------------------
 
     def plan(self, up: float) -> None:
         """From here on the scenario's times are known."""
         self.world.post(up + self.scenario.failure_at, self._fail)
         for fault in self.scenario.faults:
-            self._plan_one(fault, up)
+            self.plan_one(fault, up)
 
-    def _plan_one(self, fault: Fault, up: float) -> None:
+    def plan_one(self, fault: Fault, up: float) -> None:
+        """The subclass has those of the vehicle itself."""
         post = self.world.post
         if isinstance(fault, WayFault):
             self._way(fault.way).append(fault.spell.later(up))
@@ -131,7 +151,7 @@ class Rig(ABC):
         elif isinstance(fault, Stalls):
             chance = self.chance(f"stalls of {fault.who}")
             post(up + fault.begin, partial(self._stall, fault, up + fault.end, chance))
-        else:
+        elif isinstance(fault, Stop):
             post(up + fault.at, partial(self._stop, fault))
 
     def _fail(self, now: float) -> None:

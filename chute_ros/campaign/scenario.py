@@ -1,17 +1,18 @@
-"""One flight of a campaign, drawn from a seed: vehicle, wind, what fails, what else goes wrong."""
+"""One flight of a campaign: vehicle, wind, what fails, what else goes wrong (draw.py draws it)."""
 
 from __future__ import annotations
 
 import enum
-import random
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import dataclass
 
 from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.estimator import EstimatorFault
+from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.campaign.truth import SOFT
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
-
-KindT = TypeVar("KindT")
+from chute_ros.sim.flight import Descent
+from chute_ros.sim.home import Homing
 
 #: At most so many things go wrong besides the failure, and one more of a second source.
 MOST_FAULTS = 3
@@ -37,6 +38,9 @@ class Failure(enum.Enum):
     REBOOT = "the autopilot starts anew, and does not hold the vehicle"
     POWER = "the vehicle's power fails, and with it the autopilot"
     HANG = "the autopilot hangs, and the vehicle flies on"
+    SINK = "a part of its thrust is lost, and it sinks upright"
+    GLIDE = "its motor stops, and it glides"
+    STALL = "it stalls, spins or dives, and does not recover"
     NO_DROGUE = "the drogue does not come by itself at the apogee"
     FAULT = "the flight computer goes to Fault"
     COMPUTER_REBOOT = "the flight computer starts anew"
@@ -44,26 +48,8 @@ class Failure(enum.Enum):
     COMPUTER_SILENT = "the flight computer falls silent, and does its work"
 
 
-_LIKELY = {
-    Failure.NOTHING: 5,
-    Failure.MOTOR: 7,
-    Failure.REBOOT: 3,
-    Failure.POWER: 1,
-    Failure.HANG: 1,
-}
-_LIKELY_ROCKET = {
-    Failure.NOTHING: 4,
-    Failure.NO_DROGUE: 5,
-    Failure.FAULT: 3,
-    Failure.COMPUTER_REBOOT: 3,
-    Failure.COMPUTER_POWER: 1,
-    Failure.COMPUTER_SILENT: 1,
-}
-_VEHICLES = {Vehicle.MAVLINK: 4, Vehicle.UPF: 3, Vehicle.BOTH: 2, Vehicle.ROCKET: 2}
 PROFILES = ("multirotor", "fixed_wing", "rocket")
 
-_ROS_WAYS = ("to the supervisor", "from the supervisor")
-_STANDBY_WAYS = ("to the standby", "from the standby")
 #: Over which an autopilot tells.
 AUTOPILOT_WAYS = ("autopilot", "mavlink_parachute")
 #: The ways that a spell can lie on, and the processes and devices that can stop.
@@ -86,6 +72,7 @@ _SENSORS = {
     "speed": ("sticks", "drifts", "jumps", "noise", "zero"),
     "tilt": ("sticks", "jumps", "noise", "gone"),
     "force": ("sticks", "noise", "zero"),
+    "pressure": ("sticks", "drifts", "jumps", "noise", "gone"),
     "landed": ("lies",),
     "disarmed": ("lies",),
 }
@@ -96,15 +83,15 @@ _ROCKET_SENSORS = {
     "fix": ("lies",),
 }
 #: Of each source besides the autopilot.
-_SECOND_SENSORS = {
+SECOND_SENSORS = {
     IMU: {"tilt": _SENSORS["tilt"], "force": _SENSORS["force"]},
     ODOMETRY: {name: _SENSORS[name] for name in ("height", "speed", "tilt")},
 }
-#: So many aircraft have one, of so many of these one goes wrong, and so many fly as high as this,
-#: m: from there even the slowest rule is in time.
-_WITH_SECOND, _SECOND_FAULT, _WITH_SECOND_HIGH, _HIGH = 0.3, 0.4, 0.3, (120.0, 300.0)
-#: Heights are looked at for a second, of which the flight has settled for 0.3 s.
-_CARRIED_UNTIL = 0.7
+
+
+def sensors_of(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
+    """Of its autopilot or flight computer, and in which ways each may be wrong."""
+    return _ROCKET_SENSORS if vehicle is Vehicle.ROCKET else _SENSORS
 
 
 @dataclass(frozen=True)
@@ -145,7 +132,15 @@ class ClockJump:
     by: float
 
 
-Fault = WayFault | Stop | Stalls | ClockJump | SensorFault
+@dataclass(frozen=True)
+class HomeMove:
+    """Home is set anew in flight, so many m higher."""
+
+    at: float
+    by: float
+
+
+Fault = WayFault | Stop | Stalls | ClockJump | SensorFault | EstimatorFault | HomeMove
 
 
 @dataclass(frozen=True)
@@ -157,11 +152,35 @@ class Person:
 
 
 @dataclass(frozen=True)
+class Canopy:
+    """Of the parachute that comes out first: m/s under it, and s until it is open."""
+
+    speed: float = 5.0
+    opens: float = 1.2
+
+    @property
+    def carries(self) -> bool:
+        """It lands what hangs below it softly, if it opens in time."""
+        return self.speed <= SOFT
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """Whose it is shows in what it does besides flying. home_drift: m/s; releases: it orders the
+    release of a parachute itself when it terminates the flight; imus: accelerometers, 1 or 2."""
+
+    homing: Homing = Homing.STAYS
+    home_drift: float = 0.0
+    releases: bool = False
+    imus: int = 1
+
+
+@dataclass(frozen=True)
 class Scenario:
     """Times are s after an aircraft has stood at its height for 0.3 s, or a rocket was launched.
     Nothing goes wrong before that height or launch: what was drawn earlier (a negative time)
     begins there, and a stop then lasts as long from there. height (m), gusts (m/s^2), fall_speed
-    (m/s): of an aircraft; burn: of a rocket, s."""
+    (m/s): of an aircraft; burn: of a rocket, s; ground: under the flight, m above the take-off."""
 
     seed: int
     vehicle: Vehicle
@@ -182,6 +201,14 @@ class Scenario:
     person: Person | None = None
     #: Where the supervisor learns of the vehicle, as its node's parameter: the preferred first.
     vehicle_sources: tuple[str, ...] = (VEHICLE_STATE,)
+    ground: float = 0.0
+    #: What it is told to do besides hovering.
+    manoeuvre: Manoeuvre | None = None
+    #: How it comes down with its autopilot and without; None: it falls and tumbles.
+    descent: Descent | None = None
+    unheld: Descent | None = None
+    canopy: Canopy = Canopy()
+    autopilot: Autopilot = Autopilot()
 
     @property
     def second_sources(self) -> tuple[str, ...]:
@@ -192,118 +219,3 @@ class Scenario:
     def apogee_at(self) -> float:
         """About when the rocket turns over, s after its launch."""
         return self.burn * (1.0 + (_BURN - _GRAVITY) / _GRAVITY)
-
-
-def draw(seed: int) -> Scenario:
-    """The same for the same seed, on any machine."""
-    chance = random.Random(seed)
-    vehicle = _one_of(chance, _VEHICLES)
-    is_rocket = vehicle is Vehicle.ROCKET
-    failure = _one_of(chance, _LIKELY_ROCKET if is_rocket else _LIKELY)
-    burn = round(chance.uniform(1.5, 3.0), 2) if is_rocket else 0.0
-    apogee = Scenario(0, vehicle, "", 0.0, 0.0, 0.0, burn, failure, 0.0).apogee_at
-    failure_at = round(chance.uniform(0.5, apogee + 2.0 if is_rocket else 3.0), 3)
-    # Most of what goes wrong goes wrong around the failure; that is what hurts.
-    around = max(failure_at, apogee + 3.0) if is_rocket and chance.random() < 0.7 else failure_at
-    standby = chance.random() < 0.25
-    count = chance.choices((0, 1, 2, 3), (3, 4, 2, 1))[0]
-    drawn = Scenario(
-        seed,
-        vehicle,
-        "rocket" if is_rocket else chance.choice(PROFILES[:2]),
-        round(chance.choice((chance.uniform(12.0, 40.0), chance.uniform(40.0, 120.0))), 1),
-        round(chance.choice((0.0, chance.uniform(0.0, 2.0))), 2),
-        round(chance.uniform(18.0, 35.0), 1),
-        burn,
-        failure,
-        failure_at,
-        tuple(_fault(chance, vehicle, around, standby) for _ in range(count)),
-        standby,
-        aps=chance.random() < 0.5,
-        arms=is_rocket or chance.random() < 0.3,
-        person=_person(chance, apogee + 1.0),
-    )
-    # Drawn last: a flight without one stays as it was.
-    return drawn if is_rocket else _with_second_source(chance, drawn, around)
-
-
-def _one_of(chance: random.Random, likely: dict[KindT, int]) -> KindT:
-    return chance.choices(list(likely), list(likely.values()))[0]
-
-
-def _person(chance: random.Random, earliest: float) -> Person | None:
-    if chance.random() > 0.12:
-        return None
-    return Person(chance.choice(("deploy", "kill")), round(chance.uniform(0.5, 4.0) + earliest, 3))
-
-
-def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool) -> Fault:
-    begin = round(around + chance.uniform(-2.0, 2.0), 3)
-    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
-    end = round(begin + lasts, 3)
-    supervisors = ("supervisor", "standby") if standby else ("supervisor",)
-    kind = chance.choices(("way", "stop", "stalls", "clock", "sensor"), (9, 3, 1, 1, 4))[0]
-    if kind == "sensor":
-        sensors = _ROCKET_SENSORS if vehicle is Vehicle.ROCKET else _SENSORS
-        sensor = chance.choice(list(sensors))
-        how = chance.choice(sensors[sensor])
-        if vehicle is not Vehicle.ROCKET and sensor in ("height", "speed"):
-            # Being carried up, as no vehicle climbs, makes the heights tell nothing until then.
-            begin = max(begin, _CARRIED_UNTIL)
-            end = round(begin + lasts, 3)
-        return SensorFault(sensor, how, begin, end)
-    if kind == "stalls":
-        return Stalls(chance.choice(supervisors), begin, end, round(chance.uniform(0.05, 0.6), 3))
-    nodes = tuple(one for one in STOPPING[vehicle] if one in NODES)
-    if kind == "clock":
-        by = chance.choice((-1.0, 1.0)) * 10.0 ** chance.uniform(-1.0, 5.0)
-        return ClockJump(chance.choice((*supervisors, *nodes)), begin, round(by, 3))
-    if kind == "stop":
-        who = chance.choice((*supervisors, *supervisors, *STOPPING[vehicle]))
-        return Stop(who, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
-    ways = (*WAYS[vehicle], *_ROS_WAYS, *(_STANDBY_WAYS if standby else ()))
-    return WayFault(chance.choice(ways), _spell(chance, begin, end))
-
-
-def _with_second_source(chance: random.Random, drawn: Scenario, around: float) -> Scenario:
-    """The same, or with an IMU, odometry or both besides its autopilot."""
-    if chance.random() >= _WITH_SECOND:
-        return drawn
-    sources = chance.choice(((IMU,), (ODOMETRY,), (IMU, ODOMETRY)))
-    autopilot_first = chance.random() < 0.7
-    order = (VEHICLE_STATE, *sources) if autopilot_first else (*sources, VEHICLE_STATE)
-    faults = drawn.faults
-    if chance.random() < _SECOND_FAULT:
-        faults = (*faults, _second_fault(chance, chance.choice(sources), around))
-    high = chance.random() < _WITH_SECOND_HIGH
-    height = round(chance.uniform(*_HIGH), 1) if high else drawn.height
-    return replace(drawn, vehicle_sources=order, faults=faults, height=height)
-
-
-def _second_fault(chance: random.Random, source: str, around: float) -> Fault:
-    begin = round(around + chance.uniform(-2.0, 2.0), 3)
-    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
-    kind = chance.choices(("way", "stop", "sensor"), (2, 1, 3))[0]
-    if kind == "way":
-        return WayFault(source, _spell(chance, begin, round(begin + lasts, 3)))
-    if kind == "stop":
-        return Stop(source, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
-    sensor = chance.choice(list(_SECOND_SENSORS[source]))
-    how = chance.choice(_SECOND_SENSORS[source][sensor])
-    begin = max(begin, _CARRIED_UNTIL)
-    return SensorFault(sensor, how, begin, round(begin + lasts, 3), source)
-
-
-def _spell(chance: random.Random, begin: float, end: float) -> Spell:
-    strength = round(chance.uniform(0.05, 0.5), 3)
-    return chance.choice(
-        (
-            Spell(begin, end, loss=strength),
-            Spell(begin, end, loss=1.0),
-            Spell(begin, end, double=strength),
-            Spell(begin, end, corrupt=strength),
-            Spell(begin, end, delay=strength),
-            Spell(begin, end, reorder=strength),
-            Spell(begin, end, loss=1.0, flaps=round(chance.uniform(0.1, 1.2), 3)),
-        )
-    )

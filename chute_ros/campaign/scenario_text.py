@@ -8,10 +8,15 @@ from dataclasses import asdict
 from typing import Any
 
 from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.estimator import EstimatorFault
+from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.scenario import (
+    Autopilot,
+    Canopy,
     ClockJump,
     Failure,
     Fault,
+    HomeMove,
     Person,
     Scenario,
     Stalls,
@@ -21,11 +26,23 @@ from chute_ros.campaign.scenario import (
 )
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
+from chute_ros.sim.flight import Descent
+from chute_ros.sim.home import Homing
 
 #: Rises when what is written means something else.
 FORMAT = 1
 _FAULTS: dict[str, type[Any]] = {
-    one.__name__: one for one in (WayFault, Stop, Stalls, ClockJump, SensorFault)
+    one.__name__: one
+    for one in (WayFault, Stop, Stalls, ClockJump, SensorFault, EstimatorFault, HomeMove)
+}
+#: Fields that are parts of their own: none of them is told by null, or by being left out.
+_PARTS: dict[str, type[Any]] = {
+    "person": Person,
+    "manoeuvre": Manoeuvre,
+    "descent": Descent,
+    "unheld": Descent,
+    "canopy": Canopy,
+    "autopilot": Autopilot,
 }
 
 
@@ -33,6 +50,7 @@ def text_of(scenario: Scenario, was: str) -> str:
     """As JSON. was: what became of it, in words."""
     values = asdict(scenario)
     values["vehicle"], values["failure"] = scenario.vehicle.name, scenario.failure.name
+    values["autopilot"]["homing"] = scenario.autopilot.homing.name
     values["faults"] = [{"kind": type(one).__name__, **_short(one)} for one in scenario.faults]
     return json.dumps({"format": FORMAT, "was": was, "scenario": values}, indent=2) + "\n"
 
@@ -49,7 +67,12 @@ def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
         values["faults"] = tuple(map(_fault, values["faults"]))
         if "vehicle_sources" in values:
             values["vehicle_sources"] = tuple(values["vehicle_sources"])
-        values["person"] = Person(**values["person"]) if values["person"] else None
+        if "autopilot" in values:
+            homing = Homing[values["autopilot"]["homing"]]
+            values["autopilot"] = {**values["autopilot"], "homing": homing}
+        for name, kind in _PARTS.items():
+            if values.get(name) is not None:
+                values[name] = kind(**values[name])
         return Scenario(**values), str(whole["was"])
     except (KeyError, TypeError, ValueError) as error:
         kind = type(error).__name__

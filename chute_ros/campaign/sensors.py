@@ -7,10 +7,10 @@ import math
 import random
 from dataclasses import dataclass, replace
 
-#: The noise of one that is whole, standard deviation: m, m/s, rad, m/s^2.
-_NOISE = {"height": 0.15, "speed": 0.08, "tilt": 0.01, "force": 0.15}
-#: How much each is wrong: m, m/s, rad, m/s^2.
-_SCALES = {"height": 30.0, "speed": 15.0, "tilt": math.pi, "force": 20.0}
+#: The noise of one that is whole, standard deviation: m, m/s, rad, m/s^2, m.
+_NOISE = {"height": 0.15, "speed": 0.08, "tilt": 0.01, "force": 0.15, "pressure": 0.3}
+#: How much each is wrong: m, m/s, rad, m/s^2, m.
+_SCALES = {"height": 30.0, "speed": 15.0, "tilt": math.pi, "force": 20.0, "pressure": 30.0}
 
 
 @dataclass(frozen=True)

@@ -84,6 +84,8 @@ class SupervisorHost:
         #: When each decision was first made, in their order.
         self.decided: list[tuple[float, Decision]] = []
         self.said: list[tuple[float, str]] = []
+        #: Those of them that were alarms.
+        self.alarmed: list[tuple[float, str]] = []
         #: When it was first told that a parachute is out.
         self.knew_release = math.nan
         self._kept: State | None = None
@@ -229,6 +231,8 @@ class SupervisorHost:
                 self._ros.publish(self.process, output.decision)
             elif isinstance(output, i.Say):
                 self.said.append((now, output.text))
+                if output.alarm:
+                    self.alarmed.append((now, output.text))
             elif isinstance(output, i.Finish):
                 caller = self._callers.pop(output.token, None)
                 if caller is not None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.scenario import AUTOPILOT_WAYS, Failure, Scenario, Stop, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 
 _SENSORS = {
-    VEHICLE_STATE: ("height", "speed", "tilt", "force"),
+    VEHICLE_STATE: ("height", "speed", "tilt", "force", "pressure", "estimator"),
     ODOMETRY: ("height", "speed", "tilt"),
     IMU: ("tilt", "force"),
 }
@@ -19,7 +20,7 @@ def outlives(scenario: Scenario) -> bool:
     return scenario.failure is Failure.POWER and bool(scenario.second_sources)
 
 
-def may_count(scenario: Scenario, fault: SensorFault) -> bool:
+def may_count(scenario: Scenario, fault: SensorFault | EstimatorFault) -> bool:
     """What this sensor says may be told to the supervisor: its source is the preferred one of
     those that know it, or one that is preferred falls silent at some time."""
     teller = fault.source or VEHICLE_STATE

@@ -17,6 +17,8 @@ STEP = 0.02  # s
 SOFT = 6.5
 #: The same of a rocket under its drogue, whose main may fail as well.
 SOFT_UNDER_DROGUE = 31.0
+#: Of a parachute that carries, m/s.
+_CARRIES = FlightModel.canopy_speed
 #: The release may be put off by so much, s, and that is found to this.
 _LONGEST_FALL, _GRAIN = 60.0, 0.02
 
@@ -42,7 +44,7 @@ class Truth:
 
 
 def observe(model: FlightModel, now: float) -> Truth:
-    """Nothing carries the aircraft from now on."""
+    """Nothing carries the aircraft from now on, nor does a canopy that is out already."""
     return Truth(now, now + _latest(_fall_of(model), SOFT), model.height)
 
 
@@ -78,9 +80,19 @@ def _fall_of(model: FlightModel) -> _Fall:
     one = FlightModel(
         **{name: copy.copy(getattr(model, name)) for name in FlightModel.__dataclass_fields__}
     )
-    one.armed = False
+    if not math.isnan(one.released_for) and one.canopy_speed <= SOFT:
+        one.canopy_speed = one.fall_speed
+
+    def release() -> None:
+        # Its motors are stopped first. A parachute that does not carry is not meant here.
+        one.armed = False
+        if one.canopy_speed > SOFT:
+            one.release_another(_CARRIES)
+        else:
+            one.release()
+
     # Once it is as slow as that it will not become faster again.
-    return _Fall(one, one.release, lambda: one.canopy >= 1.0 and -one.vertical_speed <= SOFT)
+    return _Fall(one, release, lambda: one.canopy >= 1.0 and -one.vertical_speed <= SOFT)
 
 
 def _fall_of_rocket(rocket: Rocket) -> _Fall:

@@ -8,10 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from chute_ros.campaign.estimator import Estimator
+from chute_ros.campaign.manoeuvre import Manoeuvre, Motion
 from chute_ros.campaign.sensors import Sensors
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
 from chute_ros.sim.flight import GRAVITY, FlightModel
+from chute_ros.sim.mavlink_device import Params
 
 #: Gusts change within about this time, s.
 _GUST_TIME = 1.0
@@ -26,11 +29,20 @@ class WindyModel(FlightModel):
 
     gusts: float = 0.0
     chance: random.Random = field(default_factory=random.Random)
+    #: What it flies now, and since when, s.
+    manoeuvre: Manoeuvre | None = None
+    flown_for: float = 0.0
     _gust: float = 0.0
     _sway: float = 0.0
 
     def step(self, dt: float) -> None:
-        """Move on; the wind pushes whatever is in the air."""
+        """Move on; the wind pushes whatever is in the air and does not fly a manoeuvre."""
+        flown = self._manoeuvre(dt)
+        if flown is not None:
+            self.vertical_speed, self.roll, self.acceleration = flown
+            self.height += self.vertical_speed * dt
+            self.target_height = self.height
+            return
         if self.gusts and not self.on_ground:
             share = dt / _GUST_TIME
             push = self.chance.gauss(0.0, self.gusts * math.sqrt(2.0 * share))
@@ -39,6 +51,17 @@ class WindyModel(FlightModel):
             self._sway = math.radians(3.0) * self._gust
         super().step(dt)
 
+    def _manoeuvre(self, dt: float) -> Motion | None:
+        """What it is told to fly; whoever is out of control does not."""
+        if self.manoeuvre is None or not self.controlled:
+            self.manoeuvre = None
+            return None
+        flown = self.manoeuvre.at(self.flown_for)
+        self.flown_for += dt
+        if flown is None:
+            self.manoeuvre = None
+        return flown
+
     def _turn(self, dt: float) -> None:
         super()._turn(dt)
         if self.armed and not self.motors_failed and not self.on_ground:
@@ -46,10 +69,11 @@ class WindyModel(FlightModel):
 
 
 class Nature:
-    """Moves the vehicle on, whoever hangs or has no power. moved: called after each step."""
+    """Moves the vehicle on, whoever hangs or has no power. ground: under it once it is up, m above
+    its take-off; moved: called after each step."""
 
-    def __init__(self, model: FlightModel, moved: Callable[[float], None]) -> None:
-        self.model, self._moved = model, moved
+    def __init__(self, model: FlightModel, ground: float, moved: Callable[[float], None]) -> None:
+        self.model, self._ground, self._moved = model, ground, moved
         self._at = STEP
         #: It is being carried to its height.
         self.lifts = False
@@ -62,6 +86,8 @@ class Nature:
             model.height = min(model.target_height, model.height + _LIFT * STEP)
             model.vertical_speed = 0.0
             self.lifts = model.height < model.target_height
+            if not self.lifts:
+                model.ground = self._ground
         else:
             model.step(STEP)
         self._moved(now)
@@ -72,11 +98,16 @@ class Nature:
 
 
 class CampaignAutopilot(AutopilotDevice):
-    """Tells what its sensors say; nature moves the vehicle."""
+    """Tells what its estimator and its sensors say; nature moves the vehicle."""
 
     def __init__(self, model: FlightModel, sensors: Sensors) -> None:
         super().__init__(1, [], model)
         self._sensors = sensors
+        self.estimator = Estimator()
+        self._told = 0.0
+        #: It orders the release of a parachute itself when it terminates the flight; when it did.
+        self.releases = False
+        self.released_at = math.nan
 
     def step(self, now: float) -> None:
         """Nature does."""
@@ -86,14 +117,24 @@ class CampaignAutopilot(AutopilotDevice):
 
     def _global_position_int(self) -> Any:
         message: Any = super()._global_position_int()
-        height = self._sensors.read("height", self.model.height, self.now)
-        speed = self._sensors.read("speed", self.model.vertical_speed, self.now)
-        message.relative_alt, message.vz = int(height * 1000.0), int(speed * -100.0)
+        picture = self.estimator.picture(self.model, self.now)
+        height = self._told = self._sensors.read("height", picture.height, self.now)
+        speed = self._sensors.read("speed", picture.vertical_speed, self.now)
+        message.relative_alt = int((height - self.home.offset) * 1000.0)
+        message.alt = int((height + self.home.altitude) * 1000.0)
+        message.vz = int(speed * -100.0)
         return message
+
+    def _height_error(self) -> float:
+        return self.model.height - self._told
+
+    def _pressure_height(self) -> float:
+        return self._sensors.read("pressure", self.model.height, self.now)
 
     def _attitude(self) -> Any:
         message: Any = super()._attitude()
-        message.roll = self._sensors.read("tilt", self.model.roll, self.now)
+        roll = self.estimator.picture(self.model, self.now).roll
+        message.roll = self._sensors.read("tilt", roll, self.now)
         return message
 
     def _scaled_imu(self) -> Any:
@@ -113,3 +154,13 @@ class CampaignAutopilot(AutopilotDevice):
         if self._sensors.lies("disarmed", self.now):
             message.base_mode = 0
         return message
+
+    def _terminate(self, params: Params) -> int:
+        result = super()._terminate(params)
+        if self.releases and result == dialect.MAV_RESULT_ACCEPTED:
+            self.released_at = self.now
+            release, parachute = dialect.PARACHUTE_RELEASE, dialect.MAV_COMP_ID_PARACHUTE
+            command = (self.system_id, parachute, dialect.MAV_CMD_DO_PARACHUTE, 0)
+            nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            self.send(dialect.MAVLink_command_long_message(*command, float(release), *nothing))
+        return result

@@ -11,25 +11,24 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.goals import FORCE_DISARM
 from chute_ros.sim.acting import number_of
+from chute_ros.sim.autopilot_telemetry import HOME_LATITUDE, HOME_LONGITUDE, AutopilotTelemetry
 from chute_ros.sim.flight import GRAVITY, FlightModel
-from chute_ros.sim.mavlink_device import MavlinkDevice, Params
+from chute_ros.sim.mavlink_device import Params
 
 STEP = 0.02  # s
-_HOME_LATITUDE, _HOME_LONGITUDE = 474000000, 85000000  # degrees * 1e7
 _MOTOR, _OFF = float(dialect.FAILURE_UNIT_SYSTEM_MOTOR), float(dialect.FAILURE_TYPE_OFF)
 
 
-class AutopilotDevice(MavlinkDevice):
+class AutopilotDevice(AutopilotTelemetry):
     """One vehicle."""
 
     def __init__(
         self, system_id: int, script: list[tuple[float, str]], model: FlightModel | None = None
     ) -> None:
-        super().__init__(system_id, 1, script)
-        self.model = model or FlightModel()
+        super().__init__(system_id, script, model or FlightModel())
         self.terminated = False
         self._stepped_to = math.nan
-        self.streams = {
+        own = {
             dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
             dialect.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_sys_state,
@@ -38,8 +37,9 @@ class AutopilotDevice(MavlinkDevice):
             dialect.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
             dialect.MAVLINK_MSG_ID_SCALED_IMU: self._scaled_imu,
         }
+        self.streams |= own
         # Attitude and acceleration only on request, as many autopilots are delivered.
-        self.default_intervals = dict.fromkeys(self.streams, 1.0)
+        self.default_intervals |= dict.fromkeys(own, 1.0)
         self.default_intervals[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT] = 0.2
         self.default_intervals[dialect.MAVLINK_MSG_ID_ATTITUDE] = math.inf
         self.default_intervals[dialect.MAVLINK_MSG_ID_SCALED_IMU] = math.inf
@@ -153,13 +153,14 @@ class AutopilotDevice(MavlinkDevice):
         return dialect.MAVLink_sys_status_message(0, 0, 0, 100, 15800, -1, 87, 0, 0, 0, 0, 0, 0)
 
     def _global_position_int(self) -> object:
-        height_mm = int(self.model.height * 1000.0)
+        home, height = self.home, self.model.height
+        home.follow(self.model, self.now)
         return dialect.MAVLink_global_position_int_message(
             self.boot_ms(),
-            _HOME_LATITUDE,
-            _HOME_LONGITUDE,
-            400_000 + height_mm,
-            height_mm,
+            HOME_LATITUDE,
+            HOME_LONGITUDE,
+            int((home.altitude + height) * 1000.0),
+            int((height - home.offset) * 1000.0),
             0,
             0,
             int(-self.model.vertical_speed * 100.0),

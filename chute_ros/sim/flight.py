@@ -1,7 +1,8 @@
-"""Vertical motion of a small multirotor: climb, hover, motor failure, fall, descent under canopy.
+"""Vertical motion of a small aircraft: climb, hover, motor failure, fall, descent under canopy.
 
 A point mass with quadratic drag. Not an aerodynamic model: enough for heights, speeds and times to
-mean something. SI units, up positive, time in s.
+mean something. What comes down otherwise than as a tumbling multirotor has a Descent. SI units, up
+positive, time in s.
 """
 
 from __future__ import annotations
@@ -10,6 +11,23 @@ import math
 from dataclasses import dataclass
 
 GRAVITY = 9.80665  # m/s^2
+#: The most that a descent turns to its tilt, rad/s.
+_TURN_RATE = 1.6
+
+
+@dataclass(frozen=True)
+class Descent:
+    """How something comes down that does not tumble: partial thrust, a glide, a spin.
+
+    sink: m/s downwards in the end; settles: time constant to it, s; tilt: rad; force: specific
+    force in the end, m/s^2.
+    """
+
+    name: str
+    sink: float
+    settles: float = 1.0
+    tilt: float = 0.0
+    force: float = GRAVITY
 
 
 @dataclass
@@ -36,11 +54,34 @@ class FlightModel:
     released_for: float = math.nan
     #: Specific force (what an accelerometer measures), m/s^2.
     acceleration: float = GRAVITY
+    #: The ground under it, m above where it took off: negative beside a roof, over a valley.
+    ground: float = 0.0
+    #: How it comes down once its motors have failed while it is armed, and once it is disarmed;
+    #: None: it falls and tumbles.
+    descent: Descent | None = None
+    unheld: Descent | None = None
 
     @property
     def on_ground(self) -> bool:
         """It stands."""
-        return self.height <= 0.0
+        return self.height <= self.ground
+
+    @property
+    def clearance(self) -> float:
+        """Above the ground under it, m."""
+        return self.height - self.ground
+
+    @property
+    def controlled(self) -> bool:
+        """It does what it is told to."""
+        return self.armed and not self.motors_failed and not self.on_ground
+
+    @property
+    def way_down(self) -> Descent | None:
+        """Of one in the air that nothing carries; None: it is carried, or falls and tumbles."""
+        if self.on_ground or self.controlled or self.canopy > 0.0:
+            return None
+        return self.descent if self.armed else self.unheld
 
     @property
     def canopy(self) -> float:
@@ -54,17 +95,25 @@ class FlightModel:
         if math.isnan(self.released_for):
             self.released_for = 0.0
 
+    def release_another(self, canopy_speed: float) -> None:
+        """A second parachute leaves its pod; m/s under its canopy."""
+        self.canopy_speed, self.released_for = canopy_speed, 0.0
+
     def step(self, dt: float) -> None:
         """Move on by dt, 0 to 0.1 s."""
         if not math.isnan(self.released_for):
             self.released_for += dt
-        thrust = self._thrust(dt)
-        drag = self._drag()
-        self.vertical_speed += (thrust + drag - GRAVITY) * dt
+        way = self.way_down
+        if way is None:
+            carried = self._thrust(dt) + self._drag()
+            gained, self.acceleration = carried - GRAVITY, abs(carried)
+        else:
+            gained = (-way.sink - self.vertical_speed) / max(way.settles, dt)
+            self.acceleration = max(0.0, way.force + gained)
+        self.vertical_speed += gained * dt
         self.height += self.vertical_speed * dt
-        self.acceleration = abs(thrust + drag)
-        if self.height <= 0.0:
-            self.height, self.vertical_speed = 0.0, max(0.0, self.vertical_speed)
+        if self.height <= self.ground:
+            self.height, self.vertical_speed = self.ground, max(0.0, self.vertical_speed)
             self.acceleration = GRAVITY
         self._turn(dt)
 
@@ -78,15 +127,19 @@ class FlightModel:
         """Acceleration by the motors: fly to the target height at the climb speed."""
         if not self.armed or self.motors_failed:
             return 0.0
-        if self.on_ground and self.target_height <= 0.0:
+        if self.on_ground and self.target_height <= self.ground:
             return 0.0
         wanted = self.target_height - self.height
         speed = max(-2.0, min(self.climb_speed, wanted))
         return max(0.0, min(2.0 * GRAVITY, GRAVITY + 3.0 * (speed - self.vertical_speed)))
 
     def _turn(self, dt: float) -> None:
+        way = self.way_down
         if self.on_ground or (self.armed and not self.motors_failed):
             self.roll = 0.0
+        elif way is not None:
+            most = _TURN_RATE * dt
+            self.roll += max(-most, min(most, way.tilt - self.roll))
         elif self.canopy > 0.0:
             self.roll = math.copysign(max(0.0, abs(self.roll) - 2.0 * dt), self.roll)
         else:

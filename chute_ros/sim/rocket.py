@@ -9,28 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from chute_ros.sim.air import Air, air_at
+
 GRAVITY = 9.80665  # m/s^2
 #: Longest step of the integration, s; a longer one is divided.
 _STEP = 0.02
 _METRES_PER_DEGREE = 111_320.0
-
-
-@dataclass(frozen=True)
-class Air:
-    """The standard atmosphere at one height. temperature: K, pressure: Pa, density: kg/m^3."""
-
-    temperature: float
-    pressure: float
-    density: float
-
-
-def air_at(altitude: float) -> Air:
-    """The standard atmosphere this many metres above the sea, up to 11 km."""
-    temperature = 288.15 - 0.0065 * max(-1000.0, min(11_000.0, altitude))
-    pressure = 101_325.0 * (temperature / 288.15) ** 5.255876
-    return Air(temperature, pressure, pressure / (287.053 * temperature))
-
-
 _SEA_LEVEL_DENSITY = air_at(0.0).density
 
 

@@ -15,11 +15,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.campaign import campaign, kept_tally
+from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.rare import OfEach, rare
-from chute_ros.campaign.scenario import Scenario, draw
+from chute_ros.campaign.scenario import Scenario
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.tellers import outlives
 from chute_ros.errors import RecordError

@@ -9,6 +9,8 @@ from campaign_bench import FOLDER, SHIPPED, fired, flown, rocket, scenario
 
 from chute_ros.campaign import campaign
 from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.draw import draw
+from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.flight import Flight, fly
 from chute_ros.campaign.judge import Count, judge
 from chute_ros.campaign.scenario import (
@@ -16,15 +18,18 @@ from chute_ros.campaign.scenario import (
     PROFILES,
     ClockJump,
     Failure,
+    HomeMove,
     Person,
+    Scenario,
     Stalls,
     Stop,
     Vehicle,
     WayFault,
-    draw,
 )
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.campaign.truth import SOFT
 from chute_ros.model import Action
+from chute_ros.sim.home import Homing
 
 AIRCRAFT = (Vehicle.MAVLINK, Vehicle.UPF, Vehicle.BOTH)
 UNBRAKED = (Failure.NO_DROGUE, Failure.FAULT, Failure.COMPUTER_REBOOT)
@@ -186,14 +191,41 @@ def test_every_scenario_is_drawn_within_its_bounds() -> None:
     assert {one.profile for one in every} == set(PROFILES)
     assert {one.failure for one in every} == set(Failure)
     alone = [one for one in every if not one.second_sources]
-    assert {len(one.faults) for one in alone} == set(range(MOST_FAULTS + 1))
-    assert {len(one.faults) for one in every} == set(range(MOST_FAULTS + 2))
+    assert {faults(one) for one in alone} == set(range(MOST_FAULTS + 1))
+    assert {faults(one) for one in every} == set(range(MOST_FAULTS + 2))
     assert {type(fault) for one in every for fault in one.faults} == {
-        *(WayFault, Stop, Stalls, ClockJump, SensorFault)
+        *(WayFault, Stop, Stalls, ClockJump, SensorFault, EstimatorFault, HomeMove)
     }
-    assert all(12.0 <= one.height <= 120.0 for one in alone)
-    assert all(12.0 <= one.height <= 300.0 for one in every)
+    assert all(12.0 <= one.height - min(one.ground, 0.0) <= 430.0 for one in every)
     assert repr(every[7]) == repr(draw(7))
+
+
+def faults(one: Scenario) -> int:
+    """Home that is set anew is no fault."""
+    return sum(not isinstance(fault, HomeMove) for fault in one.faults)
+
+
+def test_every_world_is_drawn() -> None:
+    every = [draw(seed) for seed in range(3000)]
+    flown = [one.manoeuvre.kind for one in every if one.manoeuvre]
+    assert set(flown) == {"flip", "throw", "dive", "descent"}
+    wrong = [f for one in every for f in one.faults if isinstance(f, EstimatorFault)]
+    assert {one.how for one in wrong} == {"diverges", "leans", "hovers"}
+    assert {one.autopilot.homing for one in every} == set(Homing)
+    assert {one.autopilot.releases for one in every} == {False, True}
+    assert {one.autopilot.imus for one in every} == {1, 2}
+    grounds = [one.ground for one in every]
+    assert min(grounds) < -60.0 < 0.0 < max(grounds)
+    assert grounds.count(0.0) > len(every) / 2
+    assert len({one.descent.name for one in every if one.failure is Failure.STALL}) == 6
+    for one in every:
+        glides = one.failure is Failure.GLIDE
+        assert not glides or one.descent.sink < SOFT < one.unheld.sink
+        sinks = one.failure in (Failure.SINK, Failure.STALL)
+        assert not sinks or one.descent.sink > SOFT
+        own = one.profile == "fixed_wing" and one.failure is not Failure.MOTOR
+        assert (one.unheld is not None) is own, "an aeroplane does not tumble"
+    assert {one.canopy.carries for one in every} == {False, True}
 
 
 def test_a_campaign_counts_every_flight_once() -> None:

@@ -8,13 +8,15 @@ from dataclasses import replace
 import pytest
 from campaign_bench import SHIPPED, fired, flown, rocket, scenario
 
-from chute_ros.campaign.blind import Need, blinded
+from chute_ros.campaign.blind import Need, Seen, blinded, enough_time
 from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, judge
 from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import Truth
+from chute_ros.sim.flight import Descent
 
 
 @pytest.fixture(scope="module")
@@ -162,10 +164,10 @@ def test_what_falls_like_one_that_flies_well_cannot_be_known(
     """Given an autopilot that lost its power at 1 s, and the ground at 8 s."""
     lies = SensorFault(sensor, how, 1.5, 6.0, "imu")
     alone = scenario(Failure.POWER, lies, vehicle_sources=sources)
-    assert blinded(alone, 0.0, Need(1.0, 8.0), light_until=light_until) == cause
+    assert blinded(alone, 0.0, Need(1.0, 8.0), Seen(light_until=light_until)) == cause
     # An autopilot that has its power tells more.
     told = replace(alone, failure=Failure.MOTOR)
-    assert blinded(told, 0.0, Need(1.0, 8.0), light_until=light_until) == ""
+    assert blinded(told, 0.0, Need(1.0, 8.0), Seen(light_until=light_until)) == ""
 
 
 @pytest.mark.parametrize(("how", "cause"), [("jumps", LEFT), ("gone", "")])
@@ -175,6 +177,69 @@ def test_what_lied_a_moment_ago_may_lie_again(how: str, cause: str) -> None:
     assert blinded(alone, 0.0, Need(1.0, 8.0)) == cause
     # Ten seconds later it is taken at its word.
     assert blinded(alone, 0.0, Need(1.0, 16.0)) == ""
+
+
+SINKS = Descent("partial thrust", 8.0, settles=2.0)
+
+
+@pytest.mark.parametrize(
+    ("fault", "way", "is_hidden"),
+    [
+        (EstimatorFault("hovers", 0.5, 20.0), SINKS, True),
+        (SensorFault("pressure", "jumps", 0.5, 20.0), SINKS, True),
+        # It is gone and denies nothing; there is time enough after it; the attitude tells it, too.
+        (SensorFault("pressure", "gone", 0.5, 20.0), SINKS, False),
+        (EstimatorFault("hovers", 0.5, 2.0), SINKS, False),
+        (EstimatorFault("hovers", 0.5, 20.0), replace(SINKS, tilt=1.2), False),
+        # Height and speed are two of the estimator's, and the pressure is a third.
+        (SensorFault("speed", "zero", 0.5, 20.0), SINKS, False),
+    ],
+)
+def test_a_level_sink_that_one_tells_and_one_denies_cannot_be_known(fault, way, is_hidden) -> None:
+    sinks = scenario(Failure.SINK, fault, descent=way)
+    assert bool(blinded(sinks, 0.0, Need(1.0, 12.0))) is is_hidden
+
+
+def test_what_sinks_slowly_is_known_once_it_is_faster_than_softly() -> None:
+    plain, sinks = scenario(Failure.MOTOR), scenario(Failure.SINK, descent=SINKS)
+    assert enough_time(sinks) == pytest.approx(enough_time(plain) + 3.35, abs=0.05)
+
+
+def test_past_the_height_of_its_take_off_nobody_knows_where_the_ground_is() -> None:
+    past = Seen(unclear=(1.0, 3.5))
+    assert blinded(scenario(Failure.MOTOR), 0.0, Need(1.0, 5.0), past).startswith("it fell past")
+    assert blinded(scenario(Failure.MOTOR), 0.0, Need(1.0, 6.0), past) == ""
+
+
+def test_a_kill_that_opens_a_parachute_where_none_may_open_is_false(good: Flown) -> None:
+    opened = replace(good, opened_by_kill=good.truth.at + 0.1)
+    assert judge(opened).count is Count.RIGHT
+    assert judge(replace(opened, release_height=8.0)).count is Count.FALSE
+    assert judge(replace(opened, opened_by_kill=good.truth.at - 0.1)).count is Count.FALSE
+
+
+def test_a_canopy_that_does_not_carry_wants_an_alarm_and_the_next_parachute(good: Flown) -> None:
+    falls = Truth(good.released + 2.0, good.released + 5.5, 40.0)
+    hard = replace(good, another=falls, landed=good.released + 7.0, landing_speed=22.0)
+    assert judge(hard).why == "the canopy did not carry, and nobody was alarmed"
+    alarmed = replace(hard, alarmed=((good.released + 3.0, "it falls on"),))
+    assert judge(alarmed).count is Count.RIGHT, "there is no other"
+    both = replace(alarmed, scenario=replace(good.scenario, vehicle=Vehicle.BOTH))
+    assert judge(both).why == "the canopy did not carry, and no other followed in time"
+    assert judge(replace(both, released_another=good.released + 4.0)).count is Count.RIGHT
+    late = replace(both, another=replace(falls, latest=falls.at + 1.0))
+    assert judge(late).count is Count.NO_TIME
+    assert judge(replace(hard, landed=good.released + 3.0)).count is Count.NO_TIME
+    assert judge(replace(hard, landing_speed=5.0)).count is Count.RIGHT, "it opened in the end"
+
+
+def test_one_that_glides_does_not_fall_and_one_whose_autopilot_is_gone_does() -> None:
+    glide, dive = Descent("glide", 3.0, 1.5, 0.1), Descent("spiral dive", 16.0, 2.5, 1.2, 20.0)
+    body = {"profile": "fixed_wing", "descent": glide, "unheld": dive}
+    glides = flown(Failure.GLIDE, **body)
+    assert not glides.truth.falls
+    assert judge(glides).count is Count.RIGHT
+    assert flown(Failure.REBOOT, **body).truth.falls
 
 
 def test_a_fall_is_light_until_drag_carries_half_of_it() -> None:
@@ -189,11 +254,11 @@ def test_where_no_line_of_a_flight_computer_came_whole_nothing_was_told() -> Non
     falls = rocket(Failure.NO_DROGUE)
     often = [n * 0.9 for n in range(-10, 10)]
     rests = [at for at in often if not 2.0 < at < 5.0]
-    assert blinded(falls, 0.0, need, often) == ""
-    assert blinded(falls, 0.0, need, rests) == cause
+    assert blinded(falls, 0.0, need, Seen(often)) == ""
+    assert blinded(falls, 0.0, need, Seen(rests)) == cause
     assert blinded(falls, 0.0, need) == cause
     # Before it there was time enough.
-    assert blinded(falls, 0.0, Need(-6.0, 8.0), rests) == ""
+    assert blinded(falls, 0.0, Need(-6.0, 8.0), Seen(rests)) == ""
     # Of an aircraft nobody asks for lines.
     assert blinded(scenario(Failure.MOTOR), 0.0, need) == ""
 

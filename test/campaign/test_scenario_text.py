@@ -8,7 +8,8 @@ import pytest
 from campaign_bench import scenario
 
 from chute_ros.campaign.channel import Spell
-from chute_ros.campaign.scenario import Failure, Person, WayFault, draw
+from chute_ros.campaign.draw import draw
+from chute_ros.campaign.scenario import Failure, Person, WayFault
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError

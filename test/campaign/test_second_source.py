@@ -8,12 +8,13 @@ from dataclasses import replace
 import pytest
 from campaign_bench import SHIPPED, fired, flown, scenario
 
-from chute_ros.campaign import scenario as drawing
+from chute_ros.campaign import draw as drawing
 from chute_ros.campaign.blind import Need, blinded
 from chute_ros.campaign.channel import Spell
+from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flight
 from chute_ros.campaign.judge import Count, judge
-from chute_ros.campaign.scenario import Failure, Scenario, Stop, Vehicle, WayFault, draw
+from chute_ros.campaign.scenario import Failure, Scenario, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 

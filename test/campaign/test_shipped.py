@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 from campaign_bench import SHIPPED
 
-from chute_ros.campaign.scenario import Vehicle, draw
+from chute_ros.campaign.draw import draw
+from chute_ros.campaign.scenario import Vehicle
 from chute_ros.nodes import (
     mavlink_parameters,
     supervisor_parameters,

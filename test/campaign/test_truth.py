@@ -12,7 +12,7 @@ from chute_ros.campaign.truth import (
     observe_rocket,
     touchdown_speed,
 )
-from chute_ros.sim.flight import FlightModel
+from chute_ros.sim.flight import Descent, FlightModel
 from chute_ros.sim.rocket import Rocket
 
 
@@ -41,6 +41,39 @@ def test_the_higher_the_more_time() -> None:
 
 def test_without_a_parachute_it_hits_the_ground_hard() -> None:
     assert touchdown_speed(falling_from(100.0), 1e9) > 20.0
+
+
+def test_one_that_sinks_slowly_has_until_a_canopy_still_opens() -> None:
+    """Given 8 m/s from 60 m: its motors are stopped with the release, and not before."""
+    sinks = Descent("partial thrust", 8.0, settles=2.0)
+    model = falling_from(60.0)
+    model.descent = sinks
+    truth = observe(model, 0.0)
+    assert 7.0 < truth.leeway < 9.0
+    assert observe(falling_from(60.0), 0.0).leeway < 4.0
+    assert model.armed
+    assert touchdown_speed(model, 1e9) == pytest.approx(8.0, abs=0.2)
+
+
+def test_over_a_valley_there_is_more_time_and_over_a_hill_less() -> None:
+    leeways = []
+    for ground in (-60.0, 0.0, 30.0):
+        model = falling_from(60.0)
+        model.ground = ground
+        leeways.append(observe(model, 0.0).leeway)
+    assert leeways == sorted(leeways, reverse=True)
+    assert leeways[0] > leeways[1] + 2.0
+
+
+@pytest.mark.parametrize("speed", [22.0, 5.0])
+def test_beside_a_canopy_that_does_not_carry_another_one_is_meant(speed: float) -> None:
+    """Given one that tangles, or one that never left its bag, whatever its status says."""
+    model = falling_from(100.0)
+    model.canopy_speed, model.released_for, model.vertical_speed = speed, 3.0, -22.0
+    truth = observe(model, 0.0)
+    assert 1.5 < truth.leeway < 4.0
+    assert touchdown_speed(model, truth.leeway - 0.05) <= SOFT
+    assert touchdown_speed(model, truth.leeway + 0.1) > SOFT
 
 
 def test_a_rocket_has_until_its_drogue_just_brakes_it() -> None:

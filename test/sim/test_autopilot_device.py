@@ -1,10 +1,15 @@
 """The simulated autopilot, from the other side of the protocol."""
 
+import math
+
 import pytest
 from device_bench import Station, parachute_status
 
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.sim.air import air_at
 from chute_ros.sim.autopilot_device import AutopilotDevice
+from chute_ros.sim.flight import Descent
+from chute_ros.sim.home import Homing
 
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED
 DENIED = dialect.MAV_RESULT_DENIED
@@ -197,3 +202,103 @@ def test_after_a_pause_it_catches_up(flying):
     flying.now += 2.0
     flying.run(0.0)
     assert 30.0 < height(flying) < 50.0
+
+
+# -- what it tells besides ------------------------------------------------------------------------
+
+
+def asked(station, *names):
+    """Ten times a second from now on."""
+    for name in names:
+        message_id = getattr(dialect, f"MAVLINK_MSG_ID_{name}")
+        assert station.command(SET, message_id, 100_000) == [ACCEPTED]
+
+
+def test_altitude_and_pressure_tell_of_the_height_whatever_home_is(flying):
+    asked(flying, "SCALED_PRESSURE", "HOME_POSITION")
+    flying.device.home.move(55.0)
+    flying.run(0.5)
+    position = flying.newest("GLOBAL_POSITION_INT")
+    assert position.alt / 1000.0 == pytest.approx(548.0, abs=1.0)
+    assert position.relative_alt / 1000.0 == pytest.approx(5.0, abs=1.0)
+    assert flying.newest("HOME_POSITION").altitude == 543_000
+    told = {one.press_abs for one in flying.messages("SCALED_PRESSURE")}
+    assert len(told) > 3, "a barometer has noise"
+    assert sum(told) / len(told) == pytest.approx(air_at(548.0).pressure / 100.0, abs=0.15)
+
+
+def test_the_local_position_is_that_of_take_off_whatever_home_is(flying):
+    asked(flying, "LOCAL_POSITION_NED")
+    flying.device.home.move(55.0)
+    flying.command(TERMINATE, 1)
+    flying.run(1.0)
+    local, position = flying.newest("LOCAL_POSITION_NED"), flying.newest("GLOBAL_POSITION_INT")
+    assert -local.z == pytest.approx(position.relative_alt / 1000.0 + 55.0, abs=2.0)
+    assert local.vz == pytest.approx(position.vz / 100.0, abs=2.0)
+    assert local.vz > 5.0
+
+
+@pytest.mark.parametrize(
+    ("homing", "told"), [(Homing.STAYS, 30.0), (Homing.FOLLOWS, 0.0), (Homing.ZEROED, -20.0)]
+)
+def test_home_after_a_disarming_in_the_air(flying, homing, told):
+    """Given a vehicle that falls by some 30 m: 5 m of them before its home is set anew."""
+    flying.device.home.homing = homing
+    flying.command(ARM_DISARM, 0, FORCE)
+    lowest = 0.0
+    for _ in range(54):
+        flying.run(0.05)
+        lowest = min(lowest, height(flying))
+    true = flying.device.model.height
+    assert 25.0 < true < 36.0
+    assert flying.newest("GLOBAL_POSITION_INT").alt / 1000.0 == pytest.approx(488 + true, abs=4.0)
+    if homing is Homing.FOLLOWS:
+        assert -20.0 < lowest < 0.0, "it starts at zero again and again"
+    else:
+        assert height(flying) == pytest.approx(told, abs=10.0)
+
+
+def test_a_home_that_drifts_takes_the_heights_with_it(flying):
+    flying.device.home.drift = 0.5
+    flying.run(20.0)
+    assert height(flying) == pytest.approx(50.0, abs=1.0)
+    assert flying.newest("GLOBAL_POSITION_INT").alt == pytest.approx(548_000, abs=1000)
+
+
+def turned(message):
+    """The angle from upright that an attitude target asks for, rad."""
+    return 2.0 * math.atan2(message.q[1], message.q[0])
+
+
+def test_what_is_in_control_was_told_to_do_what_it_does(flying):
+    asked(flying, "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED")
+    model = flying.device.model
+    model.step = lambda dt: None
+    model.roll, model.vertical_speed, model.height = 1.1, -7.0, 42.0
+    flying.run(0.3)
+    target = flying.newest("POSITION_TARGET_LOCAL_NED")
+    assert turned(flying.newest("ATTITUDE_TARGET")) == pytest.approx(1.1)
+    assert (target.z, target.vz) == pytest.approx((-42.0, 7.0))
+    used = dialect.POSITION_TARGET_TYPEMASK_Z_IGNORE | dialect.POSITION_TARGET_TYPEMASK_VZ_IGNORE
+    assert not target.type_mask & used
+
+
+@pytest.mark.parametrize("sinks", [False, True])
+def test_what_is_out_of_control_was_told_to_be_upright_and_to_stay(flying, sinks):
+    asked(flying, "ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED")
+    flying.device.model.descent = Descent("sink", 8.0) if sinks else None
+    flying.device.act("fail-motor")
+    flying.run(2.0)
+    target = flying.newest("POSITION_TARGET_LOCAL_NED")
+    assert turned(flying.newest("ATTITUDE_TARGET")) == 0.0
+    assert (target.z, target.vz) == pytest.approx((-60.0, 0.0))
+    assert flying.newest("GLOBAL_POSITION_INT").vz > 500
+
+
+def test_one_accelerometer_or_two(ground):
+    second = (SET, dialect.MAVLINK_MSG_ID_SCALED_IMU2, 100_000)
+    assert ground.command(*second) == [DENIED]
+    ground.device.add_second_imu()
+    assert ground.command(*second) == [ACCEPTED]
+    ground.run(0.5)
+    assert ground.newest("SCALED_IMU2").zacc == pytest.approx(-1000, abs=2)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chute_ros.sim.flight import GRAVITY, FlightModel
+from chute_ros.sim.flight import GRAVITY, Descent, FlightModel
 
 STEP = 0.02
 
@@ -121,6 +121,57 @@ def test_it_touches_down_under_its_canopy_and_stays_there():
     assert fly(model, 5.0) == [0.0] * round(5.0 / STEP)
     assert model.vertical_speed == 0.0
     assert model.acceleration == pytest.approx(GRAVITY)
+
+
+def test_a_second_parachute_carries_where_the_first_one_has_not():
+    model = hovering(400.0)
+    model.armed, model.canopy_speed = False, 22.0
+    model.release()
+    fly(model, 6.0)
+    assert model.vertical_speed == pytest.approx(-22.0, rel=0.02)
+    model.release_another(5.0)
+    fly(model, 6.0)
+    assert model.vertical_speed == pytest.approx(-5.0, rel=0.02)
+
+
+def test_with_part_of_its_thrust_it_sinks_upright_until_its_motors_are_stopped():
+    model = hovering(200.0)
+    model.descent = Descent("partial thrust", 8.0, settles=2.0, tilt=0.2)
+    model.motors_failed = True
+    model.step(STEP)
+    assert 0.3 * GRAVITY < model.acceleration < 0.8 * GRAVITY, "most of it is still carried"
+    fly(model, 10.0)
+    assert model.vertical_speed == pytest.approx(-8.0, rel=0.02)
+    assert model.roll == pytest.approx(0.2)
+    assert model.acceleration == pytest.approx(GRAVITY, rel=0.05)
+    model.armed = False
+    fly(model, 2.0)
+    assert model.vertical_speed < -12.0
+    assert model.roll > 1.0
+
+
+def test_an_aeroplane_that_nobody_holds_comes_down_in_its_own_way_until_a_canopy_opens():
+    model = hovering(200.0)
+    model.unheld = Descent("spiral dive", 16.0, settles=1.5, tilt=1.2, force=20.0)
+    model.armed = False
+    fly(model, 6.0)
+    assert model.vertical_speed == pytest.approx(-16.0, rel=0.05)
+    assert (model.roll, model.acceleration) == pytest.approx((1.2, 20.0), rel=0.05)
+    model.release()
+    fly(model, 6.0)
+    assert model.vertical_speed == pytest.approx(-5.0, rel=0.02)
+    assert model.roll == 0.0
+
+
+@pytest.mark.parametrize("ground", [-30.0, 20.0])
+def test_it_lands_where_the_ground_is(ground):
+    model = hovering(40.0)
+    model.ground, model.armed = ground, False
+    assert model.clearance == pytest.approx(40.0 - ground, abs=0.5)
+    model.release()
+    fly(model, 30.0)
+    assert model.on_ground
+    assert model.height == ground
 
 
 EVENTS = st.one_of(

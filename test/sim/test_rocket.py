@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from chute_ros.sim.rocket import GRAVITY, Rocket, air_at
+from chute_ros.sim.air import air_at
+from chute_ros.sim.rocket import GRAVITY, Rocket
 
 
 def fly_until(rocket, condition, dt=0.02, longest=1000.0):

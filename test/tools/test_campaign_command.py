@@ -11,9 +11,10 @@ import pytest
 
 from chute_ros.campaign import campaign as flights
 from chute_ros.campaign import kept_tally
+from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count, Judged
 from chute_ros.campaign.kept_tally import code_that_flies
-from chute_ros.campaign.scenario import Failure, Vehicle, draw
+from chute_ros.campaign.scenario import Failure, Vehicle
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
 from chute_ros.tools.machine import machine
