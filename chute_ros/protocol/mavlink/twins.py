@@ -37,6 +37,7 @@ OVER_AFTER = 15.0
 @dataclass(frozen=True)
 class _Sight:
     at: float
+    kind: str
     #: Our time less the clock's, s.
     offset: float
     #: It runs behind the newest of its kind.
@@ -100,7 +101,7 @@ class Twins:
         behind = boot_ms < newest - _JITTER_MS
         if not behind or now - newest_at > _GONE:
             self._newest[kind] = max(newest, boot_ms) if not behind else boot_ms, now
-        self._sights.append(_Sight(now, now - boot_ms / 1000.0, behind))
+        self._sights.append(_Sight(now, kind, now - boot_ms / 1000.0, behind))
         if behind and now - self._judged_at >= _EACH_TIME:
             self._judged_at = now
             self._judge(now)
@@ -115,6 +116,9 @@ class Twins:
 
     def _judge(self, now: float) -> None:
         sights = [one for one in self._sights if now - one.at <= WINDOW]
+        # What only one of them sends is never behind, whichever of them it is.
+        both = {one.kind for one in sights if one.behind}
+        sights = [one for one in sights if one.kind in both]
         # Before the second clock was heard the first one was ahead, whichever of them it is.
         sights = list(itertools.dropwhile(lambda one: not one.behind, sights))
         ahead = [one.offset for one in sights if not one.behind]

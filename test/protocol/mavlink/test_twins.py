@@ -40,13 +40,14 @@ def run(messages, twins=None):
     apart=st.integers(1, 5000).map(lambda whole: whole + 0.033),
     rates=st.tuples(st.sampled_from([4.0, 10.0, 20.0]), st.sampled_from([4.0, 10.0, 20.0])),
     phase=st.floats(0.0, 0.01),
+    kinds=st.sampled_from([KINDS, KINDS[:1], KINDS[1:]]),
     seed=st.integers(0, 1000),
 )
 @settings(max_examples=25, deadline=None)
-def test_two_are_found_within_seconds_and_kept_apart(apart, rates, phase, seed):
+def test_two_are_found_within_seconds_and_kept_apart(apart, rates, phase, kinds, seed):
     chance = random.Random(seed)
     first = said(-100.0, 0.0, 6.0, rates[0])
-    second = said(-100.0 - apart, 0.0, 6.0, rates[1], phase)
+    second = said(-100.0 - apart, 0.0, 6.0, rates[1], phase, kinds)
     found, ours = run(received([*first, *second], lambda: chance.uniform(0.0, 0.02)))
     if apart < 6.0 and max(rates) / min(rates) > 2.0:
         return  # what comes seldom may be messages of the other one that are late
