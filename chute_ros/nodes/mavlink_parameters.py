@@ -100,6 +100,14 @@ PARAMETERS = (
         changeable=True,
     ),
     Parameter(
+        "needed_message_rate",
+        5.0,
+        "rate that the rules need of GLOBAL_POSITION_INT, ATTITUDE and SCALED_IMU each, Hz: below "
+        "it take-off is forbidden; 0: not judged",
+        0.0,
+        100.0,
+    ),
+    Parameter(
         "signing_key_file",
         "",
         "file with the MAVLink signing key (32 bytes or 64 hexadecimal digits); empty: none",
@@ -132,5 +140,6 @@ def config_from(values: Mapping[str, Any]) -> MavlinkConfig:
         default_triggers=TriggerFlags(values["default_triggers"]),
         kill_method=KillMethod(values["kill_method"]),
         autopilot_message_rate=values["autopilot_message_rate"],
+        needed_message_rate=values["needed_message_rate"],
         disarm_when_blocked=values["disarm_when_blocked"],
     )

@@ -11,6 +11,14 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import (
+    ACCELERATION,
+    CLIMB_RATE,
+    TILT,
+    VERTICAL_ACCELERATION,
+    VERTICAL_SPEED,
+)
 from chute_ros.supervisor.rules import (
     ALL,
     ANY,
@@ -25,6 +33,17 @@ from chute_ros.supervisor.rules import (
 from chute_ros.supervisor.state import ASK_LASTS, State
 
 _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
+#: Measurement -> the one of which it is said that it is denied; those that claim it by being low.
+_CLAIMS = {
+    VERTICAL_SPEED: VERTICAL_SPEED,
+    CLIMB_RATE: VERTICAL_SPEED,
+    VERTICAL_ACCELERATION: VERTICAL_SPEED,
+    "sink_beyond_target": VERTICAL_SPEED,
+    ACCELERATION: ACCELERATION,
+    TILT: TILT,
+    "attitude_error": TILT,
+}
+_CLAIMED_BELOW = (VERTICAL_SPEED, CLIMB_RATE, VERTICAL_ACCELERATION, ACCELERATION)
 
 
 class Finding(NamedTuple):
@@ -70,16 +89,39 @@ def _measurement(
         gap = now - flight.last_usable(config, state, name) <= UNKNOWN_STANDS
         return Finding(None, tell, samples, expected=gap)
     doubt = flight.doubt(state, name, value, now)
-    if value != known.value:
-        samples = state.measured("height").count  # told by the heights instead
+    if name == CLIMB_RATE or value != known.value:
+        samples = flight.rate_count(config, state, now)  # told by heights instead
+    if name == VERTICAL_ACCELERATION:
+        samples = state.measured(VERTICAL_SPEED).count
     # A limit that is not asked for is NaN, and nothing is beyond it.
     holds = not (value <= condition.above or value >= condition.below)
+    denied = _denied(config, state, condition, now) if holds else ""
 
     def told() -> str:
-        return f"{name} {value:.2f} ({condition.limits}{f'; in doubt: {doubt}' if doubt else ''})"
+        weaker = f"; in doubt: {doubt}" if doubt else ""
+        return f"{name} {value:.2f} ({condition.limits}{weaker})"
+
+    if denied:
+        return Finding(False, lambda: f"{told()} denied: {denied}", samples)
 
     lingers = not holds and condition.lingers(value)
     return Finding(holds, told, samples, bool(doubt), lingers=lingers)
+
+
+def _denied(
+    config: SupervisorConfig, state: State, condition: MeasurementCondition, now: float
+) -> str:
+    """Why what this claims of a fall is not so, by other origins; empty: none denies it."""
+    name = condition.measurement
+    if not (state.denied or state.commanded) or name not in _CLAIMS:
+        return ""
+    below = not math.isnan(condition.below)
+    claims_a_fall = below if name in _CLAIMED_BELOW else not math.isnan(condition.above)
+    by_barometer = name == CLIMB_RATE and not math.isnan(flight.pressure_rate(config, state, now))
+    if not claims_a_fall or by_barometer:
+        return ""
+    claim = _CLAIMS[name]
+    return state.denied.get(claim, "") or state.commanded.get(claim, "")
 
 
 def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:
@@ -135,6 +177,15 @@ def _autopilot(
                 f"(minimum {minimum:g} m), and {'nothing' if silent else 'something'} tells "
                 "whether it falls"
             ),
+        )
+    if fact is AutopilotFact.MOTORS_STOPPED:
+        kill = state.kill
+        ours = (
+            state.stage is Stage.KILLING and state.killed_in_flight and not state.killed_standing
+        )
+        stopped = ours and kill is not None and kill.confirmed and not state.kill_only
+        return Finding(
+            stopped, lambda: "its motors were stopped in flight, as its own state confirms"
         )
     if fact is AutopilotFact.DISARMED:
         said = flight.armed(config, state, now)

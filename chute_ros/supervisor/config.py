@@ -101,6 +101,8 @@ class SupervisorConfig:
     require_vehicle_state: bool = True
     #: Without a landed state, armed and higher than this (m) is in the air.
     takeoff_height: float = 2.0
+    #: Once it has landed and is disarmed, parachutes that `safety/arm` has armed are disarmed.
+    disarm_after_landing: bool = True
     #: An update that comes later than its deadline by more was late: what was not heard meanwhile
     #: is not held against anybody.
     late_after: float = 0.2

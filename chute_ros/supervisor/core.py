@@ -33,6 +33,8 @@ _OF_LINKS = (Stimulus.LINKS_UNHEALTHY, Stimulus.LINKS_HEALTHY)
 _ARMED_SHOWS = 2.0
 #: A vehicle that nobody watched may have climbed as fast, m/s.
 _CLIMBS_UNSEEN = 20.0
+#: Off the ground for so long it was seen to be up, on it to be down, s; no look counts for more.
+_UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 1.0, 1.0, 0.2
 #: A limit that an age may just reach has passed this much later, s.
 _JUST_AFTER = 1e-6
 
@@ -175,6 +177,7 @@ class _Update(Deploying):
         told by the leader is what was decided."""
         if not self.state.leading:
             self._note_down()
+            self._note_height()
             self.look_at_rules()
             return
         self._look_at_vehicle()
@@ -193,6 +196,9 @@ class _Update(Deploying):
         self._note_down()
         in_air = flight.in_air(self.config, self.state, self.now)
         stage = self.state.stage
+        blocked = stage in (Stage.STARTUP, Stage.BLOCKED)
+        if in_air and blocked and flight.low_as_at_take_off(self.config, self.state, self.now):
+            return  # it says so because it was ordered to take off, and is kept down
         if in_air and listed(stage, Stimulus.TAKEN_OFF) and self._may_take_off():
             if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
                 self.alarm(f"in the air although {stage.name}")
@@ -220,6 +226,7 @@ class _Update(Deploying):
             )
         if self.state.stage is Stage.LANDED and flight.disarmed(self.config, self.state, self.now):
             self.move(Stimulus.SECURED)
+            self._disarm_parachutes()
         if in_air is False and not self.state.flown and self.state.stage in ON_GROUND:
             self.note_released()
 
@@ -249,17 +256,45 @@ class _Update(Deploying):
         known = not math.isnan(self.state.down_since)
         if down != known:
             self.state = replace(self.state, down_since=self.now if down else math.nan)
+        still = flight.is_still(self.config, self.state, self.now)
+        if still == math.isnan(self.state.still_since):
+            self.state = replace(self.state, still_since=self.now if still else math.nan)
+
+    def _disarm_parachutes(self) -> None:
+        """After a flight nobody is to carry an armed one; those that arm themselves disarm
+        themselves."""
+        state = self.state
+        if self.config.disarm_after_landing and state.armed_by_us and state.mode is i.Mode.ACTIVE:
+            self.outputs.append(i.ArmDevices(0, False, 0, self.config.deploy_links))
+            self.state = replace(state, armed_by_us=False)
 
     def _note_height(self) -> None:
         """Since when a deploy is worth it; without any height, some time after the take-off."""
-        if self.state.airborne and not self.state.was_high:
-            height = flight.measured(self.config, self.state, "height", self.now)
-            # Far below the take-off nobody knows the height above the ground.
-            high = abs(height) >= self.config.profile.minimum_height
-            if math.isnan(height):
-                high = self.now >= self.state.airborne_since + flight.HIGH_AFTER
-            if high:
-                self.state = replace(self.state, was_high=True)
+        state, now, minimum = self.state, self.now, self.config.profile.minimum_height
+        if not state.airborne:
+            return
+        height = flight.measured(self.config, state, "height", now)
+        # Which no estimator moves; it says where the ground was, and so that it is there again.
+        by_pressure = flight.pressure_height(self.config, state, now)
+        passed = min(max(now - self.before.updated_at, 0.0), _LONGEST_LOOK)
+        up = flight.seen_up(self.config, state, height, by_pressure, now)
+        up_for = state.up_for + (passed if up else 0.0)
+        told = height if math.isnan(by_pressure) else by_pressure
+        # Far below the take-off nobody knows the height above the ground.
+        high = told >= minimum or (told <= -minimum and up_for >= _UP_TAKES)
+        if math.isnan(told):
+            high = now >= state.airborne_since + flight.HIGH_AFTER
+        since = state.at_ground_since
+        if not flight.at_ground(self.config, state, by_pressure, now):
+            since = math.nan
+        elif math.isnan(since):
+            since = now
+        down = now >= since + _DOWN_TAKES
+        was_high, up_for = (state.was_high or high) and not down, 0.0 if down else up_for
+        if (was_high, up_for, since) != (state.was_high, state.up_for, state.at_ground_since):
+            self.state = replace(
+                state, was_high=was_high, up_for=min(up_for, _UP_TAKES), at_ground_since=since
+            )
 
     def _took_off(self, anew: bool) -> None:
         """anew: it stood disarmed before; otherwise it bounced, or was not down at all."""
@@ -276,6 +311,8 @@ class _Update(Deploying):
             airborne=True,
             airborne_since=self.now,
             was_high=False,
+            up_for=0.0,
+            at_ground_since=math.nan,
             took_off_height=flight.measured(self.config, self.state, "height", self.now),
             home=home,
             measurements=MappingProxyType(measurements),

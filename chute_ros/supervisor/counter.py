@@ -60,6 +60,9 @@ class RuleEvidence:
     sure: bool = False
     #: It was acted on and is not done with yet.
     latched: bool = False
+    #: Its deploy was put off, as it was too low for one: the motors were stopped alone. It follows
+    #: once the vehicle is not too low, or nobody knows, while it still falls.
+    put_off: bool = False
     #: Why it was fulfilled and not acted on; empty: it was not, or was.
     denied: str = ""
 

@@ -55,6 +55,7 @@ class Deploying(Policy):
             if low and self.state.deploy_rule != OPERATOR:
                 # It was high enough when the kill left; a canopy needs the height now.
                 self.alarm(f"no deploy by rule '{self.state.deploy_rule}' after the kill: {low}")
+                self.put_off(self.state.deploy_rule)
                 # Nobody waits for it: a person's is held back by no height.
                 self.state = replace(self.state, deploy_rule="", deploy_reasons=())
                 return
@@ -151,6 +152,10 @@ class Deploying(Policy):
 
     def _answer(self) -> None:
         accepted, text = self.deploy_reached(Outcome.ACCEPTED), self.deploy_details()
+        kill = self.state.kill
+        if kill is not None and not kill.confirmed:
+            why = kill.newest_details() or "nobody reported"
+            text = "; ".join(filter(None, (f"WARNING, the motors may still turn: {why}", text)))
         if self.state.stage is Stage.FAULT:
             self.finish_deploy(False, accepted, text or "no device node reported")
         elif self.state.stage is Stage.DEPLOYED:
@@ -161,10 +166,12 @@ class Deploying(Policy):
 
     def _alarm_again(self) -> None:
         """The end of the ladder without a parachute is an alarm that does not stop until one is
-        out or a person resets, whatever is tried meanwhile."""
-        if self.state.stage is not Stage.DEPLOYED and self.now >= self.state.alarm_at:
+        out or a person resets, whatever is tried meanwhile; so is a canopy that does not carry."""
+        out = self.state.stage is Stage.DEPLOYED
+        if (not out or self.state.canopy_fails) and self.now >= self.state.alarm_at:
             # A state that was handed over or read from a black box may know of no alarm.
-            text = ": ".join(("still no parachute", *self.state.alarms[-1:]))
+            begin = "the canopy does not carry" if out else "still no parachute"
+            text = ": ".join((begin, *self.state.alarms[-1:]))
             self.outputs.append(i.Say(text, alarm=True))
             alarm_at = self.now + self.config.alarm_interval
             self.state = replace(self.state, alarm_at=alarm_at)

@@ -13,13 +13,20 @@ from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.measurements import CLIMB_RATE, FALL_SIGNS, HEIGHT
+from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import (
+    ACCELERATION,
+    CLIMB_RATE,
+    FALL_SIGNS,
+    HEIGHT,
+    PRESSURE_ALTITUDE,
+    TILT,
+    VERTICAL_ACCELERATION,
+    VERTICAL_SPEED,
+)
 from chute_ros.supervisor.state import State
 
-#: m/s^2.
-GRAVITY = 9.81
-#: Less specific force than this is free fall, m/s^2 (half of what a body at rest feels).
-FREE_FALL = 4.9
 #: An autopilot that started anew in flight must say for so long that it stands, s.
 _LANDED_HOLD_AFTER_REBOOT = 10.0
 #: One that is armed and says so higher than a deploy needs, on a roof or a hill, for so long, s:
@@ -43,21 +50,32 @@ _SAME_TIME = 0.2
 _SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
 #: Measurement -> the part of vehicle/state that tells it, where that has another name.
 PARTS = {"tilt_deg": "attitude"}
+#: A barometer that stands drifts by less than this, m, and tells less than this, m/s.
+_OFF_GROUND, _STANDS_BELOW = 2.5, 1.0
+#: An estimator that says that it is up is believed at first where it is not faster, m/s, and not
+#: further from upright, degrees: both are flown.
+_CALM_SPEED, _CALM_TILT = 8.0, 60.0
+#: What ends a flight, after which a person may reset one that has been still for so long, s.
+_ENDED, _STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
+_HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
 
 
 def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
     """A measurement and "", or NaN and why it cannot be used."""
-    if name in (HEIGHT, CLIMB_RATE) and state.rebooted:
-        return math.nan, "the autopilot started anew in flight, and its height with it"
     if name == CLIMB_RATE:
-        return _climb_rate(config, state, now)
+        rate = pressure_rate(config, state, now)
+        return (rate, "") if not math.isnan(rate) else _estimated_rate(config, state, now)
+    if name == HEIGHT and state.rebooted:
+        return math.nan, _HEIGHT_LOST
+    if name == VERTICAL_ACCELERATION:
+        return _vertical_acceleration(config, state, now)
     known = state.measured(name)
-    why = known.unusable(config.profile.limits[name], now)
+    why = state.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
         return known.value, ""
-    if name == "vertical_speed":
+    if name == VERTICAL_SPEED:
         rate = climb_rate(config, state, now)
         return rate, why if math.isnan(rate) else ""
     return math.nan, why
@@ -80,23 +98,68 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
 
 def last_usable(config: SupervisorConfig, state: State, name: str) -> float:
     """Until when what tells a measurement could be used, monotonic s; -infinity: never."""
-    times = [state.climb_told_at] if name in (CLIMB_RATE, "vertical_speed") else []
+    times = [state.climb_told_at] if name in (CLIMB_RATE, VERTICAL_SPEED) else []
+    if name == VERTICAL_ACCELERATION:
+        name = VERTICAL_SPEED
     if name != CLIMB_RATE:
         times.append(state.measured(name).last_usable(config.profile.limits[name]))
     return max([time for time in times if not math.isnan(time)], default=-math.inf)
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
-    """Vertical speed from the heights of the last second, m/s, for sources that tell none (a
-    receiver without a fix, a barometer alone). NaN: not known. What they are
+    """Vertical speed from the estimator's heights of the last second, m/s, for sources that tell
+    none (a receiver without a fix, a barometer alone). NaN: not known. What they are
     above is the same for all of them, also where the autopilot has started anew."""
-    return _climb_rate(config, state, now)[0]
+    return _rate_of(config, state, HEIGHT, now)[0]
 
 
-def _climb_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
-    heights, limits = state.heights, config.profile.limits["height"]
-    height = state.measured("height")
-    if height.unusable(limits, now) or not _enough(heights, height.measured_at):
+def pressure_rate(config: SupervisorConfig, state: State, now: float) -> float:
+    """Vertical speed from the barometer's heights of the last second, m/s; NaN: it tells none, or
+    has jumped within that second."""
+    if state.measured(PRESSURE_ALTITUDE).doubt(PRESSURE_ALTITUDE, now):
+        return math.nan
+    return _rate_of(config, state, PRESSURE_ALTITUDE, now)[0]
+
+
+def pressure_height(config: SupervisorConfig, state: State, now: float) -> float:
+    """Height above the take-off by the barometer, m; NaN: not known, or in doubt."""
+    known = state.measured(PRESSURE_ALTITUDE)
+    if known.has_jumped(now):
+        return math.nan
+    usable = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
+    return usable - state.ground_pressure_altitude
+
+
+def rate_count(config: SupervisorConfig, state: State, now: float) -> int:
+    """Samples that have come so far of what tells CLIMB_RATE."""
+    by_pressure = not math.isnan(pressure_rate(config, state, now))
+    return state.measured(PRESSURE_ALTITUDE if by_pressure else HEIGHT).count
+
+
+def _estimated_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
+    return (math.nan, _HEIGHT_LOST) if state.rebooted else _rate_of(config, state, HEIGHT, now)
+
+
+def _vertical_acceleration(
+    config: SupervisorConfig, state: State, now: float
+) -> tuple[float, str]:
+    """Of the last second of vertical speeds, m/s^2, or NaN and why there is none."""
+    known = state.measured(VERTICAL_SPEED)
+    if why := known.unusable(config.profile.limits[VERTICAL_SPEED], now):
+        return math.nan, why
+    told = [(one[0], one[1]) for one in state.motion if now - one[0] <= 1.0]
+    told = [one for one in told if not math.isnan(one[1])]
+    if not told or told[-1][0] - told[0][0] < _CLIMB_OVER:
+        return math.nan, "too few vertical speeds that can be used"
+    return _slope(tuple(told)), ""
+
+
+def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    heights = state.heights if name == HEIGHT else state.pressure_heights
+    height = state.measured(name)
+    if height.unusable(config.profile.limits[name], now) or not _enough(
+        heights, height.measured_at
+    ):
         return math.nan, "too few heights that can be used"
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rates = [
@@ -215,14 +278,56 @@ def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> s
 
 def moving(config: SupervisorConfig, state: State, now: float) -> str:
     """How the vehicle moves as nothing on the ground does, in words; empty: it does not."""
-    speed = measured(config, state, "vertical_speed", now)
-    if abs(speed) > config.profile.moving_speed:
-        limit = config.profile.moving_speed
+    speed = measured(config, state, VERTICAL_SPEED, now)
+    limit = config.profile.moving_speed
+    if abs(speed) > limit and not (speed < 0.0 and VERTICAL_SPEED in state.denied):
         return f"vertical_speed {speed:.1f} m/s (nothing on the ground beyond {limit:g})"
-    force = measured(config, state, "acceleration", now)
-    if force < FREE_FALL:
+    rate = pressure_rate(config, state, now)
+    if VERTICAL_SPEED in state.denied and abs(rate) > limit:
+        return f"climb_rate {rate:.1f} m/s (nothing on the ground beyond {limit:g})"
+    force = measured(config, state, ACCELERATION, now)
+    if force < FREE_FALL and ACCELERATION not in state.denied:
         return f"acceleration {force:.1f} m/s^2 (nothing on the ground below {FREE_FALL:g})"
     return ""
+
+
+def seen_up(
+    config: SupervisorConfig, state: State, height: float, by_pressure: float, now: float
+) -> bool:
+    """Off the ground, as the barometer shows it; without one, as an estimator says that is upright
+    and not in a rush: one that runs away on the ground is neither. Heights in m."""
+    if not math.isnan(by_pressure):
+        return abs(by_pressure) > _OFF_GROUND
+    calm = not abs(measured(config, state, VERTICAL_SPEED, now)) > _CALM_SPEED
+    upright = not measured(config, state, TILT, now) > _CALM_TILT
+    return height - state.armed_height > config.takeoff_height and calm and upright
+
+
+def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: float) -> bool:
+    """The barometer shows that it stands on the height of its take-off. by_pressure: m."""
+    rate = pressure_rate(config, state, now)
+    return abs(by_pressure) <= _OFF_GROUND and abs(rate) <= _STANDS_BELOW
+
+
+def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool:
+    """After a kill or a deploy it has not moved for a while: the autopilot of a vehicle that has
+    crashed may say for ever that it is in the air."""
+    return state.stage in _ENDED and now >= state.still_since + _STILL_FOR
+
+
+def is_still(config: SupervisorConfig, state: State, now: float) -> bool:
+    """Its vertical speed is known and is none, by whatever tells one."""
+    speeds = [measured(config, state, name, now) for name in (VERTICAL_SPEED, CLIMB_RATE)]
+    known = [abs(speed) for speed in speeds if not math.isnan(speed)]
+    return bool(known) and max(known) <= _STANDS_BELOW and not moving(config, state, now)
+
+
+def low_as_at_take_off(config: SupervisorConfig, state: State, now: float) -> bool:
+    """Its height is known, and is that of where it was armed."""
+    height = measured(config, state, HEIGHT, now) - state.armed_height
+    by_pressure = pressure_height(config, state, now)
+    limit = config.takeoff_height
+    return height <= limit and not by_pressure > limit and not moving(config, state, now)
 
 
 def fresh(config: SupervisorConfig, state: State, age: float, now: float) -> bool:

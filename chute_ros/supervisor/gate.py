@@ -46,9 +46,24 @@ def against_rule(
     config: SupervisorConfig, state: State, rule: Rule, findings: Sequence[Finding], now: float
 ) -> str:
     """Why the deploy of a rule is denied; empty: it is not."""
-    if state.stage is not Stage.IN_FLIGHT and not (
+    told = [
+        finding
+        for condition, finding in zip(rule.conditions, findings, strict=True)
+        if finding.holds and not is_silence(condition)
+    ]
+    wrong = against_any_rule(config, state, now)
+    if not wrong and not told:
+        return "only silence speaks for it, and silence alone never deploys"
+    return wrong
+
+
+def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
+    """Why no rule may deploy now; empty: one may."""
+    in_flight = state.stage is Stage.IN_FLIGHT or (
         state.stage is Stage.KILLING and state.killed_in_flight
-    ):
+    )
+    # Under a canopy that does not carry the next one may be released.
+    if not in_flight and not (state.stage is Stage.DEPLOYED and state.airborne):
         return f"the vehicle is {state.stage.name}, not in flight"
     killed = _killed(state, now)
     if flight.down_undisputed(config, state, now) and not killed:
@@ -57,13 +72,6 @@ def against_rule(
         return "the motors are disarmed, and nothing says that it falls"
     if killed and flight.in_air(config, state, now) is False:
         return "the vehicle has come down"
-    told = [
-        finding
-        for condition, finding in zip(rule.conditions, findings, strict=True)
-        if finding.holds and not is_silence(condition)
-    ]
-    if not told:
-        return "only silence speaks for it, and silence alone never deploys"
     return ""
 
 
@@ -84,14 +92,20 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     profile = config.profile
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
+    minimum = profile.minimum_height
     height = flight.lowest_height(config, state, now)
     known = state.measured("height")
     if known.has_jumped(now) and known.value < known.before_jump:
         height = math.nan  # it has jumped down: that it is low may be as wrong as before
+    by_pressure = flight.pressure_height(config, state, now)
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
-    low = -profile.minimum_height <= height < profile.minimum_height
-    if low and not flight.above_its_ground(state, height) >= profile.minimum_height:
-        return f"height {height:.1f} m is below the minimum {profile.minimum_height:g} m"
+    low = -minimum <= height < minimum
+    low = low and not flight.above_its_ground(state, height) >= minimum
+    if not math.isnan(by_pressure) and (low or not height >= minimum):
+        # The barometer says it where the estimator does not, and denies it where it does.
+        height, low = by_pressure, -minimum <= by_pressure < minimum
+    if low:
+        return f"height {height:.1f} m is below the minimum {minimum:g} m"
     if profile.minimum_height > 0.0 and not state.was_high:
         return f"it was never seen at the minimum height, {profile.minimum_height:g} m"
     return ""

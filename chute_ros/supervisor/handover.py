@@ -45,7 +45,12 @@ def told(state: State, now: float) -> str:
         killed_sinking=state.killed_sinking,
         killed_standing=state.killed_standing,
         landed_at=state.landed_at,
+        kill_only=state.kill_only,
+        home_altitude=state.home_altitude,
+        ground_pressure_altitude=state.ground_pressure_altitude,
         was_high=state.was_high,
+        up_for=state.up_for,
+        armed_by_us=state.armed_by_us,
         airborne_since=state.airborne_since,
         down_since=state.down_since,
         rebooted=state.rebooted,
@@ -59,6 +64,7 @@ def told(state: State, now: float) -> str:
         block_refused=state.block_refused,
         alarms=state.alarms,
         alarm_at=state.alarm_at,
+        canopy_fails=state.canopy_fails,
     )
     return _CODEC.to_json(_moved(kept, -now))
 
@@ -82,6 +88,16 @@ def followed(state: State, text: str, now: float) -> State:
         measurements=state.measurements,
         heights=state.heights,
         climb_told_at=state.climb_told_at,
+        pressure_heights=state.pressure_heights,
+        motion=state.motion,
+        denied=state.denied,
+        denied_since=state.denied_since,
+        commanded=state.commanded,
+        unfit=state.unfit,
+        fitness_since=state.fitness_since,
+        still_since=state.still_since,
+        at_ground_since=state.at_ground_since,
+        faults_told=state.faults_told,
     )
 
 

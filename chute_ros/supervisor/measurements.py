@@ -57,8 +57,14 @@ STANDARD_LIMITS: dict[str, Limits] = {
     "height": Limits(-500.0, 50_000.0, 400.0, 10.0, 1.0, 5.0),
     # m/s, up positive
     "vertical_speed": Limits(-400.0, 400.0, 200.0, 5.0, 1.0, 5.0),
+    # m in the standard atmosphere, of the static pressure: only its changes are told
+    "pressure_altitude": Limits(-2000.0, 80_000.0, 400.0, 10.0, 1.0, 1.0),
     # degrees between the vehicle's axis and the vertical, 0 upright to 180; pi as float32 is more
     "tilt_deg": Limits(0.0, 180.001, 2000.0, 60.0, 0.5, 5.0),
+    # degrees between the vehicle's axis and the one that it was commanded
+    "attitude_error": Limits(0.0, 180.001, 2000.0, 180.0, 0.5, 0.0),
+    # m/s by which it sinks faster than it was commanded; it may change with the command at once
+    "sink_beyond_target": Limits(-400.0, 400.0, 200.0, 100.0, 1.0, 0.0),
     # m/s^2, length of the specific force: 9.8 at rest, 0 in free fall
     "acceleration": Limits(0.0, 2000.0, 100_000.0, 200.0, 0.5, 5.0),
     # m over ground from where it took off
@@ -79,15 +85,28 @@ REJECTION_DOUBTED = 1.0
 #: m/s^2. To the last bit so: an accelerometer that fails. One that falls feels its drag and its
 #: noise.
 _FAILED_ACCELERATION = 0.0
-#: From the heights of the last second; on it conditions can rest as on the measurements.
-CLIMB_RATE = "climb_rate"
+PRESSURE_ALTITUDE, ACCELERATION, TILT = "pressure_altitude", "acceleration", "tilt_deg"
+#: From the barometer's heights of the last second (where it tells none from the estimator's), and
+#: from the vertical speeds of the last second, m/s^2. On these conditions can rest as on the
+#: measurements that tell them.
+CLIMB_RATE, VERTICAL_ACCELERATION = "climb_rate", "vertical_acceleration"
+DERIVED: dict[str, tuple[str, ...]] = {
+    CLIMB_RATE: (HEIGHT, PRESSURE_ALTITUDE),
+    VERTICAL_ACCELERATION: (VERTICAL_SPEED,),
+}
+#: A commanded height is missed if the vehicle is lower by more than this, m: at half of its climb
+#: speed a controller is as far behind.
+_MISSES_TARGET = 1.5
 
 
 #: The unit of each, for people.
 UNITS: dict[str, str] = {
     "height": "m above take-off",
     "vertical_speed": "m/s, up positive",
+    "pressure_altitude": "m in the standard atmosphere",
     "tilt_deg": "degrees from upright, 0 to 180",
+    "attitude_error": "degrees from the commanded attitude, 0 to 180",
+    "sink_beyond_target": "m/s by which it sinks faster than commanded",
     "acceleration": "m/s^2, length of the specific force: 9.8 at rest, 0 in free fall",
     "distance_from_home": "m over ground from where it took off",
     "battery_voltage": "V",
@@ -306,13 +325,22 @@ def _jumps(
 
 
 def samples_of(
-    vehicle: VehicleState, received: float, home: tuple[float, float] | None
+    vehicle: VehicleState,
+    received: float,
+    home: tuple[float, float] | None,
+    home_altitude: float = math.nan,
 ) -> Mapping[str, Sample]:
-    """Every measurement in a VehicleState. received: monotonic s; home: degrees."""
+    """Every measurement in a VehicleState. received: monotonic s; home: degrees; home_altitude: m
+    above mean sea level of what heights are above, wherever home is now; NaN: of home."""
+    above = vehicle.altitude - home_altitude
+    height = (vehicle.height, vehicle.height_age)
     told = {
-        "height": (vehicle.height, vehicle.height_age),
+        "height": height if math.isnan(above) else (above, vehicle.altitude_age),
+        "pressure_altitude": (pressure_altitude(vehicle.pressure), vehicle.pressure_age),
         "vertical_speed": (vehicle.vertical_speed, vehicle.vertical_speed_age),
         "tilt_deg": (vehicle.tilt * DEGREES, vehicle.attitude_age),
+        "attitude_error": (vehicle.attitude_error * DEGREES, vehicle.attitude_error_age),
+        "sink_beyond_target": _sink_beyond_target(vehicle),
         "acceleration": (vehicle.acceleration, vehicle.acceleration_age),
         "battery_voltage": (vehicle.battery_voltage, vehicle.battery_age),
         "battery_remaining": (vehicle.battery_remaining, vehicle.battery_age),
@@ -321,6 +349,23 @@ def samples_of(
         here = (vehicle.latitude, vehicle.longitude)
         told["distance_from_home"] = (distance_between(home, here), vehicle.position_age)
     return {name: Sample(value, received - age) for name, (value, age) in told.items()}
+
+
+def _sink_beyond_target(vehicle: VehicleState) -> tuple[float, float]:
+    """m/s, and how old it is, s. Of one that is lower than it was commanded no sink was."""
+    value = vehicle.target_vertical_speed - vehicle.vertical_speed
+    if math.isnan(vehicle.target_vertical_speed):
+        missed = vehicle.below_target > _MISSES_TARGET
+        value = -vehicle.vertical_speed if missed else vehicle.below_target * 0.0
+    return value, max(vehicle.target_age, vehicle.vertical_speed_age)
+
+
+def pressure_altitude(pressure: float) -> float:
+    """Height at which the standard atmosphere has this pressure (Pa), m (ICAO Doc 7488, below
+    11 km); NaN: it is no pressure."""
+    if not 1000.0 <= pressure <= 120_000.0:
+        return math.nan
+    return 44_330.77 * (1.0 - math.pow(pressure / 101_325.0, 0.190263))
 
 
 def distance_between(one: tuple[float, float], other: tuple[float, float]) -> float:

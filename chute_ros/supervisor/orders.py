@@ -19,8 +19,11 @@ _KILL_SETTLES = 0.2
 class Orders(Steps):
     """An order of the same kind that is under way is joined."""
 
-    def order_kill(self, rule: str, reasons: tuple[str, ...], token: int = 0) -> None:
-        """Stop the motors. token not 0: a person waits for it."""
+    def order_kill(
+        self, rule: str, reasons: tuple[str, ...], token: int = 0, kill_only: bool = False
+    ) -> None:
+        """Stop the motors. token not 0: a person waits for it, and kill_only says whether they
+        want no deploy to follow it."""
         if self.state.mode is not i.Mode.ACTIVE:
             self.fire(Action.KILL, rule, reasons)
             return
@@ -30,6 +33,8 @@ class Orders(Steps):
         # Beside an open canopy it changes nothing else; nor does it end what FAULT tries again.
         if self.state.stage not in (Stage.DEPLOYED, Stage.FAULT):
             self._to_killing("; ".join(reasons))
+        if token:
+            self.state = replace(self.state, kill_only=kill_only)
         if not self._kill_joined(token):
             self.fire(Action.KILL, rule, reasons)
 
@@ -45,6 +50,13 @@ class Orders(Steps):
             return
         if self.deploy_reached(Outcome.CONFIRMED) and not again:
             return  # out already, which is said at the end of this update
+        all_out = all(out_already(self.state, rung) for rung in self.config.ladder)
+        if again and rule != OPERATOR and all_out:
+            text = f"the canopy does not carry, and no other is left: {'; '.join(reasons)}"
+            self.alarm(text)
+            alarm_at = self.now + self.config.alarm_interval
+            self.state = replace(self.state, canopy_fails=True, alarm_at=alarm_at)
+            return
         if self.state.stage in ON_GROUND or again:
             self.note_released()
         self.end_kill()
@@ -86,6 +98,7 @@ class Orders(Steps):
                 sinking = -flight.measured(self.config, self.state, "vertical_speed", self.now)
                 self.state = replace(
                     self.state,
+                    kill_only=False,
                     killed_in_flight=self.state.airborne,
                     killed_standing=stood,
                     killed_at=self.now,

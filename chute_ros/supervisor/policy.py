@@ -12,7 +12,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions import Finding, find
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import Look, RuleEvidence
-from chute_ros.supervisor.gate import against_rule, too_low
+from chute_ros.supervisor.gate import against_any_rule, against_rule, too_low
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.reports import Reports
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
@@ -99,7 +99,7 @@ def rests_until(config: SupervisorConfig, state: State, now: float) -> float:
 def _as_before(rule: Rule, evidence: RuleEvidence) -> bool:
     """Looked at again, it is what it was: a rule that did not hold, of a vehicle that rests."""
     looked_at = len(evidence.seen) == len(rule.conditions)
-    quiet = evidence.holds is False and not evidence.latched
+    quiet = evidence.holds is False and not evidence.latched and not evidence.put_off
     return rule.rests_on_the_vehicle and looked_at and quiet
 
 
@@ -129,7 +129,8 @@ class Policy(Reports):
                 continue
             judged = judge(self.config, self.state, rule, self.now)
             rules[rule.name] = self._cleared(rule, judged.evidence)
-            if judged.evidence.fulfilled(rule) and not rules[rule.name].latched:
+            waits = rules[rule.name].put_off and self._falls_on()
+            if (judged.evidence.fulfilled(rule) or waits) and not rules[rule.name].latched:
                 fulfilled.append(judged)
         self._keep(rules)
         # A stable sort: of two that want the same, the one that the profile names first.
@@ -165,32 +166,52 @@ class Policy(Reports):
             return replace(evidence, latched=False)
         return evidence
 
+    def _falls_on(self) -> bool:
+        """It moves as nothing on the ground does, and nobody has seen it come down."""
+        moves = flight.moving(self.config, self.state, self.now)
+        return bool(moves) and flight.in_air(self.config, self.state, self.now) is not False
+
     def _act(self, judged: Judged) -> None:
         rule, reasons = judged.rule, judged.reasons()
         if not self.state.leading or self.state.mode is i.Mode.INHIBITED:
             return
         if self.state.stage not in rule.states:
             return  # a graver one has just moved it on
-        action = rule.action
-        if action is Action.DEPLOY:
-            denied = against_rule(self.config, self.state, rule, judged.findings, self.now)
-            lowered = too_low(self.config, self.state, self.now)
-            if self.config.profile.below_minimum is BelowMinimum.NOTHING:
-                denied = denied or lowered
-            if denied:
-                self._deny(rule, denied, reasons)
-                return
-            if lowered:
-                action, reasons = Action.KILL, (*reasons, f"no deploy: {lowered}")
+        if rule.action is Action.DEPLOY:
+            self._act_on_deploy(judged)
+            return
         evidence = self.state.rule(rule.name)
         self._remember(rule, replace(evidence, latched=True, denied=""))
-        if action is Action.DEPLOY:
-            self.order_deploy(rule.name, reasons)
-        elif action is Action.KILL:
+        if rule.action is Action.KILL:
             self.order_kill(rule.name, reasons)
         else:
             text = f"rule '{rule.name}': {rule.says or '; '.join(reasons)}"
             self.outputs.append(i.Say(f"{text} ({'; '.join(reasons)})", alarm=True))
+
+    def _act_on_deploy(self, judged: Judged) -> None:
+        rule, reasons, evidence = judged.rule, judged.reasons(), self.state.rule(judged.rule.name)
+        if evidence.put_off:
+            denied = against_any_rule(self.config, self.state, self.now)
+            moves = flight.moving(self.config, self.state, self.now)
+            reasons = (*reasons, f"put off as it was too low, and it still falls: {moves}")
+        else:
+            denied = against_rule(self.config, self.state, rule, judged.findings, self.now)
+        lowered = too_low(self.config, self.state, self.now)
+        if self.config.profile.below_minimum is BelowMinimum.NOTHING:
+            denied = denied or lowered
+        if denied:
+            self._deny(rule, denied, reasons)
+        elif not lowered:
+            self._remember(rule, replace(evidence, latched=True, put_off=False, denied=""))
+            self.order_deploy(rule.name, reasons)
+        elif not evidence.put_off:
+            self.put_off(rule.name)
+            self.order_kill(rule.name, (*reasons, f"no deploy: {lowered}"))
+
+    def put_off(self, name: str) -> None:
+        """The deploy of this rule waits until the vehicle is not too low any more."""
+        evidence = replace(self.state.rule(name), put_off=True, latched=False, denied="")
+        self._keep({**self.state.rules, name: evidence})
 
     def _deny(self, rule: Rule, why: str, reasons: tuple[str, ...]) -> None:
         evidence = self.state.rule(rule.name)

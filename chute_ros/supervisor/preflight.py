@@ -19,8 +19,14 @@ from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, Supervis
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import CONTRADICTED_FOR, State
 
+#: MAV_STATE of an autopilot that cannot fly, or only ends a flight (MAVLink common.xml).
+_UNABLE = {
+    5: "the autopilot says MAV_STATE_CRITICAL (need STANDBY or ACTIVE): look at its own messages",
+    6: "the autopilot says MAV_STATE_EMERGENCY (need STANDBY or ACTIVE): look at its own messages",
+    8: "the autopilot says MAV_STATE_FLIGHT_TERMINATION (need STANDBY or ACTIVE): reboot it",
+}
 _EPOCH = datetime.date(1970, 1, 1).toordinal()
 #: A wall clock that says less was never set.
 _FIRST_DAY = datetime.date(2024, 1, 1).toordinal() - _EPOCH
@@ -84,8 +90,27 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
         reasons.append(text)
     if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):
         reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
-    reasons += [f"vehicle: {fault}" for fault in state.vehicle.faults]
+    reasons += _measured_problems(config, state, now)
+    if now - state.vehicle_received <= config.vehicle_state_age:
+        reasons += [f"vehicle: {fault}" for fault in state.vehicle.faults]
+        unable = _UNABLE.get(state.vehicle.system_status)
+        reasons += [unable] if unable else []
     return tuple(reasons)
+
+
+def _measured_problems(config: SupervisorConfig, state: State, now: float) -> list[str]:
+    """What is measured of a vehicle that stands, and cannot be."""
+    used = {name for rule in config.profile.rules for name in rule.measured}
+    wrong = [f"{name} cannot be used: {why}" for name, why in state.unfit.items() if name in used]
+    wrong += [
+        f"{name} is contradicted: {state.denied[name]}"
+        for name, since in state.denied_since.items()
+        if now >= since + CONTRADICTED_FOR and name in used and name not in state.unfit
+    ]
+    return wrong + [
+        f"{part} is told otherwise by another source, or has jumped"
+        for part in sorted(state.disputed)
+    ]
 
 
 def _rung_problem(rung: Rung, evidence: LinkEvidence) -> str:

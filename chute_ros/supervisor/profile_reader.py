@@ -17,7 +17,7 @@ from chute_ros.model import Action
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import CLIMB_RATE, STANDARD_LIMITS, Limits
+from chute_ros.supervisor.measurements import DERIVED, STANDARD_LIMITS, Limits
 from chute_ros.supervisor.rules import (
     ALL,
     ANY,
@@ -251,7 +251,7 @@ def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | No
 def _measurement(
     reader: _ProfileLines, what: str, where: Where, entries: dict[str, Where], weight: float
 ) -> MeasurementCondition:
-    known = (*STANDARD_LIMITS, CLIMB_RATE)
+    known = (*STANDARD_LIMITS, *DERIVED)
     name = reader.choice(entries["measurement"], f"measurement in {what}", known)
     if "is" in entries:
         reader.wrong(entries["is"].line, "`is` belongs to a link: use above or below")
@@ -289,6 +289,6 @@ def _check_deploy(reader: _ProfileLines, what: str, line: int, rule: Rule) -> No
     if silence >= rule.needed - 1e-9:
         text = f"{what} would deploy on silence alone, which is never done"
         reader.wrong(line, f"{text}: raise needed above {silence:g}, or add a measurement")
-    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING}:
+    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING, Stage.DEPLOYED}:
         text = f"{what} would deploy out of flight, which is never done"
-        reader.wrong(line, f"{text}: its states may be IN_FLIGHT and KILLING")
+        reader.wrong(line, f"{text}: its states may be IN_FLIGHT, KILLING and DEPLOYED")

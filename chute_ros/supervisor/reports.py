@@ -8,15 +8,37 @@ from types import MappingProxyType
 from chute_ros.model import Action, Armed, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.contradictions import commanded, denials, noted
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.machine import Stage, Stimulus
-from chute_ros.supervisor.measurements import HEIGHT, VERTICAL_SPEED, Measured, samples_of
+from chute_ros.supervisor.measurements import (
+    ACCELERATION,
+    CLIMB_RATE,
+    DEGREES,
+    HEIGHT,
+    PRESSURE_ALTITUDE,
+    TILT,
+    VERTICAL_SPEED,
+    Measured,
+    pressure_altitude,
+    samples_of,
+)
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.requests import Requests
+from chute_ros.supervisor.state import CONTRADICTED_FOR
 
 #: A vertical speed and that of the heights differ by so much if one of them is wrong, m/s: a fall
 #: that began within the second of the heights is seen late by them.
 _SPEEDS_DIFFER = 10.0
+#: Accelerometers differ by more than motors that shake make them, m/s^2.
+_FORCES_DIFFER = 6.0
+#: What the newest pressure counts in that of the ground.
+_OF_NEWEST = 0.1
+#: No force without any speed is that of a fall for so long, s.
+_NEVER_FALLS_FOR = 3.0
+#: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); it is found
+#: fit or unfit by the samples of so long, s.
+_AT_REST, _FITNESS_TAKES = (7.8, 11.8), 1.0
 #: A vehicle that was not heard as it was killed may be so much later, s.
 _HEARD_AFTER_KILL = 1.0
 
@@ -95,9 +117,10 @@ class Reports(Requests):
 
     def vehicle(self, one: i.VehicleReport) -> None:
         """What the vehicle is told to be, and each measurement in it as evidence."""
-        state, new = self.state, one.state
-        limits = self.config.profile.limits
-        samples = samples_of(new, self.now, state.home)
+        new = one.state
+        self._note_home(new)
+        state, limits = self.state, self.config.profile.limits
+        samples = samples_of(new, self.now, state.home, state.home_altitude)
         before = {
             # What nobody tells just now has not changed its source.
             name: state.measured(name).told_by(one.told_by.get(flight.PARTS.get(name, name), ""))
@@ -116,16 +139,19 @@ class Reports(Requests):
             speed = self._believed_speed(measurements[VERTICAL_SPEED], one.disputed)
         measurements[HEIGHT] = before[HEIGHT].with_sample(told, limits[HEIGHT], speed)
         was_disarmed = state.vehicle.armed is Armed.DISARMED
+        differ = new.acceleration_spread > _FORCES_DIFFER
         self.state = replace(
             state,
             vehicle=new,
             vehicle_received=self.now,
-            disputed=one.disputed,
+            disputed=one.disputed | {ACCELERATION} if differ else one.disputed,
             measurements=MappingProxyType({**state.measurements, **measurements}),
         )
-        self._note_height_told()
+        self._note_heights_told()
+        self._note_contradictions()
         self._note_height_of_kill()
         self._note_reboots(new)
+        self._note_faults(new.faults)
         if was_disarmed and new.armed is Armed.ARMED:
             height = flight.measured(self.config, self.state, "height", self.now)
             self.state = replace(self.state, armed_height=0.0 if math.isnan(height) else height)
@@ -153,21 +179,120 @@ class Reports(Requests):
         by_heights = flight.climb_rate(self.config, self.state, self.now)
         return math.nan if abs(told - by_heights) > _SPEEDS_DIFFER else told
 
-    def _note_height_told(self) -> None:
+    def _note_home(self, new: VehicleState) -> None:
+        """What heights are above, as long as it has not taken off: an autopilot that moves its
+        home in flight, or sets its height to zero, moves nothing here."""
+        state = replace(self.state, vehicle=new, vehicle_received=self.now)
+        if state.airborne and not math.isnan(state.home_altitude):
+            return
+        home_altitude = new.altitude - new.height
+        if not math.isnan(home_altitude):
+            self.state = replace(self.state, home_altitude=home_altitude)
+        here = pressure_altitude(new.pressure)
+        if state.airborne or flight.says_down(self.config, state, self.now) is not True:
+            return
+        before = state.ground_pressure_altitude
+        still = flight.armed(self.config, state, self.now) is not Armed.ARMED
+        if not math.isnan(here) and (still or math.isnan(before)):
+            ground = here if math.isnan(before) else before + _OF_NEWEST * (here - before)
+            self.state = replace(self.state, ground_pressure_altitude=ground)
+
+    def _note_heights_told(self) -> None:
         """Keep the heights of the last second, at most ten of them, all since one was doubted:
         what is left of noise without its jumps may look like a fall."""
-        height = self.state.measured("height")
+        heights = self._kept(HEIGHT, self.state.heights)
+        pressure_heights = self._kept(PRESSURE_ALTITUDE, self.state.pressure_heights)
+        if heights is self.state.heights and pressure_heights is self.state.pressure_heights:
+            return
+        self.state = replace(self.state, heights=heights, pressure_heights=pressure_heights)
+        if not math.isnan(flight.measured(self.config, self.state, CLIMB_RATE, self.now)):
+            self.state = replace(self.state, climb_told_at=self.now)
+
+    def _kept(
+        self, name: str, before: tuple[tuple[float, float], ...]
+    ) -> tuple[tuple[float, float], ...]:
+        height = self.state.measured(name)
+        if math.isnan(height.measured_at):
+            return before
         kept = tuple(
             one
-            for one in self.state.heights
+            for one in before
             if 0.0 <= height.measured_at - one[0] <= 1.0 and not one[0] < height.doubted_at
         )
         if not kept or height.measured_at - kept[-1][0] >= 0.1:
             kept = (*kept, (height.measured_at, height.value))
-        if not math.isnan(height.measured_at) and kept != self.state.heights:
-            self.state = replace(self.state, heights=kept)
-            if not math.isnan(flight.climb_rate(self.config, self.state, self.now)):
-                self.state = replace(self.state, climb_told_at=self.now)
+        return before if kept == before else kept
+
+    def _note_contradictions(self) -> None:
+        """What is claimed of a fall and is not so; in flight an alarm once it has lasted."""
+        state, now = self.state, self.now
+
+        def certain(name: str) -> float:
+            doubted = name in state.disputed or state.measured(name).doubt(name, now)
+            return math.nan if doubted else flight.measured(self.config, state, name, now)
+
+        cosine = math.cos(certain(TILT) / DEGREES)
+        moment = (now, certain(VERTICAL_SPEED), certain(ACCELERATION), cosine)
+        motion = noted(state.motion, moment)
+        if motion is state.motion:
+            return
+        denied = denials(motion, flight.pressure_rate(self.config, state, now))
+        targets = [
+            flight.measured(self.config, state, name, now)
+            for name in ("attitude_error", "sink_beyond_target")
+        ]
+        since = {name: state.denied_since.get(name, now) for name in denied}
+        self.state = replace(
+            state,
+            motion=motion,
+            denied=MappingProxyType(dict(denied)),
+            denied_since=MappingProxyType(since),
+            commanded=MappingProxyType(dict(commanded(*targets))),
+        )
+        last = state.motion[-1][0] if state.motion else now
+        for name, begun in since.items():
+            if state.airborne and last < begun + CONTRADICTED_FOR <= now:
+                self.outputs.append(i.Say(f"{name} is contradicted: {denied[name]}", alarm=True))
+        self._note_fitness()
+
+    def _note_fitness(self) -> None:
+        """An accelerometer that tells on the ground what it cannot feel there, or without any
+        speed of a fall, is not used until it tells on the ground what it must."""
+        state, now = self.state, self.now
+        unfit = dict(state.unfit)
+        begun = state.denied_since.get(ACCELERATION, math.nan)
+        if now >= begun + _NEVER_FALLS_FOR:
+            unfit.setdefault(ACCELERATION, f"it tells of a fall, and {state.denied[ACCELERATION]}")
+        since = math.nan
+        stands = not state.airborne and flight.says_down(self.config, state, now) is True
+        speeds = (
+            flight.measured(self.config, state, name, now) for name in (VERTICAL_SPEED, CLIMB_RATE)
+        )
+        stands = stands and not any(abs(s) > self.config.profile.moving_speed for s in speeds)
+        known = state.measured(ACCELERATION)
+        force = known.usable(self.config.profile.limits[ACCELERATION], now)
+        if stands and not math.isnan(force):
+            least, most = _AT_REST
+            fits = least <= force <= most
+            if fits == (ACCELERATION in unfit):
+                since = now if math.isnan(state.fitness_since) else state.fitness_since
+                if now >= since + _FITNESS_TAKES:
+                    unfit.pop(ACCELERATION, None)
+                    if not fits:
+                        unfit[ACCELERATION] = (
+                            f"it tells {force:.1f} m/s^2 while the vehicle stands (need {least:g} "
+                            f"to {most:g}; 0 is told by a driver that takes gravity out)"
+                        )
+        if unfit != state.unfit or since != state.fitness_since:
+            self.state = replace(state, unfit=MappingProxyType(unfit), fitness_since=since)
+
+    def _note_faults(self, faults: tuple[str, ...]) -> None:
+        """In flight what forbids a take-off is an alarm, each once as long as it lasts."""
+        new = tuple(one for one in faults if one not in self.state.faults_told)
+        if self.state.airborne:
+            self.outputs += [i.Say(f"vehicle: {one}", alarm=True) for one in new]
+        if faults != self.state.faults_told:
+            self.state = replace(self.state, faults_told=faults if self.state.airborne else ())
 
     def _note_reboots(self, new: VehicleState) -> None:
         """Restarts on the ground do not count; a node that counts from 0 again has restarted."""

@@ -39,6 +39,10 @@ class Requests(Orders):
         stimulus = Stimulus.ARMED if one.arm else Stimulus.DISARMED
         if one.success and listed(self.state.stage, stimulus):
             self.move(stimulus)
+        if one.success:
+            self.state = replace(self.state, armed_by_us=one.arm)
+        elif not one.token:
+            self.alarm(f"the parachutes are not disarmed after the flight: {one.message}")
         self.finish(one.token, one.success, one.success, one.message)
 
     def kill_request(self, one: i.KillRequest) -> None:
@@ -50,7 +54,7 @@ class Requests(Orders):
         if not self.state.leading:
             self.finish(one.token, False, False, f"refused: {i.CALL_AGAIN}")
             return
-        self.order_kill(one.by, (reason,), one.token)
+        self.order_kill(one.by, (reason,), one.token, one.kill_only)
         if self.state.mode is not i.Mode.ACTIVE:
             self._nothing_sent(one.token)
 
@@ -101,6 +105,8 @@ class Requests(Orders):
         """Back to the start, on the ground only."""
         stage = self.state.stage
         in_air = flight.in_air(self.config, self.state, self.now)
+        if in_air and flight.says_air_in_vain(self.config, self.state, self.now):
+            in_air = False
         if in_air or stage is Stage.IN_FLIGHT:
             self.finish(one.token, False, False, "refused: the vehicle is in the air")
         elif in_air is None and self.state.deploy_rule:
@@ -125,6 +131,8 @@ class Requests(Orders):
                 asks=MappingProxyType({}),
                 alarms=(),
                 alarm_at=math.nan,
+                canopy_fails=False,
+                kill_only=False,
                 # A device that still wants it asks again; one that was exchanged cannot.
                 device_blocks=MappingProxyType({}),
             )

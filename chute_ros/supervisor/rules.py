@@ -18,9 +18,10 @@ from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
     CLIMB_RATE,
+    DERIVED,
     FALL_SIGNS,
-    HEIGHT,
     STANDARD_LIMITS,
+    VERTICAL_SPEED,
     Limits,
 )
 
@@ -53,6 +54,8 @@ class AutopilotFact(enum.Enum):
     EMERGENCY = "emergency"  # it says MAV_STATE_EMERGENCY or MAV_STATE_FLIGHT_TERMINATION
     #: We stopped its motors in the air, so long ago that it still falls, and nothing tells how.
     KILLED_ALOFT = "killed_aloft"
+    #: We stopped its motors in the air, which is confirmed, and nobody asked for the kill alone.
+    MOTORS_STOPPED = "motors_stopped"
 
 
 class DeviceFact(enum.Enum):
@@ -65,7 +68,7 @@ class DeviceFact(enum.Enum):
 
 @dataclass(frozen=True)
 class MeasurementCondition:
-    """A usable measurement, or CLIMB_RATE, is above, or below, a limit (NaN: not asked for)."""
+    """A usable measurement, or one of DERIVED, is above or below a limit (NaN: not asked for)."""
 
     measurement: str
     above: float = math.nan
@@ -166,7 +169,9 @@ class Rule:
     def measured(self) -> tuple[str, ...]:
         """The measurements that it rests on."""
         known = (one for one in self.conditions if isinstance(one, MeasurementCondition))
-        return tuple(HEIGHT if c.measurement == CLIMB_RATE else c.measurement for c in known)
+        return tuple(
+            name for one in known for name in DERIVED.get(one.measurement, (one.measurement,))
+        )
 
     @cached_property
     def asks_the_autopilot(self) -> bool:
@@ -194,9 +199,10 @@ class Rule:
         }
         if self.asks_for_a_kill_aloft:
             names |= set(FALL_SIGNS)
-        # These are told by the heights as well.
-        by_height = names & {CLIMB_RATE, "vertical_speed"}
-        return frozenset(names - {CLIMB_RATE} | ({HEIGHT} if by_height else set()))
+        # The vertical speed is told by the heights as well.
+        derived = names & DERIVED.keys() | ({CLIMB_RATE} if VERTICAL_SPEED in names else set())
+        told_by = {name for one in derived for name in DERIVED[one]}
+        return frozenset(names - DERIVED.keys() | told_by)
 
     @cached_property
     def turned_by_time(self) -> frozenset[str]:

@@ -23,6 +23,8 @@ _RAREST_RESEND = 1.0
 #: A kill or a deploy is sent again after so long at first, s: of those that a bad way loses the
 #: kill must not be later than the deploy that follows it after 0.2 s.
 _SOONEST_RESEND = 0.02
+#: A measurement that is contradicted for so long is an alarm in flight and blocks it before, s.
+CONTRADICTED_FOR = 1.0
 #: A device that asks for a kill is taken to want it for so long, s.
 ASK_LASTS = 1.0
 
@@ -127,8 +129,25 @@ class State:
     #: Parts of it that another source has lately told otherwise.
     disputed: frozenset[str] = frozenset()
     measurements: Mapping[str, Measured] = field(default_factory=lambda: MappingProxyType({}))
-    #: (monotonic s, m) of the heights of the last second, the oldest first.
+    #: (monotonic s, m) of the heights of the last second, the oldest first; and by the barometer.
     heights: tuple[tuple[float, float], ...] = ()
+    pressure_heights: tuple[tuple[float, float], ...] = ()
+    #: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt) of the last
+    #: seconds, the oldest first; NaN: not known, or in doubt.
+    motion: tuple[tuple[float, float, float, float], ...] = ()
+    #: Measurement -> why what it claims of a fall is not so; and since when, monotonic s.
+    denied: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    denied_since: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    #: Measurement -> in words that what it claims of a fall was commanded.
+    commanded: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    #: Measurement -> what it told that cannot be; it is not used until it tells what can.
+    unfit: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    #: Since when an accelerometer on the ground tells otherwise of its fitness, monotonic s.
+    fitness_since: float = math.nan
+    #: Altitudes of what heights are above, m above mean sea level and in the standard atmosphere:
+    #: as they were on the ground before this flight.
+    home_altitude: float = math.nan
+    ground_pressure_altitude: float = math.nan
     #: When they last told a rate, monotonic s.
     climb_told_at: float = math.nan
     rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
@@ -160,12 +179,18 @@ class State:
     killed_sinking: float = math.nan
     #: Since when the vehicle says that it stands and nothing contradicts it.
     down_since: float = math.nan
+    #: A person asked for the kill under way alone: no deploy follows it by itself.
+    kill_only: bool = False
     #: It said before that kill that it stands, or is disarmed: that is not the kill's effect.
     killed_standing: bool = False
     #: When it last landed.
     landed_at: float = math.nan
-    #: It was seen high enough for a deploy since the take-off.
+    #: Seen high enough for a deploy since the take-off.
     was_high: bool = False
+    #: Seen off the ground since the take-off, for so long, s.
+    up_for: float = 0.0
+    #: By the barometer on the height of its take-off, and not moving, since, monotonic s.
+    at_ground_since: float = math.nan
     #: When it took off.
     airborne_since: float = math.nan
     #: The autopilot started anew since the take-off.
@@ -184,12 +209,20 @@ class State:
     device_blocks: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     #: It was said that no more of them are remembered.
     block_refused: bool = False
+    #: `safety/arm` has armed the parachutes: after the flight they are disarmed again.
+    armed_by_us: bool = False
+    #: Nothing has moved since, whatever the autopilot says of being in the air, monotonic s.
+    still_since: float = math.nan
+    #: Why the vehicle must not fly, as last raised as an alarm in flight.
+    faults_told: tuple[str, ...] = ()
     #: Who waits for the outcome.
     kill_tokens: tuple[int, ...] = ()
     deploy_tokens: tuple[int, ...] = ()
     alarms: tuple[str, ...] = ()
     #: When the alarm that does not stop is said next.
     alarm_at: float = math.nan
+    #: A canopy is out, does not carry, and no other parachute is left: the alarm does not stop.
+    canopy_fails: bool = False
 
     @property
     def deploy(self) -> Pending | None:

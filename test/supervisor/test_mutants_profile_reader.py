@@ -231,7 +231,7 @@ CONDITION_KEYS = (
     "measurement, link, autopilot, device, above, below, until, if_unknown, is, counted, weight"
 )
 LIMIT_KEYS = "minimum, maximum, rate, jump, max_age, stuck_after"
-FLYING = "its states may be IN_FLIGHT and KILLING"
+FLYING = "its states may be IN_FLIGHT, KILLING and DEPLOYED"
 KINDS = "needs one of measurement, link, autopilot, device; it has"
 
 

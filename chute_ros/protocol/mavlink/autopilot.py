@@ -1,28 +1,40 @@
 """What the autopilot on the same network says of the vehicle.
 
-Source: MAVLink common.xml: HEARTBEAT, EXTENDED_SYS_STATE, GLOBAL_POSITION_INT, LOCAL_POSITION_NED,
-ALTITUDE, ATTITUDE, ATTITUDE_QUATERNION, SCALED_IMU, HIGHRES_IMU, SYS_STATUS, SYSTEM_TIME.
-A value that is not finite, or that the message marks as unknown, is not taken over: the reading
-before it goes on ageing.
+Source: MAVLink common.xml: HEARTBEAT, SYSTEM_TIME, and what vehicle_readers.py reads.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
-from chute_ros.model import Armed, LandedState, Reading, VehicleState
+from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR, StreamWatch
+from chute_ros.protocol.mavlink.optional_streams import OptionalStreams
+from chute_ros.protocol.mavlink.readings import Readings
+from chute_ros.protocol.mavlink.sensors import FURTHER_ACCELEROMETERS, PRESSURE
+from chute_ros.protocol.mavlink.stream_rate import StreamRate
+from chute_ros.protocol.mavlink.stream_watch import Ask, StreamWatch
+from chute_ros.protocol.mavlink.targets import Vehicle
+from chute_ros.protocol.mavlink.vehicle_readers import VehicleReaders
 
-STANDARD_GRAVITY = 9.80665  # m/s^2
 #: What was said longer ago (s) proves nothing about now.
 STREAM_SILENCE = 2.5
 
-_NEVER = Reading()
+#: Their time_boot_ms is the autopilot's own time now. That of others (NAMED_VALUE_FLOAT, ...) a
+#: user's script may have filled in, and a target keeps the time at which it was set.
+_CLOCKS = frozenset(
+    {
+        "ATTITUDE",
+        "ATTITUDE_QUATERNION",
+        "GLOBAL_POSITION_INT",
+        "LOCAL_POSITION_NED",
+        "SCALED_IMU",
+        "SYSTEM_TIME",
+    }
+)
 
 #: Types that never fly the vehicle, whatever their heartbeat says in its field autopilot.
 _NOT_FLYING = frozenset(
@@ -55,30 +67,25 @@ def is_autopilot(heartbeat: Any) -> bool:
 
 
 class AutopilotTracker:
-    """Follows one autopilot."""
+    """Follows one autopilot. needed_rate: of each message that the rules need, Hz."""
 
-    def __init__(self, system_id: int, component_id: int, limits: LivenessLimits) -> None:
+    def __init__(
+        self, system_id: int, component_id: int, limits: LivenessLimits, needed_rate: float
+    ) -> None:
         self.system_id = system_id
         self.component_id = component_id
         self.liveness = Liveness(limits)
         self.reboot_count = 0
         self.rebooted_in_flight = False
-        self._readings: dict[str, Reading] = {}
         self._system_status = 0
-        self._streams = StreamWatch()
+        self._streams = StreamWatch(needed_rate)
+        self._optional = OptionalStreams()
+        #: Of each message that is read, by name.
+        self._rates: dict[str, StreamRate] = {}
         self._clock = BootClock()
+        self._readings = Readings(self._streams.heard)
+        self._readers = VehicleReaders(self._readings, self._clock)
         self._in_flight_before = False
-        self._readers: dict[str, Callable[[Any, float], None]] = {
-            "EXTENDED_SYS_STATE": self._extended_sys_state,
-            "GLOBAL_POSITION_INT": self._global_position_int,
-            "LOCAL_POSITION_NED": self._local_position_ned,
-            "ALTITUDE": self._altitude,
-            "ATTITUDE": self._attitude,
-            "ATTITUDE_QUATERNION": self._attitude_quaternion,
-            "SCALED_IMU": self._scaled_imu,
-            "HIGHRES_IMU": self._highres_imu,
-            "SYS_STATUS": self._sys_status,
-        }
 
     @property
     def device(self) -> str:
@@ -88,18 +95,18 @@ class AutopilotTracker:
     @property
     def armed(self) -> Armed:
         """By the newest heartbeat."""
-        reading = self._readings.get("armed")
-        return Armed.UNKNOWN if reading is None else Armed(int(reading.value))
+        value = self._readings.value("armed")
+        return Armed.UNKNOWN if math.isnan(value) else Armed(int(value))
 
     @property
     def landed_state(self) -> LandedState:
         """By the newest EXTENDED_SYS_STATE."""
-        reading = self._readings.get("landed_state")
-        return LandedState.UNKNOWN if reading is None else LandedState(int(reading.value))
+        value = self._readings.value("landed_state")
+        return LandedState.UNKNOWN if math.isnan(value) else LandedState(int(value))
 
     def on_ground(self, now: float) -> bool:
         """The autopilot says so now: what it said before its stream fell silent proves nothing."""
-        age = self._readings.get("landed_state", _NEVER).age(now)
+        age = self._readings.age("landed_state", now)
         return self.landed_state is LandedState.ON_GROUND and age < STREAM_SILENCE
 
     @property
@@ -111,42 +118,56 @@ class AutopilotTracker:
     def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
         """A HEARTBEAT of the autopilot."""
         armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        self._set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
+        self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
         self._system_status = message.system_status
+        self._readers.targets.vehicle = Vehicle(
+            message.autopilot, message.type, message.custom_mode
+        )
         changes = self.liveness.heard(now)
         if changes:
-            self._streams.begin()
+            self._begin_streams()
         return changes
 
     def ask_anew(self) -> None:
         """It is to be asked for other intervals from now on."""
-        self._streams = StreamWatch()
+        self._streams.fill_stores()
+        self._begin_streams()
 
-    def messages_due(self, interval: float, now: float) -> tuple[int, ...]:
-        """The messages to ask for now, so that each comes each interval (s)."""
-        return self._streams.due(interval, now)
+    def messages_due(self, interval: float, now: float) -> tuple[Ask, ...]:
+        """What to ask for now, so that each needed message comes each interval (s)."""
+        needed = self._streams.due(interval, now)
+        if needed:
+            return needed
+        targets = self._readers.targets.vehicle.target_messages
+        wanted = {**PRESSURE, **targets, **FURTHER_ACCELEROMETERS}
+        if self._streams.line_is_slow(now):
+            return self._optional.give_up(wanted, now)
+        return self._optional.due(wanted, self._rates, interval, now)
 
     def message(self, message: Any, now: float) -> bool:
         """Any other message of the autopilot; True: the vehicle's picture changed."""
-        kind = message.get_type()
-        reader = self._readers.get(kind)
-        # Others (NAMED_VALUE_FLOAT, ...) carry times that a user's script may have filled in.
-        if reader is not None or kind == "SYSTEM_TIME":
-            self._watch_clock(getattr(message, "time_boot_ms", 0))
-        if reader is None:
+        if message.get_type() in _CLOCKS:
+            self._watch_clock(message.time_boot_ms)
+        self._streams.received(len(message.get_msgbuf()))
+        if not self._readers.read(message, now):
             return False
-        reader(message, now)
+        self._rates.setdefault(message.get_type(), StreamRate()).heard(now)
         return True
+
+    def rates(self, now: float) -> dict[str, float]:
+        """Hz of each message that is read and came at least twice, by name."""
+        rates = {name: stream.rate(now) for name, stream in self._rates.items()}
+        return {name: rate for name, rate in rates.items() if not math.isnan(rate)}
 
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture at now, each part with its age."""
 
-        def value(name: str) -> float:
-            return self._readings.get(name, _NEVER).value
+        value = self._readings.value
 
         def age(name: str) -> float:
-            return self._readings.get(name, _NEVER).age(now)
+            return self._readings.age(name, now)
 
+        target_vertical_speed, below_target, target_age = self._readers.targets.at(now)
         return VehicleState(
             source=self.device,
             link_state=self.liveness.state,
@@ -156,6 +177,10 @@ class AutopilotTracker:
             landed_state_age=age("landed_state"),
             height=value("height"),
             height_age=age("height"),
+            altitude=value("altitude"),
+            altitude_age=age("altitude"),
+            pressure=value("pressure"),
+            pressure_age=age("pressure"),
             vertical_speed=value("vertical_speed"),
             vertical_speed_age=age("vertical_speed"),
             roll=value("roll"),
@@ -163,7 +188,13 @@ class AutopilotTracker:
             yaw=value("yaw"),
             tilt=value("tilt"),
             attitude_age=age("tilt"),
+            attitude_error=value("attitude_error"),
+            attitude_error_age=age("attitude_error"),
+            target_vertical_speed=target_vertical_speed,
+            below_target=below_target,
+            target_age=target_age,
             acceleration=value("acceleration"),
+            acceleration_spread=value("acceleration_spread"),
             acceleration_age=age("acceleration"),
             latitude=value("latitude"),
             longitude=value("longitude"),
@@ -175,13 +206,18 @@ class AutopilotTracker:
             uptime=self._clock.uptime,
             reboot_count=self.reboot_count,
             rebooted_in_flight=self.rebooted_in_flight,
+            faults=self._faults(now),
         )
 
-    def _set(self, name: str, value: float, now: float) -> None:
-        if math.isfinite(value):
-            self._readings[name] = Reading(float(value), now)
-            if name in ASKED_FOR:
-                self._streams.heard(name, now)
+    def _faults(self, now: float) -> tuple[str, ...]:
+        # Of one that is not heard that is the reason, not its rates.
+        heard = self.liveness.state is LinkState.OK
+        return tuple(self._streams.faults(now)) if heard else ()
+
+    def _begin_streams(self) -> None:
+        self._streams.begin()
+        self._optional.begin()
+        self._rates.clear()
 
     def _watch_clock(self, boot_ms: int) -> None:
         age = self._clock.observe(boot_ms)
@@ -195,63 +231,6 @@ class AutopilotTracker:
             return
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
-        self._streams.begin()
+        self._begin_streams()
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
-        for name in ("armed", "landed_state"):
-            self._readings.pop(name, None)
-
-    def _extended_sys_state(self, message: Any, now: float) -> None:
-        if LandedState.UNKNOWN < message.landed_state <= max(LandedState):
-            self._set("landed_state", message.landed_state, now)
-
-    def _global_position_int(self, message: Any, now: float) -> None:
-        self._set("height", message.relative_alt / 1000.0, now)
-        self._set("vertical_speed", -message.vz / 100.0, now)
-        latitude, longitude = message.lat / 1e7, message.lon / 1e7
-        # 0, 0 is what autopilots send before they know.
-        known = (latitude, longitude) != (0.0, 0.0)
-        if known and abs(latitude) <= 90.0 and abs(longitude) <= 180.0:
-            self._set("latitude", latitude, now)
-            self._set("longitude", longitude, now)
-
-    def _local_position_ned(self, message: Any, now: float) -> None:
-        # Its origin may not be the take-off point, so that only the speed is taken from it.
-        self._set("vertical_speed", -message.vz, now)
-
-    def _altitude(self, message: Any, now: float) -> None:
-        self._set("height", message.altitude_relative, now)
-
-    def _attitude(self, message: Any, now: float) -> None:
-        if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
-            return
-        self._set("roll", message.roll, now)
-        self._set("pitch", message.pitch, now)
-        self._set("yaw", message.yaw, now)
-        upright = math.cos(message.roll) * math.cos(message.pitch)
-        self._set("tilt", math.acos(max(-1.0, min(1.0, upright))), now)
-
-    def _attitude_quaternion(self, message: Any, now: float) -> None:
-        w, x, y, z = message.q1, message.q2, message.q3, message.q4
-        length = math.sqrt(w * w + x * x + y * y + z * z)
-        if not 0.5 < length < 2.0:
-            return
-        w, x, y, z = w / length, x / length, y / length, z / length
-        self._set("roll", math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)), now)
-        self._set("pitch", math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))), now)
-        self._set("yaw", math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)), now)
-        self._set("tilt", math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y)))), now)
-
-    def _scaled_imu(self, message: Any, now: float) -> None:
-        length = math.sqrt(message.xacc**2 + message.yacc**2 + message.zacc**2)
-        self._set("acceleration", length * STANDARD_GRAVITY / 1000.0, now)
-
-    def _highres_imu(self, message: Any, now: float) -> None:
-        parts = (message.xacc, message.yacc, message.zacc)
-        if all(map(math.isfinite, parts)):
-            self._set("acceleration", math.hypot(*parts), now)
-
-    def _sys_status(self, message: Any, now: float) -> None:
-        if message.voltage_battery != 0xFFFF:
-            self._set("battery_voltage", message.voltage_battery / 1000.0, now)
-        if 0 <= message.battery_remaining <= 100:
-            self._set("battery_remaining", message.battery_remaining / 100.0, now)
+        self._readings.forget("armed", "landed_state")

@@ -42,6 +42,8 @@ class MavlinkConfig:
     kill_method: KillMethod = KillMethod.FLIGHT_TERMINATION
     #: Rate to ask of the autopilot for each message that vehicle/state needs, Hz; 0: do not ask.
     autopilot_message_rate: float = 10.0
+    #: Rate that the rules need of each message that they measure with, Hz; 0: not judged.
+    needed_message_rate: float = 5.0
     #: Undo arming on the ground while flight is blocked.
     disarm_when_blocked: bool = True
     heartbeat_interval: float = 1.0

@@ -151,7 +151,9 @@ class Devices:
             return
         autopilot = self.autopilots.get(*ids)
         if autopilot is None:
-            autopilot = AutopilotTracker(*ids, self._config.autopilot_liveness)
+            config = self._config
+            limits, needed = config.autopilot_liveness, config.needed_message_rate
+            autopilot = AutopilotTracker(*ids, limits, needed)
             self.autopilots.add(*ids, autopilot)
         self._changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
         self._vehicle_changed(now)

@@ -23,6 +23,7 @@ from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
+from chute_ros.protocol.mavlink.stream_watch import Ask
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
 from chute_ros.protocol.requests import Requests
 
@@ -297,14 +298,15 @@ class MavlinkLink:
         self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
         self._begin(self._disarming, goals.disarm_on_ground(autopilot, now), now)
 
-    def _ask_for(
-        self, message_ids: tuple[int, ...], autopilot: AutopilotTracker, now: float
-    ) -> None:
-        interval_us = min(1e6 / self.config.autopilot_message_rate, _LONGEST_INTERVAL_US)
-        for message_id in message_ids:
+    def _ask_for(self, asks: tuple[Ask, ...], autopilot: AutopilotTracker, now: float) -> None:
+        for ask in asks:
+            interval_us = min(ask.interval * 1e6, _LONGEST_INTERVAL_US)
             self.requests.commands.send_once(
                 goals.command(
-                    autopilot, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(message_id), interval_us
+                    autopilot,
+                    dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+                    float(ask.message_id),
+                    interval_us,
                 ),
                 now,
             )

@@ -271,19 +271,24 @@ def test_copy_of_an_acknowledgement_settles_nothing_twice():
 STREAMED = [245, 33, 30, 26, 1]
 
 
+def needed(bench):
+    return [order for order in bench.commands(511) if order.param1 in STREAMED]
+
+
 def test_autopilots_messages_are_asked_for_at_the_set_rate():
     bench = Bench(autopilot_message_rate=20.0).hear(PILOT, copter())
     orders = bench.commands(511)
-    assert [(order.param1, order.param2) for order in orders] == [(i, 50_000) for i in STREAMED]
+    asked = [(order.param1, order.param2) for order in orders]
+    assert asked == [(message, 50_000) for message in STREAMED[:-1]] + [(STREAMED[-1], 1_000_000)]
     bench.stream(4.6, 0.5, PILOT, copter)
-    assert len(bench.commands(511)) == 5 * 10, "often at first"
+    assert len(needed(bench)) == 5 * 10, "often at first"
     bench.clear()
     bench.stream(40.0, 0.5, PILOT, copter)
-    assert 5 * 6 <= len(bench.commands(511)) <= 5 * 9, "then now and then"
+    assert 5 * 6 <= len(needed(bench)) <= 5 * 9, "then now and then"
     bench.clear()
     bench.link.set_autopilot_message_rate(4.0, bench.now)
     bench.collect()
-    assert [order.param2 for order in bench.commands(511)] == [250_000] * 5
+    assert [order.param2 for order in bench.commands(511)] == [250_000] * 4 + [1_000_000]
     bench.clear()
     bench.link.set_autopilot_message_rate(0.0, bench.now)
     bench.stream(20.0, 0.5, PILOT, copter)
@@ -300,7 +305,7 @@ def test_a_rate_that_is_set_later_is_asked_for_once_the_autopilot_is_there():
     bench = Bench(autopilot_message_rate=0.0).hear(PILOT, copter())
     bench.link.set_autopilot_message_rate(10.0, bench.now)
     bench.collect()
-    assert [order.param2 for order in bench.commands(511)] == [100_000] * 5
+    assert [order.param2 for order in bench.commands(511)] == [100_000] * 4 + [1_000_000]
 
 
 def test_a_refused_release_names_what_the_parachute_says_of_itself():

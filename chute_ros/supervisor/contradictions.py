@@ -1,0 +1,180 @@
+"""What a measurement claims of a fall, held against what others tell: physics, not thresholds.
+
+Height, vertical speed and attitude of an autopilot are one estimator: when it goes wrong, it is
+wrong with itself. The barometer and the accelerometer are origins of their own. A claim that they
+contradict is denied, with the reason:
+
+- a sink of the estimator, where the barometer tells none; without a barometer, where no force was
+  missing while it is said to have speeded up;
+- a force as in a fall, where no speed follows from it (what is not carried by a force f speeds up
+  downwards by 9.8 - f at least);
+- a tilt, where it is carried in full and does not speed up.
+
+Only an origin that lives denies: a sensor that is stuck has no noise, one that fails has much of
+it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from statistics import fmean
+
+from chute_ros.supervisor.measurements import ACCELERATION, TILT, VERTICAL_SPEED
+
+GRAVITY = 9.81  # m/s^2
+#: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt); NaN: not known.
+Moment = tuple[float, float, float, float]
+#: Moments are kept for so long, and this far apart at least, s.
+KEPT_FOR, _APART = 3.0, 0.08
+#: Between the least and the most of a sensor that lives, m/s^2 and m/s; and the usual step of a
+#: speed that is no noise, m/s.
+_FORCE_LIVES, _SPEED_LIVES, _SPEED_STEADY = 0.02, 0.003, 3.0
+#: Moments further apart say nothing of what lay between, s.
+_GAP = 0.35
+#: A sink is denied if it differs by so much, m/s, and this part of itself, from the barometer's.
+_SINK_DIFFERS, _OF_SINK = 2.0, 0.5
+#: Speeded up by so much more than was felt, m/s, in this time at least, s.
+_NOT_FELT, _FELT_OVER = 4.0, 1.0
+#: Below this a force is that of a fall, m/s^2: half of what a body at rest feels.
+FREE_FALL = 4.9
+#: It must have been that for so long, s, and the speed be higher by so much, m/s.
+_FALLS_FOR, _NO_SPEED = 0.25, 2.0
+#: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
+#: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
+_FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
+#: Carried in full: on the average between these, m/s^2, for so long, s, each so near to gravity,
+#: m/s^2, as motors shake.
+_CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
+#: Faster than that it may have reached the last speed of its fall, m/s; and one that lies on its
+#: side while it is carried along its axis speeds up by more than this in that time, m/s.
+_FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
+
+
+def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
+    """With one more, if it is far enough from the last."""
+    now = moment[0]
+    if motion and now - motion[-1][0] < _APART:
+        return motion
+    return (*(one for one in motion if now - one[0] <= KEPT_FOR), moment)
+
+
+def denials(motion: tuple[Moment, ...], baro_rate: float) -> Mapping[str, str]:
+    """Measurement -> why what it claims is not so. baro_rate: of the last second by the barometer,
+    m/s, up positive; NaN: it tells none."""
+    denied = {}
+    if why := _sink_denied(motion, baro_rate):
+        denied[VERTICAL_SPEED] = why
+    if why := _fall_denied(motion, baro_rate):
+        denied[ACCELERATION] = why
+    if why := _tilt_denied(motion):
+        denied[TILT] = why
+    return denied
+
+
+def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, str]:
+    """Measurement -> in words that what it claims was commanded: no accident. Degrees from
+    the commanded attitude, and m/s of sink beyond the commanded one; NaN: not known."""
+    told = {}
+    if attitude_error <= _FOLLOWS:
+        told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
+    if sink_beyond_target <= _SINKS_AS_TOLD:
+        beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
+        told[VERTICAL_SPEED] = f"it was commanded ({beyond})"
+    return told
+
+
+def _last(motion: tuple[Moment, ...], seconds: float) -> list[Moment]:
+    return [one for one in motion if motion[-1][0] - one[0] <= seconds + _APART / 2.0]
+
+
+def _sink_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
+    if not motion or not motion[-1][1] < -1.0:
+        return ""
+    if not math.isnan(baro_rate):
+        speeds = [one[1] for one in _last(motion, 1.0) if not math.isnan(one[1])]
+        told = fmean(speeds)
+        if baro_rate - told <= max(_SINK_DIFFERS, _OF_SINK * abs(told)):
+            return ""
+        return f"the barometer tells {baro_rate:+.1f} m/s where it tells {told:+.1f}"
+    return _not_felt(motion)
+
+
+def _not_felt(motion: tuple[Moment, ...]) -> str:
+    """It speeded up downwards, and no force was missing."""
+    known = [one for one in motion if not any(map(math.isnan, one))]
+    if not _carried(motion):
+        return ""
+    felt, best, over = 0.0, 0.0, 0.0
+    for after, before in _backwards(known):
+        if after[0] - before[0] > _GAP:
+            break  # nobody knows what was felt meanwhile
+        # A force to the side carries nothing, so that upwards it counts as none.
+        felt += min(after[2] * after[3] - GRAVITY, 0.0) * (after[0] - before[0])
+        passed = known[-1][0] - before[0]
+        more = felt - (known[-1][1] - before[1])
+        if passed >= _FELT_OVER and more > best:
+            best, over = more, passed
+    if best <= _NOT_FELT:
+        return ""
+    return f"it sinks {best:.1f} m/s faster than {over:.1f} s before, of which no force tells"
+
+
+def _fall_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
+    """No speed follows from a force as in a fall."""
+    fell: list[Moment] = []
+    for one in reversed(motion):
+        if not one[2] < FREE_FALL:
+            break
+        fell.insert(0, one)
+    if len(fell) < 3 or math.isnan(fell[-1][1]) or not _speed_lives(motion):
+        return ""
+    speeds = [one[1] for one in _last(motion, 1.0) if not math.isnan(one[1])]
+    if not baro_rate >= fmean(speeds) - _SINK_DIFFERS and not math.isnan(baro_rate):
+        return ""  # the barometer does tell of a fall
+    due = 0.0
+    for after, before in _backwards(fell):
+        due += (after[2] - GRAVITY) * (after[0] - before[0])
+        passed = fell[-1][0] - before[0]
+        change = fell[-1][1] - before[1]
+        if passed >= _FALLS_FOR and change - due > _NO_SPEED + 0.1 * abs(due):
+            return (
+                f"in {passed:.1f} s the vertical speed changed by {change:+.1f} m/s, "
+                f"where such a force makes it {due:.1f}"
+            )
+    return ""
+
+
+def _tilt_denied(motion: tuple[Moment, ...]) -> str:
+    """Carried in full, and not speeding up: it does not lie on its side."""
+    known = _carried(motion)
+    if not known or known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
+        return ""
+    force = fmean([one[2] for one in known])
+    return f"a force of {force:.1f} m/s^2 carries it, and its vertical speed stays"
+
+
+def _carried(motion: tuple[Moment, ...]) -> list[Moment]:
+    """The newest moments, if an accelerometer that lives tells in all of them that the vehicle is
+    carried in full; empty: it does not."""
+    newest = _last(motion, _CARRIED_FOR) if motion else []
+    known = [one for one in newest if not any(map(math.isnan, one))]
+    if len(known) < 4 or known[-1] is not motion[-1]:
+        return []
+    forces, (least, most) = [one[2] for one in known], _CARRIED
+    in_full = all(abs(force - GRAVITY) <= _SHAKES for force in forces)
+    lives = max(forces) - min(forces) >= _FORCE_LIVES
+    return known if in_full and lives and least <= fmean(forces) <= most else []
+
+
+def _speed_lives(motion: tuple[Moment, ...]) -> bool:
+    speeds = [one[1] for one in _last(motion, 1.0)]
+    if any(map(math.isnan, speeds)):
+        return False
+    steps = [abs(after - before) for after, before in zip(speeds[1:], speeds, strict=False)]
+    # One that sends noise differs by much from one to the next, and back again.
+    return max(speeds) - min(speeds) >= _SPEED_LIVES and fmean(steps) <= _SPEED_STEADY
+
+
+def _backwards(moments: list[Moment]) -> Iterator[tuple[Moment, Moment]]:
+    return zip(moments[:0:-1], moments[-2::-1], strict=True)
