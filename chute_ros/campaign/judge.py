@@ -139,7 +139,9 @@ def _not_carried(flown: Flown) -> Judged | None:
         return Judged(Count.NOT_TOLD, blind)
     if flown.landed < due:
         return Judged(Count.NO_TIME, f"{flown.landed - out:.2f} s from its release to the ground")
-    if not any(out < at <= due for at, _ in flown.alarmed):
+    followed = [at for at, one in flown.decided if one.action is Action.DEPLOY]
+    told = [*followed, *(at for at, _ in flown.alarmed)]
+    if not any(flown.another.at <= at <= due for at in told):
         return Judged(Count.MISSED, "the canopy did not carry, and nobody was alarmed")
     if scenario.vehicle is not Vehicle.BOTH or flown.released_another <= flown.another.latest:
         return None
