@@ -118,3 +118,15 @@ def test_a_canopy_that_does_not_carry_and_is_the_only_one_is_told_of() -> None:
     assert judge(end).count is Count.RIGHT
     assert end.landing_speed > 15.0
     assert [text for at, text in end.alarmed if at > end.another.at]
+
+
+@pytest.mark.parametrize("vehicle", [Vehicle.MAVLINK, Vehicle.UPF])
+@pytest.mark.parametrize(("how", "strength"), [("leans", 0.33), ("diverges", 4.0)])
+def test_an_estimator_that_runs_away_on_the_ground_releases_nothing(
+    how: str, strength: float, vehicle: Vehicle
+) -> None:
+    runs_away = EstimatorFault(how, 1.0, 9.0, strength)
+    end = flown(Failure.NOTHING, runs_away, height=0.0, vehicle=vehicle)
+    assert not end.truth.falls
+    assert math.isnan(end.released)
+    assert judge(end).count is Count.RIGHT
