@@ -57,7 +57,7 @@ class MavlinkNode(DeviceNode):
         if chosen is None:
             return LinkState.NEVER_SEEN, False
         flying = self.link.vehicle_state(now).armed is Armed.ARMED
-        healthy = chosen.status(now).healthy and (flying or not self.link.doubts())
+        healthy = chosen.status(now).healthy and (flying or not self.link.doubts(now))
         return chosen.liveness.state, healthy
 
     def is_release(self, data: bytes) -> bool:

@@ -29,6 +29,8 @@ class Details:
 
     parachutes: tuple[ParachuteDetails, ...]
     vehicle: model.VehicleState
+    #: Of each message that is read of the autopilot, Hz.
+    rates: Mapping[str, float]
     doubts: tuple[str, ...]
     received: int
     sent: int
@@ -47,7 +49,8 @@ def details_of(link: MavlinkLink, now: float) -> Details:
     return Details(
         tuple(map(parachute, link.parachutes.all())),
         link.vehicle_state(now),
-        tuple(link.doubts()),
+        link.autopilot_rates(now),
+        tuple(link.doubts(now)),
         link.received_count,
         link.sent_count,
         Counter(link.counts),
@@ -98,8 +101,9 @@ def _parachute_task(name: str, one: ParachuteDetails) -> DiagnosticStatus:
     )
 
 
-def autopilot_task(name: str, vehicle: model.VehicleState) -> DiagnosticStatus:
+def autopilot_task(name: str, details: Details) -> DiagnosticStatus:
     """The autopilot on the same network."""
+    vehicle = details.vehicle
     level, text = diagnostics.OK, f"{vehicle.armed.name}, {vehicle.landed_state.name}"
     if vehicle.link_state is model.LinkState.NEVER_SEEN:
         level, text = diagnostics.STALE, "never heard"
@@ -107,13 +111,65 @@ def autopilot_task(name: str, vehicle: model.VehicleState) -> DiagnosticStatus:
         level, text = diagnostics.ERROR, f"heartbeat {vehicle.link_state.name}"
     elif vehicle.rebooted_in_flight:
         level, text = diagnostics.ERROR, "restarted in flight"
+    elif vehicle.faults:
+        level, text = diagnostics.ERROR, "; ".join(vehicle.faults)
     values = {
         "heartbeat age (s)": vehicle.armed_age,
         "height (m)": vehicle.height,
         "height age (s)": vehicle.height_age,
+        "altitude (m)": vehicle.altitude,
+        "pressure (Pa)": vehicle.pressure,
         "attitude age (s)": vehicle.attitude_age,
         "landed state age (s)": vehicle.landed_state_age,
         "battery (V)": vehicle.battery_voltage,
         "restarts": vehicle.reboot_count,
+        "rates (Hz)": ", ".join(f"{kind} {hz:.1f}" for kind, hz in sorted(details.rates.items())),
+        "not seen": "; ".join(not_seen(details.rates)),
     }
     return diagnostics.status(name, "autopilot", level, text, values, vehicle.source)
+
+
+#: Messages, one of which at least is needed for what the text says.
+_SIGHTS = (
+    (
+        ("SCALED_PRESSURE", "SCALED_PRESSURE2", "SCALED_PRESSURE3", "HIGHRES_IMU"),
+        "no SCALED_PRESSURE: a wrong estimator is not contradicted by a barometer",
+    ),
+    (
+        ("SCALED_IMU2", "SCALED_IMU3"),
+        "no SCALED_IMU2: a wrong accelerometer is not contradicted by another",
+    ),
+    (
+        ("ATTITUDE_TARGET",),
+        "no ATTITUDE_TARGET: an attitude that was commanded looks like one that was not",
+    ),
+    (
+        ("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED", "NAV_CONTROLLER_OUTPUT"),
+        "no targets: a level sink that nobody commanded raises an alarm only",
+    ),
+)
+
+
+def not_seen(rates: Mapping[str, float]) -> list[str]:
+    """What the supervisor does not see, as these messages do not come."""
+    return [text for kinds, text in _SIGHTS if not any(kind in rates for kind in kinds)]
+
+
+#: What a parachute is that is whole and heard, and not ready.
+_NOT_READY = {
+    model.ParachuteState.NOT_READY: "is starting or calibrating, by its heartbeat",
+    model.ParachuteState.LAUNCHED: "is released",
+    model.ParachuteState.TOUCHDOWN: "is released",
+}
+
+
+def unhealthy_reasons(
+    details: Details, chosen: model.ParachuteStatus | None, expected: bool
+) -> tuple[str, ...]:
+    """Why the link is not healthy, besides what the parachute's own status tells as faults."""
+    reasons = list(details.doubts)
+    if expected and chosen is None:
+        reasons.append("no parachute was heard on this network")
+    elif expected and chosen is not None and not chosen.faults and not chosen.healthy:
+        reasons.append(f"{chosen.device} {_NOT_READY.get(chosen.state, chosen.state.name)}")
+    return tuple(reasons)

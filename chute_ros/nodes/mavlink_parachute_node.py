@@ -23,6 +23,7 @@ from chute_ros.nodes.mavlink_diagnostics import (
     details_of,
     link_task,
     parachute_tasks,
+    unhealthy_reasons,
 )
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from
 from chute_ros.nodes.signing_memory import SigningMemory
@@ -75,13 +76,16 @@ class MavlinkParachuteNode(DeviceNode):
         details = details_of(link, now)
         # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
         known = details.vehicle.armed is model.Armed.ARMED or not details.doubts
-        if not self.values["expect_parachute"]:
+        expected = self.values["expect_parachute"]
+        status = None if chosen is None else chosen.status(now)
+        reasons = unhealthy_reasons(details, status, expected)
+        if not expected:
             state, age = details.vehicle.link_state, details.vehicle.armed_age
-            return Summary(state, state is model.LinkState.OK and known, age, details)
-        if chosen is None:
-            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
-        healthy = chosen.status(now).healthy and known
-        return Summary(chosen.liveness.state, healthy, chosen.liveness.age(now), details)
+            return Summary(state, state is model.LinkState.OK and known, age, details, reasons)
+        if chosen is None or status is None:
+            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details, reasons)
+        age = chosen.liveness.age(now)
+        return Summary(status.link_state, status.healthy and known, age, details, reasons)
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, VehicleChanged):
@@ -133,7 +137,7 @@ class MavlinkParachuteNode(DeviceNode):
         return [
             link_task(name, details, traffic, wire),
             *parachute_tasks(name, details, self.values["expect_parachute"]),
-            autopilot_task(name, details.vehicle),
+            autopilot_task(name, details),
             self._signing.task(name),
         ]
 

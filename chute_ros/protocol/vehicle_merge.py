@@ -159,7 +159,7 @@ class VehicleMerge:
             uptime=self._vehicle.uptime,
             reboot_count=self._vehicle.reboot_count,
             rebooted_in_flight=self._vehicle.rebooted_in_flight,
-            faults=self._vehicle.faults,
+            faults=self._faults(now),
             **fields,
         )
 
@@ -256,6 +256,12 @@ class VehicleMerge:
         """
         told = [self._link(source, now) for source in self._sources if source in AUTOPILOTS]
         return min(told, key=lambda one: _PREFERENCE.index(one[0]), default=(LinkState.OK, 0))
+
+    def _faults(self, now: float) -> tuple[str, ...]:
+        """As vehicle/state tells them; of one that is lost that is the reason."""
+        told = VEHICLE_STATE in self._sources
+        lost = told and self._link(VEHICLE_STATE, now)[0] is LinkState.LOST
+        return () if lost else self._vehicle.faults
 
     def _link(self, source: str, now: float) -> tuple[LinkState, int]:
         word = self._words[source].get(readings.AUTOPILOT)

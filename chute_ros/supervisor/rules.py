@@ -213,9 +213,8 @@ class Rule:
     def rests_on_the_vehicle(self) -> bool:
         """All its conditions are what the vehicle tells, and nothing of what we did."""
         kinds = (MeasurementCondition, AutopilotCondition)
-        return not self.asks_for_a_kill_aloft and all(
-            isinstance(one, kinds) for one in self.conditions
-        )
+        ours = self.asks_for_a_kill_aloft or self.asks(AutopilotFact.MOTORS_STOPPED)
+        return not ours and all(isinstance(one, kinds) for one in self.conditions)
 
     @cached_property
     def asks_for_a_kill_aloft(self) -> bool:

@@ -23,6 +23,38 @@ def test_before_anything_was_heard_nothing_is_known():
     assert (state.source, state.armed, state.landed_state) == ("", 0, 0)
 
 
+def test_faults_are_told_until_their_source_is_lost():
+    one = merge("vehicle/state", "imu")
+    one.hear_state(VehicleState(link_state=LinkState.OK, faults=("ATTITUDE is slow",)), 10.0)
+    assert one.state(12.0).faults == ("ATTITUDE is slow",)
+    one.hear("imu", {"attitude": LEVEL}, 13.0)
+    assert one.state(13.0).faults == ()
+
+
+def test_new_parts_have_their_own_source_and_age():
+    one = merge("imu", "vehicle/state")
+    one.hear("imu", {"acceleration": (9.8,)}, 10.0)
+    told = VehicleState(
+        link_state=LinkState.OK,
+        altitude=488.0,
+        altitude_age=0.1,
+        pressure=95_500.0,
+        pressure_age=0.2,
+        target_vertical_speed=-1.0,
+        target_age=0.3,
+        acceleration=7.0,
+        acceleration_spread=2.0,
+        acceleration_age=0.0,
+    )
+    one.hear_state(told, 10.0)
+    state = one.state(10.1)
+    assert (state.altitude, state.pressure) == (488.0, 95_500.0)
+    assert state.target_age == pytest.approx(0.4)
+    assert (state.target_vertical_speed, state.acceleration) == (-1.0, 9.8)
+    assert math.isnan(state.below_target)
+    assert math.isnan(state.acceleration_spread), "of another source's accelerometers"
+
+
 def test_each_part_has_its_own_age():
     one = merge("odometry", "imu")
     one.hear("odometry", {"height": (12.0,), "vertical_speed": None, "attitude": None}, 10.0)

@@ -297,4 +297,4 @@ def test_the_autopilot_of_another_without_the_key_is_nobody(attacked, bench):
     stranger = Autopilot(system_id=2)
     attacked.network.plug(stranger)
     bench.until(lambda: attacked.counts()[UNSIGNED] > 5, "it is there")
-    assert attacked.link.doubts() == []
+    assert attacked.link.doubts(time.monotonic()) == []

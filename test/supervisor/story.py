@@ -59,6 +59,11 @@ _AGES = {
     "armed": "armed_age",
     "landed_state": "landed_state_age",
     "height": "height_age",
+    "altitude": "altitude_age",
+    "pressure": "pressure_age",
+    "attitude_error": "attitude_error_age",
+    "target_vertical_speed": "target_age",
+    "below_target": "target_age",
     "vertical_speed": "vertical_speed_age",
     "tilt": "attitude_age",
     "acceleration": "acceleration_age",
@@ -73,11 +78,17 @@ PROFILES = Path(__file__).parents[2] / "config" / "profiles"
 
 
 def vehicle(age: float = 0.0, **told: Any) -> i.VehicleReport:
-    """The vehicle tells these parts, each measured age s ago. tilt: degrees."""
-    if "tilt" in told:
-        told = {**told, "tilt": math.radians(told["tilt"])}
+    """The vehicle tells these parts, each measured age s ago. tilt, attitude_error: degrees."""
+    for name in ("tilt", "attitude_error"):
+        if name in told:
+            told = {**told, name: math.radians(told[name])}
     ages = {_AGES[name]: age for name in told if name in _AGES}
     return i.VehicleReport(VehicleState(**{**ages, **told}))
+
+
+def pressure_at(height: float, ground: float = 488.0) -> float:
+    """Pa, by the standard atmosphere, at this height over a ground so high, m."""
+    return 101_325.0 * (1.0 - (height + ground) / 44_330.77) ** (1.0 / 0.190263)
 
 
 def falling(t: float, height: float = 100.0) -> dict[str, float]:

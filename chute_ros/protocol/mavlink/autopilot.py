@@ -18,6 +18,7 @@ from chute_ros.protocol.mavlink.sensors import FURTHER_ACCELEROMETERS, PRESSURE
 from chute_ros.protocol.mavlink.stream_rate import StreamRate
 from chute_ros.protocol.mavlink.stream_watch import Ask, StreamWatch
 from chute_ros.protocol.mavlink.targets import Vehicle
+from chute_ros.protocol.mavlink.twins import WINDOW, Twins
 from chute_ros.protocol.mavlink.vehicle_readers import VehicleReaders
 
 #: What was said longer ago (s) proves nothing about now.
@@ -86,6 +87,11 @@ class AutopilotTracker:
         self._readings = Readings(self._streams.heard)
         self._readers = VehicleReaders(self._readings, self._clock)
         self._in_flight_before = False
+        self._twins = Twins()
+        #: A restart was seen that may be another device's clock.
+        self._restart_pending = False
+        #: When the newest restart was counted, and what was known before it.
+        self._restarted: tuple[float, int, bool] = (-math.inf, 0, False)
 
     @property
     def device(self) -> str:
@@ -117,12 +123,14 @@ class AutopilotTracker:
 
     def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
         """A HEARTBEAT of the autopilot."""
-        armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
-        self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
-        self._system_status = message.system_status
-        self._readers.targets.vehicle = Vehicle(
-            message.autopilot, message.type, message.custom_mode
-        )
+        # Of two with the same ids nobody knows whose it is: what was known ages.
+        if not self._twins.found(now):
+            armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
+            self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
+            self._system_status = message.system_status
+            self._readers.targets.vehicle = Vehicle(
+                message.autopilot, message.type, message.custom_mode
+            )
         changes = self.liveness.heard(now)
         if changes:
             self._begin_streams()
@@ -146,12 +154,17 @@ class AutopilotTracker:
 
     def message(self, message: Any, now: float) -> bool:
         """Any other message of the autopilot; True: the vehicle's picture changed."""
-        if message.get_type() in _CLOCKS:
-            self._watch_clock(message.time_boot_ms)
+        kind = message.get_type()
+        if kind in _CLOCKS:
+            if not self._twins.observe(kind, message.time_boot_ms, now):
+                return False
+            self._watch_clock(message.time_boot_ms, now)
+        elif not self._twins.ours(getattr(message, "time_boot_ms", 0), now):
+            return False
         self._streams.received(len(message.get_msgbuf()))
         if not self._readers.read(message, now):
             return False
-        self._rates.setdefault(message.get_type(), StreamRate()).heard(now)
+        self._rates.setdefault(kind, StreamRate()).heard(now)
         return True
 
     def rates(self, now: float) -> dict[str, float]:
@@ -219,7 +232,11 @@ class AutopilotTracker:
         self._optional.begin()
         self._rates.clear()
 
-    def _watch_clock(self, boot_ms: int) -> None:
+    def doubt(self, now: float) -> str:
+        """Another device uses the same ids, in words; empty: none does."""
+        return self._twins.doubt(f"two autopilots are {self.device}", now)
+
+    def _watch_clock(self, boot_ms: int, now: float) -> None:
         age = self._clock.observe(boot_ms)
         if age is Age.DOUBTFUL:
             known = self.landed_state is not LandedState.UNKNOWN
@@ -227,8 +244,18 @@ class AutopilotTracker:
             # Restarts again before it said where it is: it is where it was.
             still_there = not known and self.rebooted_in_flight
             self._in_flight_before = in_air or still_there or self.armed is Armed.ARMED
-        if age is not Age.RESTARTED:
-            return
+        self._restart_pending = self._restart_pending or age is Age.RESTARTED
+        if self._twins.found(now):
+            self._restart_pending = False
+            at, count, in_flight = self._restarted
+            if now - at <= WINDOW:
+                self.reboot_count, self.rebooted_in_flight = count, in_flight
+        elif self._restart_pending and not self._twins.by_turns(now):
+            self._restart_pending = False
+            self._restart(now)
+
+    def _restart(self, now: float) -> None:
+        self._restarted = now, self.reboot_count, self.rebooted_in_flight
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
         self._begin_streams()

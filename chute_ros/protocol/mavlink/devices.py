@@ -70,9 +70,11 @@ class Devices:
         """The first autopilot of ours that is not lost, or the first."""
         return first_alive(self.autopilots.all())
 
-    def doubts(self) -> list[str]:
+    def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
         doubts = [self.parachutes.doubt(), self.autopilots.doubt()]
+        doubts += [parachute.doubt(now) for parachute in self.parachutes.all()]
+        doubts += [autopilot.doubt(now) for autopilot in self.autopilots.all()]
         both = self.parachutes.all() and self.autopilots.all()
         if both and self.parachutes.system_id != self.autopilots.system_id:
             unset = [f"{self.parachutes.kind}_system_id"] if not self.parachutes.fixed else []

@@ -24,13 +24,12 @@ class FlightBlock:
         self._disarm_at = -math.inf
         self._told = False
 
-    def set(self, reason: str) -> bool:
-        """Block for reason, or release (empty). True: this is news."""
+    def set(self, reason: str) -> None:
+        """Block for reason, or release (empty)."""
         news = bool(reason) != bool(self.reason)
         self.reason = reason
         if news:
             self._disarm_at, self._told = -math.inf, False
-        return news
 
     def stands(self, autopilot: AutopilotTracker, now: float) -> bool:
         """Flight is blocked and the autopilot says, now, that it is on the ground."""

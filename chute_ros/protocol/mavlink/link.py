@@ -14,6 +14,7 @@ from dataclasses import replace
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event, Severity
 from chute_ros.protocol.mavlink import goals
+from chute_ros.protocol.mavlink.announcements import Announcements
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
@@ -50,6 +51,7 @@ class MavlinkLink:
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
         self._next_internal = -1
         self._block = FlightBlock()
+        self._announcements = Announcements()
         self._disarming = 0
         self._heartbeat_at = -math.inf
         self._heartbeats_until = -math.inf
@@ -79,7 +81,7 @@ class MavlinkLink:
 
     def next_deadline(self) -> float:
         """When update has something to do; at the latest at our next heartbeat."""
-        parts = (self._inbox, self._devices, self.requests)
+        parts = (self._inbox, self._devices, self.requests, self._announcements)
         deadlines = [part.next_deadline() for part in parts]
         if self._heartbeat_at < self._heartbeats_until:
             deadlines.append(self._heartbeat_at)
@@ -91,7 +93,9 @@ class MavlinkLink:
 
     def take_events(self) -> list[Event]:
         """What happened, oldest first; each is handed out once."""
-        return self._devices.take_events() + self.requests.take_events()
+        ends = self.requests.take_events()
+        self._announcements.heard(ends)
+        return self._devices.take_events() + ends
 
     # -- what the node asks for: every request ends in one RequestFinished with its token ------
 
@@ -122,6 +126,7 @@ class MavlinkLink:
         parachute = self._devices.to_release(device) or self._target(token, device)
         if parachute is not None:
             self.requests.make_way_for_release(now)
+            self._announcements.ordered(token, f"DEPLOY of {parachute.device}")
             self._begin(token, goals.release(parachute, force, now), now)
 
     def parachute_action(self, token: int, action: int, device: str, now: float) -> None:
@@ -162,13 +167,13 @@ class MavlinkLink:
             why = "no autopilot of ours was ever heard; set autopilot_system_id"
             self.requests.refuse(token, why)
         else:
+            self._announcements.ordered(token, "KILL")
             self._begin(token, goals.kill(autopilot, self.config.kill_method, now), now)
 
     def flight_block(self, reason: str, now: float) -> None:
         """Block flight for reason, or release the block (empty)."""
-        if self._block.set(reason):
-            text = f"flight blocked: {reason}" if reason else "flight block released"
-            self._outbox.announce(text, dialect.MAV_SEVERITY_WARNING, now)
+        self._block.set(reason)
+        self._announcements.reason(reason)
         self._look_after_autopilot(now)
         self._drive(now)
 
@@ -204,9 +209,14 @@ class MavlinkLink:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
 
-    def doubts(self) -> list[str]:
+    def autopilot_rates(self, now: float) -> dict[str, float]:
+        """Hz of each message that is read of our autopilot."""
+        autopilot = self._devices.chosen_autopilot()
+        return {} if autopilot is None else autopilot.rates(now)
+
+    def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
-        return self._devices.doubts()
+        return self._devices.doubts(now)
 
     # -- inside ----------------------------------------------------------------------------------
 
@@ -292,8 +302,7 @@ class MavlinkLink:
         if self._block.worth_telling():
             text = f"autopilot armed while flight is blocked ({reason}): disarming"
             self._devices.notice(Severity.WARNING, text)
-            text = f"disarming, flight blocked: {reason}"
-            self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
+            self._announcements.say(f"{reason}: flight blocked, disarming")
         # Our own requests count down from -1, so that they never meet a token of the owner's.
         self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
         self._begin(self._disarming, goals.disarm_on_ground(autopilot, now), now)
@@ -314,6 +323,8 @@ class MavlinkLink:
     def _drive(self, now: float) -> None:
         for send in self.requests.drive(now):
             self._send_command(send.command, send.confirmation, now)
+        for text in self._announcements.take(now):
+            self._outbox.send(text, now)
 
     def _send_command(self, command: Command, confirmation: int, now: float) -> None:
         message = dialect.MAVLink_command_long_message(

@@ -26,6 +26,7 @@ from chute_ros.model import (
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.twins import Twins
 
 _UNHEALTHY_STATES = {
     dialect.MAV_STATE_CRITICAL: "critical",
@@ -115,6 +116,7 @@ class ParachuteTracker:
         self.status_interval = math.nan  # s, between the two newest
         self.reboot_count = 0
         self._clock = BootClock()
+        self._twins = Twins()
         self._limits = status
         self._system_status = 0
         self._message: Any = None
@@ -152,8 +154,10 @@ class ParachuteTracker:
 
     def parachute_status(self, message: Any, now: float) -> None:
         """A PARACHUTE_STATUS of the device."""
+        if not self._twins.observe("PARACHUTE_STATUS", message.time_boot_ms, now):
+            return
         age = self._clock.observe(message.time_boot_ms)
-        self.reboot_count += age is Age.RESTARTED
+        self.reboot_count += age is Age.RESTARTED and not self._twins.found(now)
         self._doubtful = age is Age.DOUBTFUL
         if age in (Age.OLD, Age.DOUBTFUL):
             # Delayed: it must not undo what a newer one said.
@@ -166,6 +170,10 @@ class ParachuteTracker:
     def component_information(self, message: Any) -> None:
         """A COMPONENT_INFORMATION_BASIC of the device."""
         self.information = component_information(message)
+
+    def doubt(self, now: float) -> str:
+        """Another device uses the same ids, in words; empty: none does."""
+        return self._twins.doubt(f"two parachutes are {self.device}", now)
 
     def status_overdue(self, now: float) -> bool:
         """The status stream stopped: the newest is too old, though the link may live."""

@@ -104,10 +104,6 @@ class Outbox:
         state = dialect.MAV_STATE_ACTIVE
         self.send(dialect.MAVLink_heartbeat_message(kind, autopilot, 0, 0, state, 3), now)
 
-    def announce(self, text: str, severity: int, now: float) -> None:
-        """Tell the ground station (STATUSTEXT carries 50 bytes)."""
-        self.send(dialect.MAVLink_statustext_message(severity, text.encode()[:50]), now)
-
     def take(self) -> list[bytes]:
         """Frames to send; each is handed out once."""
         output, self._output = self._output, []

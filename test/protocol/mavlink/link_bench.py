@@ -10,6 +10,7 @@ from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
+from chute_ros.protocol.mavlink.status_texts import StatusTexts
 
 START = 1000.0
 ASLEEP = {"autopilot_message_rate": 0.0}
@@ -145,4 +146,7 @@ class Bench:
         return [e.status for e in self.events if isinstance(e, ParachuteChanged)][-1]
 
     def texts(self) -> list[str]:
-        return [m.text for _, m in self.sent if m.get_type() == "STATUSTEXT"]
+        """What a ground station reads."""
+        whole = StatusTexts()
+        said = [(t, m) for t, m in self.sent if m.get_type() == "STATUSTEXT"]
+        return [text.text for t, m in said for text in whole.feed(m, t)]

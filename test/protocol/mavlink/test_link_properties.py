@@ -78,7 +78,7 @@ def test_random_frames_and_requests_never_raise_and_never_make_it_spin(frames, a
         link.update(now)
         assert link.next_deadline() > now
         link.vehicle_state(now)
-        link.doubts()
+        link.doubts(now)
         for parachute in link.parachutes.all():
             parachute.status(now)
     assert link.received_count == len(frames)
@@ -111,7 +111,7 @@ def test_flood_of_made_up_devices_does_not_grow_it():
         bench.hear((system, 161), heartbeat(), copter(), status())
     assert len(bench.link.parachutes.all()) == MOST_DEVICES
     assert len(bench.link.autopilots.all()) == MOST_DEVICES
-    assert len(bench.link.doubts()) == 2
+    assert len(bench.link.doubts(bench.now)) == 2
     for stream in range(100):
         bench.link.receive(b"\xfd\x09", bench.now, stream)
     assert bench.at(60.0).link.next_deadline() == math.inf

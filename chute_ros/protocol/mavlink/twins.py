@@ -1,0 +1,152 @@
+"""Two devices that use the same ids: their clocks, time_boot_ms, come by turns.
+
+One clock may run back: the device restarted, and the old clock never comes again. It may seem to:
+a message came late, or twice by two ways. Two clocks that both go on, each in step with ours, are
+two devices. Which of them said what is told by the clock; what bears none is of nobody known.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from statistics import median
+
+#: Only so old messages are looked at, s, and so many; and no more often than this, s.
+WINDOW, _MOST, _EACH_TIME = 15.0, 1000, 0.5
+#: A clock that was not heard for so long, s, is gone: its device restarted or left, and what it
+#: said before has arrived.
+_GONE = 3.0
+#: Messages of one kind may be so much out of order, ms, without a second clock.
+_JITTER_MS = 20
+#: Both must come so often, and take turns so often.
+_EACH, _TURNS = 6, 4
+#: A clock is in step with ours if it is never further off, s: lines stall.
+_IN_STEP = 1.5
+#: Clocks that differ by less, s, are one.
+_CLOSEST = 0.1
+#: No message is later than this, s. Clocks that differ by less may be one of which a part comes
+#: late or twice: then so much of it must come again and again, and not twice.
+_LATEST, _SHARE, _COPIES = 5.0, 1.0 / 3.0, 0.25
+#: So long after the last sign of it, s, it is over.
+OVER_AFTER = 15.0
+
+
+@dataclass(frozen=True)
+class _Sight:
+    at: float
+    kind: str
+    #: Our time less the clock's, s.
+    offset: float
+    #: It runs behind the newest of its kind.
+    behind: bool
+
+
+class Twins:
+    """Follows the clocks behind one pair of ids. All times are monotonic s.
+
+    Clocks that differ by less than the interval of their messages are not told apart."""
+
+    def __init__(self) -> None:
+        self._newest: dict[str, tuple[int, float]] = {}
+        #: (Kind, boot ms) of the newest messages, oldest first.
+        self._seen: dict[tuple[str, int], None] = {}
+        self._sights: deque[_Sight] = deque(maxlen=_MOST)
+        self._copies: deque[float] = deque(maxlen=_MOST)
+        self._found_at = self._judged_at = -math.inf
+        #: Offset of the device that is followed, and of the other one.
+        self._ours = self._other = math.nan
+        self._ours_at = -math.inf
+
+    def found(self, now: float) -> bool:
+        """There are two."""
+        return now - self._found_at < OVER_AFTER
+
+    def by_turns(self, now: float) -> bool:
+        """Two clocks came by turns just now: a restart may only seem to be one."""
+        return _turns(one for one in self._sights if now - one.at <= _GONE) > 1
+
+    def doubt(self, who: str, now: float) -> str:
+        """That who, two of them, are there, and what to do about it; empty: they are not."""
+        if not self.found(now):
+            return ""
+        apart = abs(self._ours - self._other)
+        return (
+            f"{who} (their clocks are {apart:.1f} s apart): give each vehicle a system id of its "
+            "own (MAV_SYS_ID on PX4, MAV_SYSID or SYSID_THISMAV on ArduPilot), and each device of "
+            "a vehicle its own component id, or keep the other one off this network"
+        )
+
+    def ours(self, boot_ms: int, now: float) -> bool:
+        """A message with this time is of the one that is followed, as far as can be told."""
+        if not self.found(now):
+            return True
+        offset = now - boot_ms / 1000.0
+        return boot_ms > 0 and abs(offset - self._ours) <= abs(offset - self._other)
+
+    def observe(self, kind: str, boot_ms: int, now: float) -> bool:
+        """A message of this kind (its name) and time came: ours (see there) of it. True as well
+        when it is found out just now that there are two."""
+        if boot_ms == 0:
+            return self.ours(boot_ms, now)
+        if (kind, boot_ms) in self._seen:
+            self._copies.append(now)
+            return self.ours(boot_ms, now)
+        self._seen[kind, boot_ms] = None
+        if len(self._seen) > _MOST:
+            del self._seen[next(iter(self._seen))]
+        newest, newest_at = self._newest.get(kind, (boot_ms, now))
+        behind = boot_ms < newest - _JITTER_MS
+        if not behind or now - newest_at > _GONE:
+            self._newest[kind] = max(newest, boot_ms) if not behind else boot_ms, now
+        self._sights.append(_Sight(now, kind, now - boot_ms / 1000.0, behind))
+        if behind and now - self._judged_at >= _EACH_TIME:
+            self._judged_at = now
+            self._judge(now)
+        ours = self.ours(boot_ms, now)
+        if ours and (abs(self._sights[-1].offset - self._ours) <= _IN_STEP or self._lost(now)):
+            self._ours, self._ours_at = self._sights[-1].offset, now
+        return ours
+
+    def _lost(self, now: float) -> bool:
+        """The one that is followed was not heard for a while, or nobody was followed yet."""
+        return now - self._ours_at > _GONE
+
+    def _judge(self, now: float) -> None:
+        sights = [one for one in self._sights if now - one.at <= WINDOW]
+        # What only one of them sends is never behind, whichever of them it is.
+        both = {one.kind for one in sights if one.behind}
+        sights = [one for one in sights if one.kind in both]
+        # Before the second clock was heard the first one was ahead, whichever of them it is.
+        sights = list(itertools.dropwhile(lambda one: not one.behind, sights))
+        ahead = [one.offset for one in sights if not one.behind]
+        behind = [one.offset for one in sights if one.behind]
+        if min(len(ahead), len(behind)) < _EACH or _turns(sights) < _TURNS:
+            return
+        if max(one.at for one in sights if not one.behind) - sights[0].at < _GONE:
+            return
+        if max(_spread(ahead), _spread(behind)) > _IN_STEP:
+            return
+        pair = median(ahead), median(behind)
+        if abs(pair[0] - pair[1]) < _CLOSEST:
+            return
+        if abs(pair[0] - pair[1]) < _LATEST:
+            copies = sum(now - at <= WINDOW for at in self._copies)
+            if len(behind) < _SHARE * len(ahead) or copies > _COPIES * len(behind):
+                return
+        self._found_at = now
+        self._ours, self._other = sorted(pair, key=lambda one: abs(one - self._ours))
+
+
+def _turns(sights: Iterable[_Sight]) -> int:
+    """How often it was the other clock's turn."""
+    return sum(a.behind is not b.behind for a, b in itertools.pairwise(sights))
+
+
+def _spread(offsets: list[float]) -> float:
+    """Of all but the outermost tenths: when the second clock was new some were of the other."""
+    cut = max(1, len(offsets) // 10)
+    kept = sorted(offsets)[cut:-cut]
+    return kept[-1] - kept[0]

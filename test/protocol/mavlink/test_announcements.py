@@ -1,0 +1,113 @@
+"""What the ground station reads: given a block or an order, at t+..., then these texts."""
+
+import pytest
+from link_bench import ASLEEP, Bench, ack, copter, heartbeat, landed, status
+
+from chute_ros.protocol.mavlink.announcements import REASON_INTERVAL, Announcements
+from chute_ros.protocol.mavlink.config import KillMethod
+from chute_ros.protocol.mavlink.dialect import dialect as d
+
+PILOT, CHUTE = (1, 1), (1, 161)
+KILL, RELEASE = 185, 208
+LONG = (
+    "parachute 1/161: heartbeat LOST: 12.3 s old; battery 13.9 V, need 14.0 V; mavlink link lost"
+)
+
+
+def flying():
+    bench = Bench(**ASLEEP, kill_method=KillMethod.FLIGHT_TERMINATION)
+    bench.hear(PILOT, copter(armed=True), landed(2)).hear(CHUTE, heartbeat(), status())
+    bench.clear()
+    return bench
+
+
+def block(bench, reason):
+    bench.link.flight_block(reason, bench.now)
+    bench.collect()
+    return bench
+
+
+def test_the_whole_reason_comes_first_in_as_many_chunks_as_it_takes():
+    bench = block(flying(), LONG)
+    assert bench.texts() == [f"{LONG}: flight blocked"]
+    first, *_ = [m for _, m in bench.sent if m.get_type() == "STATUSTEXT"]
+    assert first.text == LONG[:50]
+    assert first.id != 0
+
+
+def test_two_long_texts_have_different_ids():
+    bench = block(block(flying(), LONG).at(3.0), LONG[::-1])
+    ids = [m.id for _, m in bench.sent if m.get_type() == "STATUSTEXT"]
+    assert len(set(ids)) == 2
+
+
+def test_a_reason_that_changes_is_said_anew_at_a_pace_and_the_newest_wins():
+    bench = flying()
+    for step in range(19):
+        block(bench.at(step / 10), f"reason {step}")
+    assert bench.texts() == ["reason 0: flight blocked"]
+    bench.at(REASON_INTERVAL)
+    assert bench.texts() == ["reason 0: flight blocked", "reason 18: flight blocked"]
+    bench.at(60.0)
+    assert len(bench.texts()) == 2
+
+
+def test_a_reason_that_is_told_again_is_not_said_again():
+    bench = block(flying(), "x")
+    for second in range(1, 20):
+        block(bench.at(second), "x")
+    assert bench.texts() == ["x: flight blocked"]
+    block(bench.at(30.0), "")
+    assert bench.texts() == ["x: flight blocked", "flight block released"]
+
+
+def test_one_that_comes_and_goes_within_the_pace_says_nothing():
+    bench = block(flying(), "x")
+    block(bench.at(0.5), "y")
+    block(bench.at(1.0), "x")
+    bench.at(10.0)
+    assert bench.texts() == ["x: flight blocked"]
+
+
+def test_a_kill_is_said_when_it_is_ordered_and_when_it_is_confirmed():
+    bench = flying()
+    bench.link.kill(1, bench.now)
+    bench.at(0.1).hear(PILOT, ack(KILL), copter(armed=False)).at(0.2)
+    ordered, confirmed = bench.texts()
+    assert ordered == "KILL ordered"
+    assert confirmed.startswith("KILL confirmed: ")
+
+
+def test_a_kill_that_is_refused_and_one_that_fails_are_said():
+    bench = flying()
+    bench.link.kill(1, bench.now)
+    bench.at(0.1).hear(PILOT, ack(KILL, d.MAV_RESULT_TEMPORARILY_REJECTED))
+    bench.stream(20.0, 0.5, PILOT, lambda: copter(armed=True))
+    texts = bench.texts()
+    assert texts[0] == "KILL ordered"
+    assert texts[1].startswith("KILL refused, trying on: ")
+    assert texts[-1].startswith("KILL FAILED: ")
+    assert len(texts) == 3
+
+
+def test_a_deploy_names_the_parachute():
+    bench = flying()
+    bench.link.deploy(1, True, bench.now)
+    bench.at(0.1).hear(CHUTE, ack(225), status(armed=4), ack(RELEASE))
+    bench.hear(CHUTE, status(deployed=4)).at(0.5)
+    texts = bench.texts()
+    assert texts[0] == "DEPLOY of 1/161 ordered"
+    assert texts[-1].startswith("DEPLOY of 1/161 confirmed: ")
+
+
+def test_texts_and_orders_without_end_do_not_grow_us():
+    announcements = Announcements()
+    for token in range(1000):
+        announcements.ordered(token, "KILL")
+    assert len(announcements.take(0.0)) <= 8
+    assert announcements.take(0.0) == []
+
+
+@pytest.mark.parametrize("reason", ["", "x" * 1000, "ä" * 60])
+def test_any_reason_can_be_said(reason):
+    assert all(len(text) < 310 for text in block(flying(), reason).texts())

@@ -1,0 +1,63 @@
+"""A canopy that is out and does not carry: the next parachute, or an alarm that does not stop."""
+
+from __future__ import annotations
+
+from story import LINK, Story, falling, parachute, shipped
+
+from chute_ros.model import Action, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.config import Rung
+from chute_ros.supervisor.machine import Stage
+
+TWO = (Rung(LINK, "1/161"), Rung(LINK, "1/162"))
+
+
+def under_canopy(speed: float, seconds: float, *ladder: Rung) -> Story:
+    """It tumbled and was deployed; under its canopy it comes down so fast, m/s."""
+    story = Story(shipped("multirotor", deploy_ladder=ladder)).ready()
+    story.at(0.0, parachute(device="1/161"), parachute(device="1/162"))
+    story.fly(2.0, height=300.0)
+    for k in range(40):
+        story.fly(story.t + 0.05, **{**falling(0.05 * k, 300.0), "tilt": min(120.0, 10.0 * k)})
+        if story.fired():
+            break
+    story.at(story.t, story.report(Action.KILL, Outcome.CONFIRMED))
+    out = ("1/161",) if ladder else ("1/161", "1/162")
+    story.at(story.t, *[parachute(device=device, deployed=True) for device in out])
+    assert story.state.stage is Stage.DEPLOYED
+    now, height = story.state.measured("vertical_speed").value, 290.0
+    for k in range(round(seconds / 0.05)):
+        now += min(max(-speed - now, -0.5), 0.5)
+        height += 0.05 * now
+        story.fly(story.t + 0.05, height=height, vertical_speed=now, tilt=20.0 + k % 3)
+    return story
+
+
+def test_one_that_carries_is_left_alone() -> None:
+    story = under_canopy(6.0, 20.0, *TWO)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.alarms() == []
+
+
+def test_one_that_does_not_is_followed_by_the_next_parachute() -> None:
+    story = under_canopy(22.0, 4.5, *TWO)
+    assert story.fired()[:2] == ["KILL", "DEPLOY"]
+    assert "canopy does not carry" in {one.rule for one in story.decisions(Action.KILL)}
+    story.at(story.t, story.report(Action.KILL, Outcome.CONFIRMED))
+    story.fly(story.t + 0.6, vertical_speed=-22.0, height=200.0)
+    assert story.newest(Action.DEPLOY).device == "1/162"
+
+
+def test_without_another_it_is_an_alarm_that_does_not_stop() -> None:
+    story = under_canopy(22.0, 10.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    said = [one for one in story.alarms() if "the canopy does not carry" in one]
+    assert len(said) >= 2
+    # Until a person resets it, on the ground.
+    down = {"armed": 1, "landed_state": 1, "vertical_speed": 0.0}
+    story.fly(story.t + 15.0, height=0.0, **down)
+    story.at(story.t, i.ResetRequest(5))
+    assert story.answer(5).success
+    before = len(story.alarms())
+    story.fly(story.t + 5.0, height=0.0, **down)
+    assert len(story.alarms()) == before

@@ -1,0 +1,64 @@
+"""What hangs on its motors falls without them: a kill in the air brings the deploy at once."""
+
+from __future__ import annotations
+
+import pytest
+from story import Story, falling, shipped
+
+from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.supervisor import inputs as i
+
+D = Action.DEPLOY
+
+
+def killed(profile: str, height: float, kill_only: bool = False) -> Story:
+    story = Story(shipped(profile)).ready().fly(2.0, height=height)
+    story.at(2.0, i.KillRequest(1, "operator", "flies away", kill_only))
+    story.at(2.05, story.report(Action.KILL, Outcome.CONFIRMED))
+    return story
+
+
+def test_a_confirmed_kill_of_a_multirotor_is_followed_by_the_deploy_at_once() -> None:
+    story = killed("multirotor", 50.0)
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.newest(D).rule == "motors stopped in flight"
+    assert story.when(D) == pytest.approx(2.05)
+
+
+def test_one_that_is_not_confirmed_is_not() -> None:
+    story = Story(shipped("multirotor")).ready().fly(2.0)
+    story.at(2.0, i.KillRequest(1, "operator", "flies away"))
+    story.fly(2.4)
+    assert story.fired() == ["KILL"]
+
+
+@pytest.mark.parametrize(("profile", "height"), [("fixed_wing", 50.0), ("multirotor", 8.0)])
+def test_what_glides_or_is_too_low_is_not(profile: str, height: float) -> None:
+    story = killed(profile, height).fly(2.3, height=height)
+    assert story.fired() == ["KILL"]
+
+
+def test_a_person_may_ask_for_the_kill_alone() -> None:
+    story = killed("multirotor", 50.0, kill_only=True).fly(2.3)
+    assert story.fired() == ["KILL"]
+    # Then a person sees it fall, and asks for both.
+    story.at(2.35, i.KillRequest(2, "operator", "it falls"))
+    story.at(2.4, story.report(Action.KILL, Outcome.CONFIRMED))
+    assert story.fired()[-1] == "DEPLOY"
+
+
+@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+def test_disarmed_in_the_air_by_whomever_it_is_deployed(profile: str) -> None:
+    story = Story(shipped(profile)).ready().fly(2.0, height=80.0)
+    for k in range(50):
+        said = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
+        story.fly(story.t + 0.05, **{**falling(0.05 * k, 80.0), **said})
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.when(D) - 2.0 < (1.3 if profile == "multirotor" else 2.2)
+
+
+def test_landed_on_a_roof_and_disarmed_it_is_not() -> None:
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=30.0)
+    said = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
+    story.fly(20.0, height=30.0, vertical_speed=0.0, **said)
+    assert story.fired() == []

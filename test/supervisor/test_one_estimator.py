@@ -1,0 +1,258 @@
+"""Height, vertical speed and attitude of an autopilot are one estimator: when it goes wrong it is
+wrong with itself, and neither ends a flight that goes well nor releases on the ground."""
+
+from __future__ import annotations
+
+import math
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from story import DOWN, Story, pressure_at, shipped
+
+from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.supervisor.machine import Stage
+
+EVERY = 0.1
+AIRCRAFT = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+
+
+class Teller:
+    """Tells ten times a second, with the noise of real sensors; its devices confirm."""
+
+    def __init__(self, story: Story, seed: int = 11) -> None:
+        self.story, self.random = story, Random(seed)
+
+    def noise(self, width: float) -> float:
+        return width * (self.random.random() - 0.5)
+
+    def tell(self, **told: Any) -> None:
+        story = self.story
+        if "force" in told:
+            told["acceleration"] = told.pop("force") + self.noise(0.4)
+        if "true_height" in told:
+            told["pressure"] = pressure_at(told.pop("true_height") + self.noise(0.4))
+        inputs = [story.heartbeat(), story.told(**told)]
+        fired = [one for one in story.decisions() if one.action >= Action.KILL]
+        if fired:
+            inputs.append(story.report(fired[-1].action, Outcome.CONFIRMED))
+        story.at(story.t + EVERY, *inputs)
+
+    def stand(self, seconds: float, **told: Any) -> None:
+        down = {**DOWN, "height": 0.0, "vertical_speed": 0.0, "tilt": 1.0, "force": 9.8}
+        for _ in range(round(seconds / EVERY)):
+            parts = {**down, **told}
+            parts["vertical_speed"] += self.noise(0.03)
+            self.tell(**parts)
+
+    def hover(self, seconds: float, height: float, **told: Any) -> None:
+        for _ in range(round(seconds / EVERY)):
+            speed = self.noise(0.2)
+            self.tell(height=height, vertical_speed=speed, **{"tilt": 3.0, "force": 9.8, **told})
+
+
+def told_to(profile: str) -> Teller:
+    story = Story(shipped(profile))
+    story.ready()
+    return Teller(story)
+
+
+def deployed(teller: Teller) -> bool:
+    return "DEPLOY" in teller.story.fired()
+
+
+# -- on the ground ----------------
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("rate", [8.0, 19.0, 60.0])
+@pytest.mark.parametrize("barometer", [True, False])
+def test_an_attitude_that_runs_away_on_the_ground_releases_nothing(
+    profile: str, rate: float, barometer: bool
+) -> None:
+    """Given throttle up at take-off, IN_AIR said, and one estimator that leans over and, believing
+    that, sinks: its height was never above 0 m."""
+    teller, height, speed = told_to(profile), 0.0, 0.0
+    truth = {"true_height": 0.0} if barometer else {}
+    teller.stand(2.0, **truth)
+    for k in range(120):
+        lean = min(95.0, rate * EVERY * k)
+        speed -= 0.981 * (1.0 - math.cos(math.radians(lean)))
+        height += EVERY * speed
+        teller.tell(height=height, vertical_speed=speed, tilt=lean, force=9.8, **truth)
+    assert not deployed(teller)
+
+
+@settings(max_examples=25)
+@given(
+    pushes=st.lists(st.floats(-6.0, 6.0), min_size=2, max_size=6),
+    leans=st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=6),
+)
+def test_whatever_way_one_estimator_runs_on_the_ground_nothing_is_released(
+    pushes: list[float], leans: list[float]
+) -> None:
+    """Given a barometer that tells 0 m, and a height that runs up as well as down."""
+    teller = told_to("multirotor")
+    teller.stand(1.0, true_height=0.0)
+    height = speed = tilt = 0.0
+    for k in range(100):
+        speed += EVERY * pushes[k * len(pushes) // 100]
+        tilt = min(max(tilt + EVERY * leans[k * len(leans) // 100], 0.0), 170.0)
+        height += EVERY * speed
+        teller.tell(height=height, vertical_speed=speed, tilt=tilt, force=9.8, true_height=0.0)
+    assert not deployed(teller)
+
+
+def test_one_that_runs_away_at_touch_down_releases_nothing() -> None:
+    teller = told_to("multirotor")
+    teller.stand(2.0, true_height=0.0)
+    teller.hover(4.0, 40.0, true_height=40.0)
+    for k in range(200):
+        low = max(40.0 - 0.2 * k, 0.0)
+        teller.tell(height=low, vertical_speed=-2.0, tilt=3.0, force=9.8, true_height=low)
+    for sign in (1.0, -1.0):
+        for k in range(60):
+            run = sign * 0.05 * k**2
+            tilt = min(2.0 * k, 120.0)
+            speed = sign * k - 8.0
+            teller.tell(height=run, vertical_speed=speed, tilt=tilt, force=9.8, true_height=0.0)
+    assert not deployed(teller)
+
+
+# -- in the air ----------------
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("drift", [1.5, 2.0, 3.0, 4.0, 6.0])
+@pytest.mark.parametrize("barometer", [True, False])
+def test_an_estimator_that_sinks_while_the_vehicle_hovers_ends_no_flight(
+    profile: str, drift: float, barometer: bool
+) -> None:
+    """Given a force of 9.8 +- 0.2 all the time, and height and speed that drift down together."""
+    teller, truth = told_to(profile), {"true_height": 60.0} if barometer else {}
+    if barometer:
+        teller.stand(1.0, true_height=0.0)
+    teller.hover(6.0, 60.0, **truth)
+    height, speed = 60.0, 0.0
+    for _ in range(80):
+        speed -= EVERY * drift
+        height += EVERY * speed
+        teller.tell(height=height, vertical_speed=speed, tilt=3.0, force=9.8, **truth)
+    assert teller.story.fired() == []
+    assert any("vertical_speed is contradicted" in one for one in teller.story.alarms())
+
+
+@settings(max_examples=25)
+@given(
+    pushes=st.lists(st.floats(-8.0, 8.0), min_size=2, max_size=6),
+    leans=st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6),
+)
+def test_whatever_way_one_estimator_runs_in_a_level_hover_it_ends_no_flight(
+    pushes: list[float], leans: list[float]
+) -> None:
+    teller = told_to("multirotor")
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(3.0, 60.0, true_height=60.0)
+    height, speed, tilt = 60.0, 0.0, 3.0
+    for k in range(100):
+        speed += EVERY * pushes[k * len(pushes) // 100]
+        tilt = min(max(tilt + EVERY * leans[k * len(leans) // 100], 0.0), 170.0)
+        height += EVERY * speed
+        teller.tell(height=height, vertical_speed=speed, tilt=tilt, force=9.8, true_height=60.0)
+    assert teller.story.fired() == []
+
+
+def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer() -> None:
+    """Given a tumble whose height and speed are told as in a hover, with noise."""
+    teller = told_to("multirotor")
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 100.0, true_height=100.0)
+    start = teller.story.t
+    for k in range(40):
+        t = EVERY * k
+        drop = 20.0**2 / 9.81 * math.log(math.cosh(9.81 * t / 20.0))
+        teller.tell(
+            height=100.0,
+            vertical_speed=teller.noise(6.0),
+            tilt=min(160.0, 230.0 * t),
+            force=6.0 + 4.0 * math.sin(9.0 * t),
+            true_height=100.0 - drop,
+        )
+    assert teller.story.fired()[:2] == ["KILL", "DEPLOY"]
+    assert teller.story.when(Action.DEPLOY) - start < 2.5
+
+
+# -- accelerometers ----------------
+
+
+def test_an_imu_without_gravity_is_named_and_forbids_the_take_off() -> None:
+    teller = told_to("multirotor")
+    teller.stand(4.0, force=0.2)
+    assert teller.story.state.stage is Stage.BLOCKED
+    assert "acceleration cannot be used: it tells 0.2 m/s^2" in teller.story.said()
+    # Then its driver is set right.
+    teller.stand(3.0, force=9.8)
+    assert teller.story.state.stage is Stage.READY
+
+
+def test_an_imu_without_gravity_ends_no_flight_and_hides_no_landing() -> None:
+    """Given one that nobody saw on the ground: a steep turn, level, and a landing."""
+    teller = told_to("multirotor")
+    teller.hover(4.0, 40.0, force=0.3)
+    teller.hover(2.0, 40.0, tilt=50.0, force=0.8)
+    assert teller.story.fired() == []
+    teller.stand(20.0, force=0.2)
+    assert teller.story.state.stage is not Stage.IN_FLIGHT
+
+
+def test_accelerometers_that_differ_forbid_the_take_off() -> None:
+    teller = told_to("multirotor")
+    teller.stand(1.0, acceleration_spread=9.0)
+    assert teller.story.state.stage is Stage.BLOCKED
+    assert "acceleration is told otherwise by another source" in teller.story.said()
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("sink", [3.5, 4.5, 5.5])
+@pytest.mark.parametrize(
+    "wrong", [{"force": 0.0}, {"tilt": 169.0}, {"tilt": 95.0}], ids=["no force", "jump", "lies"]
+)
+def test_one_wrong_sensor_in_a_descent_that_is_flown_ends_no_flight(
+    profile: str, sink: float, wrong: dict[str, float]
+) -> None:
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(2.0, 100.0, true_height=100.0)
+    height = 100.0
+    for k in range(120):
+        speed = -min(sink, 0.3 * k)
+        height += EVERY * speed
+        told = {"tilt": 5.0, "force": 9.8, **(wrong if 40 <= k < 80 else {})}
+        teller.tell(
+            height=height, vertical_speed=speed + teller.noise(0.2), true_height=height, **told
+        )
+    assert teller.story.fired() == []
+
+
+# -- a landing that is not believed ----------------
+
+
+def test_in_the_air_for_ever_after_a_crash_a_person_may_reset() -> None:
+    """Given a kill in flight; the wreck lies still, and its autopilot says IN_AIR for ever."""
+    from chute_ros.supervisor import inputs as i
+
+    teller = told_to("by_hand")
+    teller.hover(2.0, 20.0)
+    story = teller.story
+    story.at(story.t, i.KillRequest(1, "operator", "stop", kill_only=True))
+    lies = {"landed_state": LandedState.IN_AIR, "armed": Armed.ARMED, "height": 0.3}
+    for _ in range(20):
+        teller.tell(**lies, vertical_speed=-9.0, force=3.0)
+    story.at(story.t + 0.01, i.ResetRequest(2))
+    assert not story.answer(2).success
+    for _ in range(130):
+        teller.tell(**lies, vertical_speed=teller.noise(0.1), tilt=80.0, force=9.8)
+    story.at(story.t + 0.01, i.ResetRequest(3))
+    assert story.answer(3).success

@@ -1,0 +1,84 @@
+"""A sink that nobody commanded is an accident, upright or not; one that was commanded is none."""
+
+from __future__ import annotations
+
+import pytest
+from story import DOWN, Story, pressure_at, shipped
+
+from chute_ros.model import Action
+
+EVERY = 0.1
+AIRCRAFT = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+
+
+def sinking(profile: str, fastest: float, barometer: bool = True, **told: float) -> Story:
+    """From 110 m, level, to the ground. told: what was commanded."""
+    story, height, speed, k = Story(shipped(profile)).ready(), 110.0, 0.0, 0
+
+    def tell(height: float, speed: float, force: float, **more: object) -> None:
+        parts = {"height": height, "vertical_speed": speed, "acceleration": force, **more}
+        if barometer:
+            parts["pressure"] = pressure_at(height + 0.1 * (k % 3))
+        story.at(story.t + EVERY, story.heartbeat(), story.told(tilt=8.0, **parts))
+
+    for _ in range(10):
+        tell(0.0, 0.0, 9.8, **DOWN)
+    for k in range(30):
+        tell(110.0, 0.1 * (k % 2), 9.8 + 0.1 * (k % 3))
+    while height > 1.0 and not story.fired():
+        k += 1
+        speed = max(-fastest, speed - 0.35)
+        height += EVERY * speed
+        tell(height, speed, 9.8 - 3.5 * (speed > -fastest) + 0.1 * (k % 3), **told)
+    return story
+
+
+@pytest.mark.parametrize("fastest", [8.0, 10.0, 11.5])
+@pytest.mark.parametrize("barometer", [True, False])
+@pytest.mark.parametrize("told", [{"target_vertical_speed": 0.0}, {"below_target": 4.0}])
+def test_a_level_sink_that_nobody_commanded_is_deployed_in_time(
+    fastest: float, barometer: bool, told: dict[str, float]
+) -> None:
+    story = sinking("multirotor", fastest, barometer, **told)
+    assert story.fired() == ["KILL"]
+    assert story.newest(Action.KILL).rule == "uncommanded sink"
+    assert story.state.measured("height").value > 80.0
+    assert any("sinks fast" in one for one in story.alarms())
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("fastest", [8.0, 10.0])
+def test_where_no_target_is_told_it_is_an_alarm(profile: str, fastest: float) -> None:
+    story = sinking(profile, fastest)
+    assert story.fired() == []
+    assert sum("sinks fast" in one for one in story.alarms()) == 1
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("fastest", [5.0, 8.0, 13.0])
+def test_one_that_was_commanded_is_neither(profile: str, fastest: float) -> None:
+    story = sinking(profile, fastest, target_vertical_speed=-fastest)
+    assert story.fired() == []
+    assert not any("sinks fast" in one for one in story.alarms())
+
+
+def test_above_the_commanded_height_no_sink_is_missed_and_none_made_up() -> None:
+    assert sinking("multirotor", 5.0, below_target=-8.0).fired() == []
+
+
+@pytest.mark.parametrize("told", [{}, {"attitude_error": 90.0}])
+def test_a_tilt_that_nobody_commanded_is_an_accident(told: dict[str, float]) -> None:
+    story = Story(shipped("multirotor")).ready().fly(1.0)
+    for k in range(20):
+        speed = -0.45 * k
+        story.fly(story.t + 0.05, tilt=min(85.0, 12.0 * k), vertical_speed=speed, **told)
+    assert story.fired() == ["KILL"]
+
+
+def test_a_commanded_one_is_none() -> None:
+    """A flip, and a dive of 65 degrees."""
+    story = Story(shipped("multirotor")).ready().fly(1.0)
+    for k in range(40):
+        speed, tilt = max(-5.0, -0.45 * k), min(65.0, 12.0 * k)
+        story.fly(story.t + 0.05, tilt=tilt, vertical_speed=speed, attitude_error=4.0)
+    assert story.fired() == []
