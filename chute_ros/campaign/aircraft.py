@@ -171,7 +171,7 @@ class Aircraft(Rig):
         self.world.stir(self.plugs["autopilot"])
 
     def is_up(self) -> bool:
-        return self._flew and not self.nature.lifts
+        return (self._flew or self.scenario.stands) and not self.nature.lifts
 
     def refused_at(self) -> float:
         return math.nan if self.only_parachute is None else self.only_parachute.misled_at

@@ -151,7 +151,7 @@ def _with_second_source(chance: random.Random, drawn: Scenario, around: float) -
     faults = drawn.faults
     if chance.random() < _SECOND_FAULT:
         faults = (*faults, _second_fault(chance, chance.choice(sources), around))
-    high = chance.random() < _WITH_SECOND_HIGH
+    high = chance.random() < _WITH_SECOND_HIGH and not drawn.stands
     height = round(chance.uniform(*_HIGH), 1) if high else drawn.height
     return replace(drawn, vehicle_sources=order, faults=faults, height=height)
 

@@ -35,7 +35,7 @@ _ENDS = {
 #: Of so many flights each of these is one, and of so many of those in which nothing fails it flies
 #: a manoeuvre, half of them with one sensor wrong in it.
 _GROUNDS, _DRIFTS, _HOME_MOVES, _ESTIMATORS, _CANOPIES = 0.2, 0.1, 0.1, 0.15, 0.06
-_MANOEUVRES, _WRONG_SENSOR = 0.6, 0.5
+_MANOEUVRES, _WRONG_SENSOR, _STANDS = 0.6, 0.5, 0.05
 #: Of those that fail so many do it in a manoeuvre.
 _FAILS_IN_ONE = 0.1
 #: A manoeuvre ends so high, and a hill leaves so much room, m.
@@ -47,6 +47,8 @@ _SETTLED = 0.7
 def in_the_world(chance: random.Random, drawn: Scenario) -> Scenario:
     """The same flight, there."""
     drawn = replace(drawn, autopilot=_autopilot(chance, drawn.profile))
+    if drawn.failure is Failure.NOTHING and chance.random() < _STANDS:
+        return _on_the_ground(chance, drawn)
     drawn = _with_body(chance, drawn)
     drawn = _over_ground(chance, drawn)
     if chance.random() < _HOME_MOVES:
@@ -61,6 +63,17 @@ def in_the_world(chance: random.Random, drawn: Scenario) -> Scenario:
         late = Canopy(opens=round(chance.uniform(2.0, 4.0), 1))
         drawn = replace(drawn, canopy=chance.choice((tangles, late)))
     return drawn
+
+
+def _on_the_ground(chance: random.Random, drawn: Scenario) -> Scenario:
+    """Its estimator runs away while it stands, armed, and takes it for one in flight."""
+    begin, lasts = chance.uniform(0.5, 2.0), chance.uniform(4.0, 9.0)
+    how = chance.choice(("leans", "diverges"))
+    strength = chance.uniform(0.2, 0.6) if how == "leans" else chance.uniform(2.0, 6.0)
+    end = round(begin + lasts, 3)
+    fault = EstimatorFault(how, round(begin, 3), end, round(strength, 2))
+    stands = replace(drawn, height=0.0, gusts=0.0, person=None, aps=False)
+    return _with_one_wrong(stands, fault)
 
 
 def _autopilot(chance: random.Random, profile: str) -> Autopilot:

@@ -53,6 +53,10 @@ class Estimator:
         #: By each fault that hovers: where.
         self._kept: dict[EstimatorFault, float] = {}
 
+    def tells_of_flight(self, now: float) -> bool:
+        """It is wrong enough for its autopilot to take the vehicle for one in the air."""
+        return any(one.begin <= now < one.end for one in self.faults)
+
     def picture(self, model: FlightModel, now: float) -> Picture:
         """By now."""
         height, speed, roll = model.height, model.vertical_speed, model.roll

@@ -158,7 +158,7 @@ class Flight:
 
     def _is_believed(self) -> bool:
         leader = self.rig.leader
-        return leader is not None and leader.state.airborne
+        return leader is not None and (self.scenario.stands or leader.state.airborne)
 
     # -- the end ---------------------------------------------------------------------------------
 

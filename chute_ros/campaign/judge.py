@@ -73,7 +73,8 @@ def judge(flown: Flown) -> Judged:
 
 def _never(flown: Flown) -> Judged | None:
     """What must never happen, whatever reached whom."""
-    fires = (Action.KILL, Action.DEPLOY)
+    # Motors that are stopped on the ground hurt nobody.
+    fires = (Action.DEPLOY,) if flown.scenario.stands else (Action.KILL, Action.DEPLOY)
     fired = [one for one in flown.acted if one.decision.action in fires]
     person = flown.scenario.person
     known = min(
@@ -93,7 +94,9 @@ def _never(flown: Flown) -> Judged | None:
     if opened < known or (not math.isnan(opened) and flown.release_height < _LOWEST):
         text = f"a kill alone opened a parachute {opened - flown.up:.2f} s after it was up"
         return Judged(Count.FALSE, f"{text}, at {flown.release_height:.1f} m")
-    decided = [one.action for _, one in flown.decided if one.action in fires]
+    if flown.scenario.stands and not math.isnan(flown.released):
+        return Judged(Count.FALSE, "released on the ground")
+    decided = [one.action for _, one in flown.decided if one.action >= Action.KILL]
     if decided and decided[0] is Action.DEPLOY:
         return Judged(Count.OUT_OF_ORDER, "no kill was decided before the deploy")
     by_node: dict[str, Action] = {}
@@ -139,7 +142,9 @@ def _not_carried(flown: Flown) -> Judged | None:
         return Judged(Count.NOT_TOLD, blind)
     if flown.landed < due:
         return Judged(Count.NO_TIME, f"{flown.landed - out:.2f} s from its release to the ground")
-    if not any(out < at <= due for at, _ in flown.alarmed):
+    followed = [at for at, one in flown.decided if one.action is Action.DEPLOY]
+    told = [*followed, *(at for at, _ in flown.alarmed)]
+    if not any(flown.another.at <= at <= due for at in told):
         return Judged(Count.MISSED, "the canopy did not carry, and nobody was alarmed")
     if scenario.vehicle is not Vehicle.BOTH or flown.released_another <= flown.another.latest:
         return None

@@ -26,11 +26,18 @@ jump, are noisy or silent: up to {MOST_FAULTS} of these at a time, most of them 
 Some vehicles are armed by a person, some are killed or deployed by one.
 Three of ten aircraft have an IMU, odometry or both besides their autopilot (`vehicle_sources`): on
 power of its own, in a process and over a way of its own, and sometimes with one more fault there.
+Home is set anew or drifts in flight, and moves with a vehicle that is disarmed in the air; some
+autopilots order a release themselves when they terminate the flight. The ground is elsewhere than
+where it took off: beside a roof, in a valley, on a hill. An estimator is wrong with itself, in
+height, speed and attitude together. Flips, dives, throws and fast descents are flown on purpose,
+with one sensor wrong or none. Some lose a part of their thrust and sink upright; aeroplanes glide,
+stall, spin and dive. Some canopies open late, or tangle and do not carry.
 
 The truth comes from the flight models: since when only a parachute helps (a rocket: since when it
 comes down and no drogue will come by itself), and until when its release still lands it softly.
 Flights that left less time than the chain takes (2 s, and {FRESH:g} s more where the last word of
-an autopilot without power, that it does not sink, must get old first; a rocket 6.5 s), or in which
+an autopilot without power, that it does not sink, must get old first; until what sinks upright,
+spins or dives is faster than a soft landing; a rocket 6.5 s), or in which
 no such time in a row was free of cuts, stops, second wrong sensors and (rocket) of seconds without
 a whole line of telemetry, are named with the cause. So are those whose autopilot lost its power
 and that nobody else told of, those whose only parachute refused in time, as by the wrong height
@@ -41,7 +48,10 @@ is the preferred one of those that know this, or a preferred one falls silent.
 Where the autopilot has no power and an IMU is all that is left, no more can be known once drag
 carries half of the weight and its attitude is wrong, or lied in the last 10 s: just so it would
 tell of one that flies well, whose autopilot hangs and whose attitude alone is wrong. Those are
-named as well."""
+named as well. So are level sinks while the estimator tells one thing and the barometer another, as
+nothing else tells them; and the time in which something falls past the height of its take-off high
+above other ground, which cannot be known. A canopy that is out and does not carry must be told of,
+or followed by the next parachute, within 3 s; a kill alone must open no parachute below 10 m."""
 
 #: Seeds that were looked at, flights, how many of each kind.
 _OF_EACH = """\

@@ -211,6 +211,11 @@ class Scenario:
     autopilot: Autopilot = Autopilot()
 
     @property
+    def stands(self) -> bool:
+        """It never leaves the ground, armed as it is."""
+        return self.vehicle is not Vehicle.ROCKET and self.height == 0.0
+
+    @property
     def second_sources(self) -> tuple[str, ...]:
         """Those that outlive the autopilot."""
         return tuple(one for one in self.vehicle_sources if one != VEHICLE_STATE)

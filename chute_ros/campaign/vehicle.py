@@ -145,6 +145,8 @@ class CampaignAutopilot(AutopilotDevice):
 
     def _extended_sys_state(self) -> Any:
         message: Any = super()._extended_sys_state()
+        if self.estimator.tells_of_flight(self.now):
+            message.landed_state = dialect.MAV_LANDED_STATE_IN_AIR
         if self._sensors.lies("landed", self.now):
             message.landed_state = dialect.MAV_LANDED_STATE_ON_GROUND
         return message

@@ -93,9 +93,11 @@ class AutopilotTelemetry(MavlinkDevice):
     def _attitude_target(self) -> Any:
         # What is out of control was last told to be upright.
         roll = self.model.roll if self.model.controlled else 0.0
+        # A controller that cannot hold it gives all that it has.
+        thrust = 1.0 if self.model.armed and self.model.motors_failed else 0.5
         turned = [math.cos(roll / 2.0), math.sin(roll / 2.0), 0.0, 0.0]
         return dialect.MAVLink_attitude_target_message(
-            self.boot_ms(), _ATTITUDE_ONLY, turned, 0.0, 0.0, 0.0, 0.5
+            self.boot_ms(), _ATTITUDE_ONLY, turned, 0.0, 0.0, 0.0, thrust
         )
 
     def _position_target(self) -> Any:

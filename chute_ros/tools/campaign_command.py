@@ -223,7 +223,7 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     """What was drawn, what happened, what it is counted as."""
     _, flown, judged = campaign.fly_here(profiles, scenario)
     print("\n".join(text_of(scenario, "").splitlines()[3:-1]))
-    up, truth, person = flown.up, flown.truth, scenario.person
+    up, truth, person, flies = flown.up, flown.truth, scenario.person, scenario.manoeuvre
     lines = [(at, f"said: {text}") for at, text in flown.said]
     for at, one in flown.decided:
         what = f"decided {one.epoch}.{one.id} {one.action.name} by {one.rule!r}"
@@ -233,9 +233,12 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
         (up, "is up"),
         (up + scenario.failure_at, _failure(scenario)),
         (up + person.at if person else math.nan, f"a person wants: {person and person.does}"),
+        (up + flies.begin if flies else math.nan, f"is told to fly: {flies and flies.kind}"),
         (truth.at, "ONLY A PARACHUTE HELPS"),
         (truth.latest, "the last moment for its release"),
         (flown.released, "RELEASED"),
+        (flown.another.at, "ITS CANOPY DOES NOT CARRY"),
+        (flown.released_another, "ANOTHER RELEASED"),
         (flown.landed, f"lands at {flown.landing_speed:.1f} m/s"),
     ):
         if not math.isnan(at):

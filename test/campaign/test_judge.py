@@ -211,6 +211,14 @@ def test_past_the_height_of_its_take_off_nobody_knows_where_the_ground_is() -> N
     assert blinded(scenario(Failure.MOTOR), 0.0, Need(1.0, 6.0), past) == ""
 
 
+def test_on_the_ground_motors_may_be_stopped_and_nothing_is_released(good: Flown) -> None:
+    stands = replace(good.scenario, height=0.0, failure=Failure.NOTHING)
+    stopped = replace(good, scenario=stands, truth=Truth(), acted=fired(good)[:1])
+    assert judge(replace(stopped, released=math.nan)).count is Count.RIGHT
+    assert judge(stopped).count is Count.FALSE
+    assert judge(replace(stopped, acted=fired(good), released=math.nan)).count is Count.FALSE
+
+
 def test_a_kill_that_opens_a_parachute_where_none_may_open_is_false(good: Flown) -> None:
     opened = replace(good, opened_by_kill=good.truth.at + 0.1)
     assert judge(opened).count is Count.RIGHT

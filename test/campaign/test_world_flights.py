@@ -1,0 +1,132 @@
+"""Single flights of the world as it is: whose autopilot, over what ground, out of which
+manoeuvre, with which body and canopy."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from campaign_bench import fired, flown
+
+from chute_ros.campaign.estimator import EstimatorFault
+from chute_ros.campaign.judge import Count, judge
+from chute_ros.campaign.manoeuvre import Manoeuvre
+from chute_ros.campaign.scenario import Autopilot, Canopy, Failure, HomeMove, Person, Vehicle
+from chute_ros.campaign.sensors import SensorFault
+from chute_ros.sim.flight import Descent
+from chute_ros.sim.home import Homing
+
+SINKS = Descent("partial thrust", 8.0, settles=2.0, tilt=0.2)
+FLAT_SPIN = Descent("flat spin", 10.0, settles=1.5, tilt=0.35, force=10.5)
+DIVE = Descent("spiral dive", 16.0, settles=2.5, tilt=1.2, force=20.0)
+GLIDE = Descent("glide", 3.0, settles=1.5, tilt=0.1)
+
+
+def test_what_sinks_upright_and_was_not_told_to_is_released() -> None:
+    end = flown(Failure.SINK, descent=SINKS)
+    assert judge(end).count is Count.RIGHT
+    assert end.truth.at + 1.0 < end.released < end.truth.latest
+
+
+def test_a_spin_is_released_and_a_glide_is_not() -> None:
+    spins = flown(Failure.STALL, profile="fixed_wing", descent=FLAT_SPIN, unheld=FLAT_SPIN)
+    assert judge(spins).count is Count.RIGHT
+    assert spins.released < spins.truth.latest
+    glides = flown(Failure.GLIDE, profile="fixed_wing", descent=GLIDE, unheld=DIVE)
+    assert judge(glides).count is Count.RIGHT
+    assert not fired(glides)
+
+
+@pytest.mark.parametrize("vehicle", [Vehicle.MAVLINK, Vehicle.UPF])
+def test_from_a_roof_it_is_released_once_it_is_below_it(vehicle: Vehicle) -> None:
+    end = flown(Failure.MOTOR, vehicle=vehicle, height=8.0, ground=-80.0)
+    assert judge(end).count is Count.RIGHT
+    assert end.release_height < -9.0
+    assert end.landing_speed <= 6.5 or math.isnan(end.landed)
+
+
+@pytest.mark.parametrize("homing", list(Homing))
+def test_what_a_person_kills_is_released_whatever_becomes_of_home(homing: Homing) -> None:
+    autopilot = Autopilot(homing)
+    end = flown(Failure.NOTHING, person=Person("kill", 1.0), autopilot=autopilot)
+    assert judge(end).count is Count.RIGHT
+    assert end.released < end.up + 2.0
+
+
+@pytest.mark.parametrize("by", [-40.0, 55.0])
+def test_a_home_that_is_set_anew_hides_no_fall_and_is_none(by: float) -> None:
+    falls = flown(Failure.MOTOR, HomeMove(0.9, by))
+    assert judge(falls).count is Count.RIGHT
+    assert falls.released < falls.truth.latest
+    flies = flown(Failure.NOTHING, HomeMove(0.9, by))
+    assert judge(flies).count is Count.RIGHT
+    assert not fired(flies)
+
+
+@pytest.mark.parametrize(
+    "manoeuvre",
+    [
+        Manoeuvre("flip", 500.0, 1.0),
+        Manoeuvre("throw", 0.9, 1.0),
+        Manoeuvre("dive", 70.0, 1.0, 1.0, 4.0),
+        Manoeuvre("descent", 7.0, 1.0, 5.0),
+    ],
+    ids=lambda one: one.kind,
+)
+@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+def test_what_is_flown_on_purpose_is_left_alone(manoeuvre: Manoeuvre, profile: str) -> None:
+    end = flown(Failure.NOTHING, manoeuvre=manoeuvre, profile=profile, height=80.0)
+    assert judge(end).count is Count.RIGHT
+    assert not fired(end)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "how"), [("tilt", "jumps"), ("force", "zero"), ("speed", "jumps")]
+)
+def test_a_descent_with_one_sensor_wrong_is_left_alone(sensor: str, how: str) -> None:
+    wrong = SensorFault(sensor, how, 2.0, 5.0)
+    end = flown(Failure.NOTHING, wrong, manoeuvre=Manoeuvre("descent", 4.0, 1.0, 6.0))
+    assert judge(end).count is Count.RIGHT
+    assert not fired(end)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [EstimatorFault("diverges", 1.0, 6.0, 3.0), EstimatorFault("leans", 1.0, 6.0, 0.4)],
+    ids=lambda one: one.how,
+)
+def test_an_estimator_that_is_wrong_with_itself_ends_no_flight(fault: EstimatorFault) -> None:
+    end = flown(Failure.NOTHING, fault)
+    assert judge(end).count is Count.RIGHT
+    assert not fired(end)
+
+
+def test_nor_does_it_hide_a_tumble() -> None:
+    end = flown(Failure.MOTOR, EstimatorFault("hovers", 0.8, 12.0), height=80.0)
+    assert judge(end).count is Count.RIGHT
+    assert end.released < end.truth.latest
+
+
+def test_a_canopy_that_does_not_carry_is_followed_by_the_next_parachute() -> None:
+    end = flown(Failure.MOTOR, vehicle=Vehicle.BOTH, height=120.0, canopy=Canopy(22.0))
+    assert end.another.at < end.released_another < end.another.latest
+    assert judge(end).count is Count.RIGHT
+
+
+def test_a_canopy_that_does_not_carry_and_is_the_only_one_is_told_of() -> None:
+    end = flown(Failure.MOTOR, height=120.0, canopy=Canopy(22.0))
+    assert judge(end).count is Count.RIGHT
+    assert end.landing_speed > 15.0
+    assert [text for at, text in end.alarmed if at > end.another.at]
+
+
+@pytest.mark.parametrize("vehicle", [Vehicle.MAVLINK, Vehicle.UPF])
+@pytest.mark.parametrize(("how", "strength"), [("leans", 0.33), ("diverges", 4.0)])
+def test_an_estimator_that_runs_away_on_the_ground_releases_nothing(
+    how: str, strength: float, vehicle: Vehicle
+) -> None:
+    runs_away = EstimatorFault(how, 1.0, 9.0, strength)
+    end = flown(Failure.NOTHING, runs_away, height=0.0, vehicle=vehicle)
+    assert not end.truth.falls
+    assert math.isnan(end.released)
+    assert judge(end).count is Count.RIGHT
