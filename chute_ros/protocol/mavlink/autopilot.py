@@ -15,7 +15,10 @@ from typing import Any
 from chute_ros.model import Armed, LandedState, Reading, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.autopilot_settings import AutopilotSettings
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.firmware import firmware_of
+from chute_ros.protocol.mavlink.motor_signs import MotorSigns
 from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR, StreamWatch
 
 STANDARD_GRAVITY = 9.80665  # m/s^2
@@ -63,6 +66,12 @@ class AutopilotTracker:
         self.liveness = Liveness(limits)
         self.reboot_count = 0
         self.rebooted_in_flight = False
+        #: HEARTBEAT.type.
+        self.vehicle_type = 0
+        self.settings = AutopilotSettings()
+        self.motor_signs = MotorSigns()
+        #: How often it was seen to arm.
+        self.arming_count = 0
         self._readings: dict[str, Reading] = {}
         self._system_status = 0
         self._streams = StreamWatch()
@@ -97,6 +106,10 @@ class AutopilotTracker:
         reading = self._readings.get("landed_state")
         return LandedState.UNKNOWN if reading is None else LandedState(int(reading.value))
 
+    def reading(self, name: str) -> Reading:
+        """The newest value of a part of the picture; NaN: none."""
+        return self._readings.get(name, _NEVER)
+
     def on_ground(self, now: float) -> bool:
         """The autopilot says so now: what it said before its stream fell silent proves nothing."""
         age = self._readings.get("landed_state", _NEVER).age(now)
@@ -111,11 +124,16 @@ class AutopilotTracker:
     def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
         """A HEARTBEAT of the autopilot."""
         armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        self.arming_count += bool(armed) and self.armed is Armed.DISARMED
+        self.vehicle_type = message.type
+        self.motor_signs.armed(bool(armed))
         self._set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
         self._system_status = message.system_status
         changes = self.liveness.heard(now)
-        if changes:
+        firmware = firmware_of(message.autopilot)
+        if changes or firmware is not self.settings.firmware:
             self._streams.begin()
+            self.settings.begin(firmware, now)
         return changes
 
     def ask_anew(self) -> None:
@@ -129,10 +147,13 @@ class AutopilotTracker:
     def message(self, message: Any, now: float) -> bool:
         """Any other message of the autopilot; True: the vehicle's picture changed."""
         kind = message.get_type()
+        self.motor_signs.heard(message, now)
+        if kind in ("PARAM_VALUE", "PARAM_ERROR"):
+            self.settings.heard(message)
         reader = self._readers.get(kind)
         # Others (NAMED_VALUE_FLOAT, ...) carry times that a user's script may have filled in.
         if reader is not None or kind == "SYSTEM_TIME":
-            self._watch_clock(getattr(message, "time_boot_ms", 0))
+            self._watch_clock(getattr(message, "time_boot_ms", 0), now)
         if reader is None:
             return False
         reader(message, now)
@@ -183,7 +204,7 @@ class AutopilotTracker:
             if name in ASKED_FOR:
                 self._streams.heard(name, now)
 
-    def _watch_clock(self, boot_ms: int) -> None:
+    def _watch_clock(self, boot_ms: int, now: float) -> None:
         age = self._clock.observe(boot_ms)
         if age is Age.DOUBTFUL:
             known = self.landed_state is not LandedState.UNKNOWN
@@ -196,6 +217,7 @@ class AutopilotTracker:
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
         self._streams.begin()
+        self.settings.begin(self.settings.firmware, now)
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         for name in ("armed", "landed_state"):
             self._readings.pop(name, None)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event, Severity
-from chute_ros.protocol.mavlink import goals
+from chute_ros.protocol.mavlink import arm_authorization, goals, results
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
@@ -21,7 +21,10 @@ from chute_ros.protocol.mavlink.devices import Devices
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.protocol.mavlink.heartbeat_watch import HeartbeatWatch
+from chute_ros.protocol.mavlink.kill import DeployDecided, KillPlan, kill_plan
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+from chute_ros.protocol.mavlink.setup_check import Setup, SetupNews, setup_of
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
 from chute_ros.protocol.requests import Requests
@@ -48,7 +51,11 @@ class MavlinkLink:
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
         self._next_internal = -1
-        self._block = FlightBlock()
+        self._block = FlightBlock(config.takeoff_height)
+        self._heartbeats = HeartbeatWatch()
+        self._setup_news = SetupNews()
+        self._driven_at = -math.inf
+        self._deploy_decided = DeployDecided(self._devices.arming_count)
         self._disarming = 0
         self._heartbeat_at = -math.inf
         self._heartbeats_until = -math.inf
@@ -118,10 +125,12 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
+        self._deploy_decided.decide()
         parachute = self._devices.to_release(device) or self._target(token, device)
         if parachute is not None:
             self.requests.make_way_for_release(now)
-            self._begin(token, goals.release(parachute, force, now), now)
+            goal = goals.release(parachute, force, now, self._devices.motors_remark)
+            self._begin(token, goal, now)
 
     def parachute_action(self, token: int, action: int, device: str, now: float) -> None:
         """MAV_CMD_DO_PARACHUTE: disable 0, enable 1, release 2 (the same as deploy)."""
@@ -161,7 +170,12 @@ class MavlinkLink:
             why = "no autopilot of ours was ever heard; set autopilot_system_id"
             self.requests.refuse(token, why)
         else:
-            self._begin(token, goals.kill(autopilot, self.config.kill_method, now), now)
+            plan, patience = self._plan_of(autopilot), self.config.commands.ack_timeout
+            goal = goals.kill(autopilot, plan, self._deploy_decided, patience, now)
+            if goal is None:
+                self.requests.refuse(token, f"no way to stop the motors is allowed: {plan.text()}")
+            else:
+                self._begin(token, goal, now)
 
     def flight_block(self, reason: str, now: float) -> None:
         """Block flight for reason, or release the block (empty)."""
@@ -199,6 +213,13 @@ class MavlinkLink:
         """Where requests without a device go: the first that is not lost, or the first."""
         return self._devices.chosen_parachute()
 
+    def setup(self) -> Setup | None:
+        """How our autopilot is set up for a kill and a flight block; None: there is none."""
+        autopilot = self._devices.chosen_autopilot()
+        if autopilot is None:
+            return None
+        return setup_of(autopilot, self._plan_of(autopilot), self.config.system_id)
+
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
@@ -226,6 +247,8 @@ class MavlinkLink:
         self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
+        elif arm_authorization.is_request(message, self._own_ids):
+            self._authorize(ids, now)
         else:
             self._devices.heard(message, ids, now)
         self.requests.effects_may_show(now)
@@ -242,6 +265,23 @@ class MavlinkLink:
                 frame.system_id, frame.component_id, message.command, message.result
             )
             self.requests.commands.acknowledged(ack, now)
+            if ack.result == results.ACCEPTED:
+                self._devices.accepted(ack, now)
+
+    def _authorize(self, asking: tuple[int, int], now: float) -> None:
+        """The autopilot asks whether it may arm."""
+        autopilot = self.autopilots.get(*asking)
+        if autopilot is None:
+            return
+        reason = self._block.reason
+        self._outbox.send(arm_authorization.answer(asking, reason, autopilot.settings), now)
+        if reason:
+            text = f"arming denied, flight blocked: {reason}"
+            self._devices.notice(Severity.WARNING, text)
+            self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
+
+    def _plan_of(self, autopilot: AutopilotTracker) -> KillPlan:
+        return kill_plan(self.config.kill_method, autopilot.vehicle_type, autopilot.settings)
 
     def _release_under_way(self, token: int) -> bool:
         """A release is under way, which nothing may undo: the request is refused."""
@@ -269,6 +309,12 @@ class MavlinkLink:
         autopilot = self._devices.chosen_autopilot()
         if autopilot is None or autopilot.liveness.state is not LinkState.OK:
             return
+        self._block.observe(autopilot, now)
+        self._read_settings(autopilot, now)
+        rate_too = self.config.autopilot_message_rate > 0
+        undone = bool(self._block.reason) and self.config.disarm_when_blocked
+        for ask in self._heartbeats.due(autopilot, rate_too, undone, now):
+            self.requests.commands.send_once(ask, now)
         if (rate := self.config.autopilot_message_rate) > 0:
             self._ask_for(autopilot.messages_due(1.0 / rate, now), autopilot, now)
         if self._disarming in self.requests:
@@ -295,7 +341,24 @@ class MavlinkLink:
             self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
         # Our own requests count down from -1, so that they never meet a token of the owner's.
         self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
-        self._begin(self._disarming, goals.disarm_on_ground(autopilot, now), now)
+        goal = goals.disarm_on_ground(
+            autopilot, self._may_force, self.config.commands.ack_timeout, now
+        )
+        self._begin(self._disarming, goal, now)
+
+    def _may_force(self) -> bool:
+        return self._block.may_force(self._driven_at)
+
+    def _read_settings(self, autopilot: AutopilotTracker, now: float) -> None:
+        if autopilot.settings.complete:
+            setup = setup_of(autopilot, self._plan_of(autopilot), self.config.system_id)
+            for severity, text in self._setup_news.news(autopilot.device, setup):
+                self._devices.notice(severity, text)
+                if severity is Severity.ERROR:
+                    self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
+        if name := autopilot.settings.due(now):
+            ids, encoded = (autopilot.system_id, autopilot.component_id), name.encode()
+            self._outbox.send(dialect.MAVLink_param_request_read_message(*ids, encoded, -1), now)
 
     def _ask_for(
         self, message_ids: tuple[int, ...], autopilot: AutopilotTracker, now: float
@@ -310,6 +373,7 @@ class MavlinkLink:
             )
 
     def _drive(self, now: float) -> None:
+        self._driven_at = now
         for send in self.requests.drive(now):
             self._send_command(send.command, send.confirmation, now)
 
