@@ -30,6 +30,8 @@ MOST_EXACT = 2**24
 
 #: Name of the goal that fires.
 RELEASE = "release"
+#: And of the one that disarms by force, on the ground.
+FORCED = "forced disarm on the ground"
 
 #: When the heartbeat is asked for after an answer, s: autopilots change state some 10 ms later.
 _LOOKS = (0.0, 0.025, 0.05, 0.1, 0.2)
@@ -189,7 +191,7 @@ def disarm_on_ground(
     def disarm(forced: bool) -> MavlinkGoal:
         param2 = (FORCE_DISARM,) if forced else ()
         return Goal(
-            "forced disarm on the ground" if forced else "disarm on the ground",
+            FORCED if forced else "disarm on the ground",
             (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
             "the autopilot's heartbeat says disarmed",
             lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,

@@ -12,19 +12,18 @@ from collections.abc import Hashable
 from dataclasses import replace
 
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
-from chute_ros.protocol.events import Event, Severity
+from chute_ros.protocol.events import Event
 from chute_ros.protocol.mavlink import arm_authorization, goals, results
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
+from chute_ros.protocol.mavlink.autopilot_care import AutopilotCare
 from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.devices import Devices
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
-from chute_ros.protocol.mavlink.heartbeat_watch import HeartbeatWatch
-from chute_ros.protocol.mavlink.kill import DeployDecided, KillPlan, kill_plan
+from chute_ros.protocol.mavlink.kill import DeployDecided
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
-from chute_ros.protocol.mavlink.setup_check import Setup, SetupNews, setup_of
+from chute_ros.protocol.mavlink.setup_check import Setup
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
 from chute_ros.protocol.requests import Requests
@@ -50,13 +49,8 @@ class MavlinkLink:
         self._inbox = Inbox(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
-        self._next_internal = -1
-        self._block = FlightBlock(config.takeoff_height)
-        self._heartbeats = HeartbeatWatch()
-        self._setup_news = SetupNews()
-        self._driven_at = -math.inf
         self._deploy_decided = DeployDecided(self._devices.arming_count)
-        self._disarming = 0
+        self._care = AutopilotCare(config, self._devices, self.requests, self._outbox)
         self._heartbeat_at = -math.inf
         self._heartbeats_until = -math.inf
 
@@ -170,7 +164,7 @@ class MavlinkLink:
             why = "no autopilot of ours was ever heard; set autopilot_system_id"
             self.requests.refuse(token, why)
         else:
-            plan, patience = self._plan_of(autopilot), self.config.commands.ack_timeout
+            plan, patience = self._care.plan_of(autopilot), self.config.commands.ack_timeout
             goal = goals.kill(autopilot, plan, self._deploy_decided, patience, now)
             if goal is None:
                 self.requests.refuse(token, f"no way to stop the motors is allowed: {plan.text()}")
@@ -179,7 +173,7 @@ class MavlinkLink:
 
     def flight_block(self, reason: str, now: float) -> None:
         """Block flight for reason, or release the block (empty)."""
-        if self._block.set(reason):
+        if self._care.block.set(reason):
             text = f"flight blocked: {reason}" if reason else "flight block released"
             self._outbox.announce(text, dialect.MAV_SEVERITY_WARNING, now)
         self._look_after_autopilot(now)
@@ -216,9 +210,7 @@ class MavlinkLink:
     def setup(self) -> Setup | None:
         """How our autopilot is set up for a kill and a flight block; None: there is none."""
         autopilot = self._devices.chosen_autopilot()
-        if autopilot is None:
-            return None
-        return setup_of(autopilot, self._plan_of(autopilot), self.config.system_id)
+        return None if autopilot is None else self._care.setup_of(autopilot)
 
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
@@ -248,7 +240,7 @@ class MavlinkLink:
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
         elif arm_authorization.is_request(message, self._own_ids):
-            self._authorize(ids, now)
+            self._care.authorize(ids, now)
         else:
             self._devices.heard(message, ids, now)
         self.requests.effects_may_show(now)
@@ -267,21 +259,6 @@ class MavlinkLink:
             self.requests.commands.acknowledged(ack, now)
             if ack.result == results.ACCEPTED:
                 self._devices.accepted(ack, now)
-
-    def _authorize(self, asking: tuple[int, int], now: float) -> None:
-        """The autopilot asks whether it may arm."""
-        autopilot = self.autopilots.get(*asking)
-        if autopilot is None:
-            return
-        reason = self._block.reason
-        self._outbox.send(arm_authorization.answer(asking, reason, autopilot.settings), now)
-        if reason:
-            text = f"arming denied, flight blocked: {reason}"
-            self._devices.notice(Severity.WARNING, text)
-            self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
-
-    def _plan_of(self, autopilot: AutopilotTracker) -> KillPlan:
-        return kill_plan(self.config.kill_method, autopilot.vehicle_type, autopilot.settings)
 
     def _release_under_way(self, token: int) -> bool:
         """A release is under way, which nothing may undo: the request is refused."""
@@ -305,60 +282,20 @@ class MavlinkLink:
         self._drive(now)
 
     def _look_after_autopilot(self, now: float) -> None:
-        """Ask for what it does not send; undo its arming on the ground while flight is blocked."""
+        """Ask for what it does not send; read its settings; keep a flight block."""
         autopilot = self._devices.chosen_autopilot()
         if autopilot is None or autopilot.liveness.state is not LinkState.OK:
             return
-        self._block.observe(autopilot, now)
-        self._read_settings(autopilot, now)
-        rate_too = self.config.autopilot_message_rate > 0
-        undone = bool(self._block.reason) and self.config.disarm_when_blocked
-        for ask in self._heartbeats.due(autopilot, rate_too, undone, now):
-            self.requests.commands.send_once(ask, now)
-        if (rate := self.config.autopilot_message_rate) > 0:
+        rate = self.config.autopilot_message_rate
+        self._care.look(autopilot, rate > 0, now)
+        if rate > 0:
             self._ask_for(autopilot.messages_due(1.0 / rate, now), autopilot, now)
-        if self._disarming in self.requests:
-            if not self._block.stands(autopilot, now):
-                why = (
-                    "flight is not blocked any more, or the vehicle not known to be on the ground"
-                )
-                self.requests.abandon(self._disarming, why, now)
-        elif self.config.disarm_when_blocked and self._block.disarm_due(autopilot, now):
-            self._disarm(autopilot, now)
 
     def _look_after_parachutes(self, now: float) -> None:
         """Ask for the status that does not come; a ground station may have switched it off."""
         for parachute in self.parachutes.all():
             if parachute.status_due(now):
                 self.requests.commands.send_once(goals.request_status(parachute), now)
-
-    def _disarm(self, autopilot: AutopilotTracker, now: float) -> None:
-        reason = self._block.reason
-        if self._block.worth_telling():
-            text = f"autopilot armed while flight is blocked ({reason}): disarming"
-            self._devices.notice(Severity.WARNING, text)
-            text = f"disarming, flight blocked: {reason}"
-            self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
-        # Our own requests count down from -1, so that they never meet a token of the owner's.
-        self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
-        goal = goals.disarm_on_ground(
-            autopilot, self._may_force, self.config.commands.ack_timeout, now
-        )
-        self._begin(self._disarming, goal, now)
-
-    def _may_force(self) -> bool:
-        return self._block.may_force(self._driven_at)
-
-    def _read_settings(self, autopilot: AutopilotTracker, now: float) -> None:
-        if autopilot.settings.complete:
-            setup = setup_of(autopilot, self._plan_of(autopilot), self.config.system_id)
-            for severity, text in self._setup_news.news(autopilot.device, setup):
-                self._devices.notice(severity, text)
-                if severity is Severity.ERROR:
-                    self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
-        if name := autopilot.settings.due(now):
-            ids, encoded = (autopilot.system_id, autopilot.component_id), name.encode()
-            self._outbox.send(dialect.MAVLink_param_request_read_message(*ids, encoded, -1), now)
 
     def _ask_for(
         self, message_ids: tuple[int, ...], autopilot: AutopilotTracker, now: float
@@ -373,7 +310,6 @@ class MavlinkLink:
             )
 
     def _drive(self, now: float) -> None:
-        self._driven_at = now
         for send in self.requests.drive(now):
             self._send_command(send.command, send.confirmation, now)
 
