@@ -12,6 +12,7 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+from chute_ros.protocol.mavlink.setup_check import Setup
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Details:
     dropped: Counter[str]
     late_acknowledgements: int
     not_followed: int
+    setup: Setup | None
 
 
 def details_of(link: MavlinkLink, now: float) -> Details:
@@ -53,6 +55,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
         Counter(link.counts),
         link.requests.commands.late_count,
         link.parachutes.refused_count + link.autopilots.refused_count,
+        link.setup(),
     )
 
 
@@ -117,3 +120,16 @@ def autopilot_task(name: str, vehicle: model.VehicleState) -> DiagnosticStatus:
         "restarts": vehicle.reboot_count,
     }
     return diagnostics.status(name, "autopilot", level, text, values, vehicle.source)
+
+
+def kill_task(name: str, setup: Setup | None) -> DiagnosticStatus:
+    """Which way a kill goes, whether the autopilot's settings allow it, and the flight block."""
+    if setup is None:
+        return diagnostics.never_heard(name, "kill")
+    level, told = diagnostics.OK, [f"{setup.firmware}: {setup.kill}"]
+    if setup.fault:
+        level, told = diagnostics.ERROR, [f"forbids take-off: {setup.fault}"]
+    elif setup.warnings:
+        level = diagnostics.WARN
+    values = {"kill": setup.kill, "flight block": setup.block, **setup.settings}
+    return diagnostics.status(name, "kill", level, "; ".join([*told, *setup.warnings]), values, "")

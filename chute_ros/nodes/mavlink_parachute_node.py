@@ -21,9 +21,11 @@ from chute_ros.nodes.device_node import DeviceNode, Summary
 from chute_ros.nodes.mavlink_diagnostics import (
     autopilot_task,
     details_of,
+    kill_task,
     link_task,
     parachute_tasks,
 )
+from chute_ros.nodes.mavlink_health import health
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from
 from chute_ros.nodes.signing_memory import SigningMemory
 from chute_ros.protocol.effect import EffectFinished
@@ -71,17 +73,9 @@ class MavlinkParachuteNode(DeviceNode):
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         self._signing.keep(now)
-        chosen = link.chosen_parachute()
         details = details_of(link, now)
-        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
-        known = details.vehicle.armed is model.Armed.ARMED or not details.doubts
-        if not self.values["expect_parachute"]:
-            state, age = details.vehicle.link_state, details.vehicle.armed_age
-            return Summary(state, state is model.LinkState.OK and known, age, details)
-        if chosen is None:
-            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
-        healthy = chosen.status(now).healthy and known
-        return Summary(chosen.liveness.state, healthy, chosen.liveness.age(now), details)
+        state, age, reasons = health(link, details.vehicle, self.values["expect_parachute"], now)
+        return Summary(state, not reasons, age, details, reasons)
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, VehicleChanged):
@@ -134,6 +128,7 @@ class MavlinkParachuteNode(DeviceNode):
             link_task(name, details, traffic, wire),
             *parachute_tasks(name, details, self.values["expect_parachute"]),
             autopilot_task(name, details.vehicle),
+            kill_task(name, details.setup),
             self._signing.task(name),
         ]
 

@@ -51,9 +51,9 @@ class FlightBlock:
             return False
         if not self._rise.known(now):
             return autopilot.on_ground(now)
-        if self._rise.left_ground:
-            return self._rise.is_low and autopilot.on_ground(now)
-        return True
+        if not self._rise.is_low:
+            return False
+        return not self._rise.left_ground or autopilot.on_ground(now)
 
     def may_force(self, now: float) -> bool:
         """It was armed while flight was blocked, and has not left the ground since."""
