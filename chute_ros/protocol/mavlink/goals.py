@@ -17,7 +17,7 @@ from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Command
 from chute_ros.protocol.mavlink.config import KillMethod
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.kill import KillPlan, Way
+from chute_ros.protocol.mavlink.kill import KillPlan
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 
 MavlinkGoal = Goal[Command]
@@ -138,21 +138,21 @@ def parachute_action(parachute: ParachuteTracker, action: int) -> MavlinkGoal:
 
 def kill(
     autopilot: AutopilotTracker,
-    plan: KillPlan,
+    plan: Callable[[], KillPlan],
     deploy_decided: Callable[[], bool],
     patience: float,
     now: float,
 ) -> MavlinkGoal | None:
-    """Stop the motors, by the ways of plan. Always sent: a heartbeat from before the order proves
-    nothing. patience: without an answer for so long the next way is tried as well, s. None: no way
-    is allowed now."""
+    """Stop the motors, by the ways that plan has as each is begun. Always sent: a heartbeat from
+    before the order proves nothing. patience: without an answer for so long the next way is tried
+    as well, s. None: no way is allowed now."""
 
     def shown() -> bool:
         told = autopilot.motors_off and autopilot.liveness.last_heard > now
         return told or autopilot.motor_signs.stopped_since(now)
 
-    def next_way(tried: tuple[Way, ...]) -> MavlinkGoal | None:
-        way = plan.allowed(tried, deploy_decided())
+    def next_way(tried: tuple[KillMethod, ...]) -> MavlinkGoal | None:
+        way = plan().allowed(tried, deploy_decided())
         if way is None:
             return None
         return Goal(
@@ -164,7 +164,7 @@ def kill(
             insist=True,
             urgent=True,
             looks=_LOOKS,
-            otherwise=lambda: next_way((*tried, way)),
+            otherwise=lambda: next_way((*tried, way.method)),
             patience=patience,
         )
 

@@ -75,10 +75,10 @@ class KillPlan:
                 )
         return ""
 
-    def allowed(self, tried: tuple[Way, ...], deploy_decided: bool) -> Way | None:
+    def allowed(self, tried: tuple[KillMethod, ...], deploy_decided: bool) -> Way | None:
         """The next way to try; None: none now."""
         for way in self._useful():
-            if way not in tried and (deploy_decided or not way.releases):
+            if way.method not in tried and (deploy_decided or not way.releases):
                 return way
         return None
 

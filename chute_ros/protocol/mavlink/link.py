@@ -164,10 +164,16 @@ class MavlinkLink:
             why = "no autopilot of ours was ever heard; set autopilot_system_id"
             self.requests.refuse(token, why)
         else:
-            plan, patience = self._care.plan_of(autopilot), self.config.commands.ack_timeout
-            goal = goals.kill(autopilot, plan, self._deploy_decided, patience, now)
+            goal = goals.kill(
+                autopilot,
+                lambda: self._care.plan_of(autopilot),
+                self._deploy_decided,
+                self.config.commands.ack_timeout,
+                now,
+            )
             if goal is None:
-                self.requests.refuse(token, f"no way to stop the motors is allowed: {plan.text()}")
+                why = f"no way is allowed: {self._care.plan_of(autopilot).text()}"
+                self.requests.refuse(token, why)
             else:
                 self._begin(token, goal, now)
 
