@@ -6,13 +6,14 @@ an order to stop, and only if it is a change: an aeroplane that glides has its m
 armed.
 
 Sources: MAVLink common.xml, SERVO_OUTPUT_RAW (us), ESC_STATUS (rpm), EXTENDED_SYS_STATE,
-STATUSTEXT; the texts: ArduCopter AP_Arming_Copter.cpp, ArduPlane AP_Arming_Plane.cpp, PX4
-Commander.cpp.
+STATUSTEXT; ardupilotmega.xml, ESC_TELEMETRY_1_TO_4 (rpm); the texts: ArduCopter
+AP_Arming_Copter.cpp, ArduPlane AP_Arming_Plane.cpp, PX4 Commander.cpp.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -42,7 +43,9 @@ class MotorSigns:
         self._idle: dict[tuple[int, int], int] = {}
         #: Those of them that were driven in the newest message before the acceptance.
         self._driven: set[tuple[int, int]] = set()
-        self._esc_turned = self._was_in_air = False
+        #: Speed controllers, in groups as they are told of -> one of the group turns.
+        self._turning: dict[int, bool] = {}
+        self._was_in_air = False
 
     def armed(self, armed: bool) -> None:
         """By the newest heartbeat."""
@@ -63,7 +66,9 @@ class MotorSigns:
         if kind == "SERVO_OUTPUT_RAW":
             self._outputs(message, now)
         elif kind == "ESC_STATUS":
-            self._escs(message, now)
+            self._escs(message.index, message.rpm, now)
+        elif kind == "ESC_TELEMETRY_1_TO_4":
+            self._escs(0, message.rpm, now)
         elif kind == "EXTENDED_SYS_STATE":
             self._landed_state(message, now)
         elif kind == "STATUSTEXT" and message.text.startswith(_DISARMED_TEXTS):
@@ -85,11 +90,11 @@ class MotorSigns:
             self._stopped = now
         self._driven = {at for at in self._driven if at[0] != message.port} | driven
 
-    def _escs(self, message: Any, now: float) -> None:
-        turns = any(message.rpm)
-        if self._esc_turned and not turns:
+    def _escs(self, group: int, rpm: Iterable[int], now: float) -> None:
+        turned_before = any(self._turning.values())
+        self._turning[group] = any(rpm)
+        if turned_before and not any(self._turning.values()):
             self._stopped = now
-        self._esc_turned = turns
 
     def _landed_state(self, message: Any, now: float) -> None:
         in_air = message.landed_state == dialect.MAV_LANDED_STATE_IN_AIR

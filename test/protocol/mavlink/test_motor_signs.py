@@ -26,12 +26,24 @@ OFF = outputs(1000, 1000, 1900)
 def flying():
     """Two motors and a control surface; it was seen disarmed."""
     bench = Bench().hear(PILOT, ardupilot(), IDLE)
-    return bench.at(0.5).hear(PILOT, ardupilot(True), landed(IN_AIR), DRIVEN).at(1.0)
+    turning = esc_status(4000, 4100, -3900, 4000)
+    return bench.at(0.5).hear(PILOT, ardupilot(True), landed(IN_AIR), DRIVEN, turning).at(1.0)
+
+
+def esc_status(*rpm, index=0):
+    return d.MAVLink_esc_status_message(index, 0, rpm, [15.0] * 4, [1.0] * 4)
+
+
+def esc_telemetry(*rpm):
+    zero = [0] * 4
+    return d.MAVLink_esc_telemetry_1_to_4_message(zero, zero, zero, zero, rpm, zero)
 
 
 SIGNS = [
     pytest.param(OFF, id="SERVO_OUTPUT_RAW"),
     pytest.param(landed(), id="EXTENDED_SYS_STATE"),
+    pytest.param(esc_status(0, 0, 0, 0), id="ESC_STATUS"),
+    pytest.param(esc_telemetry(0, 0, 0, 0), id="ESC_TELEMETRY_1_TO_4"),
     pytest.param(text("Disarming motors"), id="ArduCopter"),
     pytest.param(text("Throttle disarmed"), id="ArduPlane"),
     pytest.param(text("Disarmed by external command"), id="PX4"),
@@ -63,6 +75,15 @@ def test_a_sign_from_before_the_order_confirms_nothing(sign):
     bench.at(1.02).hear(PILOT, ack(DISARM))
     bench.at(1.05).hear(PILOT, ardupilot(True))
     assert bench.ends(1) == []
+
+
+def test_one_of_eight_motors_that_turns_is_enough():
+    bench = flying().hear(PILOT, esc_status(4000, 0, 0, 0, index=4))
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, esc_status(0, 0, 0, 0))
+    assert bench.ends(1) == []
+    bench.at(1.07).hear(PILOT, esc_status(0, 0, 0, 0, index=4))
+    assert bench.end(1).finished.success
 
 
 def test_a_glider_with_its_motor_off_and_armed_confirms_nothing():
