@@ -112,8 +112,10 @@ class _Running:
         """The loop that tells how the request ended; None: it goes on."""
         shown = [loop for loop in self.loops if loop.finished and loop.finished.success]
         if shown:
-            # Where two ways show the same effect, the one that was accepted brought it about.
-            return max(shown, key=lambda loop: bool(loop.finished and loop.finished.accepted))
+            # Where two ways show the same effect, the one that was accepted brought it about, or
+            # else the newest: the one before it was refused.
+            accepted = [loop for loop in shown if loop.finished and loop.finished.accepted]
+            return (accepted or shown)[-1]
         all_ended = all(loop.ended for loop in self.loops)
         return self.loops[-1] if all_ended else None
 
