@@ -24,6 +24,10 @@ from chute_ros.protocol.requests import Requests
 
 #: How often it is looked whether there is something new to say of its set-up, s.
 _SETUP_EVERY = 0.5
+#: An answer whether it may arm is sent again after this, s: PX4 drops one that bears the time of
+#: its question, which in its simulator, whose clock goes in steps, is every quick one.
+_ANSWER_AGAIN = 0.05
+_NO_ANSWER = (math.inf, (0, 0))
 
 
 class AutopilotCare:
@@ -44,6 +48,8 @@ class AutopilotCare:
         self._told_at = self._now = -math.inf
         #: The request that disarms. Ours count down from -1: they never meet one of the owner's.
         self._disarming = 0
+        #: When to answer once more whether an autopilot may arm, and which.
+        self._answer_again = _NO_ANSWER
 
     def plan_of(self, autopilot: AutopilotTracker) -> KillPlan:
         """Which ways to stop its motors are tried, and in which order."""
@@ -71,12 +77,29 @@ class AutopilotCare:
         autopilot = self._devices.autopilots.get(*asking)
         if autopilot is None:
             return
-        reason = self.block.reason
-        self._outbox.send(arm_authorization.answer(asking, reason, autopilot.settings), now)
-        if reason:
+        self._answer(asking, now)
+        self._answer_again = (now + _ANSWER_AGAIN, asking)
+        if reason := self.block.reason:
             text = f"arming denied, flight blocked: {reason}"
             self._devices.notice(Severity.WARNING, text)
             self._outbox.announce(text, dialect.MAV_SEVERITY_CRITICAL, now)
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        at, asking = self._answer_again
+        if now >= at:
+            self._answer_again = _NO_ANSWER
+            self._answer(asking, now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return self._answer_again[0]
+
+    def _answer(self, asking: tuple[int, int], now: float) -> None:
+        autopilot = self._devices.autopilots.get(*asking)
+        assert autopilot is not None
+        reason = self.block.reason
+        self._outbox.send(arm_authorization.answer(asking, reason, autopilot.settings), now)
 
     def _settings(self, autopilot: AutopilotTracker, now: float) -> None:
         settings = autopilot.settings

@@ -69,6 +69,7 @@ class MavlinkLink:
         self._frames(self._inbox.update(now), now)
         self._devices.update(now)
         self.requests.update(now)
+        self._care.update(now)
         self._look_after_parachutes(now)
         if now >= self._heartbeats_until:
             self._heartbeats_until = -math.inf
@@ -79,7 +80,7 @@ class MavlinkLink:
 
     def next_deadline(self) -> float:
         """When update has something to do; at the latest at our next heartbeat."""
-        parts = (self._inbox, self._devices, self.requests)
+        parts = (self._inbox, self._devices, self.requests, self._care)
         deadlines = [part.next_deadline() for part in parts]
         if self._heartbeat_at < self._heartbeats_until:
             deadlines.append(self._heartbeat_at)

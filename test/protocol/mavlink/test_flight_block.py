@@ -168,6 +168,10 @@ def answers(bench):
 def test_an_autopilot_that_asks_may_arm_only_while_flight_is_not_blocked():
     bench = Bench().hear(PILOT, copter(), may_it_arm())
     assert answers(bench) == [(d.MAV_RESULT_ACCEPTED, 0, 5, 1, 1)]
+    bench.at(0.06)
+    assert answers(bench) == [(d.MAV_RESULT_ACCEPTED, 0, 5, 1, 1)] * 2, "again, and no more"
+    bench.at(1.0)
+    assert len(answers(bench)) == 2
     bench.link.flight_block("no parachute", bench.now)
     bench.clear()
     bench.hear(PILOT, may_it_arm((1, 191)))
