@@ -64,9 +64,9 @@ def wire_task(
     return status(node, "link", level, text, every, wire.connection)
 
 
-def never_heard(node: str) -> DiagnosticStatus:
-    """The parachute of a link on which none was heard."""
-    return status(node, "parachute", STALE, "never heard", {}, "")
+def never_heard(node: str, task: str = "parachute") -> DiagnosticStatus:
+    """The task of a device of a link on which none was heard."""
+    return status(node, task, STALE, "never heard", {}, "")
 
 
 def liveness_values(live: Liveness, now: float) -> dict[str, object]:
