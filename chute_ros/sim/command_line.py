@@ -20,9 +20,10 @@ from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.sim.pty_wire import PtyWire
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
-from chute_ros.transport.loop import LoopFault, ProtocolLink, WireChange, WireLoop
+from chute_ros.transport.loop import ProtocolLink, WireLoop
 from chute_ros.transport.signing_key import signing_from_file
 from chute_ros.transport.wire import Wire, make_wire
+from chute_ros.transport.wire_events import LoopFault, WireChange
 
 if TYPE_CHECKING:
     from chute_ros.sim.mavlink_device import MavlinkDevice
