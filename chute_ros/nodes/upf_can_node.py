@@ -71,7 +71,7 @@ class UpfCanNode(DeviceNode):
         address = parse_can_address(self.values["connection"], self.values["bitrate"])
         types = load_data_types(self.values["dsdl_path"], "parameter dsdl_path")
         self._file = AllocationFile(self.values["allocation_table_file"], name)
-        table = self._file.load() if self.values["allocator"] else {}
+        table = self._file.load() if self.values["allocator"] != "false" else {}
         utc_offset = time.time() - time.monotonic()
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
         self.loop = WireLoop(link, make_can_wire(address), self.deliver)

@@ -46,6 +46,8 @@ class BusNodeConfig:
     unique_id: bytes
     calls: CallLimits = field(default=CallLimits())
     allocator: bool = True
+    #: To another allocator, and until it is known that there is none.
+    allocator_yields: bool = False
     table: Mapping[bytes, int] = field(default_factory=dict)
     #: Node ids that are never given out, besides our own.
     never: tuple[int, ...] = ()
@@ -73,7 +75,8 @@ class BusNode:
         self.endpoint = Endpoint(types, config.node_id)
         self.nodes = NodeMonitor()
         self.scripts = Scripts(config.calls)
-        self.allocator = Allocator(config.table, (config.node_id, *config.never))
+        never = (config.node_id, *config.never)
+        self.allocator = Allocator(config.table, never, config.allocator_yields)
         self.time = TimeMaster(config.node_id, config.utc_offset)
         self._started = math.nan
         self._status_at = -math.inf
@@ -112,7 +115,7 @@ class BusNode:
         elif heard.name == time_sync.MESSAGE:
             self.time.heard(heard.source, now)
         elif heard.name == NODE_STATUS and heard.source:
-            self.nodes.status(heard.source, heard.values, now)
+            self.nodes.status(heard.source, heard.values, now, heard.transfer_id)
         return heard
 
     def update(self, now: float) -> None:
@@ -130,6 +133,7 @@ class BusNode:
             self.scripts.begin(("who is", node_id), _who_is(node_id), now)
         self._drive(now)
         self._look_for_trouble(now)
+        self._events += [Notice(Severity.ERROR, text) for text in self.nodes.take_news(now)]
 
     def next_deadline(self) -> float:
         """When update has something to do."""
@@ -178,6 +182,8 @@ class BusNode:
         if now >= self._status_at:
             self._status_at = now + NODE_STATUS_INTERVAL
             self.endpoint.broadcast(NODE_STATUS, {"uptime_sec": self.uptime(now)})
+            self.allocator.update(self._in_use(), now)
+            self._events += self.allocator.take_keep()
         if self.config.time_master:
             stamp = self.time.update(now)
             if stamp is not None:
@@ -236,13 +242,29 @@ class BusNode:
     def _allocation(self, heard: Heard, now: float) -> None:
         if not self.config.allocator:
             return
-        in_use = {entry.node_id: entry.unique_id for entry in self.nodes.all()}
-        in_use[self.config.node_id] = self.config.unique_id
         # Every node has spoken once by then, whatever its id.
         listened = now - self._started >= LISTEN_TIME
         discovered = listened and self.nodes.all_discovered(now)
-        self.allocator.heard(heard.source, heard.values, in_use, discovered, now)
+        before = self.allocator.left_to
+        self.allocator.heard(heard.source, heard.values, self._in_use(), discovered, now)
+        self._tell_who_allocates(before)
         self._answer_allocations()
+
+    def _in_use(self) -> dict[int, bytes]:
+        """Node id -> unique id (empty: not known)."""
+        in_use = {entry.node_id: entry.unique_id for entry in self.nodes.all()}
+        in_use[self.config.node_id] = self.config.unique_id
+        return in_use
+
+    def _tell_who_allocates(self, before: int) -> None:
+        """Once each time it changes. before: the node that did."""
+        now = self.allocator.left_to
+        if now and now != before:
+            text = f"node {now} gives out node ids: it is left to it (parameter allocator)"
+            self._events.append(Notice(Severity.INFO, text))
+        elif before and not now:
+            text = f"node {before} answers no request for a node id any more: given out here again"
+            self._events.append(Notice(Severity.WARNING, text))
 
     def _answer_allocations(self) -> None:
         for answer in self.allocator.take_answers():
@@ -273,10 +295,11 @@ class BusNode:
                 "the CAN controller is bus-off (wiring, bit rate, resistor?); "
                 "a restart time brings it back: ip link set canX type can restart-ms 100"
             )
-        if self.config.allocator and self.allocator.another_is_there(now):
+        rivals = self.config.allocator and not self.config.allocator_yields
+        if rivals and self.allocator.another_is_there(now):
             found["allocator"] = (
                 f"node {self.allocator.other} gives out node ids as well: switch one of the two "
-                "off (parameter allocator); ours is silent"
+                "off (parameter allocator, auto leaves it to the other); ours is silent"
             )
         if self.config.time_master and self.time.contested(now):
             found["time"] = (

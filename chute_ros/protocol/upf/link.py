@@ -75,6 +75,9 @@ class UpfLink:
     def update(self, now: float) -> None:
         """Look at the clock: limits, retries, what we send by ourselves."""
         self.bus.update(now)
+        for node_id in self.bus.nodes.take_replaced():
+            self.devices.replaced(node_id, now)
+        self.devices.doubled = frozenset(self.bus.nodes.conflicts(now))
         self.devices.update(now)
         self.vehicle_service.update(now)
         self.requests.update(now)
@@ -280,7 +283,6 @@ class UpfLink:
             for node_id in self.bus.nodes.take_restarted():
                 self.devices.restarted(node_id)
                 self._deploying.restarted(node_id, now)
-                self.devices.notice(Severity.ERROR, f"node {node_id} restarted")
             self.devices.node_status(heard.source, heard.values, now)
 
     def _target(self, token: int, node_id: int, now: float) -> Controller | None:
