@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import os
 import select
-import stat
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
-_PROC = Path("/proc")
-#: Between two looks (s): a program that only tried to open the port is gone by the second one.
-LOOK_EACH = 1.0
+_PROC = "/proc"
+#: Between the looks at two processes, s.
+_REST = 0.001
+#: Between two looks (s), and while somebody else seems to read the port: a program that only tried
+#: to open it is gone by the second look.
+LOOK_EACH, LOOK_SOON = 5.0, 1.0
 #: A port that was ready without a byte so often had another reader, though it cannot be seen.
 _CERTAIN = 3
 #: Another reader is told of for so long after its last sign, s.
@@ -27,13 +29,15 @@ def users_of(number: int, apart: int = -1) -> list[str]:
     The process at the other end of a pseudo terminal is the device, and no user of it.
     """
     found = []
-    for folder in _PROC.iterdir():
-        if not folder.name.isdigit():
+    for process in os.listdir(_PROC):
+        if not process.isdigit():
             continue
+        # The link's thread has the interpreter whenever it needs it.
+        time.sleep(_REST)
         try:
-            if _reads(folder, number, apart):
-                name = (folder / "comm").read_text(errors="replace").strip()
-                found.append(f"{name} (pid {folder.name})")
+            if _reads(process, number, apart):
+                name = Path(_PROC, process, "comm").read_text(errors="replace").strip()
+                found.append(f"{name} (pid {process})")
         except OSError:
             continue  # it ended meanwhile, or is another user's
     return sorted(found)
@@ -46,30 +50,28 @@ def hung_up(file: int) -> bool:
     return bool(poll.poll(0))
 
 
-def _reads(process: Path, number: int, apart: int) -> bool:
-    own = int(process.name) == os.getpid()
+def _reads(process: str, number: int, apart: int) -> bool:
+    own = int(process) == os.getpid()
+    folder = f"{_PROC}/{process}/fd"
     found = False
-    for file in _terminals(process):
-        if os.path.basename(os.readlink(file)) == "ptmx":
-            return False
-        if os.stat(file).st_rdev != number or (own and int(file.name) == apart):
-            continue
-        found = found or _for_reading(process / "fdinfo" / file.name)
+    for file in os.listdir(folder):
+        try:
+            # The name first: to ask what a descriptor is may wait for a network.
+            target = os.readlink(f"{folder}/{file}")
+            if not target.startswith("/dev/"):
+                continue
+            if target.endswith("/ptmx"):
+                return False
+            is_it = os.stat(f"{folder}/{file}").st_rdev == number
+        except OSError:
+            continue  # closed meanwhile
+        if is_it and not (own and int(file) == apart):
+            found = found or _for_reading(f"{_PROC}/{process}/fdinfo/{file}")
     return found
 
 
-def _terminals(process: Path) -> Iterator[Path]:
-    for file in (process / "fd").iterdir():
-        # The name first: to ask what a descriptor is may wait for a network.
-        try:
-            if os.readlink(file).startswith("/dev/") and stat.S_ISCHR(os.stat(file).st_mode):
-                yield file
-        except OSError:
-            continue  # closed meanwhile
-
-
-def _for_reading(information: Path) -> bool:
-    for line in information.read_text().splitlines():
+def _for_reading(information: str) -> bool:
+    for line in Path(information).read_text().splitlines():
         if line.startswith("flags:"):
             return int(line.split()[1], 8) & os.O_ACCMODE != os.O_WRONLY
     return False
@@ -80,9 +82,13 @@ class PortUsers:
     processes takes longer than a link may wait."""
 
     def __init__(
-        self, path: str, file: int, look: Callable[[int, int], list[str]] = users_of
+        self,
+        path: str,
+        file: int,
+        look: Callable[[int, int], list[str]] = users_of,
+        look_each: float = LOOK_EACH,
     ) -> None:
-        self._path, self._file, self._look = path, file, look
+        self._path, self._file, self._look, self._look_each = path, file, look, look_each
         self._number = os.fstat(file).st_rdev
         self._signs: list[float] = []
         #: The first of the signs that follow each other, and the newest look.
@@ -122,13 +128,16 @@ class PortUsers:
         return len(self._signs) == _CERTAIN and now - self._signs[0] < _SIGN_LASTS
 
     def _run(self) -> None:
-        while not self._stopping.is_set():
+        wait = min(LOOK_SOON, self._look_each)
+        while not self._stopping.wait(wait):
             found = self._look(self._number, self._file)
             now = self._looked = time.monotonic()
             signs = bool(self._signs) and now - self._signs[-1] < _SIGN_LASTS
             # Seen twice, or with a sign beside it.
             names = found if signs else [one for one in found if one in self._before]
             self._before = found
+            if not found and self._seen[0]:
+                self._signs = []  # its doing, and it is gone
             if names or not found:
                 self._seen = (names, now)
-            self._stopping.wait(LOOK_EACH)
+            wait = LOOK_SOON if signs or found else self._look_each

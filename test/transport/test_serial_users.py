@@ -78,6 +78,7 @@ def test_a_second_reader_is_named_and_the_port_is_kept(device, program, await_un
         assert [change.is_open for change in node.changes] == [True], "never closed, nor reopened"
         other.end()
         await_until(lambda: troubles(node)[-1] == "", "its end is told")
+        assert len(troubles(node)) == 2, "and nothing in between"
         before = node.link.heard()
         os.write(device.master, b"all")
         await_until(lambda: node.link.heard() == before + b"all", "all is heard again")
@@ -124,7 +125,7 @@ def test_a_port_in_use_names_who_uses_it(device, program, await_until):
 
 def test_a_reader_that_cannot_be_seen_is_told_by_its_signs(await_until):
     looks = []
-    users = PortUsers("/dev/ttyUSB0", 0, lambda number, apart: looks.append(1) or [])
+    users = PortUsers("/dev/ttyUSB0", 0, lambda number, apart: looks.append(1) or [], 0.1)
     try:
         now = time.monotonic()
         for tenth in range(2):
@@ -146,7 +147,7 @@ def test_a_program_that_only_tried_to_open_the_port_is_not_told_of(await_until):
         looks.append(["prober (pid 7)"] if not looks else [])
         return looks[-1]
 
-    users = PortUsers("/dev/ttyUSB0", 0, look)
+    users = PortUsers("/dev/ttyUSB0", 0, look, 0.1)
     try:
         await_until(lambda: len(looks) > 2, "it was looked for again")
         assert users.trouble(time.monotonic()) == ""
