@@ -96,8 +96,7 @@ class PortUsers:
         self._seen: tuple[list[str], float] = ([], 0.0)
         self._before: list[str] = []
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"users of {path}", daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._run, name=f"users of {path}", daemon=True).start()
 
     def ready_without_data(self, now: float) -> None:
         """The port was ready to be read, and somebody else had read it."""
@@ -120,9 +119,8 @@ class PortUsers:
         )
 
     def stop(self) -> None:
-        """End the thread."""
+        """Look no more; one that is under way ends by itself, and touches no descriptor."""
         self._stopping.set()
-        self._thread.join()
 
     def _certain(self, now: float) -> bool:
         return len(self._signs) == _CERTAIN and now - self._signs[0] < _SIGN_LASTS

@@ -49,7 +49,6 @@ class SerialWire:
         self._users = PortUsers(path, self._port.fileno())
 
     def close(self) -> None:
-        # The users first: they must not ask about a descriptor that is somebody else's by then.
         users, self._users = self._users, None
         if users is not None:
             users.stop()
