@@ -21,6 +21,7 @@ from upf_bench import PATIENT, Devices, Network, tasks, vehicle_state
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.protocol.upf import parameters as p
+from chute_ros.protocol.upf.config import NODE_ID
 
 SCRIPT = Path(__file__).with_name("upf_third_party.py")
 DSDL = Path(__file__).parents[2] / "msg_defs" / "dsdl" / "flyfire"
@@ -127,9 +128,9 @@ def test_it_sees_all_three_nodes_and_reads_what_ours_says(bench, network, party)
     bench.until(lambda: network.link._vehicle._state.height == 42.5, "it is heard")
     seen = party("watch").await_end()
     nodes = {one.pop("node"): one for one in seen if "node" in one}
-    assert nodes.keys() >= {10, 33, 34}
-    assert nodes[10]["name"] == "org.chute_ros.upf_can"
-    assert nodes[10]["unique_id"] == network.link.config.unique_id.hex()
+    assert nodes.keys() >= {NODE_ID, 33, 34}
+    assert nodes[NODE_ID]["name"] == "org.chute_ros.upf_can"
+    assert nodes[NODE_ID]["unique_id"] == network.link.config.unique_id.hex()
     for node_id, one in ((33, devices.controller), (34, devices.trigger)):
         assert nodes[node_id]["name"] == one.settings.name
         assert nodes[node_id]["unique_id"] == one.settings.unique_id.hex()

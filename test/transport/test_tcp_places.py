@@ -23,6 +23,7 @@ def node(monkeypatch):
     def frames():
         return sum(data == FRAME for data, _ in one.link.received)
 
+    one.loop.stop()
     one.loop = WireLoop(one.link, one.wire, one.delivered.extend, frames=frames)
     one.loop.start()
     yield one
