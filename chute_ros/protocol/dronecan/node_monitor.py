@@ -25,8 +25,9 @@ _CONFLICT_GAPS = 2.5
 _MOST_CLOCKS = 4
 #: Transfer ids wrap around (specification).
 _TRANSFER_IDS = 32
-#: Signs, clocks and unique ids that lie further apart (s) have nothing to do with each other.
-_MEMORY = 60.0
+#: Signs and clocks that lie further apart (s) have nothing to do with each other; nor have unique
+#: ids, as a node with two is asked each second.
+_MEMORY, _UNIQUE_ID_MEMORY = 60.0, 12.0
 #: So many NodeStatus within this time (s) that count backwards: two nodes count, each for itself.
 _MOST_BACKWARDS = 3
 _BACKWARDS_WITHIN = 10.0
@@ -139,7 +140,9 @@ class NodeMonitor:
             return
         entry.information, unique_id = values, bytes(values["hardware_version"]["unique_id"])
         entry.unique_ids[unique_id] = now
-        entry.unique_ids = {one: at for one, at in entry.unique_ids.items() if now - at < _MEMORY}
+        entry.unique_ids = {
+            one: at for one, at in entry.unique_ids.items() if now - at < _UNIQUE_ID_MEMORY
+        }
         if len(entry.unique_ids) > 1:
             entry.conflict_shows(now)
         before = self._owners.get(node_id, unique_id)

@@ -183,6 +183,22 @@ def test_a_known_node_is_asked_again_and_a_second_unit_is_asked_each_second():
         assert monitor.to_ask(tick) == [33]
 
 
+def test_two_of_which_each_answers_every_other_question_are_one_conflict_that_lasts():
+    """Given two that were switched on together, and answer in turns."""
+    monitor, seen = NodeMonitor(), []
+    units, number = (UID, b"\x55" * 16), 0
+    for tick in range(60):
+        monitor.status(33, status(tick), tick)
+        for _ in monitor.to_ask(tick):
+            monitor.information(33, info(units[number % 2]), tick)
+            number += 1
+        seen.append(monitor.conflicts(tick))
+    begin = seen.index([33])
+    assert begin <= 11
+    assert seen[begin:] == [[33]] * (60 - begin)
+    assert monitor.take_news(60.0) == [], "it is no exchange of a device"
+
+
 def test_another_device_under_a_node_id_is_told_once():
     monitor = NodeMonitor()
     answers(monitor, 0.0, UID)
