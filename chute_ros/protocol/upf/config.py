@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.dronecan.bus_node import BusNodeConfig
+from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
