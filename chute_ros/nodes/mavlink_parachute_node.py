@@ -60,7 +60,9 @@ class MavlinkParachuteNode(DeviceNode):
         #: Why take-off is forbidden, as it was last told.
         self._doubts: set[str] = set()
         link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
-        self.loop = WireLoop(link, make_wire(address), self.deliver)
+        self.loop = WireLoop(
+            link, make_wire(address), self.deliver, frames=lambda: link.received_count
+        )
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
