@@ -54,8 +54,8 @@ class ParachuteDevice(MavlinkDevice):
         self.errors = ErrorFlags(0)
         self.height = math.nan
         self._height_at = -math.inf
-        #: Altitude that heights count from, m: a module's own sensor knows nothing of a home that an
-        #: autopilot moves while it falls (PX4 does).
+        #: Altitude that heights count from, m: a module's own sensor knows nothing of a home that
+        #: an autopilot moves while it falls (PX4 does).
         self._ground = math.nan
         self._sinking_since = math.nan
         self.streams = {

@@ -82,7 +82,8 @@ def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, 
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
-        told[VERTICAL_SPEED] = f"it was commanded ({beyond})"
+        # Nor is the force that is missing while it does so.
+        told[VERTICAL_SPEED] = told[ACCELERATION] = f"it was commanded ({beyond})"
     return told
 
 
