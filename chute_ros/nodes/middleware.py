@@ -9,6 +9,8 @@ showed it). And what a network loses is sent again at once.
 from __future__ import annotations
 
 import os
+import re
+from pathlib import Path
 
 from chute_ros.nodes.config_folder import config_folder
 
@@ -52,3 +54,39 @@ def _keeps_to_this_host() -> bool:
     only = os.environ.get(_OLD_RANGE) == "1" or os.environ.get(_RANGE) == "LOCALHOST"
     # Peers elsewhere that are named are to be heard all the same.
     return only and not os.environ.get(_PEERS)
+
+
+#: In each line of Fast DDS the first version that one packet does not make take all memory
+#: (CVE-2025-64438; its commits are in these tags of eProsima/Fast-DDS).
+CURED = ((2, 6, 11), (2, 14, 6), (3, 2, 4), (3, 3, 1), (3, 4, 1))
+_LIBRARY = re.compile(r"\S*/libfast(?:rtps|dds)\.so\.\d+\.\d+[.\d]*")
+
+
+def fast_dds(maps: Path = Path("/proc/self/maps")) -> tuple[int, int, int] | None:
+    """The version of Fast DDS that this process has loaded; None: none, or it does not tell."""
+    try:
+        found = _LIBRARY.search(maps.read_text(errors="replace"))
+        if found is None:
+            return None
+        # Loaded is a copy or a link named by two numbers; the file of all three lies beside it.
+        loaded = Path(found[0])
+        names = [loaded.name, *(one.name for one in loaded.parent.glob(f"{loaded.name}.*"))]
+    except OSError:
+        return None
+    versions = [name.rpartition(".so.")[2].split(".") for name in names]
+    whole = [one for one in versions if len(one) == 3 and all(map(str.isdigit, one))]
+    return (int(whole[0][0]), int(whole[0][1]), int(whole[0][2])) if whole else None
+
+
+def is_cured(version: tuple[int, int, int]) -> bool:
+    """Does it take a packet of CVE-2025-64438 without harm?"""
+    lines = {cured[:2]: cured for cured in CURED}
+    return version >= lines.get(version[:2], max(CURED))
+
+
+def is_local() -> bool:
+    """Do this process's settings, set_up_middleware's, keep it to this host?"""
+    return any(
+        os.environ.get(variable, "").endswith(f"/{name}_localhost.xml")
+        for variable, name in (_SETTINGS, _SETTINGS_2)
+    )

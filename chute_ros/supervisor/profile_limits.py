@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
     CLIMB_RATE,
     STANDARD_LIMITS,
     VERTICAL_SPEED,
     Limits,
 )
-from chute_ros.supervisor.rules import Condition, MeasurementCondition, Rule, is_silence
+from chute_ros.supervisor.rules import Condition, MeasurementCondition, Rule
 
 #: No vehicle has a height below which nothing is released, or that is low, of more than this, m.
 HIGHEST_MINIMUM = 1000.0
@@ -64,17 +63,6 @@ def condition_problem(one: MeasurementCondition, limits: Mapping[str, Limits]) -
     if not (math.isnan(one.until) or known.minimum <= one.until <= known.maximum):
         return f"has an until that is never reached: {told}"
     return ""
-
-
-def deploy_problems(rule: Rule) -> Iterator[str]:
-    """What the gate would never let through, of a rule that deploys."""
-    silence = sum(condition.weight for condition in rule.conditions if is_silence(condition))
-    if silence >= rule.needed - _ROUNDING:
-        text = "would deploy on silence alone, which is never done"
-        yield f"{text}: raise needed above {silence:g}, or add a measurement"
-    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING}:
-        text = "would deploy out of flight, which is never done"
-        yield f"{text}: its states may be IN_FLIGHT and KILLING"
 
 
 def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:

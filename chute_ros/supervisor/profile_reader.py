@@ -27,7 +27,6 @@ from chute_ros.supervisor.profile_limits import (
     MOST_SAMPLES,
     bounds,
     condition_problem,
-    deploy_problems,
     rule_problem,
 )
 from chute_ros.supervisor.rules import (
@@ -44,6 +43,7 @@ from chute_ros.supervisor.rules import (
     MeasurementCondition,
     Profile,
     Rule,
+    is_silence,
 )
 from chute_ros.supervisor.yaml_lines import LineReader, Where, compose
 
@@ -192,8 +192,7 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
         if problem := rule_problem(rule, reader.limits):
             reader.wrong(where.line, f"{what} {problem}")
         elif action is Action.DEPLOY:
-            for problem in deploy_problems(rule):
-                reader.wrong(where.line, f"{what} {problem}")
+            _check_deploy(reader, what, where.line, rule)
     return rule
 
 
@@ -310,3 +309,14 @@ def _until(reader: _ProfileLines, what: str, where: Where, limits: dict[str, flo
         text = "less than above" if "above" in limits else "more than below"
         reader.wrong(where.line, f"{what} is {until:g}: need {text}")
     return until
+
+
+def _check_deploy(reader: _ProfileLines, what: str, line: int, rule: Rule) -> None:
+    """What the gate would never let through is a mistake of the profile."""
+    silence = sum(condition.weight for condition in rule.conditions if is_silence(condition))
+    if silence >= rule.needed - 1e-9:
+        text = f"{what} would deploy on silence alone, which is never done"
+        reader.wrong(line, f"{text}: raise needed above {silence:g}, or add a measurement")
+    if not set(rule.states) <= {Stage.IN_FLIGHT, Stage.KILLING}:
+        text = f"{what} would deploy out of flight, which is never done"
+        reader.wrong(line, f"{text}: its states may be IN_FLIGHT and KILLING")
