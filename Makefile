@@ -15,7 +15,7 @@ PARACHUTE ?= mavlink
 DEPTH ?= 2
 # Modules of the supervisor that make mutate changes; empty: all.
 MODULES ?=
-# Parts of make hosts: supervisors, ground, discovery, fleet; empty: all.
+# Parts of make hosts: supervisors, ground, discovery, fleet, packet; empty: all.
 PARTS ?=
 # Loops of make soak.
 LOOPS ?= 300

@@ -1,6 +1,6 @@
 """CVE-2025-64438: the packet of RTPS that makes Fast DDS take memory for ever, and who sends it.
 
-Its form is public: RTPS 2.3 (OMG formal/2019-04-03), 8.3.7.4 and 9.4.5.6 (GAP), 9.4.5.7 (INFO_DST),
+Its form is public: RTPS 2.3 (OMG formal/2019-04-03), 9.4.5.6 (GAP), 9.4.5.9 (INFO_DST),
 9.6.1 (ports). It is sent to hosts of our own making only (faults/network.py).
 """
 
@@ -45,8 +45,7 @@ class Stranger:
         self._heard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._heard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self._heard.bind(("", MULTICAST_PORT))
-        own = socket.inet_aton(address)
-        membership = socket.inet_aton(_GROUP) + own
+        membership = socket.inet_aton(_GROUP) + socket.inet_aton(address)
         self._heard.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
         #: GUID prefixes of the participants that announced themselves.
         self.prefixes: set[bytes] = set()
@@ -60,8 +59,12 @@ class Stranger:
                 data, _ = self._heard.recvfrom(65536)
             except TimeoutError:
                 return
-            if data.startswith(b"RTPS") and len(data) >= _PREFIX.stop:
-                self.prefixes.add(data[_PREFIX])
+            self.heard(data)
+
+    def heard(self, data: bytes) -> None:
+        """What came to everybody."""
+        if data.startswith(b"RTPS") and len(data) >= _PREFIX.stop:
+            self.prefixes.add(data[_PREFIX])
 
     def prefix_of(self, process: int) -> bytes | None:
         """Of the participant of a process, whose number Fast DDS puts there; None: not heard."""

@@ -20,11 +20,9 @@ _SETTINGS = ("FASTDDS_DEFAULT_PROFILES_FILE", "fastdds")
 _SETTINGS_2 = ("FASTRTPS_DEFAULT_PROFILES_FILE", "fastrtps")
 _WITH_VERSION_2 = ("humble", "iron", "jazzy")
 _TRANSPORTS = ("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
-_RANGE, _OLD_RANGE, _PEERS = (
-    "ROS_AUTOMATIC_DISCOVERY_RANGE",
-    "ROS_LOCALHOST_ONLY",
-    "ROS_STATIC_PEERS",
-)
+#: Who may hear a process.
+RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_OLD_RANGE, _PEERS = "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"
 #: What a ground station sets to meet a vehicle, on other hosts as well, whatever the range is: a
 #: simulation must have none of it.
 LEADS_ELSEWHERE = (_PEERS, "ROS_DISCOVERY_SERVER", _SETTINGS[0], _SETTINGS_2[0])
@@ -43,7 +41,7 @@ def set_up_middleware() -> None:
         # rmw_fastrtps adds shared memory to LOCALHOST, whatever the settings say; this file keeps
         # to this host as well.
         name += "_localhost"
-        os.environ[_RANGE] = "SUBNET"
+        os.environ[RANGE] = "SUBNET"
         os.environ.pop(_OLD_RANGE, None)
     os.environ[variable] = str(config_folder() / f"{name}.xml")
 
@@ -51,7 +49,7 @@ def set_up_middleware() -> None:
 def _keeps_to_this_host() -> bool:
     if os.environ.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp") != "rmw_fastrtps_cpp":
         return False
-    only = os.environ.get(_OLD_RANGE) == "1" or os.environ.get(_RANGE) == "LOCALHOST"
+    only = os.environ.get(_OLD_RANGE) == "1" or os.environ.get(RANGE) == "LOCALHOST"
     # Peers elsewhere that are named are to be heard all the same.
     return only and not os.environ.get(_PEERS)
 

@@ -169,7 +169,7 @@ class LeaseKeeper:
             self._complain(trouble)
 
     def _namesake(self, message: SupervisorLease, now: float) -> None:
-        """Another of this name is at work: who came later, and has no flight to look after, ends."""
+        """Another of this name is at work: who came later and has no flight goes."""
         self._namesake_heard = now
         running, state = now - self._started, self._state()
         older = message.running > running + _TOGETHER

@@ -1,4 +1,4 @@
-"""Two supervisors were given one name: the second refuses, and the first one's flight is its own."""
+"""Two supervisors were given one name: the second refuses, and the first one's flight is kept."""
 
 import os
 import signal
