@@ -17,8 +17,10 @@ _INFO_DST, _GAP, _LITTLE_ENDIAN = 0x0E, 0x08, 0x01
 #: Sequence numbers that are "never sent": from one that is still to come to one that never comes.
 _FIRST, _LAST = 1_000, 2**40
 _GROUP = "239.255.0.1"
-#: Of domain 0: all participants' multicast port, and the first one's own; each next has two more.
-MULTICAST_PORT, UNICAST_PORT, PARTICIPANTS = 7400, 7410, 32
+#: All participants' multicast port in domain 0, and by how much it differs in each next one; above
+#: it the first participant's own, and from each to the next.
+_MULTICAST_PORT, _DOMAIN_GAIN, _UNICAST_OFFSET, _PARTICIPANT_GAIN = 7400, 250, 10, 2
+_PARTICIPANTS = 32
 _PREFIX = slice(8, 20)
 
 
@@ -39,12 +41,14 @@ def _number(value: int) -> bytes:
 
 
 class Stranger:
-    """Somebody on the network, with sockets of the host on which it was made. address: its own."""
+    """Somebody on the network, with sockets of the host on which it was made. address: its own;
+    domain: ROS_DOMAIN_ID."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, domain: int = 0) -> None:
+        self._port = _MULTICAST_PORT + _DOMAIN_GAIN * domain
         self._heard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._heard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        self._heard.bind(("", MULTICAST_PORT))
+        self._heard.bind(("", self._port))
         membership = socket.inet_aton(_GROUP) + socket.inet_aton(address)
         self._heard.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
         #: GUID prefixes of the participants that announced themselves.
@@ -73,8 +77,9 @@ class Stranger:
 
     def send(self, packet: bytes, host: str) -> None:
         """To every participant on the host: but one takes it for its own."""
-        for number in range(PARTICIPANTS):
-            self._heard.sendto(packet, (host, UNICAST_PORT + 2 * number))
+        for number in range(_PARTICIPANTS):
+            port = self._port + _UNICAST_OFFSET + _PARTICIPANT_GAIN * number
+            self._heard.sendto(packet, (host, port))
 
     def close(self) -> None:
         """Leave."""
