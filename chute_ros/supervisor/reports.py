@@ -242,12 +242,14 @@ class Reports(Requests):
             for name in ("attitude_error", "sink_beyond_target")
         ]
         since = {name: state.denied_since.get(name, now) for name in denied}
+        # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
+        told = {} if state.vehicle.armed is Armed.DISARMED else commanded(*targets)
         self.state = replace(
             state,
             motion=motion,
             denied=MappingProxyType(dict(denied)),
             denied_since=MappingProxyType(since),
-            commanded=MappingProxyType(dict(commanded(*targets))),
+            commanded=MappingProxyType(dict(told)),
         )
         last = state.motion[-1][0] if state.motion else now
         for name, begun in since.items():
