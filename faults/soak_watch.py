@@ -56,6 +56,8 @@ class Watch:
         self._safety_at = -math.inf
         self._beats: dict[str, float] = {}
         self.heartbeats_missed: Counter[str] = Counter()
+        #: The longest time between two heartbeats of one node, s, since it was set to 0.
+        self.longest_gap = 0.0
         set_up_middleware()
         # An interrupt is ours: what was set up must be taken down.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
@@ -191,6 +193,7 @@ class Watch:
         now = time.monotonic()
         before = self._beats.get(message.link)
         if before is not None:
+            self.longest_gap = max(self.longest_gap, now - before)
             self.heartbeats_missed[message.link] += max(0, round((now - before) / _HEARTBEAT) - 1)
         self._beats[message.link] = now
 

@@ -19,6 +19,8 @@ from sitl.vehicle import StoryError, Vehicle
 _READY_WITHIN = 90.0
 #: Processes that start take the machine for themselves, s.
 _SETTLES = 12.0
+#: From one heartbeat of the nodes to the next, s.
+_BEAT = 0.1
 _CLIMB_RATE = 1.5  # m/s, no slower
 _STILL = 0.3  # m/s, a hover
 
@@ -28,6 +30,7 @@ class Flight:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
+        vehicle.watch.longest_gap = 0.0
         self.kind = vehicle.autopilot.kind
         self.began = time.monotonic()
         #: Looks at the record, once it is whole; what is wrong goes into the verdict.
@@ -137,6 +140,7 @@ class Flight:
                cause: str = "failure") -> None:  # fmt: skip
         """From since on."""
         self.expected = Expectation(want, since, within, cause)
+        self.vehicle.watch.longest_gap = 0.0
 
     def fail_motors(self, mask: int, thrust: float = 0.0) -> float:
         """They fail now; when."""
@@ -172,7 +176,9 @@ class Flight:
         since = self.began + _SETTLES
         if not self.verdict.wrong and not math.isnan(self.expected.since):
             since = self.expected.since - 2.0
-        self.verdict.held_up = held_up([one for one in record if one.at >= since])
+        self.verdict.held_up = max(
+            held_up([one for one in record if one.at >= since]), vehicle.watch.longest_gap - _BEAT
+        )
         for look in self.afterwards:
             look(record)
         self.verdict.happened += self._decided()
