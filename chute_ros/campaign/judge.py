@@ -117,7 +117,12 @@ def _fallen(flown: Flown) -> Judged | None:
     """It should have been released; None: it should not, or was in time."""
     truth, scenario = flown.truth, flown.scenario
     soft = SOFT_UNDER_DROGUE if scenario.vehicle is Vehicle.ROCKET else SOFT
-    if not truth.falls or flown.released <= truth.latest or flown.landing_speed <= soft:
+    if (
+        not truth.falls
+        or truth.lands_softly
+        or flown.released <= truth.latest
+        or flown.landing_speed <= soft
+    ):
         return None
     enough = enough_time(scenario)
     if not truth.leeway >= enough:
