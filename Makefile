@@ -17,6 +17,12 @@ DEPTH ?= 2
 MODULES ?=
 # Parts of make hosts: supervisors, ground, discovery, fleet; empty: all.
 PARTS ?=
+# Simulator binaries of make sitl, its stories (empty: all; --list in SITL_ARGS names them), and how
+# often each is flown.
+AUTOPILOT ?=
+STORIES ?=
+RUNS ?= 3
+SITL_ARGS ?=
 # Loops of make soak.
 LOOPS ?= 300
 # How long make fuzz may take.
@@ -46,7 +52,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo test bench campaign hosts soak build lint docs explore mutate fuzz lock clean distclean
+.PHONY: help demo test bench campaign hosts soak sitl build lint docs explore mutate fuzz lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -72,6 +78,10 @@ hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write
 soak: build ## faults on real processes, LOOPS times from SEED on, write docs/soak.* (as root)
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults.soak --loops $(LOOPS) \
 	    --seed $(SEED) --page docs/soak.md
+
+sitl: build ## fly real autopilots' simulators (AUTOPILOT="PATH ..."), write docs/real_autopilots.md
+	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m sitl --runs $(RUNS) --page \
+	    $(if $(STORIES),--stories $(STORIES) --) $(SITL_ARGS) $(AUTOPILOT)
 
 build: ## build both packages
 	@$(UNDERLAY) && exec scripts/build.sh

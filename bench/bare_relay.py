@@ -19,6 +19,7 @@ _LOOPBACK = socket.inet_aton("127.0.0.1")
 _NODE_ID = 10
 _VEHICLE_SERVICE = 164
 _KILLSWITCH = 1
+_FORCE_DISARM = 21196
 _HEARTBEAT, _COMMAND_ACK = 0, 77
 _ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 
@@ -70,7 +71,7 @@ class Network:
             return
         self._wanted = {_HEARTBEAT, _COMMAND_ACK}
         kill = self._mavlink.command_long_encode(
-            1, 1, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 0, 1, 0, 0, 0, 0, 0, 0
+            1, 1, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0, 0, _FORCE_DISARM, 0, 0, 0, 0, 0
         )
         self.socket.sendto(kill.pack(self._mavlink), self._autopilot)
 

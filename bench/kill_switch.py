@@ -211,7 +211,7 @@ def report(peers: list[Peer], before: str) -> str:
     return (
         f"{before}\n\n"
         "A UPF controller asks for TYPE_KILLSWITCH on the CAN bus (UDP multicast); the kill\n"
-        "(MAV_CMD_DO_FLIGHTTERMINATION) arrives at the autopilot, which acknowledges it and\n"
+        "(a forced disarm) arrives at the autopilot, which acknowledges it and\n"
         "whose heartbeat then says motors off; SUCCESS arrives at the controller. chute_ros: the\n"
         "processes upf_can, safety_supervisor and mavlink_parachute, with two hops over ROS to\n"
         "the kill and one back. ROS alone: three processes with the same hops and messages, that\n"

@@ -16,6 +16,7 @@ from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.goals import FORCE_DISARM
 from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, VEHICLE_SERVICE, Definitions
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.can_address import parse_can_address
@@ -169,7 +170,8 @@ class WireEnds:
     def _command(self, message: Any, at: int) -> None:
         if message.get_type() != "COMMAND_LONG":
             return
-        if message.command == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
+        disarms = message.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM
+        if disarms and message.param2 == FORCE_DISARM:
             if self._armed:
                 self._killed_at = at
             self.kills += 1

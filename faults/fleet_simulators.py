@@ -17,8 +17,9 @@ from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.transport.address import parse_address
-from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
+from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire import make_wire
+from chute_ros.transport.wire_events import LoopFault, WireChange
 
 
 class Vehicle:

@@ -96,7 +96,7 @@ def stranger(chance: random.Random) -> bytes:
 
 def nonsense(chance: random.Random) -> bytes:
     """A frame that no transfer can be made of: of strangers, without a beginning or an end."""
-    identifier = chance.randrange(2**29) & ~0x7F | chance.randrange(100, 127)
+    identifier = chance.randrange(2**29) & ~0x7F | chance.randrange(101, 127)
     begins = chance.random() < 0.5
     tail = (0x80 if begins else 0x20) | chance.randrange(32)
     return pack(CanFrame(identifier, chance.randbytes(chance.randrange(8)) + bytes((tail,))))

@@ -12,6 +12,7 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.nodes import messages, qos
+from chute_ros.nodes.plain_border import with_plain_texts
 from chute_ros.supervisor.decision_gate import DecisionGate, Verdict, in_order
 
 #: So many decisions are remembered with how far they got, to be reported once more.
@@ -82,7 +83,7 @@ class DecisionCarrier:
                 taken = self._subscription.handle.take_message(SafetyDecision, False)
                 if taken is None:
                     return
-                yield taken[0]
+                yield with_plain_texts(taken[0])
 
     def _decision(self, message: SafetyDecision) -> None:
         decision, log = messages.decision_from(message), self._node.get_logger()

@@ -47,7 +47,8 @@ from chute_ros.protocol.events import (
     RequestReport,
     VehicleChanged,
 )
-from chute_ros.transport.loop import LoopFault, WireChange, WireLoop
+from chute_ros.transport.loop import WireLoop
+from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
 COMMON_PARAMETERS = (
     Parameter(
@@ -124,6 +125,8 @@ class DeviceNode(SuiteNode, ABC):
         self._supervisor = SupervisorWatch(limit, self.values["supervisor_lost_after"], self.wall)
         self.decisions = DecisionCarrier(self, limit, self._supervisor.age, self.carry_out)
         self.wire_text = "not opened yet"
+        #: What is wrong with the wire while it is open; empty: nothing is known to be.
+        self.wire_trouble = ""
         # A service that awaits the device must not keep the other callbacks from running.
         self._service_group = ReentrantCallbackGroup()
         guard = self.create_guard_condition(self._drain)
@@ -277,7 +280,9 @@ class DeviceNode(SuiteNode, ABC):
         """For the link's task in diagnostics."""
         assert self.loop is not None
         connection = self.values["connection"]
-        return diagnostics.WirePicture(self.loop.wire.is_open, self.wire_text, connection)
+        return diagnostics.WirePicture(
+            self.loop.wire.is_open, self.wire_text, connection, self.wire_trouble
+        )
 
     # -- inside ---------------------------------------------------------------------------------
 
@@ -295,6 +300,10 @@ class DeviceNode(SuiteNode, ABC):
             self.wire_text = event.text
             log = self.get_logger()
             log.info(event.text) if event.is_open else log.warning(event.text)
+        elif isinstance(event, WireTrouble):
+            self.wire_trouble = event.text
+            if event.text:
+                self.get_logger().error(event.text)
         elif isinstance(event, LoopFault):
             self._loop_faults += 1
             self.get_logger().error(event.text, throttle_duration_sec=1.0)

@@ -35,11 +35,13 @@ def status(
 
 @dataclass(frozen=True)
 class WirePicture:
-    """The wire of a link: is it open, what was last said of it, where it goes."""
+    """The wire of a link: is it open, what was last said of it, where it goes, and what is wrong
+    with it though it is open (empty: nothing)."""
 
     is_open: bool
     text: str
     connection: str
+    trouble: str = ""
 
 
 def wire_task(
@@ -52,6 +54,7 @@ def wire_task(
 ) -> DiagnosticStatus:
     """The wire, what is doubtful on it while it is open, and what was dropped on it, by reason."""
     level, text = (OK if wire.is_open else ERROR), wire.text
+    troubles = [*([wire.trouble] if wire.trouble else []), *troubles]
     if wire.is_open and troubles:
         level, text = ERROR, "; ".join(troubles)
     elif wire.is_open and not received and dropped:
@@ -64,9 +67,9 @@ def wire_task(
     return status(node, "link", level, text, every, wire.connection)
 
 
-def never_heard(node: str) -> DiagnosticStatus:
-    """The parachute of a link on which none was heard."""
-    return status(node, "parachute", STALE, "never heard", {}, "")
+def never_heard(node: str, task: str = "parachute") -> DiagnosticStatus:
+    """The task of a device of a link on which none was heard."""
+    return status(node, task, STALE, "never heard", {}, "")
 
 
 def liveness_values(live: Liveness, now: float) -> dict[str, object]:

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 from chute_ros.errors import ChuteError
 from chute_ros.interrupts import CtrlC, at_ctrl_c
 from chute_ros.nodes.middleware import set_up_middleware
+from chute_ros.plain_text import plain
 
 #: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
 #: executor hand a kill to each other, and Python's own 5 ms would be most of its way.
@@ -62,7 +63,9 @@ def run(name: str, class_name: str) -> None:
         if rclpy.ok():
             raise
     except ChuteError as error:
-        print(f"{name}: {error}", file=sys.stderr)
+        # Of several lines, where it lists several mistakes.
+        lines = [plain(line) for line in f"{name}: {error}".splitlines()]
+        print("\n".join(lines), file=sys.stderr)
         sys.exit(2)
     finally:
         # A second Ctrl-C must not cut the ending short: the link's thread is being joined.

@@ -12,6 +12,7 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+from chute_ros.protocol.mavlink.setup_check import Setup
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Details:
     dropped: Counter[str]
     late_acknowledgements: int
     not_followed: int
+    setup: Setup | None
 
 
 def details_of(link: MavlinkLink, now: float) -> Details:
@@ -56,6 +58,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
         Counter(link.counts),
         link.requests.commands.late_count,
         link.parachutes.refused_count + link.autopilots.refused_count,
+        link.setup(),
     )
 
 
@@ -155,21 +158,14 @@ def not_seen(rates: Mapping[str, float]) -> list[str]:
     return [text for kinds, text in _SIGHTS if not any(kind in rates for kind in kinds)]
 
 
-#: What a parachute is that is whole and heard, and not ready.
-_NOT_READY = {
-    model.ParachuteState.NOT_READY: "is starting or calibrating, by its heartbeat",
-    model.ParachuteState.LAUNCHED: "is released",
-    model.ParachuteState.TOUCHDOWN: "is released",
-}
-
-
-def unhealthy_reasons(
-    details: Details, chosen: model.ParachuteStatus | None, expected: bool
-) -> tuple[str, ...]:
-    """Why the link is not healthy, besides what the parachute's own status tells as faults."""
-    reasons = list(details.doubts)
-    if expected and chosen is None:
-        reasons.append("no parachute was heard on this network")
-    elif expected and chosen is not None and not chosen.faults and not chosen.healthy:
-        reasons.append(f"{chosen.device} {_NOT_READY.get(chosen.state, chosen.state.name)}")
-    return tuple(reasons)
+def kill_task(name: str, setup: Setup | None) -> DiagnosticStatus:
+    """Which way a kill goes, whether the autopilot's settings allow it, and the flight block."""
+    if setup is None:
+        return diagnostics.never_heard(name, "kill")
+    level, told = diagnostics.OK, [f"{setup.firmware}: {setup.kill}"]
+    if setup.fault:
+        level, told = diagnostics.ERROR, [f"forbids take-off: {setup.fault}"]
+    elif setup.warnings:
+        level = diagnostics.WARN
+    values = {"kill": setup.kill, "flight block": setup.block, **setup.settings}
+    return diagnostics.status(name, "kill", level, "; ".join([*told, *setup.warnings]), values, "")

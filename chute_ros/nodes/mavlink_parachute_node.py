@@ -21,10 +21,11 @@ from chute_ros.nodes.device_node import DeviceNode, Summary
 from chute_ros.nodes.mavlink_diagnostics import (
     autopilot_task,
     details_of,
+    kill_task,
     link_task,
     parachute_tasks,
-    unhealthy_reasons,
 )
+from chute_ros.nodes.mavlink_health import health
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from
 from chute_ros.nodes.signing_memory import SigningMemory
 from chute_ros.protocol.effect import EffectFinished
@@ -59,7 +60,9 @@ class MavlinkParachuteNode(DeviceNode):
         #: Why take-off is forbidden, as it was last told.
         self._doubts: set[str] = set()
         link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
-        self.loop = WireLoop(link, make_wire(address), self.deliver)
+        self.loop = WireLoop(
+            link, make_wire(address), self.deliver, frames=lambda: link.received_count
+        )
         self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
@@ -72,20 +75,9 @@ class MavlinkParachuteNode(DeviceNode):
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         self._signing.keep(now)
-        chosen = link.chosen_parachute()
         details = details_of(link, now)
-        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
-        known = details.vehicle.armed is model.Armed.ARMED or not details.doubts
-        expected = self.values["expect_parachute"]
-        status = None if chosen is None else chosen.status(now)
-        reasons = unhealthy_reasons(details, status, expected)
-        if not expected:
-            state, age = details.vehicle.link_state, details.vehicle.armed_age
-            return Summary(state, state is model.LinkState.OK and known, age, details, reasons)
-        if chosen is None or status is None:
-            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details, reasons)
-        age = chosen.liveness.age(now)
-        return Summary(status.link_state, status.healthy and known, age, details, reasons)
+        state, age, reasons = health(link, details.vehicle, self.values["expect_parachute"], now)
+        return Summary(state, not reasons, age, details, reasons)
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, VehicleChanged):
@@ -138,6 +130,7 @@ class MavlinkParachuteNode(DeviceNode):
             link_task(name, details, traffic, wire),
             *parachute_tasks(name, details, self.values["expect_parachute"]),
             autopilot_task(name, details),
+            kill_task(name, details.setup),
             self._signing.task(name),
         ]
 

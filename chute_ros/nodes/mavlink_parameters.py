@@ -86,9 +86,17 @@ PARAMETERS = (
     ),
     Parameter(
         "kill_method",
-        "flight_termination",
-        "how the autopilot is told to stop the motors",
+        "auto",
+        "which way the motors are stopped is tried first; the other follows where it fails, and "
+        "none that releases a parachute is taken before a deploy was decided",
         choices=tuple(method.value for method in KillMethod),
+    ),
+    Parameter(
+        "takeoff_height",
+        2.0,
+        "a flight block holds until the vehicle was higher than this above where it was armed, m",
+        0.1,
+        100.0,
     ),
     Parameter("disarm_when_blocked", True, "undo arming on the ground while flight is blocked"),
     Parameter(
@@ -142,4 +150,5 @@ def config_from(values: Mapping[str, Any]) -> MavlinkConfig:
         autopilot_message_rate=values["autopilot_message_rate"],
         needed_message_rate=values["needed_message_rate"],
         disarm_when_blocked=values["disarm_when_blocked"],
+        takeoff_height=values["takeoff_height"],
     )

@@ -27,7 +27,8 @@ Value = bool | int | float | str | list[str]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter. minimum and maximum are inclusive; choices are for text."""
+    """One parameter. minimum and maximum are inclusive; choices are for text. Where true and false
+    are among them they may be given as YAML reads them, and come as text."""
 
     name: str
     default: Value
@@ -51,12 +52,18 @@ class Parameter:
             return f"{kind} from {int(self.minimum)} to {int(self.maximum)}"
         return f"{kind} from {self.minimum:g} to {self.maximum:g}"
 
+    @property
+    def takes_switch(self) -> bool:
+        """True and false are among its choices."""
+        return {"true", "false"} <= set(self.choices)
+
     def descriptor(self) -> ParameterDescriptor:
         """The same for ROS."""
         descriptor = ParameterDescriptor(
             description=self.description,
             additional_constraints=self.allowed(),
             read_only=not self.changeable,
+            dynamic_typing=self.takes_switch,
         )
         if self.minimum is None or self.maximum is None:
             return descriptor
@@ -94,6 +101,8 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
             value = []  # how ROS reads an empty list on the command line
             if not isinstance(parameter.default, list):
                 raise _not_allowed(node, parameter, value)
+        if parameter.takes_switch and isinstance(value, bool):
+            value = str(value).lower()
         if parameter.choices and value not in parameter.choices:
             raise _not_allowed(node, parameter, value)
         values[parameter.name] = value

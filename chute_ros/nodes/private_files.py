@@ -7,6 +7,8 @@ import os
 import stat
 from pathlib import Path
 
+from chute_ros.transport.regular_file import read_regular
+
 
 def make_folder(path: Path) -> None:
     """The folder, and those above it that are missing. One that is there stays as it is."""
@@ -53,11 +55,11 @@ def sync_folder(path: Path) -> None:
 
 def read_own_text(path: Path) -> str:
     """The text of a file that decides what a node does; PermissionError if others may have
-    written it. FileNotFoundError, OSError and UnicodeDecodeError as usual."""
-    with open(path, encoding="utf-8") as file:
-        about = os.fstat(file.fileno())
-        if about.st_uid not in (0, os.geteuid()):
-            raise PermissionError(f"{path} belongs to another user: chown it")
-        if about.st_mode & stat.S_IWOTH:
-            raise PermissionError(f"{path} may be written by everybody: chmod 600 {path}")
-        return file.read()
+    written it. FileNotFoundError, OSError (what is no regular file, too) and UnicodeDecodeError as
+    read_regular has them."""
+    about, data = read_regular(path)
+    if about.st_uid not in (0, os.geteuid()):
+        raise PermissionError(f"{path} belongs to another user: chown it")
+    if about.st_mode & stat.S_IWOTH:
+        raise PermissionError(f"{path} may be written by everybody: chmod 600 {path}")
+    return data.decode("utf-8")

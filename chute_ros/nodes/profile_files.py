@@ -10,6 +10,7 @@ from chute_ros.nodes.config_folder import config_folder
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import Profile
 from chute_ros.transport.given_path import given_path
+from chute_ros.transport.regular_file import read_regular_text
 
 
 def load_profile(named: str, links: Sequence[str]) -> Profile:
@@ -22,7 +23,7 @@ def load_profile(named: str, links: Sequence[str]) -> Profile:
     is_path = "/" in named or named.endswith((".yaml", ".yml"))
     path = given_path(named, "parameter profile") if is_path else _folder() / f"{named}.yaml"
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular_text(path)
     except (OSError, UnicodeDecodeError, ValueError) as error:
         raise ParameterError(
             f"parameter profile is {named!r}: {path} cannot be read ({error}); need one of "

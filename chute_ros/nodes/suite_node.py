@@ -12,6 +12,13 @@ from rclpy.node import Node
 
 from chute_ros.nodes import diagnostics, qos
 from chute_ros.nodes.parameters import Parameter, declare
+from chute_ros.nodes.plain_border import (
+    PlainLogger,
+    PlainPublisher,
+    hearing_plainly,
+    is_exempt,
+    serving_plainly,
+)
 
 
 class SuiteNode(Node):
@@ -22,6 +29,7 @@ class SuiteNode(Node):
         #: one that a parameter keeps from being built.
         self.at_end = ExitStack()
         super().__init__(name, **options)
+        self._logger = PlainLogger(self.get_logger().name)
         self.values = declare(self, parameters)
         # The wall clock only stamps, whatever use_sim_time says.
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
@@ -33,6 +41,28 @@ class SuiteNode(Node):
             LinkHeartbeat, "safety/heartbeat", qos.STATUS
         )
         self.diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
+
+    # -- the border: texts that pass it are plain ------------------------------------------------
+
+    def create_publisher(self, kind: Any, topic: str, profile: Any, **options: Any) -> Any:
+        """As of every node; what is published has plain texts."""
+        options.setdefault("publisher_class", PlainPublisher)
+        return super().create_publisher(kind, topic, profile, **options)
+
+    def create_subscription(
+        self, kind: Any, topic: str, callback: Any, profile: Any, **options: Any
+    ) -> Any:
+        """As of every node; what is heard has plain texts, unless it is raw."""
+        as_it_is = options.get("raw", False) or is_exempt(kind)
+        heard = callback if as_it_is else hearing_plainly(callback)
+        return super().create_subscription(kind, topic, heard, profile, **options)
+
+    def create_service(self, kind: Any, name: str, callback: Any, **options: Any) -> Any:
+        """As of every node; requests and responses have plain texts."""
+        served = callback if is_exempt(kind) else serving_plainly(callback)
+        return super().create_service(kind, name, served, **options)
+
+    # -- what all nodes do -----------------------------------------------------------------------
 
     def stamp(self) -> Any:
         """The wall clock, for headers."""

@@ -33,6 +33,7 @@ class Details:
     heartbeats: int
     heartbeat_age: float
     latest_heartbeat: float
+    heartbeats_held: bool
     work: str
 
 
@@ -57,6 +58,7 @@ def details_of(link: UmbilicalLink, now: float) -> Details:
         heartbeats=scheduler.heartbeats_sent,
         heartbeat_age=now - scheduler.last_heartbeat,
         latest_heartbeat=scheduler.limits.latest_heartbeat,
+        heartbeats_held=scheduler.heartbeats_held,
         work=link.pause,
     )
 
@@ -109,6 +111,8 @@ def heartbeat_task(name: str, details: Details, is_open: bool) -> DiagnosticStat
     level, text = diagnostics.OK, "sent"
     if not is_open:
         level, text = diagnostics.ERROR, "not sent: the port is closed"
+    elif details.heartbeats_held:
+        text = "not sent in flight (parameter heartbeat_in_flight)"
     elif math.isnan(age):
         level, text = diagnostics.STALE, "none sent yet"
     elif age > details.latest_heartbeat:

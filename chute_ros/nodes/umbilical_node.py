@@ -28,6 +28,7 @@ from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import Notice, RequestFinished, VehicleChanged
 from chute_ros.protocol.umbilical import events
 from chute_ros.protocol.umbilical.link import UmbilicalLink
+from chute_ros.protocol.umbilical.reasons import reasons_of
 from chute_ros.protocol.umbilical.sayings import LogLine
 from chute_ros.transport.address import parse_serial_address
 from chute_ros.transport.loop import WireLoop
@@ -79,8 +80,11 @@ class UmbilicalNode(DeviceNode):
 
     def summarise(self, link: UmbilicalLink, now: float) -> Summary:
         details = details_of(link, now)
-        age = details.record_age
-        return Summary(link.computer.liveness.state, details.status.healthy, age, details)
+        status = details.status
+        stale_after = link.config.telemetry.stale_after
+        reasons = reasons_of(status, details.received_bytes, stale_after)
+        state = link.computer.liveness.state
+        return Summary(state, status.healthy, details.record_age, details, reasons)
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, events.TelemetryReceived):

@@ -8,7 +8,12 @@ from typing import Any
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.protocol.effect import EffectLimits
-from chute_ros.protocol.umbilical.config import DeployStage, MemoryLimits, UmbilicalConfig
+from chute_ros.protocol.umbilical.config import (
+    DeployStage,
+    HeartbeatInFlight,
+    MemoryLimits,
+    UmbilicalConfig,
+)
 from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
 from chute_ros.transport.address import SERIAL_FORMS
 
@@ -54,6 +59,13 @@ PARAMETERS = (
         "how much later a <H> may be for <V>, <D> and <d>, s",
         0.0,
         10.0,
+    ),
+    Parameter(
+        "heartbeat_in_flight",
+        HeartbeatInFlight.AUTO.value,
+        "send <H> from Ascent until the landing; some firmware takes a connected umbilical in "
+        "flight for a fault; auto: as the layout says, which is false for those shipped",
+        choices=tuple(one.value for one in HeartbeatInFlight),
     ),
     Parameter(
         "command_spacing",
@@ -143,5 +155,6 @@ def config_from(values: Mapping[str, Any]) -> UmbilicalConfig:
         settle_time=values["settle_time"],
         deploy=DeployStage(values["deploy_stage"]),
         safe_opens_sv=values["safe_opens_sv"],
+        heartbeat_in_flight=HeartbeatInFlight(values["heartbeat_in_flight"]),
         decided_deploy_forces=values["decided_deploy_forces"],
     )

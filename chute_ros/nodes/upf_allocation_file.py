@@ -49,8 +49,9 @@ class AllocationFile:
         return table
 
     def save(self, table: Mapping[bytes, int]) -> None:
-        """It is on the disk before anybody gets the node id; OSError if that fails."""
-        text = json.dumps({key.hex(): n for key, n in sorted(table.items())}, indent=1) + "\n"
+        """It is on the disk before anybody gets the node id; OSError if that fails. The order
+        stays: it tells of age."""
+        text = json.dumps({key.hex(): n for key, n in table.items()}, indent=1) + "\n"
         replace_text(self.path, text, durable=True)
 
     def _unusable(self, why: str) -> ParameterError:

@@ -35,6 +35,7 @@ from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.upf.errands import ErrandDone
 from chute_ros.protocol.upf.events import ErrandFinished, TriggerChanged
 from chute_ros.protocol.upf.link import UpfLink
+from chute_ros.protocol.upf.reasons import reasons_of
 from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
 from chute_ros.supervisor.config import TRIGGER
 from chute_ros.transport.can_address import parse_can_address
@@ -71,7 +72,7 @@ class UpfCanNode(DeviceNode):
         address = parse_can_address(self.values["connection"], self.values["bitrate"])
         types = load_data_types(self.values["dsdl_path"], "parameter dsdl_path")
         self._file = AllocationFile(self.values["allocation_table_file"], name)
-        table = self._file.load() if self.values["allocator"] else {}
+        table = self._file.load() if self.values["allocator"] != "false" else {}
         utc_offset = time.time() - time.monotonic()
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
         self.loop = WireLoop(link, make_can_wire(address), self.deliver)
@@ -95,15 +96,18 @@ class UpfCanNode(DeviceNode):
     def summarise(self, link: UpfLink, now: float) -> Summary:
         details = details_of(link, now)
         picture = link.devices.picture(now)
+        reasons = reasons_of(link.config, link.devices, picture, details.troubles, now)
         if picture is None:
-            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details)
+            return Summary(model.LinkState.NEVER_SEEN, False, model.NAN, details, reasons)
         device = link.devices.controller() or link.devices.trigger()
         assert device is not None
         # Doubt about who is on the bus, or a trigger that is in trouble, forbids take-off, but
         # takes nothing back in flight.
         sound = not details.troubles and all(one.sound for one in link.devices.triggers.values())
         healthy = picture.healthy and (sound or link.in_air(now))
-        return Summary(device.liveness.state, healthy, device.liveness.age(now), details)
+        liveness = device.liveness
+        told = () if healthy else reasons
+        return Summary(liveness.state, healthy, liveness.age(now), details, told)
 
     def link_event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):

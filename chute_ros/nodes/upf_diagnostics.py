@@ -43,6 +43,7 @@ class Details:
     newest_answer: str
     given: Mapping[str, str]
     refusal: str
+    allocation_left_to: int
     time_master: bool
     data_types: Mapping[str, str]
 
@@ -71,6 +72,7 @@ def details_of(link: UpfLink, now: float) -> Details:
         newest_answer=link.vehicle_service.newest_answer,
         given={f"node {n}": key.hex() for key, n in bus.allocator.table.items()},
         refusal=bus.allocator.refusal,
+        allocation_left_to=bus.allocator.left_to,
         time_master=bus.time.is_master(now),
         data_types={
             "fields that are not told here": ", ".join(link.definitions.absent),
@@ -130,6 +132,8 @@ def allocation_task(name: str, details: Details, path: str) -> DiagnosticStatus:
     """The node ids given out."""
     level = diagnostics.WARN if details.refusal else diagnostics.OK
     text = details.refusal or f"{len(details.given)} node ids given out"
+    if details.allocation_left_to:
+        level, text = diagnostics.OK, f"left to node {details.allocation_left_to}, which does it"
     return diagnostics.status(name, "node ids", level, text, {**details.given, "file": path}, "")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from chute_ros.nodes.parameters import Parameter, liveness_from
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.effect import EffectLimits
-from chute_ros.protocol.upf.config import Policy, UpfConfig
+from chute_ros.protocol.upf.config import NODE_ID, Policy, UpfConfig
 from chute_ros.transport.can_address import CAN_FORMS
 
 _POLICIES = tuple(policy.value for policy in Policy)
@@ -23,7 +23,13 @@ PARAMETERS = (
         "",
         "folder flyfire with the vendor's own data types (*.uavcan); empty: the ones shipped",
     ),
-    Parameter("node_id", 10, "our own DroneCAN node id", 1, 127),
+    Parameter(
+        "node_id",
+        NODE_ID,
+        "our own DroneCAN node id; no other node's (ArduPilot has 10, PX4 1)",
+        1,
+        127,
+    ),
     Parameter("controller_node_id", 0, "node id of our controller; 0: any", 0, 127),
     Parameter("trigger_node_id", 0, "node id of our trigger; 0: any", 0, 127),
     Parameter(
@@ -87,7 +93,13 @@ PARAMETERS = (
         0.05,
         60.0,
     ),
-    Parameter("allocator", True, "give node ids to the nodes that ask for one"),
+    Parameter(
+        "allocator",
+        "auto",
+        "give node ids to the nodes that ask for one; auto: only while no other node on the bus "
+        "does, as an autopilot",
+        choices=("auto", "true", "false"),
+    ),
     Parameter(
         "allocation_table_file",
         "",
@@ -123,7 +135,8 @@ def config_from(
         vehicle_service_timeout=values["vehicle_service_timeout"],
         vehicle_status_interval=1.0 / values["vehicle_status_rate"],
         vehicle_state_age=values["vehicle_state_age"],
-        allocator=values["allocator"],
+        allocator=values["allocator"] != "false",
+        allocator_yields=values["allocator"] == "auto",
         allocation_table=table,
         time_master=values["time_master"],
         utc_offset=utc_offset,

@@ -8,116 +8,21 @@ of the two did not come. Nothing more is sent once the effect is there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic
 
-from chute_ros.errors import ParameterError
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect_phases import ENDED, Happening, Phase, next_phase
+from chute_ros.protocol.goal import (
+    NO_ANSWER,
+    Answer,
+    CommandT,
+    EffectFinished,
+    EffectLimits,
+    Goal,
+    Report,
+)
 
-#: Result of a command that nobody answered: beside the eight bits of any protocol's results.
-NO_ANSWER = 255
-
-
-@dataclass(frozen=True)
-class EffectLimits:
-    """Seconds: from acknowledgement to effect, between tries, and for all tries together."""
-
-    effect_timeout: float = 1.5
-    retry_interval: float = 0.25
-    give_up_after: float = 5.0
-
-    def __post_init__(self) -> None:
-        for name in ("effect_timeout", "retry_interval", "give_up_after"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} is {value}: need a time above 0 s")
-
-
-#: A command of the link's protocol; the loop only compares them.
-CommandT = TypeVar("CommandT")
-
-
-class Answer(Protocol):
-    """How the transaction of one command ended, whatever the protocol."""
-
-    @property
-    def accepted(self) -> bool:
-        """The device accepted the command."""
-
-    @property
-    def not_now(self) -> bool:
-        """No answer, or one that may be another later: worth another try."""
-
-    @property
-    def superseded(self) -> bool:
-        """Given up for a newer command."""
-
-    @property
-    def result(self) -> int:
-        """The protocol's result, or NO_ANSWER."""
-
-    def text(self) -> str:
-        """What came of it, in words."""
-
-
-@dataclass(frozen=True)
-class Goal(Generic[CommandT]):
-    """What to send and how to see that it worked.
-
-    commands: sent in this order; the last one's acknowledgement counts, those before prepare it.
-    shown: True once the device's own status shows the effect; None: the acknowledgement is all
-    that there is to see. refresh: asks the device for the status that shows it.
-    insist: no refusal but time ends the tries. urgent: does not queue behind another command.
-    hinders_release: makes the parachute less ready; gives way to a release.
-    needs_acknowledgement: the effect alone, which may have come by itself, does not count.
-    unacknowledged: the protocol acknowledges nothing; the effect counts once it was sent.
-    once: never sent a second time, though the effect does not show.
-    even_if_shown: sent although the status shows the effect already.
-    sent_by_another: the same has left for another request, and may have had the effect.
-    hint: what may be the cause of a refusal, by what the device says of itself; empty: unknown.
-    """
-
-    name: str
-    commands: tuple[CommandT, ...]
-    effect: str
-    shown: Callable[[], bool] | None = None
-    refresh: CommandT | None = None
-    insist: bool = False
-    urgent: bool = False
-    hinders_release: bool = False
-    needs_acknowledgement: bool = False
-    unacknowledged: bool = False
-    once: bool = False
-    even_if_shown: bool = False
-    sent_by_another: Callable[[], bool] = bool
-    hint: Callable[[], str] = str
-
-
-@dataclass(frozen=True)
-class Report:
-    """A step that the loop reached."""
-
-    token: int
-    outcome: Outcome
-    detail: str
-
-
-@dataclass(frozen=True)
-class EffectFinished:
-    """The end of a loop. result: the protocol's result of the newest answer, or NO_ANSWER.
-
-    sent: the command left at least once. shown: the device's own status showed the effect.
-    """
-
-    token: int
-    success: bool
-    accepted: bool
-    result: int
-    message: str
-    sent: bool = False
-    shown: bool = False
+__all__ = ["NO_ANSWER", "Answer", "EffectFinished", "EffectLimits", "EffectLoop", "Goal", "Report"]
 
 
 class EffectLoop(Generic[CommandT]):
@@ -131,7 +36,10 @@ class EffectLoop(Generic[CommandT]):
         self._limits = limits
         self._started = now
         self._deadline = math.inf  # of the present phase
-        self._refresh_at = math.inf
+        #: When to look at the status, the soonest first.
+        self._looks: list[float] = []
+        self._patience_until = math.inf
+        self._hampered = False
         self._accepted_after = math.nan
         self._sends = 0
         self._result = NO_ANSWER
@@ -156,6 +64,16 @@ class EffectLoop(Generic[CommandT]):
         """Its command left at least once."""
         return self._sends > 0
 
+    @property
+    def hampered(self) -> bool:
+        """It was refused, not answered in time, or shows no effect: another way is due."""
+        return self._hampered
+
+    @property
+    def answer(self) -> str:
+        """The newest answer, in words."""
+        return self._answer or "not answered"
+
     def command_sent(self, command: CommandT, now: float) -> None:
         """One of the goal's commands went out (it may have waited for its turn)."""
         if command != self.goal.commands[-1]:
@@ -163,6 +81,7 @@ class EffectLoop(Generic[CommandT]):
         self._sends += 1
         if self._sends == 1:
             self._reports.append(Report(self.token, Outcome.SENT, f"{self.goal.name} sent"))
+            self._patience_until = now + self.goal.patience
         if self.goal.unacknowledged and self.phase is Phase.WAIT_ACKNOWLEDGEMENT:
             self._take(Happening.SENT_UNACKNOWLEDGED)
             self._deadline = math.inf if self.goal.once else now + self._limits.effect_timeout
@@ -185,14 +104,20 @@ class EffectLoop(Generic[CommandT]):
             detail = f"{self.goal.name} acknowledged after {waited:.2f} s"
             self._reports.append(Report(self.token, Outcome.ACCEPTED, detail))
             self._deadline = now + self._limits.effect_timeout
-            self._refresh(now)
+            self._patience_until = math.inf
+            self._plan_looks(now)
             self.effect_may_show(now)
         elif not self._worth_another_try(answer):
             self._take(Happening.REFUSED)
             self._end(False, f"{self.goal.name} {self._answer}")
+            self._hampered = True
         else:
             self._take(Happening.NOT_NOW)
             self._deadline = now + self._limits.retry_interval
+            self._hampered = True
+            if answer.result != NO_ANSWER and not answer.superseded:
+                # It may have done so already, which its status would show.
+                self._plan_looks(now)
             if answer.result != NO_ANSWER and not answer.superseded and not self._refused:
                 self._refused = True
                 detail = f"{self.goal.name} {self._answer}; tried again"
@@ -251,11 +176,13 @@ class EffectLoop(Generic[CommandT]):
             self._take(Happening.GIVE_UP)
             self._end(False, self._what_did_not_come(now))
             return
-        if self.phase is Phase.WAIT_EFFECT and now >= self._refresh_at:
-            self._refresh(now)
+        if now >= self._patience_until:
+            self._patience_until, self._hampered = math.inf, True
+        self._look(now)
         if now < self._deadline:
             return
         if self.phase is Phase.WAIT_EFFECT:
+            self._hampered = True
             self._take(Happening.EFFECT_LATE)
         self._take(Happening.RETRY_DUE)
         self._send()
@@ -264,7 +191,8 @@ class EffectLoop(Generic[CommandT]):
         """When update has something to do; infinity: never."""
         if self.ended:
             return math.inf
-        return min(self._started + self._limits.give_up_after, self._deadline, self._refresh_at)
+        give_up = self._started + self._limits.give_up_after
+        return min(give_up, self._deadline, self._patience_until, *self._looks[:1])
 
     def take_commands(self) -> list[CommandT]:
         """Commands to start now, each as a transaction of its own; each is handed out once."""
@@ -284,12 +212,21 @@ class EffectLoop(Generic[CommandT]):
     def _send(self) -> None:
         self._commands += self.goal.commands
         self._deadline = math.inf
-        self._refresh_at = math.inf
+        self._looks = []
 
-    def _refresh(self, now: float) -> None:
+    def _plan_looks(self, now: float) -> None:
         if self.goal.refresh is not None:
-            self._refreshes.append(self.goal.refresh)
-            self._refresh_at = now + self._limits.retry_interval
+            self._looks = [now + delay for delay in self.goal.looks]
+            self._look(now)
+
+    def _look(self, now: float) -> None:
+        """Ask for the status, if it is time; after the last planned look at the usual pace."""
+        if not self._looks or now < self._looks[0]:
+            return
+        assert self.goal.refresh is not None
+        self._refreshes.append(self.goal.refresh)
+        later = [at for at in self._looks if at > now]
+        self._looks = later or [now + self._limits.retry_interval]
 
     def _worth_another_try(self, answer: Answer) -> bool:
         if answer.superseded:
@@ -325,8 +262,12 @@ class EffectLoop(Generic[CommandT]):
         self.phase = next_phase(self.phase, happening)
 
     def _end(self, success: bool, message: str) -> None:
+        # What was given up, or has come, needs no other way.
+        self._hampered = False
         if not success and (hint := self.goal.hint()):
             message = f"{message}; {hint}"
+        if remark := self.goal.remark():
+            message = f"{message}; {remark}"
         outcome = Outcome.CONFIRMED if success else Outcome.FAILED
         self._reports.append(Report(self.token, outcome, message))
         # What nobody has fetched yet is not wanted any more.

@@ -86,14 +86,46 @@ TransactionsT = TypeVar("TransactionsT", bound=Transactions[Any])
 
 
 @dataclass(frozen=True)
-class _Running:
+class _Way:
+    """One goal on its way to the effect that the request is for."""
+
     loop: EffectLoop[Any]
     #: Marks the tries of this goal among the commands.
     family: int
+
+
+@dataclass(frozen=True)
+class _Running:
+    #: The goal, and those that were begun beside it (Goal.otherwise).
+    ways: list[_Way]
     watch: Watch | None
     follow_up: tuple[Goal[Any], Watch] | None
     #: How the goal before this follow-up ended.
     first_end: EffectFinished | None = None
+
+    @property
+    def loops(self) -> list[EffectLoop[Any]]:
+        """The loops of all its goals."""
+        return [way.loop for way in self.ways]
+
+    def end(self) -> EffectLoop[Any] | None:
+        """The loop that tells how the request ended; None: it goes on."""
+        shown = [loop for loop in self.loops if loop.finished and loop.finished.success]
+        if shown:
+            # Where two ways show the same effect, the one that was accepted brought it about, or
+            # else the newest: the one before it was refused.
+            accepted = [loop for loop in shown if loop.finished and loop.finished.accepted]
+            return (accepted or shown)[-1]
+        all_ended = all(loop.ended for loop in self.loops)
+        return self.loops[-1] if all_ended else None
+
+    def text(self, end: EffectLoop[Any]) -> str:
+        """What came of the request: of the way that tells it, and of those beside it."""
+        assert end.finished is not None
+        if len(self.ways) == 1:
+            return end.finished.message
+        others = [f"{loop.goal.name}: {loop.answer}" for loop in self.loops if loop is not end]
+        return "; ".join([f"{end.goal.name}: {end.finished.message}", *others])
 
 
 class Requests(Generic[TransactionsT]):
@@ -103,8 +135,8 @@ class Requests(Generic[TransactionsT]):
         self.commands = commands
         self._limits = limits
         self._running: dict[int, _Running] = {}
-        #: Number of each command under way -> token of its request.
-        self._owners: dict[int, int] = {}
+        #: Number of each command under way -> the loop that it is for.
+        self._owners: dict[int, EffectLoop[Any]] = {}
         self._last_number = 0
         self._events: list[Event] = []
 
@@ -114,11 +146,11 @@ class Requests(Generic[TransactionsT]):
     def not_sent_yet(self, token: int) -> bool:
         """It is under way, but nothing of it has left."""
         running = self._running.get(token)
-        return running is not None and not running.loop.is_sent
+        return running is not None and not any(loop.is_sent for loop in running.loops)
 
     def under_way(self, name: str) -> bool:
         """A goal with this name has not ended yet."""
-        return any(running.loop.goal.name == name for running in self._running.values())
+        return any(loop.goal.name == name for loop in self._loops())
 
     def begin(
         self,
@@ -130,14 +162,13 @@ class Requests(Generic[TransactionsT]):
     ) -> None:
         """Go for goal. watch: the message to hand over at the end. follow_up: what to ask after
         success; it adds its message to the answer, but cannot turn success into failure."""
-        loop = EffectLoop(token, goal, self._limits, now)
-        self._running[token] = _Running(loop, self._number(), watch, follow_up)
+        self._running[token] = _Running([self._way(token, goal, now)], watch, follow_up)
 
     def abandon(self, token: int, why: str, now: float) -> None:
         """End a request, if it is under way; nothing more is sent for it."""
         running = self._running.get(token)
-        if running is not None:
-            running.loop.abandon(why, now)
+        for loop in running.loops if running is not None else ():
+            loop.abandon(why, now)
 
     def make_way_for_release(self, now: float) -> None:
         """End whatever would make a parachute less ready."""
@@ -145,7 +176,11 @@ class Requests(Generic[TransactionsT]):
 
     def abandon_where(self, which: Callable[[Goal[Any]], bool], why: str, now: float) -> bool:
         """End the requests whose goal is one of those; whether there was any."""
-        found = [token for token, running in self._running.items() if which(running.loop.goal)]
+        found = [
+            token
+            for token, running in self._running.items()
+            if any(which(loop.goal) for loop in running.loops)
+        ]
         for token in found:
             self.abandon(token, why, now)
         return bool(found)
@@ -164,19 +199,19 @@ class Requests(Generic[TransactionsT]):
 
     def effects_may_show(self, now: float) -> None:
         """A device said something: look whether it shows an effect."""
-        for running in self._running.values():
-            running.loop.effect_may_show(now)
+        for loop in self._loops():
+            loop.effect_may_show(now)
 
     def update(self, now: float) -> None:
         """Look at the clock."""
         self.commands.update(now)
-        for running in self._running.values():
-            running.loop.update(now)
+        for loop in self._loops():
+            loop.update(now)
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""
-        loops = (running.loop.next_deadline() for running in self._running.values())
-        return min((self.commands.next_deadline(), *loops))
+        deadlines = (loop.next_deadline() for loop in self._loops())
+        return min((self.commands.next_deadline(), *deadlines))
 
     def drive(self, now: float) -> list[Any]:
         """Move what is ready between loops and transactions; returns what is to be sent."""
@@ -185,28 +220,25 @@ class Requests(Generic[TransactionsT]):
         while moved:
             moved = False
             for finished in self.commands.take_finished():
-                loop = self._loop_of(self._owners.pop(finished.token, None))
+                loop = self._owners.pop(finished.token, None)
                 if loop is not None and finished.command == loop.goal.commands[-1]:
                     loop.command_finished(finished, now)
-            for token, running in list(self._running.items()):
-                for command in running.loop.take_commands():
-                    number = self._number()
-                    self._owners[number] = token
-                    urgent = running.loop.goal.urgent
-                    self.commands.start(number, command, now, urgent, running.family)
-                for command in running.loop.take_refreshes():
-                    self.commands.send_once(command, now)
+            for token, running in self._running.items():
+                self._try_otherwise(token, running, now)
+                for way in running.ways:
+                    self._start_commands(way, now)
             for out in self.commands.take_output():
-                loop = None if out.token is None else self._loop_of(self._owners.get(out.token))
+                loop = None if out.token is None else self._owners.get(out.token)
                 if loop is not None:
                     loop.command_sent(out.command, now)
                 send.append(out)
                 moved = True
             for token, running in list(self._running.items()):
-                reports = running.loop.take_reports()
-                self._events += [RequestReport(report) for report in reports]
-                if running.loop.finished is not None:
-                    self._close(token, running, running.loop.finished, now)
+                end = running.end()
+                self._tell_reports(running, end)
+                if end is not None and end.finished is not None:
+                    finished = replace(end.finished, message=running.text(end))
+                    self._close(token, running, finished, now)
                     moved = True
         return send
 
@@ -226,13 +258,44 @@ class Requests(Generic[TransactionsT]):
         self._last_number += 1
         return self._last_number
 
-    def _loop_of(self, token: int | None) -> EffectLoop[Any] | None:
-        running = None if token is None else self._running.get(token)
-        return None if running is None else running.loop
+    def _loops(self) -> list[EffectLoop[Any]]:
+        return [loop for running in self._running.values() for loop in running.loops]
+
+    def _way(self, token: int, goal: Goal[Any], now: float) -> _Way:
+        return _Way(EffectLoop(token, goal, self._limits, now), self._number())
+
+    def _try_otherwise(self, token: int, running: _Running, now: float) -> None:
+        end, newest = running.end(), running.loops[-1]
+        done = end is not None and end.finished is not None and end.finished.success
+        if newest.hampered and not done:
+            goal = newest.goal.otherwise()
+            if goal is not None:
+                running.ways.append(self._way(token, goal, now))
+
+    def _start_commands(self, way: _Way, now: float) -> None:
+        for command in way.loop.take_commands():
+            number = self._number()
+            self._owners[number] = way.loop
+            self.commands.start(number, command, now, way.loop.goal.urgent, way.family)
+        for command in way.loop.take_refreshes():
+            self.commands.send_once(command, now)
+
+    def _tell_reports(self, running: _Running, end: EffectLoop[Any] | None) -> None:
+        """The steps of all ways; the end of one that is not the request's is none of them."""
+        for loop in running.loops:
+            for report in loop.take_reports():
+                ends = report.outcome in (Outcome.CONFIRMED, Outcome.FAILED)
+                if ends and end is None:
+                    report = replace(report, outcome=Outcome.REFUSED)
+                elif ends and loop is not end:
+                    continue
+                elif ends:
+                    report = replace(report, detail=running.text(loop))
+                self._events.append(RequestReport(report))
 
     def _close(self, token: int, running: _Running, finished: EffectFinished, now: float) -> None:
         del self._running[token]
-        for number in [n for n, owner in self._owners.items() if owner == token]:
+        for number in [n for n, owner in self._owners.items() if owner in running.loops]:
             # What is not needed any more must not be sent again.
             del self._owners[number]
             self.commands.cancel(number, now)

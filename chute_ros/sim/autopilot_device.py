@@ -6,11 +6,16 @@ Source: MAVLink common.xml; refuses a plain disarm in the air as PX4 and ArduPil
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.protocol.mavlink.goals import FORCE_DISARM
 from chute_ros.sim.acting import number_of
+from chute_ros.sim.arm_authorization import ArmAuthorization
+from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind, Termination
+from chute_ros.sim.autopilot_parameters import ParameterServer
 from chute_ros.sim.autopilot_telemetry import HOME_LATITUDE, HOME_LONGITUDE, AutopilotTelemetry
 from chute_ros.sim.flight import GRAVITY, FlightModel
 from chute_ros.sim.mavlink_device import Params
@@ -23,9 +28,20 @@ class AutopilotDevice(AutopilotTelemetry):
     """One vehicle."""
 
     def __init__(
-        self, system_id: int, script: list[tuple[float, str]], model: FlightModel | None = None
+        self,
+        system_id: int,
+        script: list[tuple[float, str]],
+        model: FlightModel | None = None,
+        kind: AutopilotKind = GENERIC,
     ) -> None:
         super().__init__(system_id, script, model or FlightModel())
+        self.kind = kind
+        self.parameters = ParameterServer(kind)
+        self._authorization = ArmAuthorization()
+        #: What was ordered and takes its time: (when, what).
+        self._later: list[tuple[float, Callable[[], None]]] = []
+        #: A take-off was ordered: from when on it says IN_AIR.
+        self._in_air_from = math.inf
         self.terminated = False
         self._stepped_to = math.nan
         own = {
@@ -62,10 +78,18 @@ class AutopilotDevice(AutopilotTelemetry):
         super().reboot()
         self.terminated = False
         self.model.armed = False
+        self._in_air_from = math.inf
+        self._later.clear()
         self._stepped_to = self.now
 
     def step(self, now: float) -> None:
         """Fly on to now."""
+        for entry in [entry for entry in self._later if now >= entry[0]]:
+            self._later.remove(entry)
+            entry[1]()
+        if (order := self._authorization.overdue(now)) is not None:
+            self.say("ARM AUTHORIZATION: no response")
+            self._acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
         while now - self._stepped_to >= STEP:
             was_flying = not self.model.on_ground
             self.model.step(STEP)
@@ -82,6 +106,10 @@ class AutopilotDevice(AutopilotTelemetry):
     def heard(self, frame: Frame) -> None:
         """The parachute's status decides whether a canopy is out."""
         message = frame.message
+        if message.get_type() in ("PARAM_REQUEST_READ", "PARAM_SET"):
+            self._parameter(frame)
+        elif message.get_type() == "COMMAND_ACK":
+            self._authorized(message)
         released = message.get_type() == "PARACHUTE_STATUS" and message.deployment_status
         if released and frame.system_id == self.system_id and math.isnan(self.model.released_for):
             self.say(f"CANOPY at {self.model.height:.1f} m")
@@ -91,8 +119,10 @@ class AutopilotDevice(AutopilotTelemetry):
         if armed is not self.model.armed:
             self.model.armed = armed
             self.say("ARMED" if armed else "DISARMED")
-            # Shown at once, but after the acknowledgement of whatever command did it.
-            self._due[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self.now
+            self._in_air_from = math.inf
+            if self.kind.quick_heartbeat:
+                # Shown at once, but after the acknowledgement of whatever command did it.
+                self._due[dialect.MAVLINK_MSG_ID_HEARTBEAT] = self.now
 
     def _fail_motor(self) -> None:
         self.model.motors_failed = True
@@ -102,23 +132,83 @@ class AutopilotDevice(AutopilotTelemetry):
         arm, force = params[0] != 0.0, params[1] == FORCE_DISARM
         if arm and self.terminated:
             return int(dialect.MAV_RESULT_DENIED)
-        if not arm and not force and not self.model.on_ground:
-            return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
-        self._set_armed(arm)
+        if not arm and not force and self._takes_itself_to_fly:
+            return self.kind.disarm_refused
+        self._after(self.kind.settles, lambda: self._set_armed(arm))
         return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _terminate(self, params: Params) -> int:
         if params[0] < 0.5:
             return int(dialect.MAV_RESULT_DENIED)
-        self.terminated = True
+        releases = self.kind.termination is Termination.RELEASES
+        if self.kind.termination is Termination.NEEDS_AFS and not self._afs_terminates():
+            return int(dialect.MAV_RESULT_FAILED)
+        if releases and self.terminated:
+            return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+        if releases and not self.model.armed:
+            return int(dialect.MAV_RESULT_DENIED)
+        self._after(self.kind.settles, self._end_flight)
+        return int(dialect.MAV_RESULT_ACCEPTED)
+
+    def _end_flight(self) -> None:
+        self.terminated = self.kind.termination is not Termination.DISARMS
         self.say(f"FLIGHT TERMINATION at {self.model.height:.1f} m")
         self._set_armed(False)
-        return int(dialect.MAV_RESULT_ACCEPTED)
+        if self.kind.termination is Termination.RELEASES:
+            release = (dialect.MAV_CMD_DO_PARACHUTE, 0, float(dialect.PARACHUTE_RELEASE))
+            parachute = (self.system_id, dialect.MAV_COMP_ID_PARACHUTE)
+            self.send(dialect.MAVLink_command_long_message(*parachute, *release, *[0.0] * 6))
+
+    def _afs_terminates(self) -> bool:
+        values = self.parameters.values
+        return (values["AFS_ENABLE"], values["AFS_TERM_ACTION"]) == (1, 42)
+
+    @property
+    def _takes_itself_to_fly(self) -> bool:
+        return not self.model.on_ground or self.now >= self._in_air_from
+
+    def _after(self, delay: float, function: Callable[[], None]) -> None:
+        """Have function called after delay, s."""
+        if delay > 0.0:
+            self._later.append((self.now + delay, function))
+        else:
+            function()
+
+    def _command(self, frame: Frame) -> None:
+        message = frame.message
+        arms = message.command == dialect.MAV_CMD_COMPONENT_ARM_DISARM and message.param1 != 0.0
+        asks = self.parameters.values.get("COM_ARM_AUTH_REQ") == 1
+        if not (arms and asks) or self.mute:
+            super()._command(frame)
+            return
+        authorizer = int(self.parameters.values["COM_ARM_AUTH_ID"])
+        self.send(self._authorization.ask(frame, authorizer, self.now))
+
+    def _authorized(self, message: Any) -> None:
+        order, allowed = self._authorization.answered(message, self.system_id)
+        if order is not None and allowed:
+            super()._command(order)
+        elif order is not None:
+            self.say("ARM AUTHORIZATION: denied")
+            self._acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+
+    def _parameter(self, frame: Frame) -> None:
+        message = frame.message
+        if message.target_system == self.system_id and self.kind.parameters and not self.mute:
+            answer = self.parameters.answer(message, (frame.system_id, frame.component_id))
+            self.send(answer)
+
+    def _set_message_interval(self, params: Params) -> int:
+        heartbeat = int(params[0]) == dialect.MAVLINK_MSG_ID_HEARTBEAT
+        if heartbeat and self.kind.autopilot == dialect.MAV_AUTOPILOT_PX4:
+            return int(dialect.MAV_RESULT_ACCEPTED)  # and ignored
+        return super()._set_message_interval(params)
 
     def _takeoff(self, params: Params) -> int:
         if not self.model.armed or not params[6] > 0.0:
             return int(dialect.MAV_RESULT_DENIED)
         self.model.target_height = params[6]
+        self._in_air_from = self.now + self.kind.early_in_air
         return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _land(self, params: Params) -> int:
@@ -137,7 +227,7 @@ class AutopilotDevice(AutopilotTelemetry):
         if self.terminated:
             state = dialect.MAV_STATE_FLIGHT_TERMINATION
         return dialect.MAVLink_heartbeat_message(
-            dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4, armed, 0, state, 3
+            self.kind.vehicle_type, self.kind.autopilot, armed, 0, state, 3
         )
 
     def _system_time(self) -> object:
@@ -145,7 +235,7 @@ class AutopilotDevice(AutopilotTelemetry):
 
     def _extended_sys_state(self) -> object:
         landed = dialect.MAV_LANDED_STATE_IN_AIR
-        if self.model.on_ground:
+        if not self._takes_itself_to_fly:
             landed = dialect.MAV_LANDED_STATE_ON_GROUND
         return dialect.MAVLink_extended_sys_state_message(0, landed)
 

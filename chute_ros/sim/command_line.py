@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from chute_ros.errors import ChuteError, ParameterError
+from chute_ros.plain_text import plain
 from chute_ros.sim.acting import Argument
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
@@ -20,9 +21,10 @@ from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.sim.pty_wire import PtyWire
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
-from chute_ros.transport.loop import LoopFault, ProtocolLink, WireChange, WireLoop
+from chute_ros.transport.loop import ProtocolLink, WireLoop
 from chute_ros.transport.signing_key import signing_from_file
 from chute_ros.transport.wire import Wire, make_wire
+from chute_ros.transport.wire_events import LoopFault, WireChange
 
 if TYPE_CHECKING:
     from chute_ros.sim.mavlink_device import MavlinkDevice
@@ -241,7 +243,7 @@ def _run_link(
         for event in events:
             text = event.text if isinstance(event, (WireChange, LoopFault)) else event
             if not options.quiet or isinstance(event, LoopFault):
-                print(f"{time.monotonic() - started:8.3f} {text}", flush=True)
+                print(f"{time.monotonic() - started:8.3f} {plain(text)}", flush=True)
 
     ended = threading.Event()
     for number_ in (signal.SIGINT, signal.SIGTERM):

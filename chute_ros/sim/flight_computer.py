@@ -90,7 +90,7 @@ class FlightComputer(Actor):
         self._running_from = math.nan
         self._loop_at = math.nan
         self._telem_at = math.nan
-        self._cycles = 0
+        self._cycles = self._heartbeats_seen = 0
         self._output: list[bytes] = []
 
     # -- as the loop wants it -------------------------------------------------------------------
@@ -230,6 +230,11 @@ class FlightComputer(Actor):
             text = f"umbilical {'connected' if connected else 'disconnected'}"
             self.say(text)
             self._log("INFO" if connected else "WARN", text.capitalize())
+        seen, self._heartbeats_seen = self._heartbeats_seen, len(self.heartbeats)
+        rises = self.mode in (Mode.Ascent, Mode.Coast)
+        if self.settings.faults_on_heartbeat and rises and len(self.heartbeats) > seen:
+            self.say("umbilical still connected in flight")
+            self.flight.fail()
 
     def _snapshot(self) -> None:
         rocket, flags = self.flight.rocket, self.flight.flags

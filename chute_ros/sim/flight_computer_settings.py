@@ -39,6 +39,8 @@ class FlightComputerSettings:
     safe_opens_sv: bool = False
     #: Without a heartbeat for this long the umbilical is not connected, s.
     heartbeat_timeout: float = 15.0
+    #: In Ascent and Coast a <H> that comes is a fault, as of an umbilical that did not let go.
+    faults_on_heartbeat: bool = False
     #: While it boots it neither hears nor sends, s.
     boot_time: float = 0.3
     #: Of the Universal day at the start, s.

@@ -22,6 +22,8 @@ ATS_SINK_SPEED = 10.0
 ATS_SINK_TIME = 0.3
 #: A height that was told is known for so long, s.
 HEIGHT_LASTS = 3.0
+#: Up or down faster, heights are not counted from another home than before, cm/s.
+_MOVES = 100
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,9 @@ class ParachuteDevice(MavlinkDevice):
         self.errors = ErrorFlags(0)
         self.height = math.nan
         self._height_at = -math.inf
+        #: Altitude that heights count from, m: a module's own sensor knows nothing of a home that
+        #: an autopilot moves while it falls (PX4 does).
+        self._ground = math.nan
         self._sinking_since = math.nan
         self.streams = {
             dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
@@ -80,6 +85,7 @@ class ParachuteDevice(MavlinkDevice):
     def reboot(self) -> None:
         """Start as the settings say; what was released stays released."""
         super().reboot()
+        self._ground = math.nan
         self.armed = TriggerFlags(self.settings.armed_triggers)
         self.errors = ErrorFlags(self.settings.errors)
         if self.deployment is DeploymentTrigger.NONE:
@@ -91,7 +97,10 @@ class ParachuteDevice(MavlinkDevice):
         if frame.message.get_type() != "GLOBAL_POSITION_INT" or not autopilot:
             return
         before = self._height()
-        self.height, self._height_at = frame.message.relative_alt / 1000.0, self.now
+        told = frame.message
+        if math.isnan(self._ground) or abs(told.vz) < _MOVES:
+            self._ground = (told.alt - told.relative_alt) / 1000.0
+        self.height, self._height_at = told.alt / 1000.0 - self._ground, self.now
         self._automatic_trigger(before, frame.message.vz / 100.0)
 
     def _height(self) -> float:

@@ -8,6 +8,7 @@ from chute_ros.sim.command_line import main_of, number, parser, run, script_of
 def _run() -> None:
     # Here, so that a dialect that is not built ends in one line and not in a traceback.
     from chute_ros.sim.autopilot_device import AutopilotDevice
+    from chute_ros.sim.autopilot_kinds import KINDS
 
     options = parser(
         "sim_autopilot",
@@ -17,8 +18,16 @@ def _run() -> None:
         "mute, unmute, silent, speak, reboot, arm, takeoff=HEIGHT, fail-motor",
     )
     options.add_argument("--system-id", type=number("id", 1, 255), default=1)
+    options.add_argument(
+        "--autopilot",
+        choices=tuple(KINDS),
+        default="generic",
+        help="which one it plays, where they differ: heartbeat, parameters, arming, termination "
+        "(px4 then orders the parachute's release itself)",
+    )
     chosen = options.parse_args()
-    run(AutopilotDevice(chosen.system_id, script_of(chosen.at)), chosen)
+    kind = KINDS[chosen.autopilot]
+    run(AutopilotDevice(chosen.system_id, script_of(chosen.at), kind=kind), chosen)
 
 
 def main() -> None:

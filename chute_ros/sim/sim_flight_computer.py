@@ -44,6 +44,7 @@ def _run() -> None:
         ("interlock", "arming needs a wiped flash"),
         ("drogue-fails", "at the apogee nothing comes out; by command it still does"),
         ("safe-opens-sv", "<V> opens SV, as newer firmware does"),
+        ("faults-on-heartbeat", "a <H> in Ascent or Coast is a fault"),
         ("binary-dump", "<G> sends bytes in place of lines"),
     ):
         options.add_argument(f"--{name}", action="store_true", help=text)
@@ -56,6 +57,7 @@ def _run() -> None:
         drogue_fails=chosen.drogue_fails,
         safe_opens_sv=chosen.safe_opens_sv,
         heartbeat_timeout=chosen.heartbeat_timeout,
+        faults_on_heartbeat=chosen.faults_on_heartbeat,
         time_of_day=time.time() % 86_400.0,
         binary_dump=chosen.binary_dump,
         cut=chosen.cut,

@@ -15,6 +15,7 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
+    HEIGHT,
     TILT,
     VERTICAL_ACCELERATION,
     VERTICAL_SPEED,
@@ -33,6 +34,8 @@ from chute_ros.supervisor.rules import (
 from chute_ros.supervisor.state import ASK_LASTS, State
 
 _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
+#: A height is not as low as it says if the barometer tells more by this, m.
+_HEIGHTS_DIFFER = 5.0
 #: Measurement -> the one of which it is said that it is denied; those that claim it by being low.
 _CLAIMS = {
     VERTICAL_SPEED: VERTICAL_SPEED,
@@ -113,6 +116,10 @@ def _denied(
 ) -> str:
     """Why what this claims of a fall is not so, by other origins; empty: none denies it."""
     name = condition.measurement
+    if name == HEIGHT and not math.isnan(condition.below):
+        by_pressure = flight.pressure_height(config, state, now)
+        higher = by_pressure > condition.below + _HEIGHTS_DIFFER
+        return f"the barometer tells {by_pressure:.1f} m" if higher else ""
     if not (state.denied or state.commanded) or name not in _CLAIMS:
         return ""
     below = not math.isnan(condition.below)

@@ -49,6 +49,8 @@ _CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
 #: Faster than that it may have reached the last speed of its fall, m/s; and one that lies on its
 #: side while it is carried along its axis speeds up by more than this in that time, m/s.
 _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
+#: Cosine of 45 degrees: a vehicle that leans less claims no fall.
+_LEANS = 0.7071
 
 
 def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
@@ -80,7 +82,8 @@ def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, 
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
-        told[VERTICAL_SPEED] = f"it was commanded ({beyond})"
+        # Nor is the force that is missing while it does so.
+        told[VERTICAL_SPEED] = told[ACCELERATION] = f"it was commanded ({beyond})"
     return told
 
 
@@ -148,7 +151,9 @@ def _fall_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
 def _tilt_denied(motion: tuple[Moment, ...]) -> str:
     """Carried in full, and not speeding up: it does not lie on its side."""
     known = _carried(motion)
-    if not known or known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
+    if not any(one[3] < _LEANS for one in known):
+        return ""
+    if known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
         return ""
     force = fmean([one[2] for one in known])
     return f"a force of {force:.1f} m/s^2 carries it, and its vertical speed stays"

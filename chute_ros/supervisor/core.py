@@ -283,7 +283,9 @@ class _Update(Deploying):
         # Far below the take-off nobody knows the height above the ground.
         high = told >= minimum or (told <= -minimum and up_for >= _UP_TAKES)
         if math.isnan(told):
-            high = now >= state.airborne_since + flight.HIGH_AFTER
+            # One that tells what cannot be is no silence: it may run away on the ground.
+            known = state.measured("height")
+            high = not known.rejected and now >= state.airborne_since + flight.HIGH_AFTER
         since = state.at_ground_since
         if not flight.at_ground(self.config, state, by_pressure, now):
             since = math.nan

@@ -152,17 +152,19 @@ class Deploying(Policy):
 
     def _answer(self) -> None:
         accepted, text = self.deploy_reached(Outcome.ACCEPTED), self.deploy_details()
+        out = self.state.stage is Stage.DEPLOYED
+        text = text or ("its own status says deployed" if out else "no device node reported")
         kill = self.state.kill
         if kill is not None and not kill.confirmed:
             why = kill.newest_details() or "nobody reported"
-            text = "; ".join(filter(None, (f"WARNING, the motors may still turn: {why}", text)))
+            text = f"WARNING, the motors may still turn ({why}): {text}"
         if self.state.stage is Stage.FAULT:
-            self.finish_deploy(False, accepted, text or "no device node reported")
+            self.finish_deploy(False, accepted, text)
         elif self.state.stage is Stage.DEPLOYED:
             reported = not self.state.deploys or self.deploy_reached(Outcome.CONFIRMED)
             waited = self.now >= self.state.stage_since + self.config.report_wait
             if reported or waited or not self.state.deploy_tokens:
-                self.finish_deploy(True, accepted, text or "its own status says deployed")
+                self.finish_deploy(True, accepted, text)
 
     def _alarm_again(self) -> None:
         """The end of the ladder without a parachute is an alarm that does not stop until one is

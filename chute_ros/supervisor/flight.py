@@ -147,7 +147,8 @@ def _vertical_acceleration(
     known = state.measured(VERTICAL_SPEED)
     if why := known.unusable(config.profile.limits[VERTICAL_SPEED], now):
         return math.nan, why
-    told = [(one[0], one[1]) for one in state.motion if now - one[0] <= 1.0]
+    newest = state.motion[-1][0] if state.motion else math.nan
+    told = [(one[0], one[1]) for one in state.motion if newest - one[0] <= 1.0]
     told = [one for one in told if not math.isnan(one[1])]
     if not told or told[-1][0] - told[0][0] < _CLIMB_OVER:
         return math.nan, "too few vertical speeds that can be used"

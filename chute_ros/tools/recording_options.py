@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
-from chute_ros.tools.plain_text import plain
+from chute_ros.plain_text import plain
 
 
 def recording_options(program: str, description: str | None) -> argparse.ArgumentParser:

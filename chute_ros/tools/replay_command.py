@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.errors import ChuteError
+from chute_ros.plain_text import plain
 from chute_ros.supervisor.codec import CLASS
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
 from chute_ros.tools.parameter_file import NODE, other_from
-from chute_ros.tools.plain_text import plain
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, files_of, read
 from chute_ros.tools.recording_options import complain, recording_options

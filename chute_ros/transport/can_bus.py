@@ -6,24 +6,21 @@ import errno
 import gc
 import logging
 import socket
-import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from operator import index
 from typing import Any
 
-from chute_ros.protocol.dronecan.can_frame import SIZE, CanFrame, pack, unpack
+from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
 from chute_ros.transport.can_address import CanAddress
-from chute_ros.transport.can_failures import bad_frame, is_full, reason
+from chute_ros.transport.can_failures import bad_frame, is_full, reason, taken_by_another
+from chute_ros.transport.can_reader import BURST, WAIT, FrameReader
+from chute_ros.transport.serial_users import PortUsers, hung_up
 
 #: Interfaces whose descriptor is their whole queue: they are read directly. All others have
 #: buffers of their own, or no descriptor: a thread waits for them.
 _DIRECT = ("socketcan", "udp_multicast")
-#: Frames taken at once, so that a flood cannot keep the loop from its deadlines.
-_BURST = 64
-#: How long the reading thread waits at once, s: so long may closing take.
-_WAIT = 0.1
 #: How long an adapter may take to accept a frame, s.
 _WRITE_TIMEOUT = 0.005
 #: So many failures, and neither a frame nor a pause between them: not bad frames, a broken driver.
@@ -37,8 +34,10 @@ class CanBusWire:
     def __init__(self, address: CanAddress) -> None:
         self._address = address
         self._bus: Any = None
-        self._reader: _Reader | None = None
+        self._reader: FrameReader | None = None
         self._echoes: Echoes | None = None
+        #: Of the serial port of an adapter.
+        self._users: PortUsers | None = None
         self._failures = 0
         #: Why a frame was dropped -> how often.
         self.counts: Counter[str] = Counter()
@@ -70,14 +69,20 @@ class CanBusWire:
         self._bus = bus
         if self._address.interface == "udp_multicast":
             self._echoes = Echoes()
+        port = _serial_port(bus)
+        if port is not None:
+            self._users = PortUsers(self._address.channel, port.fileno())
         if self._address.interface not in _DIRECT:
-            self._reader = _Reader(self._take_one, self.describe())
+            self._reader = FrameReader(self._take_one, self.describe())
 
     def close(self) -> None:
         # The thread first: it must not use a descriptor that is somebody else's by then.
         reader, self._reader = self._reader, None
         if reader is not None:
             reader.stop()
+        users, self._users = self._users, None
+        if users is not None:
+            users.stop()
         bus, self._bus = self._bus, None
         if bus is not None:
             _shut_down(bus)
@@ -91,7 +96,7 @@ class CanBusWire:
         if self._reader is not None:
             return [(frame, None) for frame in self._reader.take()]
         frames: list[tuple[bytes, Hashable]] = []
-        for _ in range(_BURST):
+        for _ in range(BURST):
             found = self._take_one(0.0)
             if found is None:
                 break
@@ -122,6 +127,10 @@ class CanBusWire:
         if self._echoes is not None:
             self._echoes.sent(data, time.monotonic())
 
+    def look(self, now: float) -> str:
+        """Who else reads the adapter's serial port; empty: nobody is known to."""
+        return "" if self._users is None else self._users.trouble(now)
+
     def describe(self) -> str:
         address = self._address
         # The port stands behind IPv4 groups only: it could not be told from the last part of
@@ -141,7 +150,7 @@ class CanBusWire:
         if address.interface == "slcan":
             # By default two seconds, for boards that start anew when they are opened: the loop
             # would stand still. And a time-out of a millisecond, which is polling.
-            options |= {"sleep_after_open": 0.0, "timeout": _WAIT}
+            options |= {"sleep_after_open": 0.0, "timeout": WAIT}
         return options
 
     def _take_one(self, timeout: float) -> bytes | None:
@@ -154,6 +163,11 @@ class CanBusWire:
         except Exception as error:  # noqa: BLE001
             # Drivers raise whatever their vendor's library does; what is not the frame's own
             # fault ends the wire, and the loop opens it again.
+            if self._users is not None and taken_by_another(error):
+                port = _serial_port(self._bus)
+                if port is not None and not hung_up(port.fileno()):
+                    self._users.ready_without_data(time.monotonic())
+                    return self._drop("reads that another program got before")
             kind = bad_frame(error)
             if not kind:
                 raise OSError(f"{reason(error)}{self._advice(error)}") from None
@@ -233,52 +247,6 @@ class Echoes:
         return False
 
 
-class _Reader:
-    """A thread that waits for frames and makes a descriptor readable with each."""
-
-    def __init__(self, take_one: Callable[[float], bytes | None], name: str) -> None:
-        self._take_one = take_one
-        # Whole frames, as each is sent at once. Who sends waits while the loop does not read.
-        self._ours, self._theirs = socket.socketpair()
-        self._ours.setblocking(False)
-        self._failure = ""
-        self._stopping = False
-        self._thread = threading.Thread(target=self._run, name=f"reader {name}", daemon=True)
-        self._thread.start()
-
-    def fileno(self) -> int:
-        """Readable when a frame has come, or the interface is gone."""
-        return self._ours.fileno()
-
-    def take(self) -> list[bytes]:
-        """Frames that came; OSError: the interface is gone."""
-        try:
-            data = self._ours.recv(SIZE * _BURST)
-        except BlockingIOError:
-            return []
-        if not data:
-            raise OSError(self._failure)
-        return [data[at : at + SIZE] for at in range(0, len(data), SIZE)]
-
-    def stop(self) -> None:
-        """End the thread."""
-        self._stopping = True
-        self._ours.shutdown(socket.SHUT_RDWR)  # it may be waiting until somebody reads
-        self._thread.join()
-        self._ours.close()
-
-    def _run(self) -> None:
-        with self._theirs as theirs:
-            while not self._stopping:
-                try:
-                    frame = self._take_one(_WAIT)
-                    if frame:
-                        theirs.sendall(frame)
-                except OSError as error:
-                    self._failure = str(error)
-                    return
-
-
 def _check_is_up(bus: Any) -> None:
     """Binding to an interface that is down succeeds; the error waits in the socket."""
     code = bus.socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
@@ -292,9 +260,14 @@ def _shut_down(bus: Any) -> None:
         bus.shutdown()
     except Exception:  # noqa: BLE001
         # The device is gone: slcan fails in saying goodbye, and leaves its port open.
-        port = getattr(bus, "serialPortOrig", None)
+        port = _serial_port(bus)
         if port is not None:
             port.close()
+
+
+def _serial_port(bus: Any) -> Any:
+    """The port of an adapter on a serial line, of pyserial; None: the interface has none."""
+    return getattr(bus, "serialPortOrig", None)
 
 
 def _quieten() -> None:

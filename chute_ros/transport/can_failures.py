@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import struct
 
-from serial import SerialTimeoutException
+from serial import SerialException, SerialTimeoutException
 
 #: What the library and its drivers let through of a frame that is none.
 _MISFITS = (
@@ -45,6 +45,13 @@ def is_full(error: BaseException) -> bool:
         return cause.errno in _FULL
     # How socketcan says that it may not be written to.
     return isinstance(error, can.CanOperationError)
+
+
+def taken_by_another(error: BaseException) -> bool:
+    """pyserial found a port that was ready to be read without a byte: unplugged, or read by
+    another program as well."""
+    cause = system_error(error)
+    return isinstance(cause, SerialException) and "readiness to read" in str(cause)
 
 
 def system_error(error: BaseException) -> OSError | None:

@@ -41,6 +41,10 @@ def load_data_types(folder: str, named: str) -> DataTypes:
                 f"{named} is {folder!r}: the folder's name is the namespace of its types and must "
                 "be flyfire, or it must hold a folder of this name"
             )
+    for file in sorted(path.rglob("*")):
+        # The library would wait for a FIFO for ever.
+        if not (file.is_file() or file.is_dir()):
+            raise ParameterError(f"{named} is {folder!r}: {file} is no regular file")
     standard = [one for name, one in dronecan.TYPENAMES.items() if name.startswith(_STANDARD)]
     try:
         own = parse_namespaces([str(path)], [str(_standard_folder(dronecan))])

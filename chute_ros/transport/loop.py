@@ -14,10 +14,11 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.transport.wire import Wire
+from chute_ros.transport.wire_events import LoopFault, WireChange
+from chute_ros.transport.wire_watch import WireWatch
 
 REOPEN_INTERVAL = 0.5  # s
 #: The loop runs at least this often (s), so that a hung one can be told from an idle one.
@@ -51,27 +52,13 @@ class ProtocolLink(Protocol):
 LinkT = TypeVar("LinkT", bound=ProtocolLink)
 
 
-@dataclass(frozen=True)
-class WireChange:
-    """The wire was opened, was closed, or cannot be opened."""
-
-    is_open: bool
-    text: str
-
-
-@dataclass(frozen=True)
-class LoopFault:
-    """An exception inside the protocol: a mistake of ours, reported and survived."""
-
-    text: str
-
-
 class WireLoop(Generic[LinkT]):
     """Runs link over wire. deliver gets the events, in the loop's thread or a caller's, and must
     not block.
 
     opened: for a protocol that wants to know from when on (monotonic s) it can send.
     not_written: for one that wants to know of a frame that the wire did not take.
+    frames: how many frames the protocol has taken, for one whose clients must send some.
     """
 
     def __init__(
@@ -81,6 +68,7 @@ class WireLoop(Generic[LinkT]):
         deliver: Callable[[list[Any]], None],
         opened: Callable[[float], None] = lambda now: None,
         not_written: Callable[[bytes], None] = lambda frame: None,
+        frames: Callable[[], int] | None = None,
     ) -> None:
         self.link = link
         self.wire = wire
@@ -89,6 +77,7 @@ class WireLoop(Generic[LinkT]):
         self._deliver = deliver
         self._opened = opened
         self._not_written = not_written
+        self._watch = WireWatch(wire, frames, deliver)
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
         self._at_turns_end: deque[Callable[[LinkT, float], None]] = deque(maxlen=1)
         self._touching = threading.Lock()
@@ -183,6 +172,7 @@ class WireLoop(Generic[LinkT]):
             self.link.update(now)
             self._send()
             self._hand_over()
+            self._watch.look(now)
             self.last_run = now
             if self._at_turns_end:
                 self._guarded(self._at_turns_end.popleft(), self.link, now)
@@ -246,7 +236,9 @@ class WireLoop(Generic[LinkT]):
             return
         for data, stream in chunks:
             if data or stream is None:
+                self._watch.before_data()
                 self._guarded(self.link.receive, data, now, stream)
+                self._watch.data_heard(stream, now)
             else:
                 self._guarded(self.link.stream_ended, stream)
 

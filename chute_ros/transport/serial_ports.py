@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import os
 
 from serial.tools import list_ports
+
+from chute_ros.transport.serial_users import users_of
 
 
 def find_usb_port(vendor: int, product: int, serial_number: str) -> str:
@@ -33,10 +36,18 @@ def explain(error: OSError, path: str) -> OSError:
         fix = "add yourself to the group of the port (ls -l shows it, often dialout) and log in"
         return PermissionError(f"permission denied: {fix} again")
     if error.errno in (errno.EAGAIN, errno.EBUSY):
-        return BlockingIOError("the port is in use by another program (fuser shows which)")
+        return BlockingIOError(f"the port is in use by another program ({_users(path)})")
     if error.errno == errno.ENOTTY or "Could not configure port" in str(error):
         return OSError(f"{path} is no serial port")
     return error
+
+
+def _users(path: str) -> str:
+    try:
+        users = users_of(os.stat(path).st_rdev)
+    except OSError:
+        users = []  # unplugged meanwhile
+    return ", ".join(users) or f"sudo fuser -v {path} shows which"
 
 
 def _ports() -> str:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import termios
+import time
 from collections.abc import Callable, Hashable
 from itertools import count
 
 import serial
 
 from chute_ros.transport.serial_ports import explain
+from chute_ros.transport.serial_users import PortUsers, hung_up
 
 _CHUNK = 4096
 _stream_numbers = count(1)
@@ -21,6 +23,7 @@ class SerialWire:
     def __init__(self, name: str, find: Callable[[], str], baud: int) -> None:
         self._name, self._find, self._baud = name, find, baud
         self._port: serial.Serial | None = None
+        self._users: PortUsers | None = None
         self._path = ""
         self._stream: tuple[str, int] = (name, 0)
 
@@ -43,8 +46,12 @@ class SerialWire:
         os.set_blocking(self._port.fileno(), False)
         self._path = path
         self._stream = (path, next(_stream_numbers))
+        self._users = PortUsers(path, self._port.fileno())
 
     def close(self) -> None:
+        users, self._users = self._users, None
+        if users is not None:
+            users.stop()
         port, self._port = self._port, None
         if port is not None:
             try:
@@ -56,18 +63,26 @@ class SerialWire:
         return [] if self._port is None else [self._port.fileno()]
 
     def read(self, file: int) -> list[tuple[bytes, Hashable]]:
+        assert self._users is not None
         try:
             data = os.read(file, _CHUNK)
         except BlockingIOError:
-            return []
-        if not data:
+            data = b""
+        if data:
+            return [(data, self._stream)]
+        if hung_up(file):
             raise ConnectionResetError(f"{self._path} was unplugged")
-        return [(data, self._stream)]
+        self._users.ready_without_data(time.monotonic())
+        return []
 
     def write(self, data: bytes) -> None:
         assert self._port is not None
         if os.write(self._port.fileno(), data) != len(data):
             raise BlockingIOError(f"{self._path} takes no more data")
+
+    def look(self, now: float) -> str:
+        """Who else reads the port; empty: nobody is known to."""
+        return "" if self._users is None else self._users.trouble(now)
 
     def describe(self) -> str:
         at = f" ({self._path})" if self._path and self._path not in self._name else ""

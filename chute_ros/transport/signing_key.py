@@ -18,6 +18,7 @@ from chute_ros.protocol.mavlink.signing import (
     key_from_text,
 )
 from chute_ros.transport.given_path import given_path
+from chute_ros.transport.regular_file import NotRegularError, TooLongError, read_regular
 
 #: Where the wall clock was set back, signing goes on so far after the newest time that was kept:
 #: the last ones before a crash were not. s
@@ -53,22 +54,13 @@ def signing_from_file(
 def _read(name: str, option: str) -> tuple[os.stat_result, bytes]:
     """What file name is, and what is in it; SigningKeyError if no key can be."""
     try:
-        # So that a pipe that nobody writes to is opened, and refused.
-        file = os.open(given_path(name, option), os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        try:
-            about = os.fstat(file)
-            if not stat.S_ISREG(about.st_mode):
-                raise SigningKeyError(
-                    f"{option}: {name} is no regular file: name a file with a key"
-                )
-            text = os.read(file, _LONGEST + 1)
-        finally:
-            os.close(file)
-    except OSError as error:
-        raise SigningKeyError(f"{option}: {name}: {error.strerror}") from None
-    if len(text) > _LONGEST:
+        return read_regular(given_path(name, option), _LONGEST)
+    except TooLongError:
         raise SigningKeyError(
             f"{option}: {name} is no key, it holds more than {_LONGEST} bytes: need "
             f"{KEY_BYTES} raw bytes or {2 * KEY_BYTES} hexadecimal digits"
-        )
-    return about, text
+        ) from None
+    except NotRegularError as error:
+        raise SigningKeyError(f"{option}: {name} is {error}: name a file with a key") from None
+    except OSError as error:
+        raise SigningKeyError(f"{option}: {name}: {error.strerror}") from None

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import socket
+import time
 from collections.abc import Hashable
 from itertools import count
 
@@ -11,6 +13,11 @@ _CHUNK = 4096
 _MOST_CLIENTS = 8
 #: How long a connection attempt may take, s; the link's deadlines wait for it.
 _CONNECT_TIMEOUT = 0.2
+#: A client keeps its place while it sends a frame at least this often, s: MAVLink's heartbeat
+#: comes each second, and a device that misses ten of them is lost on every link.
+GIVE_BACK_AFTER = 10.0
+#: That places were given back is told of for so long, s.
+_TELL_FOR = 60.0
 _stream_numbers = count(1)
 
 
@@ -58,12 +65,16 @@ class TcpClientWire:
 
 
 class TcpServerWire:
-    """tcpin:HOST:PORT."""
+    """tcpin:HOST:PORT. A client that sends no frame loses its place, so that nobody can hold all
+    places with silence or noise; one that sends frames never does, whoever else comes."""
 
     def __init__(self, host: str, port: int) -> None:
         self._host, self._port = host, port
         self._listener: socket.socket | None = None
         self._clients: dict[int, tuple[socket.socket, int]] = {}
+        #: When each stream sent its newest frame, or connected, monotonic s.
+        self._frame_at: dict[int, float] = {}
+        self._given_back_at = -math.inf
 
     @property
     def is_open(self) -> bool:
@@ -77,6 +88,7 @@ class TcpServerWire:
         for client, _ in self._clients.values():
             client.close()
         self._clients.clear()
+        self._frame_at.clear()
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -108,9 +120,23 @@ class TcpServerWire:
             try:
                 _send_whole(client, data)
             except OSError:
-                # The next read finds its end and says which stream that was.
-                with contextlib.suppress(OSError):
-                    client.shutdown(socket.SHUT_RDWR)
+                _end(client)
+
+    def frame_heard(self, stream: Hashable, now: float) -> None:
+        """What this stream sent held a frame."""
+        if stream in self._frame_at:
+            self._frame_at[stream] = now
+
+    def look(self, now: float) -> str:
+        """Look at the clock: give places back. Returns, for a while, that some had to be."""
+        for client, stream in self._clients.values():
+            if now - self._frame_at[stream] >= GIVE_BACK_AFTER:
+                self._given_back_at = now
+                _end(client)
+        if now - self._given_back_at >= _TELL_FOR:
+            return ""
+        why = f"sent no frame that counts here for {GIVE_BACK_AFTER:g} s and was disconnected"
+        return f"{self.describe()}: a client {why}"
 
     def describe(self) -> str:
         port = self._port if self._listener is None else self._listener.getsockname()[1]
@@ -126,16 +152,25 @@ class TcpServerWire:
             client.close()
             return
         _prepare(client)
-        self._clients[client.fileno()] = (client, next(_stream_numbers))
+        stream = next(_stream_numbers)
+        self._clients[client.fileno()] = (client, stream)
+        self._frame_at[stream] = time.monotonic()
 
     def _drop(self, file: int) -> None:
-        client, _ = self._clients.pop(file)
+        client, stream = self._clients.pop(file)
+        del self._frame_at[stream]
         client.close()
 
 
 def _prepare(end: socket.socket) -> None:
     end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     end.setblocking(False)
+
+
+def _end(client: socket.socket) -> None:
+    """The next read finds its end and says which stream that was."""
+    with contextlib.suppress(OSError):
+        client.shutdown(socket.SHUT_RDWR)
 
 
 def _send_whole(end: socket.socket, data: bytes) -> None:

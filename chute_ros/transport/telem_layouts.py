@@ -9,6 +9,7 @@ import yaml
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.umbilical.layouts import REFERENCE_LAYOUT, Layout, layout_from
 from chute_ros.transport.given_path import given_path
+from chute_ros.transport.regular_file import read_regular_text
 from chute_ros.transport.shared_folder import shared_folder
 
 
@@ -21,16 +22,16 @@ def load_layouts(folder: str, named: str) -> list[Layout]:
     files = sorted(path.glob("*.yaml"))
     if not files:
         raise ParameterError(f"{named} is {folder!r}: there is no layout (*.yaml) in this folder")
-    layouts = [_load(file) for file in files]
+    layouts = [_load(file, named) for file in files]
     names = [layout.name for layout in layouts]
     if len(set(names)) != len(names):
         raise ParameterError(f"{named} is {folder!r}: two layouts have one name: {names}")
     return sorted(layouts, key=lambda layout: layout.name != REFERENCE_LAYOUT)
 
 
-def _load(file: Path) -> Layout:
+def _load(file: Path, named: str) -> Layout:
     try:
-        content = yaml.safe_load(file.read_text())
+        content = yaml.safe_load(read_regular_text(file))
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
-        raise ParameterError(f"{file}: cannot be read: {error}") from None
+        raise ParameterError(f"{named}: {file}: cannot be read: {error}") from None
     return layout_from(content, str(file))

@@ -6,6 +6,7 @@ from typing import Any
 
 from chute_ros.protocol.mavlink.config import KillMethod, MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.firmware import Firmware
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.goals import FORCE_DISARM
 from chute_ros.protocol.mavlink.link import MavlinkLink
@@ -69,6 +70,8 @@ class MavlinkLinked(Linked):
         self._encoders: dict[tuple[int, int], FrameEncoder] = {}
         #: Flight was blocked since what left was looked at last.
         self._blocked = False
+        #: A deploy was ordered at some time.
+        self._deployed = False
         self._steps = (
             self._wait,
             self._to_next_deadline,
@@ -113,6 +116,7 @@ class MavlinkLinked(Linked):
     def _deploy(self, p: Program) -> None:
         force = p.flag()
         token = self._orders.begin("forced deploy" if force else "deploy")
+        self._deployed = True
         self._link.deploy(token, force, self._now, p.choice(_DEVICES))
 
     def _kill(self, p: Program) -> None:
@@ -129,6 +133,7 @@ class MavlinkLinked(Linked):
     def _action(self, p: Program) -> None:
         action = p.byte() % 4
         token = self._orders.begin("deploy" if action == d.PARACHUTE_RELEASE else "action")
+        self._deployed = self._deployed or action == d.PARACHUTE_RELEASE
         self._link.parachute_action(token, action, p.choice(_DEVICES), self._now)
 
     def _message(self, p: Program) -> None:
@@ -162,6 +167,8 @@ class MavlinkLinked(Linked):
         message = frames[0].message
         if message.get_type() in ("HEARTBEAT", "STATUSTEXT"):
             return
+        if message.get_type() in ("PARAM_REQUEST_READ", "COMMAND_ACK") and message.target_system:
+            return  # the autopilot's settings, and its question whether it may arm
         if message.get_type() != "COMMAND_LONG" or message.command not in _COMMANDS:
             raise WrongError(f"this left the link: {message}")
         if not message.target_system:
@@ -178,11 +185,21 @@ class MavlinkLinked(Linked):
             return ("deploy", "forced deploy") if fires else ("action",)
         if number == d.MAV_CMD_SET_PARACHUTE_ARM:
             return ("arm", "forced deploy")
-        if number == d.MAV_CMD_DO_FLIGHTTERMINATION or second == FORCE_DISARM:
+        if number == d.MAV_CMD_DO_FLIGHTTERMINATION:
+            self._check_release(message)
+            return ("kill",)
+        if second == FORCE_DISARM and not self._blocked:
             return ("kill",)
         if number == d.MAV_CMD_COMPONENT_ARM_DISARM and (first != 0.0 or not self._blocked):
             raise WrongError(f"nobody had blocked flight, or it arms: {message}")
         return ()
+
+    def _check_release(self, message: Any) -> None:
+        """What may release a parachute as it terminates is terminated only beside a deploy."""
+        autopilot = self._link.autopilots.get(message.target_system, message.target_component)
+        known = autopilot is not None and autopilot.settings.firmware is Firmware.ARDUPILOT
+        if not known and not self._deployed:
+            raise WrongError(f"a kill alone may release: {message}")
 
 
 TARGETS = (

@@ -11,7 +11,9 @@ from chute_ros.model import DeploymentTrigger, SafetyFlags
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.protocol.mavlink.goals import FORCE_DISARM
 from chute_ros.sim.autopilot_device import AutopilotDevice
+from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 
 #: Between two heartbeats and two statuses of the simulated devices, s.
@@ -86,9 +88,13 @@ class Module(Remembering, ParachuteDevice):
 class Autopilot(Remembering, AutopilotDevice):
     """An autopilot that speaks often."""
 
-    def __init__(self, system_id: int = 1, interval: float = INTERVAL):
+    def __init__(
+        self, system_id: int = 1, interval: float = INTERVAL, kind: AutopilotKind = GENERIC
+    ):
         self.commands_heard = []
-        super().__init__(system_id, [])
+        #: Names of the parameters that were asked for.
+        self.asked_for: set[str] = set()
+        super().__init__(system_id, [], kind=kind)
         for message_id in (
             dialect.MAVLINK_MSG_ID_HEARTBEAT,
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
@@ -96,11 +102,23 @@ class Autopilot(Remembering, AutopilotDevice):
         ):
             self.default_intervals[message_id] = interval
 
+    def heard(self, frame: Frame) -> None:
+        if frame.message.get_type() == "PARAM_REQUEST_READ":
+            self.asked_for.add(frame.message.param_id)
+        super().heard(frame)
 
-def airborne(height: float) -> Autopilot:
+    @property
+    def forced(self) -> list[Any]:
+        """The orders to disarm by force."""
+        orders = self.heard_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        return [heard for heard in orders if heard[2][1] == FORCE_DISARM]
+
+
+def airborne(height: float, kind: AutopilotKind = GENERIC) -> Autopilot:
     """One that holds its vehicle at height, m."""
-    autopilot = Autopilot()
+    autopilot = Autopilot(kind=kind)
     autopilot.update(time.monotonic())  # it has started, disarmed
+    autopilot.take_output()  # which nobody heard
     autopilot.model.height = autopilot.model.target_height = height
     autopilot.model.armed = True
     return autopilot

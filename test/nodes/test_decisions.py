@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import pytest
 from chute_msgs.msg import ActionReport, ParachuteStatus, SafetyDecision, VehicleState
@@ -12,7 +13,11 @@ from node_bench import stamped
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.sim.autopilot_kinds import ARDUPLANE, GENERIC
 
+ARDUPLANE_WITH_AFS = replace(
+    ARDUPLANE, parameters={**ARDUPLANE.parameters, "AFS_ENABLE": 1, "AFS_TERM_ACTION": 42}
+)
 TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
 ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 
@@ -62,9 +67,9 @@ def supervisor(bench):
     return Supervisor(bench)
 
 
-def flying(bench, **parameters):
+def flying(bench, kind=GENERIC, **parameters):
     """An autopilot in the air on the node's network."""
-    autopilot = airborne(80.0)
+    autopilot = airborne(80.0, kind)
     autopilot.loop = Network(bench, **parameters).plug(autopilot)
     return autopilot
 
@@ -80,8 +85,9 @@ def flying(bench, **parameters):
     ],
 )
 def test_a_kill_stops_the_motors_by_the_method_chosen(bench, supervisor, method, command, params):
-    autopilot = flying(bench, kill_method=method)
-    supervisor.sees(armed=VehicleState.ARMED, landed_state=2)
+    autopilot = flying(bench, kind=ARDUPLANE_WITH_AFS, kill_method=method)
+    supervisor.sees(armed=VehicleState.ARMED, landed_state=2, faults=[])
+    bench.until(lambda: autopilot.asked_for >= set(ARDUPLANE.parameters), "settings are read")
     decision = supervisor.decide(Action.KILL)
     supervisor.report(decision, Outcome.CONFIRMED)
     assert not autopilot.model.armed
@@ -97,7 +103,7 @@ def test_a_kill_is_tried_again_until_the_motors_stop(bench, supervisor):
     supervisor.sees(armed=VehicleState.ARMED)
     do(bench, autopilot.loop, lambda: autopilot.act("mute"))
     decision = supervisor.decide(Action.KILL)
-    bench.until(lambda: len(autopilot.heard_command(TERMINATE)) >= 4, "it is tried again")
+    bench.until(lambda: len(autopilot.heard_command(ARM_DISARM)) >= 4, "it is tried again")
     assert Outcome.CONFIRMED not in supervisor.outcomes(decision)
     do(bench, autopilot.loop, lambda: autopilot.act("unmute"))
     supervisor.report(decision, Outcome.CONFIRMED)
@@ -109,7 +115,7 @@ def test_a_kill_that_cannot_be_confirmed_fails_in_words(bench, supervisor):
     supervisor.sees(armed=VehicleState.ARMED)
     do(bench, autopilot.loop, lambda: autopilot.act("mute"))
     report = supervisor.report(supervisor.decide(Action.KILL), Outcome.FAILED)
-    assert "kill (flight_termination) given up after" in report.detail
+    assert "kill (forced_disarm) given up after" in report.detail
     assert report.link == "mavlink_parachute"
 
 
@@ -124,7 +130,7 @@ def test_a_shadow_kill_stops_nothing(bench, supervisor):
     supervisor.sees(armed=VehicleState.ARMED)
     shadow = supervisor.decide(Action.KILL, shadow=True)
     supervisor.report(supervisor.decide(Action.FLIGHT_BLOCK_RELEASE), Outcome.CONFIRMED)
-    assert autopilot.heard_command(TERMINATE) == []
+    assert autopilot.heard_command(ARM_DISARM) == []
     assert supervisor.outcomes(shadow) == []
 
 
@@ -140,7 +146,7 @@ def test_a_repeated_kill_is_reported_again_after_other_reports(bench, supervisor
     supervisor.decide(Action.KILL, id=kill.id)
     report = supervisor.report(kill, Outcome.CONFIRMED)
     assert (report.epoch, report.action) == (1, Action.KILL)
-    assert len(autopilot.heard_command(TERMINATE)) == 1
+    assert len(autopilot.forced) == 1
 
 
 # Flight block

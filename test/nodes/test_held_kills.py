@@ -36,7 +36,7 @@ def test_a_kill_that_comes_before_the_autopilot_is_heard_is_done_once_it_is(benc
     autopilot = Autopilot()
     autopilot.model.armed = True
     node.network.plug(autopilot)
-    bench.until(lambda: autopilot.terminated, "the motors are stopped")
+    bench.until(lambda: not autopilot.model.armed, "the motors are stopped")
     bench.until(lambda: node.reported(Outcome.CONFIRMED), "and it is confirmed")
     assert not node.reported(Outcome.FAILED)
 

@@ -50,7 +50,7 @@ BAD = [
     (MAVLINK, "give_up_after", -5.0, "from 0.1 to 600"),
     (MAVLINK, "default_triggers", 0, "a whole number from 1 to 255"),
     (MAVLINK, "ignored_error_flags", -1, "a whole number from 0 to"),
-    (MAVLINK, "kill_method", "gently", "one of flight_termination, forced_disarm"),
+    (MAVLINK, "kill_method", "gently", "one of auto, flight_termination, forced_disarm"),
     (MAVLINK, "deploy_arms_trigger", "yes", "true or false"),
     (MAVLINK, "disarm_when_blocked", 1, "true or false"),
     (MAVLINK, "autopilot_message_rate", 1000.0, "from 0 to 100"),

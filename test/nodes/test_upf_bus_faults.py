@@ -18,6 +18,7 @@ from chute_ros.protocol.dronecan.can_frame import (
     CanFrame,
     pack,
 )
+from chute_ros.protocol.upf.config import NODE_ID
 from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, TRIGGER_STATUS
 from chute_ros.sim.can_faults import CanFaultKnobs
 
@@ -132,7 +133,7 @@ def noise(network, rng, count):
             made.append(pack(CanFrame(identifier, data)))
         else:
             # A request to us, of any service.
-            identifier = 16 << 24 | rng.randrange(256) << 16 | 1 << 15 | 10 << 8 | 1 << 7 | 60
+            identifier = 16 << 24 | rng.randrange(256) << 16 | 1 << 15 | NODE_ID << 8 | 1 << 7 | 60
             made.append(pack(CanFrame(identifier, data)))
     return made
 
@@ -205,10 +206,10 @@ def test_another_node_with_our_node_id_is_told_and_forbids_take_off(bench):
     network = Network(bench)
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     devices = Devices(network)
-    party = network.party(10)
+    party = network.party(NODE_ID)
     party.say(NODE_STATUS, uptime_sec=1)
     devices.await_beat(device_healthy=False)
-    text = "another node uses our node id 10: set node_id to a free one"
+    text = "another node uses our node id 100: set node_id to a free one"
     await_trouble(bench, diagnostics, text)
     await_well(bench, diagnostics)
     devices.await_beat(device_healthy=True)

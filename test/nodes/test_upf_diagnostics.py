@@ -8,6 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import OTHER_LAYOUT, Devices, Network, tasks, values
 
 from chute_ros.protocol.upf import parameters as p
+from chute_ros.protocol.upf.config import NODE_ID
 from chute_ros.protocol.upf.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
 
 OK, WARN, ERROR, STALE = (
@@ -54,7 +55,7 @@ def test_a_request_with_a_bad_magic_number_is_counted_and_answered_so(bench):
     network = Network(bench)
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     party = network.party(33)
-    party.ask(10, VEHICLE_SERVICE, 0, magic_number=7, type=1)
+    party.ask(NODE_ID, VEHICLE_SERVICE, 0, magic_number=7, type=1)
     answer = bench.until(lambda: party.newest(VEHICLE_SERVICE), "it is answered")
     result = network.definitions.result_name(VEHICLE_SERVICE, answer.values)
     assert result == "BAD_MAGIC_NUMBER"

@@ -13,12 +13,14 @@ from chute_ros.errors import ParameterError
 from chute_ros.nodes.upf_allocation_file import AllocationFile
 from chute_ros.protocol.dronecan.allocation import MESSAGE
 from chute_ros.protocol.upf import parameters as p
+from chute_ros.protocol.upf.config import NODE_ID
 
 DYNAMIC = {p.STATIC_NODE_ID: 0}
 
 
-def network_of(bench, path, **parameters):
-    return Network(bench, allocator=True, allocation_table_file=str(path), **PATIENT, **parameters)
+def network_of(bench, path, allocator="auto", **parameters):
+    file = str(path)
+    return Network(bench, allocator=allocator, allocation_table_file=file, **PATIENT, **parameters)
 
 
 def await_ids(bench, *nodes):
@@ -41,7 +43,7 @@ def test_devices_without_node_ids_are_given_some_and_work(bench, tmp_path):
     network.plug(controller, trigger)
     ids = await_ids(bench, controller, trigger)
     assert len(set(ids)) == 2
-    assert not {10, 33, 34, 0, 126, 127} & set(ids), "ours, and those of static devices"
+    assert not {NODE_ID, 33, 34, 0, 126, 127} & set(ids), "ours, and those of static devices"
     assert table(path) == {
         controller.settings.unique_id: ids[0],
         trigger.settings.unique_id: ids[1],
@@ -155,4 +157,35 @@ def test_where_the_allocator_is_off_nobody_is_given_an_id(bench, tmp_path):
     bench.until(lambda: len(party.values(MESSAGE)) >= 3, "it asks, and asks again")
     assert {one.source for one in party.heard if one.name == MESSAGE} == {0}
     assert trigger.node_id == 0
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("allocator", [True, "true"])
+def test_the_allocator_may_be_switched_on_as_yaml_reads_it_or_as_text(bench, tmp_path, allocator):
+    network = network_of(bench, tmp_path / "ids.json", allocator)
+    assert network.node.values["allocator"] == "true"
+
+
+def test_an_autopilot_that_gives_out_node_ids_is_left_to_it(bench, tmp_path):
+    """Given a node 10 that answers each request, as ArduPilot does."""
+    path = tmp_path / "ids.json"
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    network = network_of(bench, path)
+    autopilot = network.party(10)
+    trigger = network.trigger(**DYNAMIC)
+    network.plug(trigger)
+    answered = []
+
+    def left():
+        asked = [one for one in autopilot.heard if (one.name, one.source) == (MESSAGE, 0)]
+        for one in asked[len(answered) :]:
+            answered.append(one)
+            autopilot.say(MESSAGE, unique_id=bytes(one.values["unique_id"]), node_id=0)
+        task = tasks(diagnostics).get("node ids")
+        return task and task.message == "left to node 10, which does it"
+
+    bench.until(left, "it is told")
+    link = tasks(diagnostics)["link"]
+    assert "gives out node ids" not in link.message, "it is no trouble of the bus"
+    assert tasks(diagnostics)["node ids"].level == DiagnosticStatus.OK
     assert not path.exists()

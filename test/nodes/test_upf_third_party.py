@@ -21,6 +21,7 @@ from upf_bench import PATIENT, Devices, Network, tasks, vehicle_state
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.protocol.upf import parameters as p
+from chute_ros.protocol.upf.config import NODE_ID
 
 SCRIPT = Path(__file__).with_name("upf_third_party.py")
 DSDL = Path(__file__).parents[2] / "msg_defs" / "dsdl" / "flyfire"
@@ -127,9 +128,9 @@ def test_it_sees_all_three_nodes_and_reads_what_ours_says(bench, network, party)
     bench.until(lambda: network.link._vehicle._state.height == 42.5, "it is heard")
     seen = party("watch").await_end()
     nodes = {one.pop("node"): one for one in seen if "node" in one}
-    assert nodes.keys() >= {10, 33, 34}
-    assert nodes[10]["name"] == "org.chute_ros.upf_can"
-    assert nodes[10]["unique_id"] == network.link.config.unique_id.hex()
+    assert nodes.keys() >= {NODE_ID, 33, 34}
+    assert nodes[NODE_ID]["name"] == "org.chute_ros.upf_can"
+    assert nodes[NODE_ID]["unique_id"] == network.link.config.unique_id.hex()
     for node_id, one in ((33, devices.controller), (34, devices.trigger)):
         assert nodes[node_id]["name"] == one.settings.name
         assert nodes[node_id]["unique_id"] == one.settings.unique_id.hex()
@@ -169,7 +170,7 @@ def test_its_kill_switch_is_answered_once_the_motors_are_off(bench, network, par
     asked = bench.follow(SafetyRequest, "safety/request")
     one = party("kill")
     bench.until(lambda: asked or one.ended(), "the supervisor is asked", SLOW)
-    assert (asked[-1].request, asked[-1].device) == (SafetyRequest.KILL, "100")
+    assert (asked[-1].request, asked[-1].device) == (SafetyRequest.KILL, "60")
     assert one.said() == [{"bad": True}], "not answered yet"
     report = ActionReport(
         action=int(Action.KILL), outcome=int(Outcome.CONFIRMED), link="mavlink_parachute"
@@ -190,7 +191,7 @@ def test_beside_its_allocator_ours_is_silent_and_says_so(bench, bus, tmp_path, p
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     one = party("allocate")
     bench.until(lambda: one.said() or one.ended(), "the other allocator runs", SLOW)
-    bench.until(lambda: network.link.bus.nodes.get(100), "it is heard", SLOW)
+    bench.until(lambda: network.link.bus.nodes.get(60), "it is heard", SLOW)
     trigger = network.trigger(**{p.STATIC_NODE_ID: 0})
     network.plug(trigger)
     bench.until(lambda: trigger.node_id or one.ended(), "it is given a node id", SLOW)
@@ -199,7 +200,33 @@ def test_beside_its_allocator_ours_is_silent_and_says_so(bench, bus, tmp_path, p
 
     def told():
         link = tasks(diagnostics).get("link")
-        return link and "node 100 gives out node ids as well" in link.message and link
+        return link and "node 60 gives out node ids as well" in link.message and link
 
     link = bench.until(told, "diagnostics say so")
     assert link.level == DiagnosticStatus.ERROR
+
+
+def test_by_default_node_ids_are_left_to_its_allocator(bench, bus, tmp_path, party):
+    path = tmp_path / "ids.json"
+    network = Network(
+        bench,
+        connection=f"mcast:{bus}",
+        allocator="auto",
+        allocation_table_file=str(path),
+        **PATIENT,
+    )
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    one = party("allocate")
+    bench.until(lambda: network.link.bus.nodes.get(60) or one.ended(), "it is heard", SLOW)
+    trigger = network.trigger(**{p.STATIC_NODE_ID: 0})
+    network.plug(trigger)
+    bench.until(lambda: trigger.node_id or one.ended(), "it is given a node id", SLOW)
+    assert trigger.node_id
+    assert not path.exists(), "not by us"
+
+    def told():
+        task = tasks(diagnostics).get("node ids")
+        return task and task.message == "left to node 60, which does it" and task
+
+    assert bench.until(told, "diagnostics say so").level == DiagnosticStatus.OK
+    assert "gives out node ids" not in tasks(diagnostics)["link"].message

@@ -12,6 +12,7 @@ from upf_bench import Network
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
 from chute_ros.nodes import qos
 from chute_ros.nodes.node_executor import NodeExecutor
+from chute_ros.protocol.upf.config import NODE_ID
 from chute_ros.protocol.upf.definitions import VEHICLE_SERVICE
 from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
 
@@ -32,7 +33,7 @@ class Asking:
     def ask(self, name):
         self.number += 1
         values = self.network.definitions.request(VEHICLE_SERVICE, name)
-        self.party.ask(10, VEHICLE_SERVICE, self.number, **values)
+        self.party.ask(NODE_ID, VEHICLE_SERVICE, self.number, **values)
 
     def await_request(self, request):
         self.bench.until(

@@ -15,9 +15,7 @@ from chute_ros.model import LinkState
 from chute_ros.nodes import qos
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.protocol.mavlink.dialect import dialect
 
-TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
 LINKS = ["mavlink_parachute", "upf_can"]
 HEIGHT = 20.0  # m
 
@@ -92,7 +90,7 @@ def test_a_kill_switch_on_the_bus_stops_the_motors_and_is_answered_after(bench):
     flight.device("deploy")
     flight.await_said("TYPE_KILLSWITCH answered: SUCCESS")
     assert not flight.autopilot.model.armed, "the motors are off by then"
-    assert flight.autopilot.heard_command(TERMINATE)
+    assert flight.autopilot.forced
     flight.await_said("FIRED")
     assert flight.when_said("KILLSWITCH answered") < flight.when_said("FIRED")
     flight.await_stage(SafetyState.DEPLOYED)
@@ -119,7 +117,7 @@ def test_a_deploy_of_the_operator_stops_the_motors_first(bench):
     assert answer.success, answer.message
     assert flight.trigger.fired
     assert not flight.autopilot.model.armed
-    assert flight.autopilot.heard_command(TERMINATE)
+    assert flight.autopilot.forced
     assert flight.controller.came[-1] == "TYPE_DEPLOY"
     flight.await_stage(SafetyState.DEPLOYED)
 

@@ -12,11 +12,9 @@ from chute_ros.model import DeploymentTrigger
 from chute_ros.nodes import qos
 from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.faults import FaultKnobs
 from chute_ros.sim.parachute_device import ParachuteSettings
 
-TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
 NO_FAULTS = FaultKnobs()
 #: High enough to fall and open, low enough not to wait for, m.
 HEIGHT = 20.0
@@ -78,7 +76,7 @@ class Flight:
 
     def check_order_on_the_wire(self):
         """Seen by the devices themselves: first the kill, then the release."""
-        kills, releases = self.autopilot.heard_command(TERMINATE), self.module.releases
+        kills, releases = self.autopilot.forced, self.module.releases
         assert kills
         assert releases
         assert kills[0][0] < releases[0][0]
@@ -119,7 +117,7 @@ def test_with_three_packets_of_ten_lost_each_way_it_still_deploys(bench, loss):
     answer = flight.fail_and_deploy()
     assert answer.success, answer.message
     # Which of them arrives first is up to what is lost; that each arrives is not.
-    assert flight.autopilot.heard_command(TERMINATE)
+    assert flight.autopilot.forced
     assert flight.module.releases
     assert flight.module.deployment
     assert not flight.autopilot.model.armed
@@ -162,6 +160,6 @@ def test_a_module_that_releases_by_itself_has_the_motors_stopped(bench):
     flight.take_off()
     do(bench, bench.loops[-1], lambda: flight.module.act("deploy=ATS"))
     bench.until(lambda: not flight.autopilot.model.armed, "the motors are stopped")
-    assert flight.autopilot.heard_command(TERMINATE)
+    assert flight.autopilot.forced
     assert flight.module.releases == []
     flight.await_stage(SafetyState.DEPLOYED)

@@ -23,7 +23,7 @@ from dronecan.transport import TransferError  # noqa: E402
 for module in (node_monitor, dynamic_node_id):
     importlib.reload(module)
 
-NODE_ID, OURS, CONTROLLER = 100, 10, 33
+NODE_ID, OURS, CONTROLLER = 60, 100, 33
 PATIENCE = 60.0
 flyfire = dronecan.thirdparty.flyfire
 

@@ -87,7 +87,7 @@ def disarmed(ids: tuple[int, int], signer: Signer | None = None) -> list[bytes]:
     encoder = FrameEncoder(*ids, signer)
     kind, make = dialect.MAV_TYPE_QUADROTOR, dialect.MAV_AUTOPILOT_PX4
     told = (
-        dialect.MAVLink_command_ack_message(dialect.MAV_CMD_DO_FLIGHTTERMINATION, 0),
+        dialect.MAVLink_command_ack_message(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0),
         dialect.MAVLink_heartbeat_message(kind, make, 0, 0, 3, 3),
         dialect.MAVLink_extended_sys_state_message(0, 1),
     )

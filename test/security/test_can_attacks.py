@@ -6,10 +6,11 @@ from chute_msgs.msg import ParachuteStatus, SafetyRequest
 from upf_bench import Devices, Network
 
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.upf.config import NODE_ID
 from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, TRIGGER_STATUS, VEHICLE_SERVICE
 
 KILL = "TYPE_KILLSWITCH"
-STRANGER, OURS = 60, 10
+STRANGER, OURS = 60, NODE_ID
 
 
 def answers(party):

@@ -121,7 +121,6 @@ def test_every_frame_that_leaves_is_signed_whatever_it_orders(attacked, bench, d
     assert orders >= {
         dialect.MAV_CMD_DO_PARACHUTE,
         dialect.MAV_CMD_SET_PARACHUTE_ARM,
-        dialect.MAV_CMD_DO_FLIGHTTERMINATION,
         dialect.MAV_CMD_COMPONENT_ARM_DISARM,
         dialect.MAV_CMD_REQUEST_MESSAGE,
         dialect.MAV_CMD_SET_MESSAGE_INTERVAL,

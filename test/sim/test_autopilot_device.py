@@ -59,7 +59,7 @@ def test_on_the_ground_it_says_so(ground):
     beat = ground.newest("HEARTBEAT")
     assert (beat.type, beat.autopilot) == (
         dialect.MAV_TYPE_QUADROTOR,
-        dialect.MAV_AUTOPILOT_PX4,
+        dialect.MAV_AUTOPILOT_GENERIC,
     )
     assert not armed(ground)
     assert landed_state(ground) == dialect.MAV_LANDED_STATE_ON_GROUND

@@ -141,7 +141,9 @@ class Watch:
         reset = any(isinstance(one, i.ResetRequest) for one in inputs)
         told = [one.status for one in inputs if isinstance(one, i.ParachuteReport)]
         takes_back = not before.deploys and any(not status.deployed for status in told)
-        if before.stage is Stage.DEPLOYED and not (reset or insists or takes_back):
+        rules = [one for one in self.config.profile.rules if Stage.DEPLOYED in one.states]
+        fails = any(one.action is D and self.state.rule(one.name).latched for one in rules)
+        if before.stage is Stage.DEPLOYED and not (reset or insists or takes_back or fails):
             assert D not in done
             assert self.state.stage is Stage.DEPLOYED
 

@@ -23,7 +23,10 @@ def killed(profile: str = "multirotor", outcome: Outcome = Outcome.CONFIRMED) ->
     """A person has stopped the motors 12 m above the ground."""
     story = Story(shipped(profile)).ready().fly(3.0, height=40.0)
     story.at(
-        3.05, story.heartbeat(), story.told(height=12.0), i.KillRequest(9, "operator", "stop")
+        3.05,
+        story.heartbeat(),
+        story.told(height=12.0),
+        i.KillRequest(9, "operator", "stop", kill_only=True),
     )
     story.at(3.1, story.heartbeat(), story.report(K, outcome))
     return story
@@ -141,7 +144,7 @@ def test_a_node_that_is_back_is_told_of_a_kill_that_is_still_meant(
     later: float, again: bool
 ) -> None:
     story = Story(shipped("multirotor")).ready().fly(3.0)
-    story.at(3.05, i.KillRequest(9, "operator", "stop"))
+    story.at(3.05, i.KillRequest(9, "operator", "stop", kill_only=True))
     story.at(3.1, story.told(), story.report(K, Outcome.FAILED))
     story.at(3.05 + later, story.told(), story.heartbeat())
     assert len(story.decisions(K)) == 1 + again

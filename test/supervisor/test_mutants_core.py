@@ -281,7 +281,7 @@ def test_since_when_it_stands_begins_anew_after_every_contradiction() -> None:
     [
         ({"height": 10.0}, 0.1, True),
         ({"height": 9.75}, 0.1, False),
-        ({"height": -10.0}, 0.1, True),
+        ({"height": -10.0}, 0.1, False),
         ({"height": 9.75}, 5.0, False),
         ({"height": math.nan}, 4.9, False),
         ({"height": math.nan}, 5.0, True),

@@ -263,4 +263,5 @@ def test_a_parachute_that_is_out_before_any_step_was_taken_is_the_answer() -> No
     story = ordered()
     story.at(1.1, parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
-    assert story.answer(5) == i.Finish(5, True, False, "its own status says deployed")
+    text = "WARNING, the motors may still turn (nobody reported): its own status says deployed"
+    assert story.answer(5) == i.Finish(5, True, False, text)

@@ -318,7 +318,7 @@ def test_after_a_reset_nothing_of_the_last_deploy_is_left() -> None:
     story.at(1.2, story.report(D, Outcome.CONFIRMED))
     story.at(2.0, story.heartbeat(), story.told(**DOWN), i.ResetRequest(6))
     assert story.answer(6).success
-    story.at(2.1, story.heartbeat(), story.told())
+    story.at(2.1, story.heartbeat(), story.told(height=55.0))
     assert story.state.stage is Stage.IN_FLIGHT
     story.at(2.2, i.DeployRequest(7, False, "it falls again"))
     assert story.answers(7) == []

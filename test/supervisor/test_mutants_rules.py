@@ -71,7 +71,7 @@ def test_what_a_profile_leaves_out_is_as_its_page_says() -> None:
     [
         (Clears, "never on_disarm by_itself"),
         (BelowMinimum, "deploy kill nothing"),
-        (AutopilotFact, "lost rebooted disarmed emergency killed_aloft"),
+        (AutopilotFact, "lost rebooted disarmed emergency killed_aloft motors_stopped"),
         (DeviceFact, "asks_for_kill deployed abnormal"),
     ],
 )

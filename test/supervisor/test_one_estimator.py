@@ -23,7 +23,7 @@ class Teller:
     """Tells ten times a second, with the noise of real sensors; its devices confirm."""
 
     def __init__(self, story: Story, seed: int = 11) -> None:
-        self.story, self.random = story, Random(seed)
+        self.story, self.random, self.true_height = story, Random(seed), 0.0
 
     def noise(self, width: float) -> float:
         return width * (self.random.random() - 0.5)
@@ -31,8 +31,9 @@ class Teller:
     def tell(self, **told: Any) -> None:
         story = self.story
         if "force" in told:
-            told["acceleration"] = told.pop("force") + self.noise(0.4)
+            told["acceleration"] = abs(told.pop("force") + self.noise(0.4))
         if "true_height" in told:
+            self.true_height = told["true_height"]
             told["pressure"] = pressure_at(told.pop("true_height") + self.noise(0.4))
         inputs = [story.heartbeat(), story.told(**told)]
         fired = [one for one in story.decisions() if one.action >= Action.KILL]
@@ -48,6 +49,9 @@ class Teller:
             self.tell(**parts)
 
     def hover(self, seconds: float, height: float, **told: Any) -> None:
+        while "true_height" in told and self.true_height < height:
+            now = min(height, self.true_height + 8.0 * EVERY)
+            self.tell(height=now, vertical_speed=8.0, tilt=3.0, force=9.8, true_height=now)
         for _ in range(round(seconds / EVERY)):
             speed = self.noise(0.2)
             self.tell(height=height, vertical_speed=speed, **{"tilt": 3.0, "force": 9.8, **told})
@@ -191,7 +195,9 @@ def test_an_imu_without_gravity_is_named_and_forbids_the_take_off() -> None:
     teller = told_to("multirotor")
     teller.stand(4.0, force=0.2)
     assert teller.story.state.stage is Stage.BLOCKED
-    assert "acceleration cannot be used: it tells 0.2 m/s^2" in teller.story.said()
+    said = teller.story.said()
+    assert "acceleration cannot be used: it tells 0." in said
+    assert "while the vehicle stands (need 7.8 to 11.8" in said
     # Then its driver is set right.
     teller.stand(3.0, force=9.8)
     assert teller.story.state.stage is Stage.READY

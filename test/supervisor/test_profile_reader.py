@@ -185,7 +185,12 @@ def test_without_needed_all_conditions_must_hold() -> None:
         ("source: ours", "sauce: ours", 12, "has no 'sauce': did you mean source?"),
         ("states: [IN_FLIGHT, K", "states: [INFLIGHT, K", 13, "(did you mean IN_FLIGHT?)"),
         ("states: [IN_FLIGHT, KILLING]", "states: []", 13, "is empty: need at least one"),
-        ("states: [IN_FLIGHT, KILLING]", "states: [READY]", 9, "its states may be IN_FLIGHT and"),
+        (
+            "states: [IN_FLIGHT, KILLING]",
+            "states: [READY]",
+            9,
+            "its states may be IN_FLIGHT, KILLING and",
+        ),
         ("below: -12.5", "below: .nan", 15, "is nan: need -inf to inf"),
         ("measurement: vertical_speed", "measurement: speed", 15, "is 'speed': need height or"),
         ("weight: 2}", "weight: 0}", 15, "weight in rule 'falls' is 0: need 1e-06 to 1e+06"),

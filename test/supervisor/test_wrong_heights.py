@@ -139,5 +139,5 @@ def test_a_glitch_that_is_over_holds_the_deploy_back_as_before(then: float, last
     """The height jumps by 40 m and back: what it says then is what it said before."""
     story = Story(shipped("multirotor")).flying().fly(1.0, height=then)
     story.fly(2.0, height=then + 40.0).fly(5.0, height=then)
-    story.fall(7.0, then, tilt=80.0)
+    story.fall(6.0, then, tilt=80.0)
     assert story.fired()[-1] == last

@@ -57,9 +57,8 @@ def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
     run(monkeypatch, "--flights", "3", "--seed", "39", *with_page)
     assert "3 of 3 flights in" in capsys.readouterr().out
     text = page.read_text()
-    written = re.search(
-        r"`make campaign FLIGHTS=3 SEED=39`: (\d+) s, (\d+) flights a minute", text
-    )
+    command = r"`make campaign FLIGHTS=3 SEED=39`"
+    written = re.search(command + r": (\d+) s, (\d+) flights a minute", text)
     took, rate = map(float, written.groups())
     assert 3.0 / rate * 60.0 == pytest.approx(took, rel=0.1, abs=0.6)
     assert f", 1 at a time on {machine()}." in text

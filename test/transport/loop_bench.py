@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.transport.address import parse_address
-from chute_ros.transport.loop import WireChange, WireLoop
+from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire import make_wire
+from chute_ros.transport.wire_events import WireChange
 
 LOCAL = "127.0.0.1"
 

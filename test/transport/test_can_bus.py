@@ -14,10 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop_bench import descriptors
 from slcan_adapter import Adapter
+from test_serial_users import TAKE_ALL, Program
 
 from chute_ros.protocol.dronecan.can_frame import CanFrame
 from chute_ros.transport.can_address import CanAddress
 from chute_ros.transport.can_bus import CanBusWire
+from chute_ros.transport.wire_events import WireTrouble
 
 #: FRAMES as lines of the LAWICEL protocol.
 LINES = [
@@ -145,6 +147,26 @@ def test_unplugged_and_plugged_in_again_at_the_same_path(adapter, path, await_un
             await_until(lambda: again.sent == LINES[2:3], "it is sent to again")
         finally:
             again.unplug()
+
+
+def test_a_second_reader_of_the_adapters_port_is_named_and_the_bus_is_kept(
+    adapter, path, await_until
+):
+    with running_can(f"slcan:{path}") as node:
+        other = Program(TAKE_ALL, path)
+        try:
+
+            def told():
+                adapter.deliver(LINES[0])
+                return [one for one in node.delivered if isinstance(one, WireTrouble)]
+
+            await_until(told, "it is told")
+            (trouble,) = told()
+            assert "has a second reader, which takes a part of what comes" in trouble.text
+            assert other.name in trouble.text
+            assert [change.is_open for change in node.changes] == [True]
+        finally:
+            other.end()
 
 
 def test_a_path_that_is_not_there_is_said_once_and_tried_again(path, await_until, capfd):

@@ -8,7 +8,7 @@ import pytest
 from loop_bench import LOCAL, Running, descriptors, loop_threads, running, udp
 
 from chute_ros.transport import loop
-from chute_ros.transport.loop import LoopFault, WireChange
+from chute_ros.transport.wire_events import LoopFault, WireChange
 
 
 def test_bytes_are_answered_at_once_without_any_deadline():

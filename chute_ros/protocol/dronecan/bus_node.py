@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 
-from chute_ros.errors import MessageError, ParameterError
+from chute_ros.errors import MessageError
 from chute_ros.protocol.dronecan import allocation, time_sync
 from chute_ros.protocol.dronecan.allocation import Allocator, KeepTable
-from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits, SendCall
+from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
+from chute_ros.protocol.dronecan.calls import Call, CallFinished, SendCall
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
 from chute_ros.protocol.dronecan.scripts import Script, Scripts
 from chute_ros.protocol.dronecan.time_sync import TimeMaster
-from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind
+from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.events import Notice, Severity
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
@@ -32,37 +31,7 @@ LISTEN_TIME = 1.2
 #: Somebody who sent under our node id so lately (s) is there.
 _OWN_ID_WINDOW = 5.0
 _SOFTWARE_VERSION = (0, 1)
-#: Bytes of a node's name (uavcan.protocol.GetNodeInfo).
-_LONGEST_NAME = 80
 _REFUSED = ("uavcan.protocol.RestartNode", "uavcan.protocol.param.ExecuteOpcode")
-
-
-@dataclass(frozen=True)
-class BusNodeConfig:
-    """Who we are on the bus, and which of its offices we hold."""
-
-    node_id: int
-    name: str
-    unique_id: bytes
-    calls: CallLimits = field(default=CallLimits())
-    allocator: bool = True
-    table: Mapping[bytes, int] = field(default_factory=dict)
-    #: Node ids that are never given out, besides our own.
-    never: tuple[int, ...] = ()
-    time_master: bool = True
-    utc_offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.node_id <= HIGHEST_NODE_ID:
-            raise ParameterError(f"node_id is {self.node_id}: need 1 to {HIGHEST_NODE_ID}")
-        if not 1 <= len(self.name.encode()) <= _LONGEST_NAME:
-            raise ParameterError(f"name is {self.name!r}: need 1 to {_LONGEST_NAME} bytes")
-        if len(self.unique_id) != allocation.UNIQUE_ID_LENGTH:
-            raise ParameterError(
-                f"unique_id has {len(self.unique_id)} bytes: need {allocation.UNIQUE_ID_LENGTH}"
-            )
-        if not math.isfinite(self.utc_offset):
-            raise ParameterError(f"utc_offset is {self.utc_offset}: need a number of seconds")
 
 
 class BusNode:
@@ -73,7 +42,8 @@ class BusNode:
         self.endpoint = Endpoint(types, config.node_id)
         self.nodes = NodeMonitor()
         self.scripts = Scripts(config.calls)
-        self.allocator = Allocator(config.table, (config.node_id, *config.never))
+        never = (config.node_id, *config.never)
+        self.allocator = Allocator(config.table, never, config.allocator_yields)
         self.time = TimeMaster(config.node_id, config.utc_offset)
         self._started = math.nan
         self._status_at = -math.inf
@@ -112,7 +82,7 @@ class BusNode:
         elif heard.name == time_sync.MESSAGE:
             self.time.heard(heard.source, now)
         elif heard.name == NODE_STATUS and heard.source:
-            self.nodes.status(heard.source, heard.values, now)
+            self.nodes.status(heard.source, heard.values, now, heard.transfer_id)
         return heard
 
     def update(self, now: float) -> None:
@@ -130,6 +100,7 @@ class BusNode:
             self.scripts.begin(("who is", node_id), _who_is(node_id), now)
         self._drive(now)
         self._look_for_trouble(now)
+        self._events += [Notice(Severity.ERROR, text) for text in self.nodes.take_news(now)]
 
     def next_deadline(self) -> float:
         """When update has something to do."""
@@ -178,6 +149,8 @@ class BusNode:
         if now >= self._status_at:
             self._status_at = now + NODE_STATUS_INTERVAL
             self.endpoint.broadcast(NODE_STATUS, {"uptime_sec": self.uptime(now)})
+            self.allocator.update(self._in_use(), now)
+            self._events += self.allocator.take_keep()
         if self.config.time_master:
             stamp = self.time.update(now)
             if stamp is not None:
@@ -236,13 +209,29 @@ class BusNode:
     def _allocation(self, heard: Heard, now: float) -> None:
         if not self.config.allocator:
             return
-        in_use = {entry.node_id: entry.unique_id for entry in self.nodes.all()}
-        in_use[self.config.node_id] = self.config.unique_id
         # Every node has spoken once by then, whatever its id.
         listened = now - self._started >= LISTEN_TIME
         discovered = listened and self.nodes.all_discovered(now)
-        self.allocator.heard(heard.source, heard.values, in_use, discovered, now)
+        before = self.allocator.left_to
+        self.allocator.heard(heard.source, heard.values, self._in_use(), discovered, now)
+        self._tell_who_allocates(before)
         self._answer_allocations()
+
+    def _in_use(self) -> dict[int, bytes]:
+        """Node id -> unique id (empty: not known)."""
+        in_use = {entry.node_id: entry.unique_id for entry in self.nodes.all()}
+        in_use[self.config.node_id] = self.config.unique_id
+        return in_use
+
+    def _tell_who_allocates(self, before: int) -> None:
+        """Once each time it changes. before: the node that did."""
+        now = self.allocator.left_to
+        if now and now != before:
+            text = f"node {now} gives out node ids: it is left to it (parameter allocator)"
+            self._events.append(Notice(Severity.INFO, text))
+        elif before and not now:
+            text = f"node {before} answers no request for a node id any more: given out here again"
+            self._events.append(Notice(Severity.WARNING, text))
 
     def _answer_allocations(self) -> None:
         for answer in self.allocator.take_answers():
@@ -273,10 +262,11 @@ class BusNode:
                 "the CAN controller is bus-off (wiring, bit rate, resistor?); "
                 "a restart time brings it back: ip link set canX type can restart-ms 100"
             )
-        if self.config.allocator and self.allocator.another_is_there(now):
+        rivals = self.config.allocator and not self.config.allocator_yields
+        if rivals and self.allocator.another_is_there(now):
             found["allocator"] = (
                 f"node {self.allocator.other} gives out node ids as well: switch one of the two "
-                "off (parameter allocator); ours is silent"
+                "off (parameter allocator, auto leaves it to the other); ours is silent"
             )
         if self.config.time_master and self.time.contested(now):
             found["time"] = (

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from chute_ros.model import Armed, LandedState, LinkState, VehicleState
+from chute_ros.model import Armed, LandedState, LinkState, Reading, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.autopilot_settings import AutopilotSettings
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.firmware import firmware_of
+from chute_ros.protocol.mavlink.motor_signs import MotorSigns
 from chute_ros.protocol.mavlink.optional_streams import OptionalStreams
 from chute_ros.protocol.mavlink.readings import Readings
 from chute_ros.protocol.mavlink.sensors import FURTHER_ACCELEROMETERS, PRESSURE
@@ -78,6 +81,12 @@ class AutopilotTracker:
         self.liveness = Liveness(limits)
         self.reboot_count = 0
         self.rebooted_in_flight = False
+        #: HEARTBEAT.type.
+        self.vehicle_type = 0
+        self.settings = AutopilotSettings()
+        self.motor_signs = MotorSigns()
+        #: How often it was seen to arm.
+        self.arming_count = 0
         self._system_status = 0
         self._streams = StreamWatch(needed_rate)
         self._optional = OptionalStreams()
@@ -110,6 +119,10 @@ class AutopilotTracker:
         value = self._readings.value("landed_state")
         return LandedState.UNKNOWN if math.isnan(value) else LandedState(int(value))
 
+    def reading(self, name: str) -> Reading:
+        """The newest value of a part of the picture; NaN: none."""
+        return self._readings.get(name)
+
     def on_ground(self, now: float) -> bool:
         """The autopilot says so now: what it said before its stream fell silent proves nothing."""
         age = self._readings.age("landed_state", now)
@@ -125,15 +138,20 @@ class AutopilotTracker:
         """A HEARTBEAT of the autopilot."""
         # Of two with the same ids nobody knows whose it is: what was known ages.
         if not self._twins.found(now):
-            armed = message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
+            armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+            self.arming_count += armed and self.armed is Armed.DISARMED
+            self.vehicle_type = message.type
+            self.motor_signs.armed(armed)
             self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
             self._system_status = message.system_status
             self._readers.targets.vehicle = Vehicle(
                 message.autopilot, message.type, message.custom_mode
             )
         changes = self.liveness.heard(now)
-        if changes:
+        firmware = firmware_of(message.autopilot)
+        if changes or firmware is not self.settings.firmware:
             self._begin_streams()
+            self.settings.begin(firmware, now)
         return changes
 
     def ask_anew(self) -> None:
@@ -161,6 +179,9 @@ class AutopilotTracker:
             self._watch_clock(message.time_boot_ms, now)
         elif not self._twins.ours(getattr(message, "time_boot_ms", 0), now):
             return False
+        self.motor_signs.heard(message, now)
+        if kind in ("PARAM_VALUE", "PARAM_ERROR"):
+            self.settings.heard(message)
         self._streams.received(len(message.get_msgbuf()))
         if not self._readers.read(message, now):
             return False
@@ -259,5 +280,6 @@ class AutopilotTracker:
         self.reboot_count += 1
         self.rebooted_in_flight = self._in_flight_before
         self._begin_streams()
+        self.settings.begin(self.settings.firmware, now)
         # What the autopilot said before its restart describes a vehicle that it no longer knows.
         self._readings.forget("armed", "landed_state")

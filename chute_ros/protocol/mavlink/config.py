@@ -15,8 +15,10 @@ from chute_ros.protocol.mavlink.parachute import StatusLimits
 
 
 class KillMethod(enum.Enum):
-    """How the autopilot is told to stop the motors."""
+    """Which way to stop the motors is tried first. The other one follows where it fails."""
 
+    #: By what the autopilot says that it is, and by its settings.
+    AUTO = "auto"
     #: MAV_CMD_DO_FLIGHTTERMINATION (185), param1 = 1.
     FLIGHT_TERMINATION = "flight_termination"
     #: MAV_CMD_COMPONENT_ARM_DISARM (400), param1 = 0, param2 = 21196.
@@ -39,17 +41,23 @@ class MavlinkConfig:
     commands: CommandLimits = field(default=CommandLimits())
     effect: EffectLimits = field(default=EffectLimits())
     default_triggers: TriggerFlags = TriggerFlags.FC | TriggerFlags.OFFBOARD
-    kill_method: KillMethod = KillMethod.FLIGHT_TERMINATION
+    kill_method: KillMethod = KillMethod.AUTO
     #: Rate to ask of the autopilot for each message that vehicle/state needs, Hz; 0: do not ask.
     autopilot_message_rate: float = 10.0
     #: Rate that the rules need of each message that they measure with, Hz; 0: not judged.
     needed_message_rate: float = 5.0
     #: Undo arming on the ground while flight is blocked.
     disarm_when_blocked: bool = True
+    #: The vehicle is off the ground once it was higher than this above where it was armed, m.
+    takeoff_height: float = 2.0
     heartbeat_interval: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.heartbeat_interval < math.inf:
             raise ParameterError(
                 f"heartbeat_interval is {self.heartbeat_interval}: need a time above 0 s"
+            )
+        if not 0.0 < self.takeoff_height < math.inf:
+            raise ParameterError(
+                f"takeoff_height is {self.takeoff_height}: need a height above 0 m"
             )

@@ -6,9 +6,10 @@ It only listens. What is sent to them, and when, is the business of MavlinkLink.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
-from chute_ros.model import VehicleState
+from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
     Event,
@@ -19,8 +20,10 @@ from chute_ros.protocol.events import (
 )
 from chute_ros.protocol.liveness import LinkChange, first_alive
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker, is_autopilot
+from chute_ros.protocol.mavlink.commands import Acknowledgement
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.kill import kill_plan
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 from chute_ros.protocol.mavlink.roster import MOST_DEVICES, Roster
 
@@ -69,6 +72,25 @@ class Devices:
     def chosen_autopilot(self) -> AutopilotTracker | None:
         """The first autopilot of ours that is not lost, or the first."""
         return first_alive(self.autopilots.all())
+
+    def arming_count(self) -> int:
+        """How often an autopilot of ours was seen to arm."""
+        return sum(autopilot.arming_count for autopilot in self.autopilots.all())
+
+    def accepted(self, ack: Acknowledgement, now: float) -> None:
+        """A device accepted a command of ours."""
+        autopilot = self.autopilots.get(ack.system_id, ack.component_id)
+        if autopilot is not None:
+            autopilot.motor_signs.accepted(ack.number, now)
+
+    def motors_remark(self) -> str:
+        """What whoever releases a parachute must know of the motors; empty: nothing."""
+        autopilot = self.chosen_autopilot()
+        if autopilot is None or autopilot.liveness.state is not LinkState.OK:
+            return ""
+        if autopilot.armed is not Armed.ARMED or autopilot.motors_off:
+            return ""
+        return f"WARNING: autopilot {autopilot.device} says that it is armed: the motors may turn"
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
@@ -124,7 +146,11 @@ class Devices:
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
         autopilot = self.chosen_autopilot()
-        return VehicleState() if autopilot is None else autopilot.vehicle_state(now)
+        if autopilot is None:
+            return VehicleState()
+        state, settings = autopilot.vehicle_state(now), autopilot.settings
+        fault = kill_plan(self._config.kill_method, autopilot.vehicle_type, settings).fault()
+        return replace(state, faults=(*state.faults, fault)) if fault else state
 
     def take_events(self) -> list[Event]:
         """What happened, oldest first; each is handed out once."""

@@ -7,6 +7,7 @@ MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,7 @@ from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
 from chute_ros.protocol.mavlink.commands import Command
 from chute_ros.protocol.mavlink.config import KillMethod
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.kill import KillPlan
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
 
 MavlinkGoal = Goal[Command]
@@ -28,6 +30,11 @@ MOST_EXACT = 2**24
 
 #: Name of the goal that fires.
 RELEASE = "release"
+#: And of the one that disarms by force, on the ground.
+FORCED = "forced disarm on the ground"
+
+#: When the heartbeat is asked for after an answer, s: autopilots change state some 10 ms later.
+_LOOKS = (0.0, 0.025, 0.05, 0.1, 0.2)
 
 
 def _params(*values: float) -> tuple[float, float, float, float, float, float, float]:
@@ -64,8 +71,11 @@ def set_triggers(
     )
 
 
-def release(parachute: ParachuteTracker, force: bool, now: float) -> MavlinkGoal:
+def release(
+    parachute: ParachuteTracker, force: bool, now: float, remark: Callable[[], str] = str
+) -> MavlinkGoal:
     """Release the parachute; with force its flight-controller trigger is armed on the way.
+    remark: what else whoever reads its end must know.
 
     A status from before the order is believed only while the status stream is alive and the device
     not lost: what a lost device said long ago must not keep us from sending.
@@ -91,6 +101,7 @@ def release(parachute: ParachuteTracker, force: bool, now: float) -> MavlinkGoal
         insist=force,
         urgent=True,
         hint=lambda: _why_not_released(parachute),
+        remark=remark,
     )
 
 
@@ -125,32 +136,74 @@ def parachute_action(parachute: ParachuteTracker, action: int) -> MavlinkGoal:
     )
 
 
-def kill(autopilot: AutopilotTracker, method: KillMethod, now: float) -> MavlinkGoal:
-    """Stop the motors. Always sent: a heartbeat from before the order proves nothing."""
+def kill(
+    autopilot: AutopilotTracker,
+    plan: Callable[[], KillPlan],
+    deploy_decided: Callable[[], bool],
+    patience: float,
+    now: float,
+) -> MavlinkGoal | None:
+    """Stop the motors, by the ways that plan has as each is begun. Always sent: a heartbeat from
+    before the order proves nothing. patience: without an answer for so long the next way is tried
+    as well, s. None: no way is allowed now."""
+
+    def shown() -> bool:
+        told = autopilot.motors_off and autopilot.liveness.last_heard > now
+        return told or autopilot.motor_signs.stopped_since(now)
+
+    def next_way(tried: tuple[KillMethod, ...]) -> MavlinkGoal | None:
+        way = plan().allowed(tried, deploy_decided())
+        if way is None:
+            return None
+        return Goal(
+            f"kill ({way.method.value})",
+            (_stop_order(autopilot, way.method),),
+            "the autopilot says motors off",
+            shown,
+            _request_heartbeat(autopilot),
+            insist=True,
+            urgent=True,
+            looks=_LOOKS,
+            otherwise=lambda: next_way((*tried, way.method)),
+            patience=patience,
+        )
+
+    return next_way(())
+
+
+def _stop_order(autopilot: AutopilotTracker, method: KillMethod) -> Command:
     if method is KillMethod.FLIGHT_TERMINATION:
-        order = command(autopilot, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)
-    else:
-        order = command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
-    return Goal(
-        f"kill ({method.value})",
-        (order,),
-        "the autopilot's heartbeat says motors off",
-        lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
-        command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT),
-        insist=True,
-        urgent=True,
-    )
+        return command(autopilot, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)
+    return command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
 
 
-def disarm_on_ground(autopilot: AutopilotTracker, now: float) -> MavlinkGoal:
-    """A plain disarm, which an autopilot refuses in flight."""
-    return Goal(
-        "disarm on the ground",
-        (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0),),
-        "the autopilot's heartbeat says disarmed",
-        lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
-        command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT),
-    )
+def _request_heartbeat(autopilot: AutopilotTracker) -> Command:
+    message_id = float(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+    return command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
+
+
+def disarm_on_ground(
+    autopilot: AutopilotTracker, may_force: Callable[[], bool], patience: float, now: float
+) -> MavlinkGoal:
+    """A plain disarm, which an autopilot refuses if it takes the vehicle to fly; where may_force
+    says that it stands, a forced one follows then."""
+
+    def disarm(forced: bool) -> MavlinkGoal:
+        param2 = (FORCE_DISARM,) if forced else ()
+        return Goal(
+            FORCED if forced else "disarm on the ground",
+            (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
+            "the autopilot's heartbeat says disarmed",
+            lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
+            _request_heartbeat(autopilot),
+            # The plain one, which may be tried on, must not keep it waiting.
+            urgent=forced,
+            looks=_LOOKS,
+            otherwise=lambda: disarm(True) if not forced and may_force() else None,
+            patience=patience,
+        )
+
+    return disarm(False)
 
 
 def request_status(parachute: ParachuteTracker) -> Command:

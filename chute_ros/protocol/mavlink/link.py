@@ -12,17 +12,19 @@ from collections.abc import Hashable
 from dataclasses import replace
 
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
-from chute_ros.protocol.events import Event, Severity
-from chute_ros.protocol.mavlink import goals
+from chute_ros.protocol.events import Event
+from chute_ros.protocol.mavlink import arm_authorization, goals, results
 from chute_ros.protocol.mavlink.announcements import Announcements
 from chute_ros.protocol.mavlink.autopilot import AutopilotTracker
+from chute_ros.protocol.mavlink.autopilot_care import AutopilotCare
 from chute_ros.protocol.mavlink.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.protocol.mavlink.config import MavlinkConfig
 from chute_ros.protocol.mavlink.devices import Devices
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.protocol.mavlink.flight_block import FlightBlock
 from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.protocol.mavlink.kill import DeployDecided
 from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+from chute_ros.protocol.mavlink.setup_check import Setup
 from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.protocol.mavlink.stream_watch import Ask
 from chute_ros.protocol.mavlink.wire import Duplicates, Inbox, Outbox
@@ -49,10 +51,11 @@ class MavlinkLink:
         self._inbox = Inbox(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
-        self._next_internal = -1
-        self._block = FlightBlock()
         self._announcements = Announcements()
-        self._disarming = 0
+        self._deploy_decided = DeployDecided(self._devices.arming_count)
+        self._care = AutopilotCare(
+            config, self._devices, self.requests, self._outbox, self._announcements
+        )
         self._heartbeat_at = -math.inf
         self._heartbeats_until = -math.inf
 
@@ -71,6 +74,7 @@ class MavlinkLink:
         self._frames(self._inbox.update(now), now)
         self._devices.update(now)
         self.requests.update(now)
+        self._care.update(now)
         self._look_after_parachutes(now)
         if now >= self._heartbeats_until:
             self._heartbeats_until = -math.inf
@@ -81,7 +85,7 @@ class MavlinkLink:
 
     def next_deadline(self) -> float:
         """When update has something to do; at the latest at our next heartbeat."""
-        parts = (self._inbox, self._devices, self.requests, self._announcements)
+        parts = (self._inbox, self._devices, self.requests, self._care, self._announcements)
         deadlines = [part.next_deadline() for part in parts]
         if self._heartbeat_at < self._heartbeats_until:
             deadlines.append(self._heartbeat_at)
@@ -123,11 +127,13 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
+        self._deploy_decided.decide()
         parachute = self._devices.to_release(device) or self._target(token, device)
         if parachute is not None:
             self.requests.make_way_for_release(now)
             self._announcements.ordered(token, f"DEPLOY of {parachute.device}")
-            self._begin(token, goals.release(parachute, force, now), now)
+            goal = goals.release(parachute, force, now, self._devices.motors_remark)
+            self._begin(token, goal, now)
 
     def parachute_action(self, token: int, action: int, device: str, now: float) -> None:
         """MAV_CMD_DO_PARACHUTE: disable 0, enable 1, release 2 (the same as deploy)."""
@@ -167,12 +173,23 @@ class MavlinkLink:
             why = "no autopilot of ours was ever heard; set autopilot_system_id"
             self.requests.refuse(token, why)
         else:
-            self._announcements.ordered(token, "KILL")
-            self._begin(token, goals.kill(autopilot, self.config.kill_method, now), now)
+            goal = goals.kill(
+                autopilot,
+                lambda: self._care.plan_of(autopilot),
+                self._deploy_decided,
+                self.config.commands.ack_timeout,
+                now,
+            )
+            if goal is None:
+                why = f"no way is allowed: {self._care.plan_of(autopilot).text()}"
+                self.requests.refuse(token, why)
+            else:
+                self._announcements.ordered(token, "KILL")
+                self._begin(token, goal, now)
 
     def flight_block(self, reason: str, now: float) -> None:
         """Block flight for reason, or release the block (empty)."""
-        self._block.set(reason)
+        self._care.block.set(reason)
         self._announcements.reason(reason)
         self._look_after_autopilot(now)
         self._drive(now)
@@ -204,6 +221,11 @@ class MavlinkLink:
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Where requests without a device go: the first that is not lost, or the first."""
         return self._devices.chosen_parachute()
+
+    def setup(self) -> Setup | None:
+        """How our autopilot is set up for a kill and a flight block; None: there is none."""
+        autopilot = self._devices.chosen_autopilot()
+        return None if autopilot is None else self._care.setup_of(autopilot)
 
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
@@ -237,6 +259,8 @@ class MavlinkLink:
         self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
+        elif arm_authorization.is_request(message, self._own_ids):
+            self._care.authorize(ids, now)
         else:
             self._devices.heard(message, ids, now)
         self.requests.effects_may_show(now)
@@ -253,6 +277,8 @@ class MavlinkLink:
                 frame.system_id, frame.component_id, message.command, message.result
             )
             self.requests.commands.acknowledged(ack, now)
+            if ack.result == results.ACCEPTED:
+                self._devices.accepted(ack, now)
 
     def _release_under_way(self, token: int) -> bool:
         """A release is under way, which nothing may undo: the request is refused."""
@@ -276,36 +302,20 @@ class MavlinkLink:
         self._drive(now)
 
     def _look_after_autopilot(self, now: float) -> None:
-        """Ask for what it does not send; undo its arming on the ground while flight is blocked."""
+        """Ask for what it does not send; read its settings; keep a flight block."""
         autopilot = self._devices.chosen_autopilot()
         if autopilot is None or autopilot.liveness.state is not LinkState.OK:
             return
-        if (rate := self.config.autopilot_message_rate) > 0:
+        rate = self.config.autopilot_message_rate
+        self._care.look(autopilot, rate > 0, now)
+        if rate > 0:
             self._ask_for(autopilot.messages_due(1.0 / rate, now), autopilot, now)
-        if self._disarming in self.requests:
-            if not self._block.stands(autopilot, now):
-                why = (
-                    "flight is not blocked any more, or the vehicle not known to be on the ground"
-                )
-                self.requests.abandon(self._disarming, why, now)
-        elif self.config.disarm_when_blocked and self._block.disarm_due(autopilot, now):
-            self._disarm(autopilot, now)
 
     def _look_after_parachutes(self, now: float) -> None:
         """Ask for the status that does not come; a ground station may have switched it off."""
         for parachute in self.parachutes.all():
             if parachute.status_due(now):
                 self.requests.commands.send_once(goals.request_status(parachute), now)
-
-    def _disarm(self, autopilot: AutopilotTracker, now: float) -> None:
-        reason = self._block.reason
-        if self._block.worth_telling():
-            text = f"autopilot armed while flight is blocked ({reason}): disarming"
-            self._devices.notice(Severity.WARNING, text)
-            self._announcements.say(f"{reason}: flight blocked, disarming")
-        # Our own requests count down from -1, so that they never meet a token of the owner's.
-        self._disarming, self._next_internal = self._next_internal, self._next_internal - 1
-        self._begin(self._disarming, goals.disarm_on_ground(autopilot, now), now)
 
     def _ask_for(self, asks: tuple[Ask, ...], autopilot: AutopilotTracker, now: float) -> None:
         for ask in asks:

@@ -28,6 +28,10 @@ class Readings:
         for part in parts:
             self._newest.pop(part, None)
 
+    def get(self, part: str) -> Reading:
+        """The newest value with its time; NaN: none came."""
+        return self._newest.get(part, _NEVER)
+
     def value(self, part: str) -> float:
         """The newest value; NaN: none came."""
         return self._newest.get(part, _NEVER).value

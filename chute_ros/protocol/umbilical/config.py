@@ -20,6 +20,15 @@ class DeployStage(enum.Enum):
     NEXT = "next"
 
 
+class HeartbeatInFlight(enum.Enum):
+    """Whether <H> is sent from Ascent until the landing."""
+
+    #: As the layout says.
+    AUTO = "auto"
+    YES = "true"
+    NO = "false"
+
+
 @dataclass(frozen=True)
 class MemoryLimits:
     """Seconds: to the first sign of a dump or wipe; of silence in a dump, and in a wipe, after
@@ -54,4 +63,5 @@ class UmbilicalConfig:
     settle_time: float = 0.2
     deploy: DeployStage = DeployStage.DROGUE
     safe_opens_sv: bool = False
+    heartbeat_in_flight: HeartbeatInFlight = HeartbeatInFlight.AUTO
     decided_deploy_forces: bool = True

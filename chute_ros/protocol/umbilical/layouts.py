@@ -63,7 +63,8 @@ class Problem:
 
 
 class Layout:
-    """One layout. target_floats: of the set-target command; target_fields: what shows it."""
+    """One layout. target_floats: of the set-target command; target_fields: what shows it.
+    heartbeat_in_flight: its firmware wants <H> in flight as well."""
 
     def __init__(
         self,
@@ -71,11 +72,13 @@ class Layout:
         fields: tuple[Field, ...],
         target_floats: int,
         target_fields: tuple[str, ...],
+        heartbeat_in_flight: bool = False,
     ) -> None:
         self.name = name
         self.fields = fields
         self.target_floats = target_floats
         self.target_fields = target_fields
+        self.heartbeat_in_flight = heartbeat_in_flight
         self.index = {field.name: number for number, field in enumerate(fields)}
         self._sure = re.compile(",".join(field.kind.sure_pattern for field in fields))
         self._ranges = struct.Struct("<" + "".join(f.kind.code for f in fields))
@@ -162,6 +165,7 @@ def layout_from(content: Mapping[str, Any], where: str) -> Layout:
             fields,
             int(content["target_floats"]),
             tuple(_word(one) for one in content["target_fields"]),
+            _switch(content.get("heartbeat_in_flight", False)),
         )
     except (LookupError, OverflowError, TypeError, ValueError) as error:
         raise ParameterError(f"{where}: no layout of $TELEM: {error!r}") from None
@@ -194,3 +198,9 @@ def _word(content: Any) -> str:
     if not isinstance(content, (str, int, float)):
         raise TypeError(f"a word is needed, not a {type(content).__name__}")
     return str(content)
+
+
+def _switch(content: Any) -> bool:
+    if not isinstance(content, bool):
+        raise TypeError(f"heartbeat_in_flight is {content!r}: need true or false")
+    return content

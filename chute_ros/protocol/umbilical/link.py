@@ -27,6 +27,7 @@ from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
 from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
 from chute_ros.protocol.umbilical.events import Progress, TelemetryReceived, UmbilicalEvent
 from chute_ros.protocol.umbilical.flight_computer import DEVICE, FlightComputer
+from chute_ros.protocol.umbilical.heartbeat_hold import HeartbeatHold
 from chute_ros.protocol.umbilical.layouts import Layout
 from chute_ros.protocol.umbilical.memory import MemoryWorks, Step
 from chute_ros.protocol.umbilical.orders import Orders
@@ -66,6 +67,7 @@ class UmbilicalLink:
         self._show_unknown_at = 0.0
         self._told_since = -math.inf
         self._told = 0
+        self._hold = HeartbeatHold(config.heartbeat_in_flight)
         self._output: list[Command] = []
         #: Of the commands that were handed out last the names, by their tokens.
         self._handed_out: dict[bytes, str] = {}
@@ -282,6 +284,7 @@ class UmbilicalLink:
             where = " IN FLIGHT" if self.computer.restarted_in_flight else ""
             self._events.append(Notice(Severity.ERROR, f"flight computer restarted{where}"))
             self.memory.restarted()
+        self._hold.record(self.computer.flying)
         self.memory.telemetry(now)
         self._changed(changes)
         self._events.append(TelemetryReceived(record, self.computer.records))
@@ -300,8 +303,10 @@ class UmbilicalLink:
         # What is over is taken out before the next token leaves.
         sends = self._requests.drive(now)
         self.scheduler.withdraw(lambda command: not self.memory.waits_for(command))
+        self.scheduler.heartbeats_held = self._hold.holds(self.decoder.layout, now)
         self.scheduler.send_next(now)
         for send in [*sends, *self._requests.drive(now)]:
             self.memory.token_sent(send.command, now)
             self.orders.token_sent(send.command.name, now)
+            self._hold.token_sent(send.command.name, now)
             self._output.append(send.command)

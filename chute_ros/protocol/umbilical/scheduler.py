@@ -98,6 +98,8 @@ class CommandScheduler:
         self.commands_sent = 0
         self.last_heartbeat = math.nan
         self.is_open = False
+        #: No heartbeat is sent for now, whoever is alive.
+        self.heartbeats_held = False
         self._urgent: deque[_Waiting] = deque()
         self._others: deque[_Waiting] = deque()
         self._heartbeats_until = -math.inf
@@ -160,7 +162,7 @@ class CommandScheduler:
             self._heartbeats_until = -math.inf
         if not self.is_open or now < self._free_at:
             return
-        beats = self._heartbeats_until > -math.inf
+        beats = self._heartbeats_until > -math.inf and not self.heartbeats_held
         late = self.limits.heartbeat_slack
         if beats and now >= self._heartbeat_at + late:
             self._beat(now)
@@ -177,7 +179,7 @@ class CommandScheduler:
             return math.inf
         if self._urgent or self._others:
             return self._free_at
-        if self._heartbeat_at < self._heartbeats_until:
+        if self._heartbeat_at < self._heartbeats_until and not self.heartbeats_held:
             return max(self._free_at, self._heartbeat_at)
         return math.inf
 

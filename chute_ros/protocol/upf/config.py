@@ -8,11 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.dronecan.bus_node import BusNodeConfig
+from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
 
+#: Ours: far from autopilots (PX4 1, ArduPilot 10), from devices with low static ids, from those
+#: given out from 125 downwards and from the tools' own 126 and 127.
+NODE_ID = 100
 #: As delivered (document, "node discovery"); never given out by the allocator.
 CONTROLLER_NODE_ID, TRIGGER_NODE_ID = 33, 34
 #: Of a node's name (uavcan.protocol.GetNodeInfo).
@@ -34,7 +37,7 @@ class Policy(enum.Enum):
 class UpfConfig:
     """Settings of a UpfLink."""
 
-    node_id: int = 10
+    node_id: int = NODE_ID
     node_name: str = "org.chute_ros.upf_can"
     unique_id: bytes = bytes(16)
     #: The controller and trigger that are ours; 0: the first ones heard.
@@ -58,6 +61,8 @@ class UpfConfig:
     #: Parts of vehicle/state that are older are told as not known.
     vehicle_state_age: float = 1.0
     allocator: bool = True
+    #: To another allocator on the bus, as an autopilot is one.
+    allocator_yields: bool = False
     allocation_table: Mapping[bytes, int] = field(default_factory=dict)
     time_master: bool = True
     #: UTC minus monotonic time at the start.
@@ -105,6 +110,7 @@ class UpfConfig:
             unique_id=self.unique_id,
             calls=self.calls,
             allocator=self.allocator,
+            allocator_yields=self.allocator_yields,
             table=self.allocation_table,
             never=never,
             time_master=self.time_master,

@@ -28,6 +28,7 @@ from chute_ros.protocol.upf.devices import Controller
 from chute_ros.protocol.upf.errands import Errand
 from chute_ros.protocol.upf.events import UpfEvent
 from chute_ros.protocol.upf.last_resort import LastResort
+from chute_ros.protocol.upf.over_motors import OverMotors
 from chute_ros.protocol.upf.roster import UpfDevices
 from chute_ros.protocol.upf.vehicle_service import VehicleService
 from chute_ros.protocol.upf.vehicle_status import Vehicle
@@ -49,6 +50,7 @@ class UpfLink:
         endpoint = self.bus.endpoint
         self._deploying = Deploying(config, self.devices, self.requests, endpoint, last_resort)
         self._vehicle = Vehicle(config, self.devices, endpoint)
+        self._over_motors = OverMotors(self._vehicle, self.vehicle_service, self.devices)
         self._desk = ErrandDesk(self.bus, self.devices, self._vehicle.in_air)
         #: Our own requests count down from -1; what follows once such a one has succeeded.
         self._next_internal = -1
@@ -75,6 +77,9 @@ class UpfLink:
     def update(self, now: float) -> None:
         """Look at the clock: limits, retries, what we send by ourselves."""
         self.bus.update(now)
+        for node_id in self.bus.nodes.take_replaced():
+            self.devices.replaced(node_id, now)
+        self.devices.doubled = frozenset(self.bus.nodes.conflicts(now))
         self.devices.update(now)
         self.vehicle_service.update(now)
         self.requests.update(now)
@@ -213,6 +218,7 @@ class UpfLink:
 
     def deploy(self, token: int, force: bool, now: float, node_id: int = 0) -> None:
         """Deploy through the controller; if it does not answer, or there is none, the trigger."""
+        self._over_motors.begin(token)
         self._deploying.deploy(token, force, node_id, now)
         self._drive(now)
         if self._deploying.update(now):
@@ -220,6 +226,7 @@ class UpfLink:
 
     def fire_triggers(self, token: int, now: float) -> None:
         """Fire the triggers directly, whatever the controller does: the end of a ladder."""
+        self._over_motors.begin(token)
         self._deploying.fire_triggers(token, now)
         self._drive(now)
         if self._deploying.update(now):
@@ -280,7 +287,6 @@ class UpfLink:
             for node_id in self.bus.nodes.take_restarted():
                 self.devices.restarted(node_id)
                 self._deploying.restarted(node_id, now)
-                self.devices.notice(Severity.ERROR, f"node {node_id} restarted")
             self.devices.node_status(heard.source, heard.values, now)
 
     def _target(self, token: int, node_id: int, now: float) -> Controller | None:
@@ -316,7 +322,7 @@ class UpfLink:
             finished = event.finished
             self._deploying.over(finished.token)
             if finished.token not in self._then:
-                self._events.append(event)
+                self._events.append(RequestFinished(self._over_motors.end(finished, now)))
                 return
             token, then = self._then.pop(finished.token)
             if finished.success:

@@ -42,6 +42,8 @@ class UpfDevices:
         self.counts: Counter[str] = Counter()
         #: Controllers whose parameters are to be read anew.
         self.to_read: list[Controller] = []
+        #: Node ids that two nodes use: what their statuses say changes with each.
+        self.doubled: frozenset[int] = frozenset()
         self._events: list[Event | TriggerChanged] = []
 
     # -- who -------------------------------------------------------------------------------------
@@ -107,7 +109,9 @@ class UpfDevices:
         jumps = controller.unknown_jumps
         before = controller.state
         self._changed(controller, controller.status_message(values, now))
-        if controller.unknown_jumps > jumps:
+        if node_id in self.doubled:
+            pass  # told once, as what it is
+        elif controller.unknown_jumps > jumps:
             self.notice(
                 Severity.WARNING,
                 f"controller {node_id} went from {controller.newest_unknown_jump}, "
@@ -160,6 +164,13 @@ class UpfDevices:
         if controller is not None:
             controller.parameters.clear()
             self.to_read.append(controller)
+
+    def replaced(self, node_id: int, now: float) -> None:
+        """Another device has this node id: what it does not say itself is not true of it."""
+        known: dict[int, Any]
+        for known in (self.controllers, self.triggers):
+            if node_id in known and known[node_id].overdue(now):
+                del known[node_id]
 
     def update(self, now: float) -> None:
         """Look at the clock."""

@@ -182,6 +182,12 @@ class VehicleService:
         if said_at > self._kill_confirmed:
             self._kill_confirmed = -math.inf
 
+    @property
+    def kill_confirmed_at(self) -> float:
+        """When the motors were last seen to stop by our kill, and not armed since; minus infinity:
+        they were not."""
+        return self._kill_confirmed
+
     def supervisor_said(self, blocked: bool, standing: Collection[str], now: float) -> None:
         """Flight is blocked or not, and the devices whose wish for it the supervisor knows."""
         self._blocked, self._standing = blocked, frozenset(standing)

@@ -64,6 +64,12 @@ class Vehicle:
             or (armed_fresh and vehicle.armed is Armed.DISARMED)
         )
 
+    def armed_at(self, now: float) -> float:
+        """When the vehicle said that it is armed, if that is still young enough to be so; NaN."""
+        age = self._state.armed_age + now - self._received
+        known = self._state.armed is Armed.ARMED and age <= self._config.vehicle_state_age
+        return now - age if known and self._state.link_state is not LinkState.LOST else NAN
+
     def update(self, now: float) -> None:
         """Tell it, if it is time to."""
         if now < self._tell_at:

@@ -180,6 +180,7 @@ def test_without_a_free_id_above_the_highest_below():
 def test_with_all_ids_taken_nobody_gets_one():
     taken = [number for number in range(LOWEST, HIGHEST + 1) if number not in NEVER]
     desk = Desk({bytes([number] * 16): number for number in taken})
+    desk.in_use |= {number: bytes([number] * 16) for number in taken}
     assert desk.ask(OTHER) is None
     assert desk.allocator.refusal == "no node id is free"
     assert desk.kept == []
@@ -261,6 +262,153 @@ def test_a_table_that_nobody_can_have_kept_is_refused():
     for table in ({OTHER[:15]: 5}, {OTHER: 0}, {OTHER: 126}, {OTHER: 5, UID: 5}):
         with pytest.raises(ParameterError, match="table of node ids"):
             Allocator(table, NEVER)
+
+
+# -- another allocator on the bus ---------------------------------------------------------------
+
+
+def yielding(table=None):
+    desk = Desk(table)
+    desk.allocator = Allocator(table or {}, NEVER, yields=True)
+    return desk
+
+
+def asks_until(desk, end, every=0.8, unique_id=OTHER, answered_by=0):
+    """A unit asks again and again; the id that we gave, or None. answered_by: who answers it."""
+    while desk.now < end:
+        given_id = desk.ask(unique_id)
+        if given_id is not None:
+            return given_id
+        if answered_by:
+            desk.part(unique_id[:6], source=answered_by)
+        desk.now += every
+    return None
+
+
+def test_requests_that_nobody_else_answers_are_ours_after_two_seconds():
+    desk = yielding()
+    assert asks_until(desk, 1.9) is None
+    assert desk.allocator.refusal == "waiting whether another allocator answers"
+    assert asks_until(desk, 4.0) == 125
+    assert (desk.allocator.refusal, desk.allocator.left_to) == ("", 0)
+    assert desk.ask(UID) == 124, "at once from then on"
+
+
+def test_an_allocator_that_answers_is_left_to_it_for_good():
+    """Given an autopilot that answers, an hour passes, and it answers again."""
+    desk = yielding()
+    assert asks_until(desk, 60.0, answered_by=10) is None
+    assert desk.allocator.left_to == 10
+    desk.now += 3600.0
+    assert asks_until(desk, desk.now + 60.0, answered_by=10) is None
+    assert desk.allocator.left_to == 10
+    assert desk.kept == []
+
+
+def test_an_allocator_that_appears_later_is_left_to_it():
+    desk = yielding()
+    assert asks_until(desk, 5.0) == 125
+    desk.part(UID[:6], source=10)
+    assert desk.allocator.left_to == 10
+    assert desk.ask(UID) is None
+
+
+def test_the_duty_is_taken_again_when_requests_go_unanswered_for_long():
+    desk = yielding()
+    asks_until(desk, 5.0, answered_by=10)
+    desk.now = begin = 100.0
+    assert asks_until(desk, begin + 9.9) is None
+    assert desk.allocator.left_to == 10
+    assert asks_until(desk, begin + 12.0) == 125
+    assert desk.allocator.left_to == 0
+
+
+def test_who_gives_out_the_ids_is_told_once_each_time_it_changes():
+    bench = Bench(allocator=True, allocator_yields=True).at(1.5)
+    for second in range(2, 8):
+        asking(bench.at(float(second)))
+        bench.hear(50, ALLOCATION, unique_id=UID[:6])
+    assert bench.said(ALLOCATION) == []
+    left = "node 50 gives out node ids: it is left to it (parameter allocator)"
+    assert bench.notices() == [left]
+    assert bench.node.troubles() == [], "it is no error, and forbids nothing"
+    for second in range(20, 32):
+        asking(bench.at(float(second)))
+    again = "node 50 answers no request for a node id any more: given out here again"
+    assert bench.notices() == [left, again]
+    assert len(bench.tables()) >= 1
+
+
+# -- strangers ----------------------------------------------------------------------------------
+
+
+def stranger(number):
+    return bytes([number % 256, number // 256]) * 8
+
+
+def flood(desk, count, every):
+    """So many units that were never seen before ask, one each every s; how many got an id."""
+    got = 0
+    for number in range(count):
+        got += desk.ask(stranger(number)) is not None
+        desk.allocator.update(desk.in_use, desk.now)
+        desk.now += every
+    return got
+
+
+def test_ten_new_units_a_minute_get_an_id():
+    desk = Desk()
+    assert flood(desk, 200, 0.25) == 10
+    assert desk.allocator.refusal == "more than 10 new units within 60 s"
+
+
+def test_known_units_are_served_whoever_else_asks():
+    desk = Desk({OTHER: 77})
+    flood(desk, 200, 0.25)
+    assert desk.ask(OTHER) == 77
+
+
+def test_strangers_never_fill_the_table_and_true_devices_keep_theirs():
+    """Given one device that was heard with its id, and a stranger each 6 s for ten hours."""
+    desk = Desk()
+    assert desk.ask(OTHER) == 125
+    desk.in_use[125] = OTHER
+    desk.allocator.update(desk.in_use, desk.now)
+    flood(desk, 6000, 6.0)
+    assert desk.allocator.refusal == ""
+    assert len(desk.allocator.table) < 110
+    del desk.in_use[125]  # switched off
+    assert desk.ask(OTHER) == 125
+
+
+def test_an_id_that_was_given_and_is_not_used_goes_back_after_ten_minutes():
+    desk = Desk()
+    desk.ask(OTHER)
+    desk.now = 599.0
+    desk.allocator.update(desk.in_use, desk.now)
+    assert desk.allocator.table == {OTHER: 125}
+    desk.now = 600.0
+    desk.allocator.update(desk.in_use, desk.now)
+    assert desk.allocator.table == {}
+    assert desk.allocator.take_keep()[-1].table == {}
+
+
+def test_where_no_id_is_left_the_unit_that_never_used_its_own_gives_way():
+    ids = [number for number in range(LOWEST, HIGHEST + 1) if number not in NEVER]
+    desk = Desk({stranger(number): number for number in ids})
+    first, second = ids[:2]
+    desk.in_use[first] = stranger(first)
+    desk.allocator.update(desk.in_use, desk.now)
+    del desk.in_use[first]
+    assert desk.ask(OTHER) == second, "the first was heard, as it is kept, a moment ago"
+
+
+def test_the_order_of_the_table_tells_who_used_its_id_last():
+    desk = Desk({OTHER: 77, UID: 78})
+    desk.in_use |= {77: OTHER}
+    desk.allocator.update(desk.in_use, 0.0)
+    desk.ask(stranger(1))
+    assert list(desk.kept[-1].table) == [stranger(1), UID, OTHER]
 
 
 # -- whatever comes -----------------------------------------------------------------------------

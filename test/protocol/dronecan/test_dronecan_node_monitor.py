@@ -134,6 +134,97 @@ def test_two_unique_ids_under_one_node_id_are_a_conflict():
     assert monitor.conflicts(0.2) == [33]
 
 
+def test_two_under_one_id_of_which_one_is_rarely_heard_are_one_conflict_that_lasts():
+    """Given one each second, and one each seven seconds, for a minute."""
+    monitor, restarts, seen = NodeMonitor(), 0, []
+    for tick in range(60):
+        speak(monitor, tick, tick, booted=-100.0)
+        if tick % 7 == 3:
+            speak(monitor, tick + 0.5, tick + 0.5, booted=-7.0)
+        restarts += len(monitor.take_restarted())
+        seen.append(monitor.conflicts(tick + 0.9))
+    assert restarts <= 1
+    begin = seen.index([33])
+    # Until the second sign nobody knows how often it comes.
+    assert seen[begin + 10 :] == [[33]] * (60 - begin - 10)
+    assert monitor.take_news(60.0) == [], "it is no restart"
+
+
+def test_two_that_were_switched_on_together_are_found_by_how_they_count():
+    monitor = NodeMonitor()
+    for tick in range(5):
+        monitor.status(33, status(tick), tick, tick % 32)
+        monitor.status(33, status(tick), tick + 0.4, (tick + 7) % 32)
+    assert monitor.conflicts(5.0) == [33]
+
+
+def test_one_that_loses_messages_and_wraps_around_counts_forwards():
+    monitor = NodeMonitor()
+    for tick in range(200):
+        monitor.status(33, status(tick // 10), tick / 10, (tick * 3) % 32)
+    assert monitor.conflicts(20.0) == []
+
+
+def answers(monitor, now, *unique_ids, node_id=33):
+    monitor.status(node_id, status(int(now) + 50), now)
+    for unique_id in unique_ids:
+        monitor.information(node_id, info(unique_id), now)
+
+
+def test_a_known_node_is_asked_again_and_a_second_unit_is_asked_each_second():
+    monitor, asked = NodeMonitor(), []
+    for tick in range(40):
+        answers(monitor, tick, UID)
+        asked += [tick for _ in monitor.to_ask(tick)]
+    assert asked == [0, 10, 20, 30]
+    for tick in range(40, 45):
+        answers(monitor, tick, UID, b"\x55" * 16)
+        assert monitor.conflicts(tick) == [33]
+        assert monitor.to_ask(tick) == [33]
+
+
+def test_two_of_which_each_answers_every_other_question_are_one_conflict_that_lasts():
+    """Given two that were switched on together, and answer in turns."""
+    monitor, seen = NodeMonitor(), []
+    units, number = (UID, b"\x55" * 16), 0
+    for tick in range(60):
+        monitor.status(33, status(tick), tick)
+        for _ in monitor.to_ask(tick):
+            monitor.information(33, info(units[number % 2]), tick)
+            number += 1
+        seen.append(monitor.conflicts(tick))
+    begin = seen.index([33])
+    assert begin <= 11
+    assert seen[begin:] == [[33]] * (60 - begin)
+    assert monitor.take_news(60.0) == [], "it is no exchange of a device"
+
+
+def test_another_device_under_a_node_id_is_told_once():
+    monitor = NodeMonitor()
+    answers(monitor, 0.0, UID)
+    monitor.forget_gone(10.0)
+    answers(monitor, 60.0, b"\x55" * 16)
+    assert monitor.take_news(61.0) == []
+    (text,) = monitor.take_news(62.5)
+    assert text.startswith("node 33 is another device than before: unique id 5555")
+    assert monitor.take_replaced() == [33]
+    assert monitor.take_news(70.0) == []
+
+
+def test_two_devices_that_swap_their_ids_are_one_error():
+    other = b"\x55" * 16
+    monitor = NodeMonitor()
+    answers(monitor, 0.0, UID)
+    answers(monitor, 0.0, other, node_id=34)
+    monitor.forget_gone(10.0)
+    answers(monitor, 20.0, other)
+    answers(monitor, 21.0, UID, node_id=34)
+    (text,) = monitor.take_news(23.0)
+    assert text.startswith("nodes 33 and 34 have swapped their node ids")
+    assert sorted(monitor.take_replaced()) == [33, 34]
+    assert monitor.take_news(30.0) == []
+
+
 def test_a_silent_node_is_forgotten_and_may_be_another_when_it_comes_back():
     monitor = NodeMonitor()
     monitor.status(33, status(5), 0.0)

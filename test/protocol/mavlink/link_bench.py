@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished
@@ -30,6 +31,31 @@ def copter(armed: bool = False, state: int = d.MAV_STATE_ACTIVE) -> Any:
     """An autopilot's HEARTBEAT."""
     mode = d.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
     return heartbeat(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, mode, state)
+
+
+def ardupilot(
+    armed: bool = False, state: int = d.MAV_STATE_ACTIVE, kind: int = d.MAV_TYPE_QUADROTOR
+) -> Any:
+    """An ArduPilot's HEARTBEAT."""
+    mode = d.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
+    return heartbeat(kind, d.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, state)
+
+
+def setting(name: str, value: float, kind: int = d.MAV_PARAM_TYPE_REAL32) -> Any:
+    """A PARAM_VALUE as ArduPilot sends it, and PX4 a float."""
+    return d.MAVLink_param_value_message(name.encode(), value, kind, 1000, 0xFFFF)
+
+
+def px4_integer(name: str, value: int) -> Any:
+    """A PARAM_VALUE as PX4 sends an integer: its bytes in the float."""
+    (as_float,) = struct.unpack("<f", struct.pack("<i", value))
+    return setting(name, as_float, d.MAV_PARAM_TYPE_INT32)
+
+
+def no_setting(name: str) -> Any:
+    """A PARAM_ERROR: there is no such parameter."""
+    missing = d.MAV_PARAM_ERROR_DOES_NOT_EXIST
+    return d.MAVLink_param_error_message(255, 0, name.encode(), -1, missing)
 
 
 def landed(state: int = d.MAV_LANDED_STATE_ON_GROUND) -> Any:
@@ -124,6 +150,10 @@ class Bench:
         """The COMMAND_LONGs sent so far."""
         longs = [m for _, m in self.sent if m.get_type() == "COMMAND_LONG"]
         return [m for m in longs if number in (None, m.command)]
+
+    def reads(self) -> list[Any]:
+        """The PARAM_REQUEST_READs sent so far."""
+        return [m for _, m in self.sent if m.get_type() == "PARAM_REQUEST_READ"]
 
     def clear(self) -> None:
         self.sent.clear()

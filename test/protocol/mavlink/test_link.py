@@ -163,7 +163,8 @@ def test_other_vehicles_and_ground_stations_do_not_confuse_it():
     assert bench.link.vehicle_state(bench.now).source == "1/1"
     assert bench.link.vehicle_state(bench.now).armed is Armed.DISARMED
     assert bench.link.doubts(bench.now) == []
-    assert bench.sent == []
+    assert bench.commands() == []
+    assert {m.target_system for m in bench.reads()} == {1}, "our autopilot's settings"
 
 
 def test_our_own_frames_that_come_back_are_counted_and_nothing_else():
@@ -273,7 +274,7 @@ def test_block_undoes_arming_on_the_ground():
     bench.collect()
     assert bench.commands() == []
     bench.at(0.5).hear(PILOT, landed(), copter(armed=True))
-    (order,) = bench.commands()
+    (order,) = bench.commands(DISARM)
     assert (order.command, order.param1, order.param2) == (DISARM, 0, 0)
     assert bench.texts() == [
         "parachute lost: flight blocked",
@@ -298,14 +299,14 @@ def test_block_never_disarms_off_the_ground_or_where_that_is_not_known(where):
     bench = Bench().hear(PILOT, copter(armed=True), landed(where))
     bench.link.flight_block("x", bench.now)
     bench.stream(10.0, 0.5, PILOT, lambda: copter(armed=True))
-    assert bench.commands() == []
+    assert bench.commands(DISARM) == []
 
 
 def test_block_does_not_believe_an_old_word_of_standing_on_the_ground():
     bench = grounded(armed=False).stream(3.0, 0.5, PILOT, copter)
     bench.link.flight_block("x", bench.now)
     bench.stream(6.0, 0.5, PILOT, lambda: copter(armed=True))
-    assert bench.commands() == []
+    assert bench.commands(DISARM) == []
 
 
 def test_block_switched_off_by_parameter():

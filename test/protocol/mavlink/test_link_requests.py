@@ -8,7 +8,7 @@ from chute_ros.protocol.mavlink import results
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
 CHUTE, PILOT = (1, 161), (1, 1)
-RELEASE, TRIGGERS, REQUEST, TERMINATE = 208, 225, 512, 185
+RELEASE, TRIGGERS, REQUEST, DISARM = 208, 225, 512, 400
 
 
 def ready(**config):
@@ -34,7 +34,8 @@ def test_release_is_done_when_the_parachute_itself_says_deployed():
     bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
     assert steps(bench, 1) == ["SENT", "ACCEPTED", "CONFIRMED"]
     assert bench.end(1).finished.message == (
-        "PARACHUTE_STATUS says deployed after 0.30 s; acknowledged after 0.10 s"
+        "PARACHUTE_STATUS says deployed after 0.30 s; acknowledged after 0.10 s; "
+        "WARNING: autopilot 1/1 says that it is armed: the motors may turn"
     )
     count = len(bench.commands(RELEASE))
     bench.at(10.0)
@@ -164,11 +165,11 @@ def test_kill_before_deploy_go_side_by_side():
     bench.link.kill(1, bench.now)
     bench.link.deploy(2, False, bench.now)
     bench.collect()
-    assert [order.command for order in bench.commands()] == [TERMINATE, RELEASE]
-    bench.at(0.6).hear(PILOT, ack(TERMINATE)).hear(CHUTE, ack(RELEASE))
+    assert [order.command for order in bench.commands()] == [DISARM, RELEASE]
+    bench.at(0.6).hear(PILOT, ack(DISARM)).hear(CHUTE, ack(RELEASE))
     bench.hear(CHUTE, status(boot_ms=5100, deployed=4))
     assert bench.end(2).finished.success
-    bench.at(0.7).hear(PILOT, copter(True, d.MAV_STATE_FLIGHT_TERMINATION))
+    bench.at(0.7).hear(PILOT, copter(False))
     assert bench.end(1).finished.success
 
 
@@ -176,7 +177,7 @@ def test_kill_is_sent_even_if_the_motors_are_thought_to_be_off():
     bench = Bench().hear(PILOT, copter(armed=False)).at(0.5)
     bench.link.kill(1, bench.now)
     bench.collect()
-    assert len(bench.commands(TERMINATE)) == 1
+    assert len(bench.commands(DISARM)) == 1
     assert bench.ends(1) == []
     bench.at(0.6).hear(PILOT, copter(armed=False))
     assert bench.end(1).finished.success
@@ -185,9 +186,9 @@ def test_kill_is_sent_even_if_the_motors_are_thought_to_be_off():
 def test_kill_that_is_refused_is_tried_on_until_time_is_up():
     bench = ready()
     bench.link.kill(1, bench.now)
-    denied = ack(TERMINATE, d.MAV_RESULT_DENIED)
+    denied = ack(DISARM, d.MAV_RESULT_DENIED)
     bench.stream(6.0, 0.1, PILOT, lambda: denied)
-    assert len(bench.commands(TERMINATE)) > 10
+    assert len(bench.commands(DISARM)) > 10
     assert bench.end(1).finished.result == d.MAV_RESULT_DENIED
 
 

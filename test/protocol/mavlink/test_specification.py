@@ -1,7 +1,7 @@
 """Each sentence of the two parachute protocol documents that test_parachute.py does not hold."""
 
 import pytest
-from link_bench import Bench, ack, copter, heartbeat, status
+from link_bench import Bench, ack, ardupilot, heartbeat, setting, status
 
 from chute_ros.model import LinkState, ParachuteState, TriggerFlags
 from chute_ros.protocol.mavlink.config import KillMethod
@@ -246,7 +246,8 @@ def test_MAV_CMD_DO_PARACHUTE_208(action, param1):  # noqa: N802
     ],
 )
 def test_kill(method, number, params):
-    bench = Bench(kill_method=method).hear((1, 1), copter(armed=True))
+    bench = Bench(kill_method=method).hear((1, 1), ardupilot(armed=True))
+    bench.hear((1, 1), setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42))
     bench.link.kill(6, bench.now)
     bench.collect()
     (order,) = bench.commands()
@@ -254,6 +255,6 @@ def test_kill(method, number, params):
     assert (order.target_system, order.target_component) == (1, 1)
     bench.at(0.1).hear((1, 1), ack(number))
     assert bench.ends(6) == []
-    bench.at(0.2).hear((1, 1), copter(armed=False))
+    bench.at(0.2).hear((1, 1), ardupilot(armed=False))
     assert bench.end(6).finished.success
-    assert "the autopilot's heartbeat says motors off" in bench.end(6).finished.message
+    assert "the autopilot says motors off" in bench.end(6).finished.message

@@ -198,6 +198,8 @@ def test_controller_that_restarts_is_noticed_and_asked_again(bench):
     controller = story.link.devices.controllers[33]
     assert controller.restart_count == 1
     assert controller.parameters == {}
+    # Once it is known that it was no second node under the same id.
+    story.at(2.5).node_status(uptime=0).at(4.6)
     assert "node 33 restarted" in story.notices()
     assert len(story.requests("uavcan.protocol.param.GetSet")) >= 1
 
@@ -324,7 +326,7 @@ def test_stray_controller_does_not_take_the_place_of_the_trigger(bench):
         ({"node_id": 128}, "node_id is 128: need 1 to 127"),
         ({"controller_node_id": 128}, "controller_node_id is 128: need 0 (any) to 127"),
         ({"trigger_node_id": -1}, "trigger_node_id is -1: need 0 (any) to 127"),
-        ({"controller_node_id": 10}, "controller_node_id and node_id are both 10"),
+        ({"controller_node_id": 100}, "controller_node_id and node_id are both 100"),
         ({"status_timeout": 0.0}, "status_timeout is 0.0: need a time above 0 s"),
         ({"last_resort_after": math.inf}, "last_resort_after is inf"),
         ({"vehicle_service_timeout": math.nan}, "vehicle_service_timeout is nan"),

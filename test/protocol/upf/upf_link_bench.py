@@ -20,7 +20,7 @@ from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished, RequestReport
 from chute_ros.protocol.upf import definitions as names
 from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import UpfConfig
+from chute_ros.protocol.upf.config import NODE_ID, UpfConfig
 from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.protocol.upf.devices import SAYINGS, SAYINGS_ORDERED
 from chute_ros.protocol.upf.events import ErrandFinished
@@ -32,7 +32,7 @@ from chute_ros.sim.upf_node import NodeSettings
 from chute_ros.sim.upf_trigger import UpfTrigger
 
 START = 1000.0
-US, CONTROLLER, TRIGGER = 10, 33, 34
+US, CONTROLLER, TRIGGER = NODE_ID, 33, 34
 #: What the vehicle decides itself, so that its requests are not refused.
 BY_REQUEST = dict.fromkeys((p.AUTO_TAKEOFF, p.AUTO_ARM, p.AUTO_DISARM, p.AUTO_LAND), False)
 

@@ -1,0 +1,57 @@
+"""Reading a file that somebody put in its place: never waiting, never without an end."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+#: No file that is read whole is longer, bytes.
+LONGEST = 16 * 2**20
+_KINDS = (
+    (stat.S_ISFIFO, "a FIFO"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISDIR, "a folder (Is a directory)"),
+)
+
+
+class NotRegularError(OSError):
+    """A FIFO, a device, a folder or a socket in place of a file."""
+
+
+class TooLongError(OSError):
+    """It holds more than it may."""
+
+
+def read_regular(path: Path, longest: int = LONGEST) -> tuple[os.stat_result, bytes]:
+    """What the file is, and what is in it. OSError, as usual; NotRegularError and
+    TooLongError (longest in bytes): a FIFO that nobody writes to would never answer, and a device
+    such as /dev/zero never end."""
+    # Before it is opened: that alone may do something to a device.
+    _check(os.stat(path))
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+    try:
+        about = os.fstat(file)
+        _check(about)
+        parts, size = [], 0
+        while part := os.read(file, longest + 1 - size):
+            parts.append(part)
+            size += len(part)
+            if size > longest:
+                raise TooLongError(f"it holds more than {longest} bytes")
+        return about, b"".join(parts)
+    finally:
+        os.close(file)
+
+
+def read_regular_text(path: Path) -> str:
+    """The same as text in UTF-8; UnicodeDecodeError if it is none."""
+    return read_regular(path)[1].decode("utf-8")
+
+
+def _check(about: os.stat_result) -> None:
+    if not stat.S_ISREG(about.st_mode):
+        kind = next((name for is_it, name in _KINDS if is_it(about.st_mode)), "something else")
+        raise NotRegularError(f"no regular file but {kind}")

@@ -1,0 +1,195 @@
+"""What the stories are made of: get ready, go up, and say what must come of it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from chute_ros.model import Action
+from chute_ros.supervisor.machine import Stage
+from sitl.autopilots import ARDUPLANE, PX4
+from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, held_up, judge
+from sitl.record import Seen, read
+from sitl.truth import GROUND, truth_of
+from sitl.vehicle import StoryError, Vehicle
+
+_READY_WITHIN = 90.0
+#: Processes that start take the machine for themselves, s.
+_SETTLES = 12.0
+_CLIMB_RATE = 1.5  # m/s, no slower
+_STILL = 0.3  # m/s, a hover
+
+
+class Flight:
+    """One run of a story on a vehicle that stands there."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.vehicle = vehicle
+        self.kind = vehicle.autopilot.kind
+        self.began = time.monotonic()
+        #: Looks at the record, once it is whole; what is wrong goes into the verdict.
+        self.afterwards: list[Callable[[Sequence[Seen]], None]] = []
+        self.expected = Expectation()
+        self.verdict = Verdict()
+        self.pilot, self.station = self.vehicle.pilot, self.vehicle.station
+
+    # -- on the ground --------------------------------------------------------------------------
+
+    def get_ready(self) -> None:
+        """The supervisor says READY, and the parachute is armed."""
+        vehicle = self.vehicle
+        vehicle.must("READY", _READY_WITHIN, lambda: vehicle.stage(Stage.READY))
+        vehicle.arm_parachute()
+
+    def change_mode(self, name: str, seconds: float = 20.0) -> None:
+        """The autopilot is in this mode."""
+        self.vehicle.again(
+            f"mode {name}",
+            seconds,
+            lambda: self.pilot.mode(name),
+            lambda: self.pilot.in_mode(name),
+        )
+
+    def arm(self) -> None:
+        """The motors are armed, as soon as the autopilot can."""
+        self.vehicle.again("armed", 60.0, self.pilot.arm, self.station.armed)
+
+    def set(self, name: str, value: float) -> float:
+        """A parameter of the autopilot, and it says that it has it; when it was sent."""
+        sent: list[float] = []
+        self.vehicle.bench.parameters.pop(name, None)
+        self.vehicle.again(
+            f"parameter {name}",
+            10.0,
+            lambda: sent.append(self.pilot.set(name, value)),
+            lambda: name in self.vehicle.bench.parameters,
+        )
+        return sent[-1]
+
+    def get(self, name: str) -> float:
+        """A parameter of the autopilot."""
+        bench = self.vehicle.bench
+        bench.parameters.pop(name, None)
+        self.vehicle.again(
+            f"parameter {name}", 5.0, lambda: bench.request(name), lambda: name in bench.parameters
+        )
+        return bench.parameters[name]
+
+    def upload_mission(self, height: float) -> None:
+        """The autopilot has the pilot's mission."""
+        self.vehicle.again(
+            "the mission is uploaded",
+            15.0,
+            lambda: self.pilot.upload(height),
+            lambda: self.station.mission_ack == 0,
+            4.0,
+        )
+
+    def released(self) -> bool:
+        """The parachute is out."""
+        return any(one.deployed for one in self.vehicle.watch.parachutes.values())
+
+    # -- up and down ----------------------------------------------------------------------------
+
+    def go_up(self, height: float) -> None:
+        """Ready, armed, in the air at this height, and the supervisor knows it."""
+        self.get_ready()
+        if self.kind == PX4:
+            self.set("MIS_TAKEOFF_ALT", height)
+        self.change_mode(self.pilot.ready_to_climb())
+        self.arm()
+        self.climb(height)
+        self.vehicle.must("IN_FLIGHT", 10.0, lambda: self.vehicle.stage(Stage.IN_FLIGHT))
+        # What still climbs must fall longer until its fall shows.
+        self.vehicle.until(10.0, lambda: abs(self.vehicle.truth.now.climb) < _STILL)
+        self.vehicle.rest(1.0)
+
+    def climb(self, height: float) -> None:
+        """An armed one goes up."""
+        vehicle = self.vehicle
+        if self.kind != PX4:
+            vehicle.again(
+                "it takes off",
+                20.0,
+                lambda: self.pilot.take_off(height),
+                lambda: vehicle.height() > 1.0,
+                3.0,
+            )
+        near = min(0.9 * height, height - 1.0)
+        seconds = 20.0 + height / _CLIMB_RATE
+        vehicle.must(f"it climbs to {height:g} m", seconds, lambda: vehicle.height() > near)
+
+    def come_down(self) -> None:
+        """Land, disarmed by itself, and the supervisor says so."""
+        vehicle = self.vehicle
+        mode = {ARDUPLANE: "QLAND"}.get(self.kind, "LAND")
+        self.change_mode(mode)
+        vehicle.must("it lands", 120.0, lambda: vehicle.height() < GROUND)
+        vehicle.must("it disarms", 30.0, lambda: not self.station.armed())
+        vehicle.rest(3.0)
+
+    # -- what must come of it -------------------------------------------------------------------
+
+    def expect(self, want: Want, since: float = math.nan, within: float = math.nan,
+               cause: str = "failure") -> None:  # fmt: skip
+        """From since on."""
+        self.expected = Expectation(want, since, within, cause)
+
+    def fail_motors(self, mask: int, thrust: float = 0.0) -> float:
+        """They fail now; when."""
+        if self.kind == PX4:
+            number = 420
+            sent = self.pilot.fail_motors(mask, thrust)
+            self.vehicle.must("the failure is injected", 3.0,
+                              lambda: self.vehicle.bench.accepted(number))  # fmt: skip
+            return sent
+        self.set("SIM_ENGINE_MUL", thrust)
+        return self.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
+
+    def see_it_out(self, seconds: float, after: float = 2.0) -> None:
+        """Until it is on the ground, or for so long; and a little more."""
+        since = time.monotonic()
+        vehicle = self.vehicle
+        vehicle.until(seconds, lambda: vehicle.height() < GROUND and time.monotonic() > since + 1)
+        vehicle.rest(after)
+
+    # -- the end --------------------------------------------------------------------------------
+
+    def end(self, notes: Path) -> Verdict:
+        """What came of it. notes: where the words of all go."""
+        vehicle = self.vehicle
+        findings = vehicle.keeper.findings
+        self.verdict.wrong += [f"error: {one}" for one in findings]
+        findings.clear()
+        record = list(read(vehicle.record, self.began, NUMBERS))
+        ports = vehicle.truth_ports()
+        events = events_of(record, ports)
+        judge(self.expected, events, truth_of(record, ports), self.verdict)
+        since = self.began + _SETTLES
+        if not self.verdict.wrong and not math.isnan(self.expected.since):
+            since = self.expected.since - 2.0
+        self.verdict.held_up = held_up([one for one in record if one.at >= since])
+        for look in self.afterwards:
+            look(record)
+        self.verdict.happened += self._decided()
+        said = [(at, f"{who}: {text}") for at, who, text in events.said]
+        lines = sorted([*said, *(one for one in vehicle.stages if one[0] >= self.began)])
+        last = [f"expected: {self.expected}", f"verdict: {self.verdict}"]
+        last += vehicle.watch.safety.alarms
+        lines += [(at, f"decision {Action(one.action).name} {one.rule}: {'; '.join(one.reasons)}")
+                  for at, one in vehicle.watch.decisions.values() if at >= self.began]  # fmt: skip
+        lines.sort()
+        notes.write_text("\n".join([*(f"{at:.3f} {text}" for at, text in lines), *last]))
+        return self.verdict
+
+    def _decided(self) -> list[str]:
+        """The rules that killed and deployed."""
+        every = self.vehicle.watch.decisions.values()
+        rules = {one.rule: None for at, one in every
+                 if at >= self.began and one.action in (Action.KILL, Action.DEPLOY)}  # fmt: skip
+        return [f"by {', '.join(rules)}"] if rules else []
+
+
+__all__ = ["Flight", "StoryError"]

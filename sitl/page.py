@@ -1,0 +1,117 @@
+"""docs/real_autopilots.md: each autopilot is written anew by itself, and keeps its place."""
+
+from __future__ import annotations
+
+import re
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from chute_ros.tools.machine import machine
+from sitl.autopilots import KINDS
+from sitl.judge import Verdict
+
+_HEAD = """\
+# Real autopilots
+
+Written by `make sitl AUTOPILOT="PATH ..."`, which flies simulator binaries of ArduCopter,
+ArduPlane (as a quadplane) and PX4 that you have; each autopilot's part is written alone. The
+numbers belong to the machine that made them: {machine}.
+
+The autopilot runs in its own simulator, on loopback, in real time. With it run the real nodes
+(`mavlink_parachute`, `safety_supervisor`, parameters as delivered but for what a story says), a
+simulated parachute, a router (what is addressed goes where the addressee was heard, as with
+mavlink-router) and a ground station. What happened is judged by the simulator's own state, never
+by the supervisor's picture. A fall that only a parachute helps must end with a release, in time
+(one motor dead to the release: 1.0 s; an operator's call to the release: 0.3 s); any other flight
+must see no kill and no release; a blocked vehicle must not rise. What of a run is not so stands in
+the last column, in bold.
+
+A run in which the node or the simulator was held up by other load of the machine is flown again.
+
+To run it, give the executable that a build of ArduPilot for the board SITL makes (`arducopter`,
+`arduplane`), or `bin/px4` in the folder of a PX4 build for POSIX with the SIH simulator.
+ArduPilot's and PX4's own documentation of their simulators says how to get one.
+`make sitl AUTOPILOT=PATH STORIES="motor-30 block" RUNS=1` flies some stories;
+`python3 -m sitl --list` names all.
+"""
+_MARK = "<!-- autopilot {} -->"
+_RIGHT = "right"
+
+
+@dataclass(frozen=True)
+class Flown:
+    """One run of a story."""
+
+    kind: str
+    version: str
+    story: str
+    text: str
+    verdict: Verdict
+
+
+def with_autopilot(page: str, flown: Sequence[Flown]) -> str:
+    """The page with the part of this autopilot written anew; the others as page has them."""
+    parts = _parts_of(page)
+    parts[flown[0].kind] = _part(flown)
+    every = [f"{_MARK.format(kind)}\n{parts[kind]}" for kind in KINDS if kind in parts]
+    return "\n".join([_HEAD.format(machine=machine()), *every])
+
+
+def _part(flown: Sequence[Flown]) -> str:
+    wrong = sum(bool(one.verdict.wrong) for one in flown)
+    rows = [_row([one for one in flown if one.story == name]) for name in _names(flown)]
+    return "\n".join(
+        [
+            f"## {flown[0].kind} {flown[-1].version}",
+            "",
+            f"{len(flown)} runs, {wrong} of them not as they must be.",
+            "",
+            "| story | runs | what happened | times | |",
+            "|---|---|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
+
+
+def _names(flown: Sequence[Flown]) -> list[str]:
+    return list(dict.fromkeys(one.story for one in flown))
+
+
+def _row(runs: Sequence[Flown]) -> str:
+    happened = _each(one.verdict.happened for one in runs)
+    names = dict.fromkeys(name for one in runs for name in one.verdict.times)
+    times = [_span(name, [one.verdict.times[name] for one in runs if name in one.verdict.times])
+             for name in names]  # fmt: skip
+    wrong = _each(one.verdict.wrong for one in runs)
+    judged = "; ".join(f"**{text}**" for text in wrong) or _RIGHT
+    cells = (f"`{runs[0].story}`: {runs[0].text}", str(len(runs)), "; ".join(happened),
+             "; ".join(times), judged)  # fmt: skip
+    return "| " + " | ".join(_cell(text) for text in cells) + " |"
+
+
+def _each(lists: object) -> list[str]:
+    """What the runs say, each once, with the number of runs if several say it differently."""
+    return list(dict.fromkeys(text for one in lists for text in one))
+
+
+def _span(name: str, values: Sequence[float]) -> str:
+    """The middle one of the runs, with the least and the greatest."""
+    middle = statistics.median(values)
+    if len(values) == 1:
+        return f"{name} {middle:.2f} s"
+    return f"{name} {middle:.2f} s ({min(values):.2f} to {max(values):.2f})"
+
+
+def _cell(text: str) -> str:
+    return " ".join(text.split()).replace("|", "/")
+
+
+def _parts_of(page: str) -> dict[str, str]:
+    pieces = re.split(r"^<!-- autopilot (\w+) -->\n", page, flags=re.MULTILINE)
+    return {
+        kind: text.rstrip("\n") + "\n"
+        for kind, text in zip(pieces[1::2], pieces[2::2], strict=True)
+        if kind in KINDS
+    }

@@ -1,0 +1,214 @@
+"""A block holds until the vehicle is off the ground by its height, whatever its landed state."""
+
+import pytest
+from link_bench import Bench, ack, ardupilot, copter, landed, px4_integer, setting
+
+from chute_ros.protocol.mavlink.dialect import dialect as d
+
+PILOT = (1, 1)
+DISARM, FORCE, REQUEST, INTERVAL = 400, 21196, 512, 511
+IN_AIR = d.MAV_LANDED_STATE_IN_AIR
+QUADPLANE = d.MAV_TYPE_VTOL_RESERVED2
+
+
+def at_height(height):
+    return d.MAVLink_global_position_int_message(
+        0, 0, 0, int(height * 1000), int(height * 1000), 0, 0, 0, 0
+    )
+
+
+def quadplane(armed=False):
+    return ardupilot(armed, kind=QUADPLANE)
+
+
+def on_the_ground(make=quadplane, reason="no parachute", **config):
+    """Disarmed, at height 0, flight blocked."""
+    bench = Bench(**config).hear(PILOT, make(False), landed(), at_height(0.0))
+    bench.link.flight_block(reason, bench.now)
+    return bench.at(0.5).hear(PILOT, make(False), at_height(0.0))
+
+
+def disarms(bench):
+    """The orders to disarm: plain (0) and forced (21196)."""
+    return [m.param2 for m in bench.commands(DISARM)]
+
+
+def test_in_air_at_height_0_ends_no_block():
+    """A quadplane says IN_AIR 0.05 s after a take-off is ordered, before it says armed."""
+    bench = on_the_ground().hear(PILOT, landed(IN_AIR))
+    bench.at(0.7).hear(PILOT, quadplane(True), at_height(0.1), landed(IN_AIR))
+    assert disarms(bench) == [0]
+    bench.at(0.72).hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
+    assert disarms(bench) == [0, FORCE], "it refuses as it takes itself to fly, and stands"
+    bench.at(0.74).hear(PILOT, ack(DISARM), quadplane(False))
+    assert bench.end(-1).finished.success
+
+
+def test_a_disarm_without_an_answer_is_followed_by_a_forced_one():
+    bench = on_the_ground().at(0.7).hear(PILOT, quadplane(True), at_height(0.1))
+    for _ in range(3):
+        bench.at(bench.t + 0.1).hear(PILOT, at_height(0.3))
+    assert disarms(bench) == [0, 0, FORCE]
+
+
+def climb(bench, make, heights, every=0.1):
+    for height in heights:
+        bench.at(bench.t + every).hear(PILOT, at_height(height), landed(IN_AIR), make(True))
+        if len(bench.commands(DISARM)):
+            bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
+
+
+def test_above_takeoff_height_nothing_is_disarmed_any_more():
+    bench = on_the_ground(takeoff_height=2.0)
+    climb(bench, quadplane, [n / 2 for n in range(1, 20)])
+    bench.clear()
+    climb(bench, quadplane, [10.0] * 50)
+    climb(bench, quadplane, [1.0] * 50)
+    assert disarms(bench) == [], "down again, but it does not say that it stands"
+    bench.at(bench.t + 0.1).hear(PILOT, at_height(0.5), landed())
+    assert disarms(bench)[:1] == [0]
+
+
+def test_one_height_above_it_is_no_take_off():
+    bench = on_the_ground()
+    climb(bench, quadplane, [0.1, 5.0, 0.1, 0.2])
+    bench.clear()
+    climb(bench, quadplane, [0.2] * 20)
+    assert FORCE in disarms(bench)
+
+
+def test_home_that_is_set_as_it_arms_is_no_climb():
+    bench = Bench().hear(PILOT, quadplane(), landed(), at_height(30.0))
+    bench.link.flight_block("x", bench.now)
+    bench.at(0.5).hear(PILOT, at_height(30.0), quadplane(True))
+    climb(bench, quadplane, [0.0, 0.0])
+    bench.clear()
+    climb(bench, quadplane, [n / 2 for n in range(1, 20)])
+    bench.clear()
+    climb(bench, quadplane, [10.0] * 20)
+    assert disarms(bench) == []
+
+
+@pytest.mark.parametrize(
+    "before",
+    [
+        pytest.param([quadplane(True), at_height(0.0)], id="not seen to arm"),
+        pytest.param([quadplane(False), quadplane(True)], id="height not known as it armed"),
+    ],
+)
+def test_nothing_is_forced_where_the_height_since_arming_is_not_known(before):
+    bench = Bench()
+    bench.link.flight_block("x", bench.now)
+    bench.hear(PILOT, landed(), *before)
+    for _ in range(20):
+        bench.at(bench.t + 0.1).hear(PILOT, at_height(0.0), landed(), quadplane(True))
+        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
+    assert set(disarms(bench)) == {0}
+
+
+def test_nothing_is_forced_on_a_height_that_no_longer_comes():
+    bench = on_the_ground().at(0.7).hear(PILOT, quadplane(True), at_height(0.1))
+    bench.clear()
+    for _ in range(20):
+        bench.at(bench.t + 0.2).hear(PILOT, quadplane(True), landed())
+        if bench.t > 2.0:
+            bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
+    forced = [t for t, m in bench.sent if m.get_type() == "COMMAND_LONG" and m.param2 == FORCE]
+    assert all(t <= 1.9 for t in forced)
+
+
+def test_nothing_is_forced_on_a_vehicle_that_was_armed_before_the_block():
+    bench = Bench().hear(PILOT, quadplane(), landed(), at_height(0.0)).at(0.5)
+    bench.hear(PILOT, quadplane(True), at_height(0.5), landed(IN_AIR))
+    bench.link.flight_block("the supervisor is lost", bench.now)
+    for _ in range(20):
+        bench.at(bench.t + 0.1).hear(PILOT, at_height(1.0), landed(IN_AIR), quadplane(True))
+        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
+    assert set(disarms(bench)) == {0}
+
+
+# -- seen sooner ------------------------------------------------------------------------------
+
+
+def test_an_old_heartbeat_is_asked_for_while_flight_is_blocked():
+    bench = on_the_ground(copter)
+    bench.stream(2.5, 0.1, PILOT, lambda: at_height(0.0))
+    asked = [m for m in bench.commands(REQUEST) if m.param1 == 0]
+    assert 4 <= len(asked) <= 7
+    bench.link.flight_block("", bench.now)
+    bench.clear()
+    bench.stream(2.9, 0.1, PILOT, lambda: at_height(0.0))
+    assert bench.commands(REQUEST) == []
+
+
+@pytest.mark.parametrize(("make", "times"), [(quadplane, 3), (copter, 0)])
+def test_a_faster_heartbeat_is_asked_for_but_of_px4(make, times):
+    bench = Bench(autopilot_message_rate=10.0).hear(PILOT, make())
+    for _ in range(200):
+        bench.at(bench.t + 0.5).hear(PILOT, at_height(0.0), make())
+    orders = [m for m in bench.commands(INTERVAL) if m.param1 == 0]
+    assert [m.param2 for m in orders] == [200_000] * times
+
+
+# -- asked whether it may arm -----------------------------------------------------------------
+
+
+def may_it_arm(target=(1, 0)):
+    return d.MAVLink_command_long_message(*target, 3001, 0, *[0.0] * 7)
+
+
+def answers(bench):
+    acks = [m for _, m in bench.sent if m.get_type() == "COMMAND_ACK"]
+    assert {m.command for m in acks} <= {3001}
+    return [
+        (m.result, m.progress, m.result_param2, m.target_system, m.target_component) for m in acks
+    ]
+
+
+def test_an_autopilot_that_asks_may_arm_only_while_flight_is_not_blocked():
+    bench = Bench().hear(PILOT, copter(), may_it_arm())
+    assert answers(bench) == [(d.MAV_RESULT_ACCEPTED, 0, 5, 1, 1)]
+    bench.at(0.06)
+    assert answers(bench) == [(d.MAV_RESULT_ACCEPTED, 0, 5, 1, 1)] * 2, "again, and no more"
+    bench.at(1.0)
+    assert len(answers(bench)) == 2
+    bench.link.flight_block("no parachute", bench.now)
+    bench.clear()
+    bench.hear(PILOT, may_it_arm((1, 191)))
+    generic = d.MAV_ARM_AUTH_DENIED_REASON_GENERIC
+    assert answers(bench) == [(d.MAV_RESULT_DENIED, generic, 0, 1, 1)]
+    assert bench.texts()[-1] == "arming denied, flight blocked: no parachute"
+    bench.link.flight_block("", bench.now)
+    bench.clear()
+    bench.hear(PILOT, may_it_arm())
+    assert answers(bench)[0][0] == d.MAV_RESULT_ACCEPTED
+
+
+def test_only_our_autopilot_is_answered_and_only_where_we_are_asked():
+    bench = Bench().hear(PILOT, copter())
+    bench.hear(PILOT, may_it_arm((10, 0)), may_it_arm((1, 42))).hear((1, 190), may_it_arm())
+    bench.hear((2, 1), may_it_arm())
+    assert answers(bench) == []
+
+
+def block_warnings(bench):
+    return [text for text in bench.link.setup().warnings if "COM_" in text]
+
+
+def test_a_block_that_cannot_be_kept_is_said_before_flight():
+    bench = Bench().hear(PILOT, copter(), setting("COM_SPOOLUP_TIME", 0.0))
+    assert block_warnings(bench) == []
+    bench.hear(PILOT, setting("MPC_TKO_RAMP_T", 0.0))
+    (warning,) = block_warnings(bench)
+    assert "COM_SPOOLUP_TIME is 0 and MPC_TKO_RAMP_T is 0" in warning
+    assert bench.link.vehicle_state(bench.now).faults == (), "it forbids nothing"
+    bench.hear(PILOT, px4_integer("COM_ARM_AUTH_REQ", 1), px4_integer("COM_ARM_AUTH_ID", 1))
+    assert block_warnings(bench) == []
+    assert bench.link.setup().block == "the autopilot asks us before it arms"
+
+
+def test_an_autopilot_that_asks_another_is_said():
+    bench = Bench().hear(PILOT, copter(), px4_integer("COM_ARM_AUTH_REQ", 1))
+    bench.hear(PILOT, px4_integer("COM_ARM_AUTH_ID", 10))
+    (warning,) = block_warnings(bench)
+    assert "COM_ARM_AUTH_ID is 10, and not our system id 1" in warning

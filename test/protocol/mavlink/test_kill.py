@@ -1,0 +1,331 @@
+"""A kill stops the motors by whatever way this autopilot obeys, and opens no parachute alone."""
+
+import pytest
+from link_bench import (
+    Bench,
+    ack,
+    ardupilot,
+    copter,
+    heartbeat,
+    landed,
+    no_setting,
+    px4_integer,
+    setting,
+    status,
+)
+
+from chute_ros.model import Armed
+from chute_ros.protocol.events import RequestReport, Severity
+from chute_ros.protocol.mavlink.config import KillMethod
+from chute_ros.protocol.mavlink.dialect import dialect as d
+
+CHUTE, PILOT = (1, 161), (1, 1)
+RELEASE, REQUEST, TERMINATE, DISARM = 208, 512, 185, 400
+DENIED, FAILED, NOT_NOW = (
+    d.MAV_RESULT_DENIED,
+    d.MAV_RESULT_FAILED,
+    d.MAV_RESULT_TEMPORARILY_REJECTED,
+)
+REFUSALS = (DENIED, FAILED, NOT_NOW, d.MAV_RESULT_UNSUPPORTED)
+PLANE = d.MAV_TYPE_FIXED_WING
+
+
+def unknown(armed=False):
+    mode = d.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
+    return heartbeat(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_GENERIC, mode)
+
+
+def plane(armed=False):
+    return ardupilot(armed, kind=PLANE)
+
+
+def flying(make, *settings, **config):
+    """An autopilot that has told its settings, armed and flies."""
+    bench = Bench(**config).hear(PILOT, make(False), *settings)
+    bench.at(0.5).hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR))
+    bench.at(1.0).clear()
+    return bench
+
+
+def kill(bench):
+    bench.link.kill(1, bench.now)
+    bench.collect()
+
+
+def ways(bench):
+    """The orders to stop the motors so far: (when, 400 or 185)."""
+    return [
+        (round(t - 1.0, 3), m.command)
+        for t, m in bench.sent
+        if m.get_type() == "COMMAND_LONG" and m.command in (TERMINATE, DISARM)
+    ]
+
+
+def outcomes(bench, token):
+    return [e.report.outcome.name for e in bench.events if isinstance(e, RequestReport)]
+
+
+# -- which way ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [copter, ardupilot, plane, unknown])
+@pytest.mark.parametrize("method", list(KillMethod))
+def test_a_kill_alone_terminates_nothing_that_may_release(make, method):
+    """No setting was read yet: of none of them it is known what termination does."""
+    bench = flying(make, kill_method=method)
+    kill(bench)
+    for result in REFUSALS:
+        bench.at(bench.t + 0.3).hear(PILOT, make(True), ack(DISARM, result))
+    bench.stream(9.0, 0.5, PILOT, lambda: make(True))
+    assert {way for _, way in ways(bench)} == {DISARM}
+
+
+@pytest.mark.parametrize("method", list(KillMethod))
+def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
+    bench = flying(copter, kill_method=method).hear(CHUTE, heartbeat(), status(armed=12))
+    kill(bench)
+    bench.at(1.1).hear(PILOT, ack(DISARM, NOT_NOW))
+    assert ways(bench) == [(0.0, DISARM)]
+    bench.at(1.15)
+    bench.link.deploy(2, False, bench.now)
+    bench.collect()
+    assert (0.15, TERMINATE) in ways(bench), "without waiting for anything more"
+    bench.hear(PILOT, ack(TERMINATE)).at(1.2).hear(
+        PILOT, copter(True, d.MAV_STATE_FLIGHT_TERMINATION)
+    )
+    end = bench.end(1).finished
+    assert end.success
+    assert "kill (flight_termination): the autopilot says motors off" in end.message
+    assert "kill (forced_disarm): temporarily rejected" in end.message
+
+
+def test_a_deploy_of_the_flight_before_allows_nothing_in_this_one():
+    bench = flying(copter).hear(CHUTE, heartbeat(), status())
+    bench.link.deploy(2, False, bench.now)
+    bench.hear(PILOT, copter(False)).at(1.5).hear(PILOT, copter(True))
+    kill(bench)
+    bench.at(1.6).hear(PILOT, ack(DISARM, NOT_NOW)).at(2.0)
+    assert {way for _, way in ways(bench)} == {DISARM}
+
+
+def test_flight_termination_is_the_first_way_on_px4_once_a_deploy_was_decided():
+    bench = flying(copter, kill_method=KillMethod.FLIGHT_TERMINATION)
+    bench.hear(CHUTE, heartbeat(), status())
+    bench.link.deploy(2, False, bench.now)
+    kill(bench)
+    assert ways(bench) == [(0.0, TERMINATE)]
+
+
+@pytest.mark.parametrize("result", REFUSALS)
+def test_a_refused_way_is_followed_by_the_other_at_once(result):
+    bench = flying(ardupilot, no_setting("AFS_ENABLE"))
+    kill(bench)
+    bench.at(1.03).hear(PILOT, ack(DISARM, result))
+    assert ways(bench) == [(0.0, DISARM), (0.03, TERMINATE)]
+    assert outcomes(bench, 1) == ["SENT", "REFUSED", "SENT"]
+    bench.hear(PILOT, ack(TERMINATE)).at(1.06).hear(PILOT, ardupilot(False))
+    end = bench.end(1).finished
+    assert (end.success, end.accepted) == (True, True)
+    assert outcomes(bench, 1)[-1] == "CONFIRMED"
+
+
+def test_a_way_without_an_answer_is_followed_by_the_other_and_not_given_up():
+    bench = flying(ardupilot, setting("AFS_ENABLE", 0))
+    kill(bench)
+    bench.at(1.5)
+    assert (0.2, TERMINATE) in ways(bench), "after one wait for an acknowledgement"
+    assert len([way for _, way in ways(bench) if way == DISARM]) >= 3
+    bench.hear(PILOT, ack(DISARM), ardupilot(False))
+    assert bench.end(1).finished.success
+    assert "kill (flight_termination): not answered" in bench.end(1).finished.message
+
+
+def test_an_accepted_way_without_effect_is_followed_by_the_other():
+    bench = flying(ardupilot, setting("AFS_ENABLE", 0))
+    kill(bench)
+    bench.at(1.02).hear(PILOT, ack(DISARM))
+    bench.stream(3.0, 0.1, PILOT, lambda: ardupilot(True))
+    first = next(t for t, way in ways(bench) if way == TERMINATE)
+    assert first == pytest.approx(1.52, abs=0.11)
+
+
+def test_both_ways_fail_and_the_end_names_both():
+    bench = flying(ardupilot, setting("AFS_ENABLE", 0))
+    kill(bench)
+    for _ in range(80):
+        bench.at(bench.t + 0.1).hear(PILOT, ardupilot(True))
+        bench.hear(PILOT, ack(DISARM, FAILED), ack(TERMINATE, DENIED))
+    end = bench.end(1).finished
+    assert not end.success
+    assert "kill (flight_termination) given up" in end.message
+    assert "kill (forced_disarm): failed" in end.message
+
+
+def test_an_aeroplane_without_afs_is_disarmed():
+    bench = flying(plane, setting("AFS_ENABLE", 0), kill_method=KillMethod.FLIGHT_TERMINATION)
+    kill(bench)
+    bench.at(1.02).hear(PILOT, ack(TERMINATE, FAILED))
+    assert ways(bench) == [(0.0, TERMINATE), (0.02, DISARM)]
+
+
+def test_an_aeroplane_that_runs_its_motor_unarmed_is_terminated():
+    afs = (setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42), setting("AFS_TERM_PIN", -1))
+    bench = flying(plane, setting("ARMING_REQUIRE", 0), *afs)
+    kill(bench)
+    assert ways(bench) == [(0.0, TERMINATE)]
+
+
+def test_a_termination_that_lands_is_no_kill():
+    bench = flying(ardupilot, setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 43))
+    kill(bench)
+    bench.at(1.02).hear(PILOT, ack(DISARM, FAILED)).at(4.0)
+    assert {way for _, way in ways(bench)} == {DISARM}
+
+
+def test_a_termination_pin_may_be_a_parachutes():
+    afs = (setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42), setting("AFS_TERM_PIN", 50))
+    bench = flying(plane, *afs)
+    assert "AFS_TERM_PIN is 50" in bench.link.setup().kill
+    kill(bench)
+    bench.at(1.02).hear(PILOT, ack(DISARM, FAILED)).at(4.0)
+    assert {way for _, way in ways(bench)} == {DISARM}
+
+
+# -- said before flight --------------------------------------------------------------------------
+
+
+def test_the_way_is_said_once_the_settings_are_read():
+    bench = Bench().hear(PILOT, copter())
+    assert bench.notices() == []
+    for name, value in (
+        ("COM_ARM_AUTH_REQ", 0),
+        ("COM_ARM_AUTH_ID", 10),
+        ("COM_ARM_AUTH_MET", 0),
+        ("CBRK_FLIGHTTERM", 121212),
+        ("COM_PARACHUTE", 0),
+    ):
+        bench.hear(PILOT, px4_integer(name, value))
+    bench.hear(PILOT, setting("COM_SPOOLUP_TIME", 1.0), setting("MPC_TKO_RAMP_T", 3.0), copter())
+    (text,) = bench.notices()
+    assert text == (
+        "autopilot 1/1 (PX4): kill by forced disarm; if it is refused or not answered: flight "
+        "termination, only once a deploy is decided (PX4 itself orders the parachute's release "
+        "as it terminates)"
+    )
+    bench.stream(5.0, 0.1, PILOT, copter)
+    assert len(bench.notices()) == 1
+
+
+@pytest.mark.parametrize(
+    ("config", "settings", "fault"),
+    [
+        ({}, {"ARMING_REQUIRE": 0, "AFS_ENABLE": 0}, ("ARMING_REQUIRE is 0", "AFS_ENABLE is 0")),
+        (
+            {"kill_method": KillMethod.FLIGHT_TERMINATION},
+            {"AFS_ENABLE": 0},
+            ("kill_method is flight_termination", "AFS_ENABLE is 0", "set AFS_ENABLE to 1"),
+        ),
+        (
+            {"kill_method": KillMethod.FLIGHT_TERMINATION},
+            {"AFS_ENABLE": 1, "AFS_TERM_ACTION": 0},
+            ("AFS_TERM_ACTION is 0",),
+        ),
+        (
+            {"kill_method": KillMethod.FORCED_DISARM},
+            {"ARMING_REQUIRE": 0, "AFS_ENABLE": 1, "AFS_TERM_ACTION": 42},
+            ("kill_method is forced_disarm", "ARMING_REQUIRE is 0"),
+        ),
+    ],
+)
+def test_settings_that_make_the_kill_impossible_forbid_take_off_by_name(config, settings, fault):
+    bench = Bench(**config).hear(PILOT, plane())
+    assert bench.link.vehicle_state(bench.now).faults == ()
+    for name, value in settings.items():
+        bench.hear(PILOT, setting(name, value))
+    (text,) = bench.link.vehicle_state(bench.now).faults
+    for part in fault:
+        assert part in text
+    missing = {"ARMING_REQUIRE", "AFS_TERM_ACTION", "AFS_TERM_PIN", "CHUTE_ENABLED"}
+    for name in {*missing, "HOME_RESET_ALT", "AFS_ENABLE"} - set(settings):
+        bench.hear(PILOT, no_setting(name))
+    said = [e for e in bench.events if getattr(e, "severity", None) is Severity.ERROR]
+    assert said[-1].text.startswith("forbids take-off: autopilot 1/1: ")
+    assert any(text.startswith("forbids take-off") for text in bench.texts())
+    # Set right by a ground station, which everybody hears.
+    for name, right in (("ARMING_REQUIRE", 1), ("AFS_ENABLE", 1), ("AFS_TERM_ACTION", 42)):
+        bench.hear(PILOT, setting(name, right))
+    assert bench.link.vehicle_state(bench.now).faults == ()
+
+
+@pytest.mark.parametrize(
+    ("make", "settings"),
+    [(copter, ()), (unknown, ()), (ardupilot, ("AFS_ENABLE",)), (plane, ("AFS_ENABLE",))],
+)
+def test_with_its_delivered_settings_no_autopilot_is_kept_from_taking_off(make, settings):
+    bench = Bench().hear(PILOT, make())
+    for name in settings:
+        bench.hear(PILOT, setting(name, 0))
+    assert bench.link.vehicle_state(bench.now).faults == ()
+
+
+def test_what_termination_does_on_px4_is_said_where_it_was_chosen():
+    bench = Bench(kill_method=KillMethod.FLIGHT_TERMINATION).hear(PILOT, copter())
+    (warning,) = bench.link.setup().warnings
+    assert "a kill without a deploy goes by forced disarm" in warning
+
+
+# -- confirmed as fast as it can be ---------------------------------------------------------------
+
+
+def asked(bench):
+    """When a heartbeat was asked for, since the order."""
+    return [
+        round(t - 1.0, 3)
+        for t, m in bench.sent
+        if m.get_type() == "COMMAND_LONG" and (m.command, m.param1) == (REQUEST, 0)
+    ]
+
+
+@pytest.mark.parametrize("result", [d.MAV_RESULT_ACCEPTED, DENIED, NOT_NOW])
+def test_the_heartbeat_is_asked_for_soon_after_any_answer_and_again(result):
+    bench = flying(ardupilot)
+    kill(bench)
+    bench.at(1.01).hear(PILOT, ack(DISARM, result)).at(1.2)
+    assert asked(bench) == [0.01, 0.035, 0.06, 0.11]
+
+
+def test_a_motor_that_was_off_already_is_confirmed_by_the_heartbeat_after_the_denial():
+    bench = flying(copter)
+    kill(bench)
+    bench.at(1.01).hear(PILOT, ack(DISARM, DENIED)).at(1.04).hear(PILOT, copter(False))
+    assert bench.end(1).finished.success
+    assert "after 0.04 s" in bench.end(1).finished.message
+
+
+# -- a deploy over motors that turn ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("beats", "warned"),
+    [
+        ([copter(True)], True),
+        ([copter(False)], False),
+        ([copter(True, d.MAV_STATE_FLIGHT_TERMINATION)], False),
+        ([], False),
+    ],
+)
+def test_a_deploy_over_motors_that_turn_says_so(beats, warned):
+    bench = Bench().hear(CHUTE, heartbeat(), status(armed=12)).hear(PILOT, *beats)
+    bench.at(0.5)
+    bench.link.deploy(1, False, bench.now)
+    bench.at(0.6).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
+    assert bench.end(1).finished.success
+    assert ("WARNING: autopilot 1/1" in bench.end(1).finished.message) is warned
+
+
+def test_an_autopilot_that_fell_silent_says_nothing_of_the_motors():
+    bench = Bench().hear(PILOT, copter(True)).at(4.0).hear(CHUTE, heartbeat(), status(armed=12))
+    assert bench.link.vehicle_state(bench.now).armed is Armed.ARMED
+    bench.link.deploy(1, False, bench.now)
+    bench.at(4.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
+    assert "WARNING" not in bench.end(1).finished.message

@@ -1,0 +1,110 @@
+"""Signs that the motors stand still, beside HEARTBEAT: only after an accepted order, and new."""
+
+import pytest
+from link_bench import Bench, ack, ardupilot, landed
+
+from chute_ros.protocol.mavlink.dialect import dialect as d
+
+PILOT = (1, 1)
+DISARM = 400
+IN_AIR = d.MAV_LANDED_STATE_IN_AIR
+
+
+def outputs(*us):
+    padded = (*us, *[0] * (16 - len(us)))
+    return d.MAVLink_servo_output_raw_message(0, 0, *padded[:8], *padded[8:])
+
+
+def text(words):
+    return d.MAVLink_statustext_message(6, words.encode())
+
+
+IDLE, DRIVEN = outputs(1000, 1000, 1500), outputs(1600, 1580, 1480)
+OFF = outputs(1000, 1000, 1900)
+
+
+def flying():
+    """Two motors and a control surface; it was seen disarmed."""
+    bench = Bench().hear(PILOT, ardupilot(), IDLE)
+    turning = esc_status(4000, 4100, -3900, 4000)
+    return bench.at(0.5).hear(PILOT, ardupilot(True), landed(IN_AIR), DRIVEN, turning).at(1.0)
+
+
+def esc_status(*rpm, index=0):
+    return d.MAVLink_esc_status_message(index, 0, rpm, [15.0] * 4, [1.0] * 4)
+
+
+def esc_telemetry(*rpm):
+    zero = [0] * 4
+    return d.MAVLink_esc_telemetry_1_to_4_message(zero, zero, zero, zero, rpm, zero)
+
+
+SIGNS = [
+    pytest.param(OFF, id="SERVO_OUTPUT_RAW"),
+    pytest.param(landed(), id="EXTENDED_SYS_STATE"),
+    pytest.param(esc_status(0, 0, 0, 0), id="ESC_STATUS"),
+    pytest.param(esc_telemetry(0, 0, 0, 0), id="ESC_TELEMETRY_1_TO_4"),
+    pytest.param(text("Disarming motors"), id="ArduCopter"),
+    pytest.param(text("Throttle disarmed"), id="ArduPlane"),
+    pytest.param(text("Disarmed by external command"), id="PX4"),
+]
+
+
+@pytest.mark.parametrize("sign", SIGNS)
+def test_a_sign_after_the_acceptance_confirms_the_kill(sign):
+    bench = flying()
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM))
+    assert bench.ends(1) == []
+    bench.at(1.05).hear(PILOT, sign)
+    assert bench.end(1).finished.success
+
+
+@pytest.mark.parametrize("sign", SIGNS)
+def test_a_sign_without_an_acceptance_confirms_nothing(sign):
+    bench = flying()
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED), sign)
+    assert bench.ends(1) == []
+
+
+@pytest.mark.parametrize("sign", SIGNS)
+def test_a_sign_from_before_the_order_confirms_nothing(sign):
+    bench = flying().hear(PILOT, sign)
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM))
+    bench.at(1.05).hear(PILOT, ardupilot(True))
+    assert bench.ends(1) == []
+
+
+def test_one_of_eight_motors_that_turns_is_enough():
+    bench = flying().hear(PILOT, esc_status(4000, 0, 0, 0, index=4))
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, esc_status(0, 0, 0, 0))
+    assert bench.ends(1) == []
+    bench.at(1.07).hear(PILOT, esc_status(0, 0, 0, 0, index=4))
+    assert bench.end(1).finished.success
+
+
+def test_a_glider_with_its_motor_off_and_armed_confirms_nothing():
+    bench = flying().hear(PILOT, OFF)
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
+    assert bench.ends(1) == []
+
+
+@pytest.mark.parametrize(
+    "newest", [outputs(1000, 1200, 1500), outputs(0, 0, 0)], ids=["one turns", "nothing known"]
+)
+def test_outputs_that_show_no_standstill_confirm_nothing(newest):
+    bench = flying()
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, newest)
+    assert (bench.ends(1) == []) is (newest is not None and newest.servo2_raw > 0)
+
+
+def test_outputs_of_an_autopilot_that_was_never_seen_disarmed_confirm_nothing():
+    bench = Bench().hear(PILOT, ardupilot(True), DRIVEN).at(1.0)
+    bench.link.kill(1, bench.now)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
+    assert bench.ends(1) == []

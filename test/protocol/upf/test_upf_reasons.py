@@ -1,0 +1,52 @@
+"""Why a UPF parachute is not healthy: the whole reason, with its value and what is needed."""
+
+import pytest
+
+from chute_ros.protocol.upf.reasons import reasons_of
+
+
+def reasons(story, *troubles):
+    link = story.link
+    picture = link.devices.picture(story.now)
+    return reasons_of(link.config, link.devices, picture, troubles, story.now)
+
+
+def test_nothing_is_wrong_with_healthy_devices(bench):
+    assert reasons(bench().ready()) == ()
+
+
+@pytest.mark.parametrize(
+    ("config", "text"),
+    [
+        ({}, "a controller was never heard: need its ParachuteStatus (controller_node_id 0: of"),
+        ({"controller_node_id": 33}, "controller 33 was never heard: need its ParachuteStatus"),
+        ({"without_controller": True}, "a trigger was never heard: need its TriggerStatus"),
+    ],
+)
+def test_never_heard(bench, config, text):
+    (reason,) = reasons(bench("", **config))
+    assert reason.startswith(text)
+
+
+def test_a_state_is_told_with_those_that_are_needed(bench):
+    story = bench("").status("NOT_READY")
+    assert reasons(story) == ("controller 33: state NOT_READY, need READY, TAKEOFF or ARMED",)
+    story = bench("").status("LAUNCHED")
+    assert reasons(story)[-1] == (
+        "controller 33: state LAUNCHED, the parachute is out, need READY, TAKEOFF or ARMED"
+    )
+
+
+def test_a_lost_controller_is_told_with_its_silence(bench):
+    story = bench("").status("READY").node_status().at(10.0)
+    assert "controller 33 LOST: 10.0 s" in reasons(story)
+
+
+def test_a_trigger_in_trouble_is_told_with_its_supply(bench):
+    story = bench("").status("READY").trigger_status("NOT_READY", supply_voltage=3.125)
+    assert reasons(story) == ("trigger 34: state NOT_READY, supply 3.1 V, need READY",)
+
+
+def test_troubles_of_the_bus_are_reasons(bench):
+    story = bench("").status("READY")
+    assert reasons(story, "two nodes use node id 40") == ("two nodes use node id 40",)
