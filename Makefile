@@ -15,7 +15,7 @@ PARACHUTE ?= mavlink
 DEPTH ?= 2
 # Modules of the supervisor that make mutate changes; empty: all.
 MODULES ?=
-# Parts of make hosts: supervisors, ground, discovery, fleet; empty: all.
+# Parts of make hosts: supervisors, ground, discovery, fleet, packet; empty: all.
 PARTS ?=
 # Simulator binaries of make sitl, its stories (empty: all; --list in SITL_ARGS names them), and how
 # often each is flown.

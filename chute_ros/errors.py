@@ -34,3 +34,7 @@ class RecordError(ChuteError, ValueError):
 
 class ProfileError(ChuteError, ValueError):
     """A profile of rules is not right. The text lists each mistake with its line and the fix."""
+
+
+class NameTakenError(ChuteError):
+    """Another living supervisor has this name. The text says which, and the fix."""

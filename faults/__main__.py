@@ -1,7 +1,7 @@
 """make hosts: writes docs/hosts.md. As root: python3 -m faults [PART ...] [--only WORDS ...]
 
-PART: supervisors, ground, discovery, fleet; none: all. --only: the stories whose names contain one
-of these, and nothing is written.
+PART: supervisors, ground, discovery, fleet, packet; none: all. --only: the stories whose names
+contain one of these, and nothing is written.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from faults import ground_station_flight, two_supervisors
+from faults import ground_station_flight, packet, two_supervisors
 from faults import ground_station_stories as ground
 from faults.ending import take_down_when_ended
 from faults.fleet_discovery import search_all
@@ -52,11 +52,19 @@ def _fleet(names: Names) -> Outcome:
     return fleet_table(every), not any(flown.wrong for flown in every)
 
 
+def _packet(names: Names) -> Outcome:
+    with Network(packet.HOSTS) as network:
+        network.enter(packet.VEHICLE)
+        every = packet.fly_all(network, names)
+    return packet.table(every), not any(told.wrong for told in every)
+
+
 _RUN: dict[str, Callable[[Names], Outcome]] = {
     "supervisors": _supervisors,
     "ground": _ground,
     "discovery": _discovery,
     "fleet": _fleet,
+    "packet": _packet,
 }
 
 

@@ -21,11 +21,17 @@ _ACTED = re.compile(r"decision (\d+)\.(\d+) (KILL|DEPLOY) \(")
 class Flight:
     """One flight with the hosts of a network; this process is on the vehicle's host."""
 
-    def __init__(self, network: Network, folder: Path, namespace: str) -> None:
+    def __init__(
+        self,
+        network: Network,
+        folder: Path,
+        namespace: str,
+        processes: Processes | None = None,
+    ) -> None:
         self.network = network
         self.folder = folder
         self.namespace = namespace
-        self.processes = Processes(folder)
+        self.processes = processes or Processes(folder)
         self.director = Director(namespace, self.processes)
         self.rig = Rig.on_free_ports("mavlink", "", namespace, self.processes)
         self.pilot = Pilot(self.rig.pilot, system_id=1)

@@ -51,6 +51,7 @@ def _vehicle(context: LaunchContext) -> list:
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
             launch_arguments={
                 "namespace": namespace,
+                "range": "LOCALHOST",
                 "connection": f"udpin:127.0.0.1:{port}",
                 "parachute": parachute,
                 "bus": bus,

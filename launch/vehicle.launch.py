@@ -5,11 +5,14 @@ ros2 launch chute_ros vehicle.launch.py namespace:=drone1 parachute:=upf bus:=so
 ros2 launch chute_ros vehicle.launch.py namespace:=rocket parachute:=umbilical
 """
 
+import os
+
 from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from chute_ros.nodes.middleware import LEADS_ELSEWHERE, RANGE
 from launch import LaunchContext, LaunchDescription
 
 #: A node that dies is started again: a supervisor goes on where it stopped, and sends a device
@@ -60,10 +63,25 @@ def _nodes(context: LaunchContext) -> list:
     return [*nodes, supervisor]
 
 
+def _range() -> str:
+    """Who may hear the nodes: as the environment says; if that says nothing, this computer alone.
+    One packet of anybody else can end a node (docs/security.md)."""
+    elsewhere = any(os.environ.get(name) for name in LEADS_ELSEWHERE)
+    return os.environ.get(RANGE) or ("SUBNET" if elsewhere else "LOCALHOST")
+
+
 def generate_launch_description() -> LaunchDescription:
     """The arguments, and the nodes that they describe."""
     return LaunchDescription(
         [
+            DeclareLaunchArgument(
+                "range",
+                default_value=_range(),
+                choices=["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF"],
+                description="who may hear the nodes: LOCALHOST, this computer alone; SUBNET, "
+                "others as well, as a ground station; docs/security.md",
+            ),
+            SetEnvironmentVariable(RANGE, LaunchConfiguration("range")),
             DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
             DeclareLaunchArgument(
                 "parachute",

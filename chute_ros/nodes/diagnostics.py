@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from chute_ros.nodes import qos
+from chute_ros.nodes.middleware_diagnostics import middleware_task
 from chute_ros.protocol.liveness import Liveness
 
 OK, WARN, ERROR, STALE = (
@@ -90,13 +91,14 @@ class DiagnosticsPublisher:
 
     def __init__(self, node: Node) -> None:
         names = {node.resolve_topic_name(name): name for name in ("/diagnostics", "diagnostics")}
+        self._middleware = middleware_task(node.get_fully_qualified_name().lstrip("/"))
         self._publishers = [
             node.create_publisher(DiagnosticArray, name, qos.STATUS) for name in names.values()
         ]
 
     def publish(self, stamp: Time, statuses: list[DiagnosticStatus]) -> None:
-        """Say how they are."""
-        message = DiagnosticArray(status=statuses)
+        """Say how they are, and how the middleware is."""
+        message = DiagnosticArray(status=[*statuses, self._middleware])
         message.header.stamp = stamp
         for publisher in self._publishers:
             publisher.publish(message)

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.interrupts import CtrlC, at_ctrl_c
+from chute_ros.nodes.memory_limit import limit_memory
 from chute_ros.nodes.middleware import set_up_middleware
 from chute_ros.plain_text import plain
 
@@ -42,6 +43,7 @@ def run(name: str, class_name: str) -> None:
     ctrl_c = CtrlC()
     ctrl_c.install()
     try:
+        limit_memory()
         _look_at_arguments(name)
         _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.

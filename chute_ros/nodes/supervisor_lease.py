@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import secrets
 import time
 from collections.abc import Callable
 
@@ -10,7 +11,7 @@ from chute_msgs.msg import SupervisorLease
 from rclpy.clock import Clock
 from rclpy.node import Node
 
-from chute_ros.errors import RecordError
+from chute_ros.errors import NameTakenError, RecordError
 from chute_ros.nodes import qos
 from chute_ros.supervisor import handover
 from chute_ros.supervisor.epochs import RANKS
@@ -18,10 +19,19 @@ from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
 from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.state import State
 
+#: Only one that has just started gives way to another of its name, s: a forged claim must not end
+#: one that has been at work.
+_JUST_STARTED = 30.0
+_APART = "end one, or give it a name (-r __node:=NAME), a rank and hot_standby of its own"
+#: Two that differ by less than this, s, started together; then the larger instance stays.
+_TOGETHER = 1.0
+
 
 class LeaseKeeper:
     """state: gives the supervisor's; links_heard: how many, now; happened: told of each event;
-    follow: given the state that the leader told. All in the decision loop's thread."""
+    follow: given the state that the leader told. All in the decision loop's thread.
+
+    NameTakenError from a callback: another of this name was there first."""
 
     def __init__(
         self,
@@ -35,6 +45,11 @@ class LeaseKeeper:
     ) -> None:
         self.config = config
         self.lease = Lease.begin(config, time.monotonic())
+        #: Tells it from another of its name.
+        self.instance = secrets.token_hex(8)
+        self._started = time.monotonic()
+        #: When another of its name was heard last, monotonic s.
+        self._namesake_heard = -math.inf
         self._node, self._wall = node, wall
         self._state, self._links_heard = state, links_heard
         self._happened, self._follow = happened, follow
@@ -85,6 +100,8 @@ class LeaseKeeper:
         claim, state = self._own(now), self._state()
         message = SupervisorLease(
             name=claim.name,
+            instance=self.instance,
+            running=now - self._started,
             rank=claim.rank,
             epoch=claim.epoch,
             leading=claim.leading,
@@ -103,6 +120,8 @@ class LeaseKeeper:
 
     def trouble(self, now: float) -> str:
         """What is wrong with the supervisors' settings; empty: nothing."""
+        if now - self._namesake_heard < self.config.timeout * RANKS:
+            return f"another supervisor is called {self.config.name} as well: {_APART}"
         name, heard = self._other
         if not self.config.standby and now - heard < self.config.timeout * RANKS:
             return f"{name} runs as well: set hot_standby and different ranks, or stop one"
@@ -118,9 +137,11 @@ class LeaseKeeper:
         return Claim(name, rank, state.epoch, self.leading, empty, self._links_heard(now))
 
     def _claim(self, message: SupervisorLease) -> None:
-        if message.name == self.config.name:
+        if message.instance == self.instance:
             return
         now = time.monotonic()
+        if message.name == self.config.name:
+            self._namesake(message, now)
         if message.leader == self.config.name:
             here = self.followers(now)
             self._followers = {name: self._followers[name] for name in here}
@@ -146,6 +167,20 @@ class LeaseKeeper:
             self._follow_claim(message, now)
         if trouble := self.trouble(now):
             self._complain(trouble)
+
+    def _namesake(self, message: SupervisorLease, now: float) -> None:
+        """Another of this name is at work: who came later and has no flight goes."""
+        self._namesake_heard = now
+        running, state = now - self._started, self._state()
+        older = message.running > running + _TOGETHER
+        together = abs(message.running - running) <= _TOGETHER
+        first = older or (together and message.instance > self.instance)
+        idle = not state.flown and state.stage in ON_GROUND
+        if first and idle and running < _JUST_STARTED:
+            raise NameTakenError(
+                f"another supervisor called {message.name} runs for {message.running:.0f} s "
+                f"already (instance {message.instance[:16]}): {_APART}"
+            )
 
     def _follow_claim(self, message: SupervisorLease, now: float) -> None:
         try:

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from chute_ros.errors import RecordError
 from chute_ros.nodes import diagnostics
 from chute_ros.nodes.kept_file import KeptFile
+from chute_ros.nodes.one_of_a_name import NameLock
 from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.private_files import read_own_text
 from chute_ros.nodes.ros_home import ros_home
@@ -38,12 +39,21 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 class Memory:
-    """In a file of the node's own, where resume_within says that it may be needed."""
+    """In a file of the node's own, where resume_within says that it may be needed.
+
+    NameTakenError if a living supervisor of this name is on this computer, whose file it would be.
+    """
 
     def __init__(self, node: Node, values: Mapping[str, Any], config: SupervisorConfig) -> None:
         self._within = values["resume_within"]
         self._log, name = node.get_logger(), node.get_fully_qualified_name().lstrip("/")
-        self._path = ros_home() / "resume" / f"{name.replace('/', '.')}.json"
+        # Another ROS domain is another vehicle.
+        own = f"{name.replace('/', '.')}@{node.context.get_domain_id()}"
+        folder = ros_home() / "resume"
+        self._path = folder / f"{own}.json"
+        self._lock = NameLock(folder / f"{own}.lock", name)
+        if self._lock.trouble:
+            self._log.warning(f"nobody is kept from this name: {self._lock.trouble}")
         told = json.dumps(dict(values), sort_keys=True) + CODEC.to_json(config, whole=True)
         self._settings = hashlib.sha256(told.encode()).hexdigest()
         self._boot = _BOOT_ID.read_text().strip() if self._within else ""
@@ -86,9 +96,10 @@ class Memory:
         return diagnostics.status(name, "memory", level, text, values, "")
 
     def close(self) -> None:
-        """Write what waits."""
+        """Write what waits, then the name is free."""
         if self._file is not None:
             self._file.close()
+        self._lock.close()
 
     def _text(self, state: State) -> str:
         return written(Left(self._boot, self._settings, state)) if worth_leaving(state) else ""

@@ -116,6 +116,11 @@ PARAMETERS = (
         100.0,
     ),
     Parameter(
+        "disarm_after_landing",
+        True,
+        "once landed and disarmed, disarm the parachutes that safety/arm has armed",
+    ),
+    Parameter(
         "alarm_interval",
         2.0,
         "an alarm that does not stop is said again after this, s",
@@ -216,6 +221,7 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         vehicle_state_age=values["vehicle_state_age"],
         require_vehicle_state=values["require_vehicle_state"],
         takeoff_height=values["takeoff_height"],
+        disarm_after_landing=values["disarm_after_landing"],
         late_after=values["late_after"],
         rank=values["rank"],
         standby=values["hot_standby"],

@@ -20,7 +20,7 @@ from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.measurements import on_earth
 from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.policy import rule_deadlines
-from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.preflight import block_reasons, not_seen
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 from chute_ros.supervisor.steps import Slot
@@ -351,6 +351,8 @@ class _Update(Deploying):
         stimulus = Stimulus.LINKS_UNHEALTHY if reasons else Stimulus.LINKS_HEALTHY
         if listed(stage, stimulus):
             self.move(stimulus, "; ".join(reasons))
+            if not reasons and (text := not_seen(self.config, self.state)):
+                self.outputs.append(i.Say(f"not seen in flight: {text}"))
 
     def _block_or_release(self) -> None:
         """Flight is blocked on the ground until READY, and after a deploy until a reset."""

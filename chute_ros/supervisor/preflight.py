@@ -19,6 +19,7 @@ from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, Supervis
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import PRESSURE_ALTITUDE
 from chute_ros.supervisor.state import CONTRADICTED_FOR, State
 
 #: MAV_STATE of an autopilot that cannot fly, or only ends a flight (MAVLink common.xml).
@@ -111,6 +112,25 @@ def _measured_problems(config: SupervisorConfig, state: State, now: float) -> li
         f"{part} is told otherwise by another source, or has jumped"
         for part in sorted(state.disputed)
     ]
+
+
+#: Measurement on which a rule may rest -> what nobody sees of a vehicle that does not tell it.
+_BLIND = {
+    "sink_beyond_target": "no target is told: a level sink that nobody commanded is an alarm only",
+    "attitude_error": "no commanded attitude is told: one that is flown on purpose looks as any",
+    PRESSURE_ALTITUDE: "no pressure is told: an estimator that is wrong with itself is believed",
+}
+
+
+def not_seen(config: SupervisorConfig, state: State) -> str:
+    """What the rules do not see of this vehicle, as it never told it; empty: nothing."""
+    used = {name for rule in config.profile.rules for name in rule.measured}
+    blind = [
+        text
+        for name, text in _BLIND.items()
+        if name in used and math.isnan(state.measured(name).measured_at)
+    ]
+    return "; ".join(blind)
 
 
 def _rung_problem(rung: Rung, evidence: LinkEvidence) -> str:

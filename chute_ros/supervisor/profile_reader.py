@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -18,6 +18,17 @@ from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import DERIVED, STANDARD_LIMITS, Limits
+from chute_ros.supervisor.profile_limits import (
+    FASTEST_STANDING,
+    HIGHEST_MINIMUM,
+    LEAST_LEAK,
+    LONGEST_HOLD,
+    LONGEST_WARNING,
+    MOST_SAMPLES,
+    bounds,
+    condition_problem,
+    rule_problem,
+)
 from chute_ros.supervisor.rules import (
     ALL,
     ANY,
@@ -62,6 +73,8 @@ class _ProfileLines(LineReader):
     def __init__(self, name: str, links: Sequence[str]) -> None:
         super().__init__(name)
         self._links = links
+        #: Of the measurements of this profile.
+        self.limits: Mapping[str, Limits] = STANDARD_LIMITS
 
     def link(self, where: Where, what: str, besides: tuple[str, ...]) -> str:
         """The name of a link that the supervisor follows."""
@@ -89,16 +102,16 @@ def _profile(reader: _ProfileLines, where: Where) -> Profile:
     if "profile" in entries:
         profile = replace(profile, name=reader.text(entries["profile"], "profile"))
     if "minimum_height" in entries:
-        height = reader.number(entries["minimum_height"], "minimum_height", 0.0, 100_000.0)
+        height = reader.number(entries["minimum_height"], "minimum_height", 0.0, HIGHEST_MINIMUM)
         profile = replace(profile, minimum_height=height)
     if "low_height" in entries:
-        height = reader.number(entries["low_height"], "low_height", 0.0, 100_000.0)
+        height = reader.number(entries["low_height"], "low_height", 0.0, HIGHEST_MINIMUM)
         profile = replace(profile, low_height=height)
     if "landed_hold" in entries:
         hold = reader.number(entries["landed_hold"], "landed_hold", 0.0, 60.0)
         profile = replace(profile, landed_hold=hold)
     if "moving_speed" in entries:
-        speed = reader.number(entries["moving_speed"], "moving_speed", 0.1, 100.0)
+        speed = reader.number(entries["moving_speed"], "moving_speed", 0.1, FASTEST_STANDING)
         profile = replace(profile, moving_speed=speed)
     if "below_minimum" in entries:
         word = reader.choice(
@@ -106,11 +119,15 @@ def _profile(reader: _ProfileLines, where: Where) -> Profile:
         )
         profile = replace(profile, below_minimum=BelowMinimum(word))
     if "measurements" in entries:
-        profile = replace(profile, limits=_limits(reader, entries["measurements"]))
+        reader.limits = _limits(reader, entries["measurements"])
+        profile = replace(profile, limits=reader.limits)
     rules = []
     if "rules" in entries:
         for name, one in reader.mapping(entries["rules"], (), "rules").items():
             rules.append(_rule(reader, name, one))
+        if entries["rules"].is_mapping and not rules:
+            text = "rules is empty: need at least one; the profile by_hand decides nothing itself"
+            reader.wrong(entries["rules"].line, text)
     return replace(profile, rules=tuple(rules))
 
 
@@ -119,7 +136,9 @@ def _limits(reader: _ProfileLines, where: Where) -> MappingProxyType[str, Limits
     names = [field.name for field in fields(Limits)]
     for name, one in reader.mapping(where, STANDARD_LIMITS, "measurements").items():
         for key, value in reader.mapping(one, names, f"measurement {name}").items():
-            number = reader.number(value, f"{key} of {name}")
+            number = reader.number(value, f"{key} of {name}", *bounds(name, key))
+            if math.isnan(number):
+                continue
             try:
                 limits[name] = replace(limits[name], **{key: number})
             except ParameterError as error:
@@ -169,15 +188,21 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
         text = f"{what} needs {rule.samples} samples at once: add `for`, in which they may come"
         reader.wrong(entries["samples"].line, text)
     # What was written wrong stands for something else until it is put right.
-    if action is Action.DEPLOY and conditions and len(reader.mistakes) == before:
-        _check_deploy(reader, what, where.line, rule)
+    if conditions and len(reader.mistakes) == before:
+        if problem := rule_problem(rule, reader.limits):
+            reader.wrong(where.line, f"{what} {problem}")
+        elif action is Action.DEPLOY:
+            _check_deploy(reader, what, where.line, rule)
     return rule
 
 
 def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: Rule) -> Rule:
+    ends_flights = rule.action in (Action.KILL, Action.DEPLOY)
+    longest = LONGEST_HOLD if ends_flights else LONGEST_WARNING
+    least = LEAST_LEAK if ends_flights else 0.0
     readers: dict[str, Callable[[Where], dict[str, Any]]] = {
-        "for": lambda w: {"hold": reader.number(w, f"for of {what}", 0.0, 600.0)},
-        "leak": lambda w: {"leak": reader.number(w, f"leak of {what}", 0.0, 100.0)},
+        "for": lambda w: {"hold": reader.number(w, f"for of {what}", 0.0, longest)},
+        "leak": lambda w: {"leak": reader.number(w, f"leak of {what}", least, 100.0)},
         "samples": lambda w: {"samples": int(_whole(reader, w, f"samples of {what}"))},
         "doubted": lambda w: {"doubted": reader.number(w, f"doubted of {what}", 0.0, 1.0)},
         "clears": lambda w: {"clears": _member(reader, w, f"clears of {what}", Clears)},
@@ -191,7 +216,7 @@ def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: R
 
 
 def _whole(reader: _ProfileLines, where: Where, what: str) -> float:
-    value = reader.number(where, what, 1, 1000)
+    value = reader.number(where, what, 1, MOST_SAMPLES)
     if not math.isnan(value) and value != int(value):
         reader.wrong(where.line, f"{what} is {value:g}: need a whole number")
     return 1.0 if math.isnan(value) else value
@@ -269,7 +294,10 @@ def _measurement(
         if_unknown = reader.truth(entries["if_unknown"], f"if_unknown of {name} in {what}")
     if "until" in entries:
         limits["until"] = _until(reader, f"until of {name} in {what}", entries["until"], limits)
-    return MeasurementCondition(name, weight=weight, if_unknown=if_unknown, **limits)
+    condition = MeasurementCondition(name, weight=weight, if_unknown=if_unknown, **limits)
+    if problem := condition_problem(condition, reader.limits):
+        reader.wrong(where.line, f"{name} in {what} {problem}")
+    return condition
 
 
 def _until(reader: _ProfileLines, what: str, where: Where, limits: dict[str, float]) -> float:

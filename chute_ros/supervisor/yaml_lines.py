@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from chute_ros.errors import ProfileError
+from chute_ros.plain_yaml import misread
 
 
 class Where:
@@ -64,17 +65,23 @@ class LineReader:
 
     def truth(self, where: Where, what: str) -> bool:
         """True or false."""
-        if not isinstance(where.value, bool):
+        if problem := misread(where.node):
+            self.wrong(where.line, f"{what} is {problem}")
+        elif not isinstance(where.value, bool):
             self.wrong(where.line, f"{what} is {where.value!r}: need true or false")
         return where.value is True
 
     def number(
         self, where: Where, what: str, least: float = -math.inf, most: float = math.inf
     ) -> float:
-        """A number in a range."""
+        """A finite number in a range, written as everybody reads it."""
         value = where.value
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
+        if problem := misread(where.node):
+            self.wrong(where.line, f"{what} is {problem}")
+        elif isinstance(value, bool) or not isinstance(value, (int, float)):
             self.wrong(where.line, f"{what} is {value!r}: need a number")
+        elif math.isinf(least) and not math.isfinite(value):
+            self.wrong(where.line, f"{what} is {value}: need a finite number")
         elif not least <= value <= most:  # NaN as well
             self.wrong(where.line, f"{what} is {value}: need {least:g} to {most:g}")
         else:

@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from chute_ros import plain_yaml
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.parameters import Parameter, what_was_meant
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
@@ -46,11 +47,11 @@ def other_from(path: Path, node: str) -> Other:
 def _given(path: Path, node: str) -> dict[str, Any]:
     """Name -> value of what the file has for this node, the later over the earlier."""
     try:
-        whole = yaml.safe_load(path.read_text(encoding="utf-8"))
+        whole = plain_yaml.load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror or error}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ParameterError(f"{path} is no YAML: {' '.join(str(error).split())}") from None
+        raise ParameterError(f"{path} cannot be read: {' '.join(str(error).split())}") from None
     found: dict[str, Any] = {}
     sections = 0
     for name, section in _sections(path, whole):

@@ -21,6 +21,9 @@ class ProcessEndedError(ChuteError):
 class Processes:
     """Modules of ours, each in a Python of its own."""
 
+    #: How a log is opened: "ab" goes on where the last of this name ended.
+    log_mode = "wb"
+
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         #: Where the children keep what outlives them: allocation tables, black boxes.
@@ -30,7 +33,7 @@ class Processes:
     def start(self, name: str, module: str, *arguments: str, on: Sequence[str] = ()) -> None:
         """Run module as name; what it writes goes to name.log. on: what the command begins with,
         where it is to run elsewhere than here."""
-        with self.log(name).open("wb") as log:
+        with self.log(name).open(self.log_mode) as log:
             self._running[name] = subprocess.Popen(
                 [*on, sys.executable, "-m", module, *arguments],
                 # Buffered, the last words of one that crashes would come before what led to them.

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from chute_ros import plain_yaml
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.umbilical.layouts import REFERENCE_LAYOUT, Layout, layout_from
 from chute_ros.transport.given_path import given_path
@@ -31,7 +32,7 @@ def load_layouts(folder: str, named: str) -> list[Layout]:
 
 def _load(file: Path, named: str) -> Layout:
     try:
-        content = yaml.safe_load(read_regular_text(file))
+        content = plain_yaml.load(read_regular_text(file))
     except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise ParameterError(f"{named}: {file}: cannot be read: {error}") from None
     return layout_from(content, str(file))

@@ -33,6 +33,8 @@ HEARTBEAT_RATE = 50.0
 class DeviceSuite:
     """Inherit, name the node, and give it a device."""
 
+    #: Tasks of diagnostics that do not rest on what the link says of its device.
+    OF_OURS = ("link", "supervisor", "middleware")
     #: The node's name, which is its link's name as well.
     name: str
     #: The link's protocol has acknowledgements.
@@ -198,7 +200,7 @@ class DeviceSuite:
             lambda: levels().get("link", ("", ""))[1].startswith("the link's thread has not run"),
             "diagnostics tell it",
         )
-        rest = {task: one for task, one in levels().items() if task not in ("link", "supervisor")}
+        rest = {task: one for task, one in levels().items() if task not in self.OF_OURS}
         assert rest
         assert {level for level, _ in rest.values()} == {DiagnosticStatus.STALE}
         assert all(text.startswith("not known now; was: ") for _, text in rest.values())
@@ -419,6 +421,26 @@ class DeviceSuite:
         device = self.make(bench, heartbeat_rate=HEARTBEAT_RATE, max_decision_age=10.0)
         self.ready_to_deploy(device)
         assert device.commands_to_deploy() == 0
+
+    def test_a_decision_whose_call_fails_inside_is_reported_as_failed_and_never_as_sent(
+        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Taken for sent, the supervisor would wait, and not try the next parachute."""
+        self.ready_to_deploy(device)
+        node = next(one for one in self.bench.nodes if one.get_name() == self.name)
+
+        def broken(*_: Any) -> None:
+            raise RuntimeError("a mistake of ours")
+
+        through = node.deploy_for
+        monkeypatch.setattr(node, "deploy_for", lambda decision, _: through(decision, broken))
+        decision = self.decide(Action.DEPLOY)
+        report = self.await_report(Outcome.FAILED, decision)
+        assert report.detail == "RuntimeError: a mistake of ours"
+        assert not device.deployed
+        order = (decision.epoch, decision.id)
+        outcomes = {one.outcome for one in self.reports if (one.epoch, one.id) == order}
+        assert outcomes == {int(Outcome.FAILED)}
 
     def test_a_decision_that_the_device_refuses_is_reported_as_failed(
         self, device: SimulatedDevice

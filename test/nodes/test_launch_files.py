@@ -157,8 +157,8 @@ STARTED = {
 }
 
 
-def made_by(file, monkeypatch, **arguments):
-    """What the function of a launch file makes: run for real, with stand-ins for `launch`."""
+def loaded(file, monkeypatch):
+    """What is in a launch file: run for real, with stand-ins for `launch`."""
     for name in {"launch", "launch.actions", "launch.substitutions", "launch_ros.actions"} | {
         "launch.launch_description_sources",
         "launch_ros",
@@ -167,10 +167,16 @@ def made_by(file, monkeypatch, **arguments):
         module = types.ModuleType(name)
         module.__getattr__ = lambda wanted: type(wanted, (Recorded,), {})
         monkeypatch.setitem(sys.modules, name, module)
-    Recorded.made.clear()
-    monkeypatch.setattr(Recorded, "chosen", {"port": "14600", **arguments})
     space = {}
     exec(compile(file.read_text(), str(file), "exec"), space)
+    return space
+
+
+def made_by(file, monkeypatch, **arguments):
+    """What the function of a launch file makes."""
+    space = loaded(file, monkeypatch)
+    Recorded.made.clear()
+    monkeypatch.setattr(Recorded, "chosen", {"port": "14600", **arguments})
     function = space.get("_nodes") or space["_vehicle"]
     function(context=None)
     return list(Recorded.made)
@@ -189,6 +195,37 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     if vehicle:
         started = [one for one in made if "executable" in one.options]
         assert all(one.options["respawn"] for one in started), "what dies is started again"
+
+
+@pytest.mark.parametrize(
+    ("given", "who"),
+    [
+        ({}, "LOCALHOST"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "SUBNET"),
+        ({"ROS_STATIC_PEERS": "192.0.2.1"}, "SUBNET"),
+        ({"ROS_DISCOVERY_SERVER": "192.0.2.1:11811"}, "SUBNET"),
+        (
+            {"ROS_STATIC_PEERS": "192.0.2.1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+            "LOCALHOST",
+        ),
+    ],
+)
+def test_a_vehicle_is_heard_on_its_own_computer_unless_it_is_said_otherwise(
+    given, who, monkeypatch
+):
+    for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", *LEADS_ELSEWHERE):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    space = loaded(vehicle, monkeypatch)
+    Recorded.made.clear()
+    space["generate_launch_description"]()
+    (argument,) = [one for one in Recorded.made if one.args[:1] == ("range",) and one.options]
+    assert argument.options["default_value"] == who
+    (variable,) = [one for one in Recorded.made if type(one).__name__ == "SetEnvironmentVariable"]
+    assert variable.args[0] == "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    assert variable.args[1].args == ("range",)
 
 
 @pytest.mark.parametrize("parachute", ["upf", "both"])

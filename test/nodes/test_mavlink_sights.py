@@ -93,8 +93,6 @@ def test_a_parachute_that_is_not_ready_has_its_reason_in_the_heartbeat(bench):
     network = Network(bench)
     beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
     bench.until(lambda: beats, "they come")
-    assert list(beats[-1].reasons) == ["no parachute was heard on this network"]
+    assert beats[-1].reasons[0].startswith("no parachute was heard: check its power")
     network.plug(Module(ParachuteSettings(deployment=4)))
-    bench.until(
-        lambda: list(beats[-1].reasons) == ["1/161 is released"], "a released one is no parachute"
-    )
+    bench.until(lambda: "1/161 is released" in beats[-1].reasons, "a released one is no parachute")

@@ -196,7 +196,10 @@ def test_a_hung_executor_is_a_silent_heartbeat(bench):
     bench.until(lambda: cable.computer.connected, "it is connected")
     # Not spun any more, the node's executor is as good as hung.
     bench.executor.remove_node(cable.node)
+    before = len(cable.computer.heartbeats)
     bench.until(lambda: not cable.computer.connected, "the flight computer misses us")
+    # Four a second: the link's own thread sends on for a second, and for no more.
+    assert len(cable.computer.heartbeats) - before <= 8
     bench.executor.add_node(cable.node)
     bench.until(lambda: cable.computer.connected, "it hears us again")
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from story import DOWN, LINK, SINKS, STANDING, START, Story, rule, vehicle, with_rules
+from story import DOWN, LINK, SINKS, STANDING, START, Story, rule, shipped, vehicle, with_rules
 
 from chute_ros.model import (
     Action,
@@ -290,3 +290,42 @@ def test_a_rule_of_another_action_blocks_nothing() -> None:
     story.at(0.1, i.ParachuteReport(LINK, abnormal))
     assert story.state.stage is Stage.READY
     assert len(story.alarms()) == 1
+
+
+def test_what_a_vehicle_does_not_tell_is_said_to_be_not_seen() -> None:
+    story = Story(shipped("multirotor")).ready()
+    assert "not seen in flight: no target is told" in story.said()
+    assert "no pressure is told" in story.said()
+    assert not any("not seen" in text for text in story.alarms())
+
+
+@pytest.mark.parametrize(
+    ("status", "name"), [(5, "CRITICAL"), (6, "EMERGENCY"), (8, "TERMINATION")]
+)
+def test_an_autopilot_that_cannot_fly_forbids_the_take_off(status: int, name: str) -> None:
+    story = Story(shipped("multirotor")).ready()
+    story.at(0.2, story.heartbeat(), story.told(**DOWN, height=0.0, system_status=status))
+    assert story.state.stage is Stage.BLOCKED
+    assert name in story.said()
+
+
+def test_what_the_vehicle_says_against_flying_is_a_reason_and_in_flight_an_alarm() -> None:
+    slow = ("ATTITUDE comes at 2.1 Hz (need 5 Hz)",)
+    story = Story(shipped("multirotor")).ready()
+    story.at(0.2, story.heartbeat(), story.told(**DOWN, height=0.0, faults=slow))
+    assert f"vehicle: {slow[0]}" in story.said()
+    aloft = Story(shipped("multirotor")).flying().fly(1.0).fly(2.0, faults=slow)
+    assert [one for one in aloft.alarms() if slow[0] in one] == [f"vehicle: {slow[0]}"]
+
+
+def test_after_the_flight_the_parachutes_that_were_armed_are_disarmed() -> None:
+    story = Story(shipped("multirotor")).ready()
+    story.at(0.0, i.ArmRequest(1, True, 0))
+    story.at(0.1, i.ArmDone(1, True, True, "armed"))
+    story.fly(2.0, height=30.0)
+    story.fly(10.0, height=0.0, vertical_speed=0.0, **DOWN)
+    orders = [one for _, one in story.outputs if isinstance(one, i.ArmDevices)]
+    assert [(one.token, one.arm) for one in orders] == [(1, True), (0, False)]
+    # Then the devices fail to: nobody waits for an answer, so that it is an alarm.
+    story.at(10.1, i.ArmDone(0, False, False, "no answer"))
+    assert any("not disarmed after the flight" in one for one in story.alarms())

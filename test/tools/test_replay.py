@@ -187,6 +187,8 @@ def test_turns_without_a_beginning_are_counted_not_guessed(flight, monkeypatch, 
         (["required_links: [1]"], "required_links of safety_supervisor is [1]"),
         (["mode: LOUD"], "need one of ACTIVE, SHADOW, INHIBITED"),
         (["required_links: []"], "need at least one link"),
+        (["takeoff_height: 1:30.5"], "it is 1:30.5, which YAML reads as 90.5: write 90.5"),
+        (["ladder: yes"], "it is yes, which YAML reads as true: write true, or 'yes' if it"),
     ],
 )
 def test_a_mistake_in_the_settings_is_told_in_one_line(
@@ -201,12 +203,12 @@ def test_a_mistake_in_the_settings_is_told_in_one_line(
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("a: [", "is no YAML"),
+        ("a: [", "cannot be read"),
         ("/**/upf_can:\n  ros__parameters: {}\n", "has no ros__parameters for"),
         ("- 1\n", "has no ros__parameters for"),
         ("ros__parameters: {mode: SHADOW}\n", "has no ros__parameters for"),
-        ("[" * 3000, "is no YAML"),
-        ("a: 2001-12-14t21:59:43.10-99:99", "is no YAML"),
+        ("[" * 3000, "cannot be read"),
+        ("a: 2001-12-14t21:59:43.10-99:99", "cannot be read"),
         ("a: &a {b: *a}", "more than 1000 names in it: no parameter file"),
     ],
 )

@@ -40,6 +40,15 @@ _CLOCKS = frozenset(
     }
 )
 
+#: What these tell is told with the next of the others: each picture is work for all who hear it.
+_TOLD_WITH_THE_NEXT = frozenset(
+    {
+        *("SCALED_PRESSURE", "SCALED_PRESSURE2", "SCALED_PRESSURE3", "SCALED_IMU2", "SCALED_IMU3"),
+        *("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"),
+        "NAV_CONTROLLER_OUTPUT",
+    }
+)
+
 #: Types that never fly the vehicle, whatever their heartbeat says in its field autopilot.
 _NOT_FLYING = frozenset(
     {
@@ -171,7 +180,7 @@ class AutopilotTracker:
         return self._optional.due(wanted, self._rates, interval, now)
 
     def message(self, message: Any, now: float) -> bool:
-        """Any other message of the autopilot; True: the vehicle's picture changed."""
+        """Any other message of the autopilot; True: the vehicle's picture is to be told."""
         kind = message.get_type()
         if kind in _CLOCKS:
             if not self._twins.observe(kind, message.time_boot_ms, now):
@@ -186,7 +195,7 @@ class AutopilotTracker:
         if not self._readers.read(message, now):
             return False
         self._rates.setdefault(kind, StreamRate()).heard(now)
-        return True
+        return kind not in _TOLD_WITH_THE_NEXT
 
     def rates(self, now: float) -> dict[str, float]:
         """Hz of each message that is read and came at least twice, by name."""

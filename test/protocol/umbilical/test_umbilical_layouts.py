@@ -271,6 +271,24 @@ def test_a_file_that_cannot_be_read(tmp_path, text):
         load_layouts(str(tmp_path), "layouts")
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("target_floats: 2", "target_floats: 0x2", "0x2, which YAML reads as 2"),
+        ("{name: temp,", "{name: no,", "no, which YAML reads as false"),
+        ("type: f32, unit: Pa}", "type: f32, unit: Pa, expected: [0, 010]}", "010, which YAML"),
+        ("type: f32, unit: Pa}", "type: f32, unit: Pa, expected: [0, 1e5]}", "1e5, which YAML"),
+    ],
+)
+def test_what_yaml_reads_as_another_value_is_told_with_its_line(tmp_path, old, new, told):
+    text = (FOLDER / f"{STATE}.yaml").read_text()
+    assert old in text
+    (tmp_path / "mine.yaml").write_text(text.replace(old, new, 1))
+    with pytest.raises(ParameterError, match=r"line [0-9]+") as caught:
+        load_layouts(str(tmp_path), "layouts")
+    assert told in str(caught.value)
+
+
 def test_two_files_with_one_name(tmp_path):
     for name in ("a", "b"):
         (tmp_path / f"{name}.yaml").write_text((FOLDER / "telem50.yaml").read_text())

@@ -1,0 +1,47 @@
+"""What a node says of its middleware: one packet can end it, or cannot."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Mapping
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from chute_ros.nodes.middleware import CURED, fast_dds, is_cured, is_local
+
+
+def middleware_task(node: str) -> DiagnosticStatus:
+    """For diagnostics. It stays the same for as long as the process lives."""
+    version, local = fast_dds(), is_local()
+    cured = ", ".join(map(_text, CURED))
+    values = {"kept to this host": local, "memory limit (MB)": _limit()}
+    if version is None:
+        return _status(node, DiagnosticStatus.OK, "no Fast DDS", values)
+    values |= {"Fast DDS": _text(version), "CVE-2025-64438 is cured in": cured}
+    name = f"Fast DDS {_text(version)}"
+    if is_cured(version):
+        return _status(node, DiagnosticStatus.OK, name, values)
+    if local:
+        return _status(node, DiagnosticStatus.OK, f"{name}, kept to this host", values)
+    text = (
+        f"{name} can be ended by one packet of anybody on the network (CVE-2025-64438, cured in "
+        f"{cured}): set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST where nothing on another computer "
+        "must hear this node (docs/security.md)"
+    )
+    return _status(node, DiagnosticStatus.WARN, text, values)
+
+
+def _status(
+    node: str, level: bytes, message: str, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+    return DiagnosticStatus(level=level, name=f"{node}: middleware", message=message, values=pairs)
+
+
+def _limit() -> str:
+    soft, _ = resource.getrlimit(resource.RLIMIT_DATA)
+    return "none" if soft == resource.RLIM_INFINITY else str(soft >> 20)
+
+
+def _text(version: tuple[int, int, int]) -> str:
+    return ".".join(map(str, version))

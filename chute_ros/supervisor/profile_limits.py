@@ -1,0 +1,106 @@
+"""What a profile may not ask for: a limit that no measurement reaches, or that each is beyond."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+
+from chute_ros.supervisor.measurements import (
+    CLIMB_RATE,
+    STANDARD_LIMITS,
+    VERTICAL_SPEED,
+    Limits,
+)
+from chute_ros.supervisor.rules import Condition, MeasurementCondition, Rule
+
+#: No vehicle has a height below which nothing is released, or that is low, of more than this, m.
+HIGHEST_MINIMUM = 1000.0
+#: No vehicle stands that moves faster, m/s.
+FASTEST_STANDING = 20.0
+#: What ends a flight waits no longer than this, s; an alarm and a flight block may.
+LONGEST_HOLD, LONGEST_WARNING = 60.0, 600.0
+#: A counter that leaks less keeps what was counted for the whole flight: s each s.
+LEAST_LEAK = 0.01
+#: Samples: 50 of them come in 10 s at the 5 Hz that are needed.
+MOST_SAMPLES = 50
+#: A measurement's limits may be so many times as far as the standard ones. A rocket's speed may
+#: jump by twelve times as much.
+WIDEST = 20.0
+#: An older measurement tells nothing of a vehicle that falls, s.
+OLDEST = 10.0
+#: Longer is as good as for ever, which is 0, s.
+LONGEST_STUCK = 600.0
+_NEVER, _ALWAYS = "can never hold", "always holds"
+_ROUNDING = 1e-9
+
+
+def bounds(name: str, key: str) -> tuple[float, float]:
+    """The lowest and the highest that a profile may set this of a measurement's limits to."""
+    standard = STANDARD_LIMITS[name]
+    if key in ("minimum", "maximum"):
+        far = WIDEST * max(abs(standard.minimum), abs(standard.maximum))
+        return -far, far
+    highest = {"max_age": OLDEST, "stuck_after": LONGEST_STUCK}
+    return 0.0, highest.get(key, WIDEST * float(getattr(standard, key)))
+
+
+def range_of(name: str, limits: Mapping[str, Limits]) -> Limits | None:
+    """What a measurement, or CLIMB_RATE, may be; None: it has no limits."""
+    return limits.get(VERTICAL_SPEED if name == CLIMB_RATE else name)
+
+
+def condition_problem(one: MeasurementCondition, limits: Mapping[str, Limits]) -> str:
+    """Why this limit makes no sense, in words; empty: it does."""
+    known = range_of(one.measurement, limits)
+    if known is None:
+        return ""
+    told = f"{one.measurement} is {known.minimum:g} to {known.maximum:g}"
+    if one.above >= known.maximum or one.below <= known.minimum:
+        return f"{_NEVER}: {told}"
+    if one.above < known.minimum or one.below > known.maximum:
+        return f"{_ALWAYS}: {told}"
+    if not (math.isnan(one.until) or known.minimum <= one.until <= known.maximum):
+        return f"has an until that is never reached: {told}"
+    return ""
+
+
+def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:
+    """Why its conditions together make no sense, in words; empty: they do."""
+    least = most = 0.0
+    for known, unknown in _sums(rule.conditions, limits):
+        least, most = least + min(known), most + max(*known, unknown)
+    needed = rule.needed - _ROUNDING
+    if most < needed:
+        return f"{_NEVER}: {most:g} at most of needed {rule.needed:g} can be true at once"
+    if least >= needed:
+        return f"{_ALWAYS}: its limits leave no value out"
+    return ""
+
+
+def _sums(
+    conditions: Sequence[Condition], limits: Mapping[str, Limits]
+) -> Iterator[tuple[list[float], float]]:
+    """For each measurement, and each condition on something else: what the weights of those that
+    are true add up to, for every value that makes a difference, and where it is not known."""
+    of: dict[str, list[MeasurementCondition]] = {}
+    for one in conditions:
+        if isinstance(one, MeasurementCondition):
+            of.setdefault(one.measurement, []).append(one)
+        else:
+            yield [0.0, one.weight], 0.0
+    for name, those in of.items():
+        edges = {edge for c in those for edge in (c.above, c.below) if not math.isnan(edge)}
+        known = range_of(name, limits)
+        if known is not None:
+            edges = {e for e in edges if known.minimum <= e <= known.maximum}
+            edges |= {known.minimum, known.maximum}
+        inner = sorted(edges)
+        between = [(low + high) / 2 for low, high in pairwise(inner)]
+        values = [*inner, *between] if known else [*inner, *between, -math.inf, math.inf]
+        unknown = sum(one.weight for one in those if one.if_unknown)
+        yield [sum(c.weight for c in those if _is(c, value)) for value in values], unknown
+
+
+def _is(one: MeasurementCondition, value: float) -> bool:
+    return not (value <= one.above or value >= one.below)
