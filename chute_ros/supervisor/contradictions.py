@@ -20,7 +20,7 @@ import math
 from collections.abc import Iterator, Mapping
 from statistics import fmean
 
-from chute_ros.supervisor.measurements import ACCELERATION, TILT, VERTICAL_SPEED
+from chute_ros.supervisor.measurements import ACCELERATION, CLIMB_RATE, TILT, VERTICAL_SPEED
 
 GRAVITY = 9.81  # m/s^2
 #: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt); NaN: not known.
@@ -74,9 +74,12 @@ def denials(motion: tuple[Moment, ...], baro_rate: float) -> Mapping[str, str]:
     return denied
 
 
-def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, str]:
+def commanded(
+    attitude_error: float, sink_beyond_target: float, climb_beyond_target: float
+) -> Mapping[str, str]:
     """Measurement -> in words that what it claims was commanded: no accident. Degrees from
-    the commanded attitude, and m/s of sink beyond the commanded one; NaN: not known."""
+    the commanded attitude, and m/s of sink beyond the commanded one, by the estimator and by what
+    tells CLIMB_RATE; NaN: not known."""
     told = {}
     if attitude_error <= _FOLLOWS:
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
@@ -84,6 +87,8 @@ def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, 
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
         # Nor is the force that is missing while it does so.
         told[VERTICAL_SPEED] = told[ACCELERATION] = f"it was commanded ({beyond})"
+    if climb_beyond_target <= _SINKS_AS_TOLD:
+        told[CLIMB_RATE] = f"it was commanded ({climb_beyond_target:+.1f} m/s beyond that)"
     return told
 
 

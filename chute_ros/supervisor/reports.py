@@ -237,17 +237,19 @@ class Reports(Requests):
         if motion is state.motion:
             return
         denied = denials(motion, flight.pressure_rate(self.config, state, now))
-        targets = [
+        error, beyond, rate = (
             flight.measured(self.config, state, name, now)
-            for name in ("attitude_error", "sink_beyond_target")
-        ]
+            for name in ("attitude_error", "sink_beyond_target", CLIMB_RATE)
+        )
+        # An estimator that is wrong follows its command where the vehicle does not.
+        climb_beyond = beyond + flight.measured(self.config, state, VERTICAL_SPEED, now) - rate
         since = {name: state.denied_since.get(name, now) for name in denied}
         self.state = replace(
             state,
             motion=motion,
             denied=MappingProxyType(dict(denied)),
             denied_since=MappingProxyType(since),
-            commanded=MappingProxyType(dict(commanded(*targets))),
+            commanded=MappingProxyType(dict(commanded(error, beyond, climb_beyond))),
         )
         last = state.motion[-1][0] if state.motion else now
         for name, begun in since.items():
