@@ -17,7 +17,7 @@ from pathlib import Path
 from chute_ros.errors import ChuteError
 from chute_ros.tools.isolation import isolated_ros
 from faults.ending import take_down_when_ended
-from sitl import stories
+from sitl import results, stories
 from sitl.autopilots import WHAT_TO_GIVE, Autopilot, recognise
 from sitl.hangar import Hangar
 from sitl.judge import Verdict
@@ -56,25 +56,29 @@ def main() -> None:
                 for name, one in every.items()
                 if autopilot.kind in one.kinds and (not chosen.stories or name in chosen.stories)
             ]
-            flown = fly_all(autopilot, picked, chosen.runs, folder)
+            kept_in = chosen.results or folder / "results.json"
+            flown = fly_all(autopilot, picked, chosen.runs, folder, kept_in)
             wrong += sum(bool(one.verdict.wrong) for one in flown)
-            if chosen.page and flown:
+            if chosen.page and (every_run := results.load(kept_in, autopilot.kind)):
                 before = PAGE.read_text() if PAGE.exists() else ""
-                PAGE.write_text(with_autopilot(before, flown))
+                PAGE.write_text(with_autopilot(before, every_run))
     if wrong:
         sys.exit(f"sitl: {wrong} runs were not as they must be")
 
 
 def fly_all(
-    autopilot: Autopilot, picked: list[stories.Story], runs: int, folder: Path
+    autopilot: Autopilot, picked: list[stories.Story], runs: int, folder: Path, kept_in: Path
 ) -> list[Flown]:
-    """Each story so many times; stories with the same setup on one vehicle, if it lasts."""
+    """Each story so many times; stories with the same setup on one vehicle, if it lasts. kept_in:
+    the file that each run is added to."""
+    every = []
     with Hangar(autopilot, folder) as hangar:
-        return [
-            fly_one(hangar, story, f"{story.name} {run}/{runs}")
-            for run in range(1, runs + 1)
-            for story in picked
-        ]
+        for run in range(1, runs + 1):
+            for story in picked:
+                flown = fly_one(hangar, story, f"{story.name} {run}/{runs}")
+                results.add(kept_in, flown)
+                every.append(flown)
+    return every
 
 
 def fly_one(hangar: Hangar, story: stories.Story, what: str) -> Flown:
@@ -85,7 +89,10 @@ def fly_one(hangar: Hangar, story: stories.Story, what: str) -> Flown:
         if story.restarts or flown.verdict.held_up < HELD_UP or not (timed or flown.verdict.wrong):
             return flown
         print(f"    the machine was held up for {flown.verdict.held_up:.1f} s: again", flush=True)
-    return _fly_once(hangar, story, what)
+    flown = _fly_once(hangar, story, what)
+    if not story.restarts and flown.verdict.held_up >= HELD_UP:
+        flown.verdict.happened.append(f"the machine held it up for {flown.verdict.held_up:.1f} s")
+    return flown
 
 
 def _fly_once(hangar: Hangar, story: stories.Story, what: str) -> Flown:
@@ -141,6 +148,8 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument("--runs", type=int, default=3, help="of each story (default: 3)")
     options.add_argument("--list", action="store_true", help="say what the stories are")
     options.add_argument("--page", action="store_true", help=f"write docs/{PAGE.name}")
+    options.add_argument("--results", type=Path, metavar="FILE",
+                         help="add the runs to those there; the page has all of them")  # fmt: skip
     options.add_argument("--keep", type=Path, metavar="FOLDER", help="keep all records there")
     return options
 

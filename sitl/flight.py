@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -167,6 +168,7 @@ class Flight:
         ports = vehicle.truth_ports()
         events = events_of(record, ports)
         judge(self.expected, events, truth_of(record, ports), self.verdict)
+        self.verdict.load = os.getloadavg()[0]
         since = self.began + _SETTLES
         if not self.verdict.wrong and not math.isnan(self.expected.since):
             since = self.expected.since - 2.0

@@ -63,6 +63,8 @@ class Verdict:
     wrong: list[str] = field(default_factory=list)
     #: The longest time that this machine kept the node or the simulator from running, s.
     held_up: float = 0.0
+    #: Of the machine, in the last minute of the run.
+    load: float = 0.0
 
 
 @dataclass(frozen=True)

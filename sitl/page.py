@@ -60,12 +60,17 @@ def with_autopilot(page: str, flown: Sequence[Flown]) -> str:
 
 def _part(flown: Sequence[Flown]) -> str:
     wrong = sum(bool(one.verdict.wrong) for one in flown)
+    loads = [one.verdict.load for one in flown]
+    told = (
+        f"{len(flown)} runs, {wrong} of them not as they must be. Load of the machine meanwhile: "
+        f"{min(loads):.1f} to {max(loads):.1f} (of a minute)."
+    )
     rows = [_row([one for one in flown if one.story == name]) for name in _names(flown)]
     return "\n".join(
         [
             f"## {flown[0].kind} {flown[-1].version}",
             "",
-            f"{len(flown)} runs, {wrong} of them not as they must be.",
+            told,
             "",
             "| story | runs | what happened | times | |",
             "|---|---|---|---|---|",

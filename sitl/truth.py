@@ -10,8 +10,11 @@ from sitl.record import Seen
 
 #: Below it the vehicle is on the ground, m.
 GROUND = 0.7
-#: A vehicle that reaches the ground faster has crashed, m/s; twice as fast as one lands.
-CRASH = 4.0
+#: A vehicle that reaches the ground faster has crashed, m/s: a parachute would have brought it
+#: down slower (5 to 6 m/s).
+CRASH = 6.0
+#: A vehicle that sinks faster, and has lost some height by it, does not fly any more, m/s.
+_SINKS = 4.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class Truth:
         falls = any(one.climb < -6.0 for one in every)
         on_its_side = any(one.tilt > 75.0 and one.climb < -2.0 for one in every)
         start = self.when(since)
-        sank = any(start.height - one.height > 5.0 and one.climb < -CRASH for one in every)
+        sank = any(start.height - one.height > 5.0 and one.climb < -_SINKS for one in every)
         return falls or on_its_side or sank
 
 

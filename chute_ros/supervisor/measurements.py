@@ -352,11 +352,12 @@ def samples_of(
 
 
 def _sink_beyond_target(vehicle: VehicleState) -> tuple[float, float]:
-    """m/s, and how old it is, s. Of one that is lower than it was commanded no sink was."""
+    """m/s, and how old it is, s. Of one that is lower than it was commanded no sink was. A height
+    below it commands none: ArduCopter tells 0 m in a hover, after a take-off in GUIDED."""
     value = vehicle.target_vertical_speed - vehicle.vertical_speed
     if math.isnan(vehicle.target_vertical_speed):
         missed = vehicle.below_target > _MISSES_TARGET
-        value = -vehicle.vertical_speed if missed else vehicle.below_target * 0.0
+        value = -vehicle.vertical_speed if missed else math.nan
     return value, max(vehicle.target_age, vehicle.vertical_speed_age)
 
 

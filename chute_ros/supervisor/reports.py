@@ -236,7 +236,7 @@ class Reports(Requests):
         motion = noted(state.motion, moment)
         if motion is state.motion:
             return
-        denied = denials(motion, flight.pressure_rate(self.config, state, now))
+        denied = denials(motion, flight.pressure_change(self.config, state, now))
         error, beyond, rate = (
             flight.measured(self.config, state, name, now)
             for name in ("attitude_error", "sink_beyond_target", CLIMB_RATE)
@@ -244,12 +244,16 @@ class Reports(Requests):
         # An estimator that is wrong follows its command where the vehicle does not.
         climb_beyond = beyond + flight.measured(self.config, state, VERTICAL_SPEED, now) - rate
         since = {name: state.denied_since.get(name, now) for name in denied}
+        # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
+        told = (
+            {} if state.vehicle.armed is Armed.DISARMED else commanded(error, beyond, climb_beyond)
+        )
         self.state = replace(
             state,
             motion=motion,
             denied=MappingProxyType(dict(denied)),
             denied_since=MappingProxyType(since),
-            commanded=MappingProxyType(dict(commanded(error, beyond, climb_beyond))),
+            commanded=MappingProxyType(dict(told)),
         )
         last = state.motion[-1][0] if state.motion else now
         for name, begun in since.items():

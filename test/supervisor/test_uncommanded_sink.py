@@ -62,6 +62,25 @@ def test_one_that_was_commanded_is_neither(profile: str, fastest: float) -> None
     assert not any("sinks fast" in one for one in story.alarms())
 
 
+@pytest.mark.parametrize(
+    "told", [{"below_target": -100.0}, {"below_target": -100.0, "attitude_error": 0.0}]
+)
+@pytest.mark.parametrize("off", [{}, DOWN])
+def test_a_height_that_was_commanded_far_below_hides_no_fall(
+    told: dict[str, float], off: dict[str, object]
+) -> None:
+    """ArduCopter in GUIDED after its take-off: POSITION_TARGET_LOCAL_NED with z 0 in a hover. It
+    was disarmed by the ground station, and nothing was released."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, **told)
+    assert story.fall(story.t + 1.5, **told, **off).fired()[:1] == ["KILL"]
+
+
+@pytest.mark.parametrize("told", [{"target_vertical_speed": -9.0}])
+def test_nothing_is_commanded_of_motors_that_are_off(told: dict[str, float]) -> None:
+    story = Story(shipped("multirotor")).ready().fly(2.0)
+    assert story.fall(story.t + 1.5, **told, **DOWN).fired()[:1] == ["KILL"]
+
+
 def test_above_the_commanded_height_no_sink_is_missed_and_none_made_up() -> None:
     assert sinking("multirotor", 5.0, below_target=-8.0).fired() == []
 
