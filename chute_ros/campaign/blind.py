@@ -93,6 +93,12 @@ def enough_time(scenario: Scenario) -> float:
     return _ENOUGH_TIME + (FRESH if waits else 0.0) + _until_it_sinks(scenario)
 
 
+def _turns_like_one_that_flies(scenario: Scenario) -> bool:
+    """An IMU alone feels the bank and the force of a spiral, which is flown on purpose as well."""
+    dives = scenario.descent is not None and scenario.descent.sink > SOFT
+    return outlives(scenario) and scenario.second_sources == (IMU,) and dives
+
+
 def _until_it_sinks(scenario: Scenario) -> float:
     """How long it comes down no faster than softly, as what is flown may, s."""
     way = scenario.descent or scenario.unheld
@@ -112,6 +118,8 @@ def blinded(
     silent = scenario.failure in _NO_POWER and not outlives(scenario)
     if silent and failed_at < need.end:
         return _NO_POWER[scenario.failure]
+    if _turns_like_one_that_flies(scenario) and failed_at < need.end:
+        return f"all that was left was an {IMU}, and an aeroplane dived as it turns in flight"
     drawn = [replace(one, begin=up + one.begin, end=up + one.end) for one in _all_hidden(scenario)]
     if scenario.vehicle is Vehicle.ROCKET:
         drawn += _gaps(seen.told, need)

@@ -56,7 +56,7 @@ def in_the_world(chance: random.Random, drawn: Scenario) -> Scenario:
         drawn = replace(drawn, faults=(*drawn.faults, HomeMove(_around(chance, drawn), by)))
     if chance.random() < _ESTIMATORS:
         drawn = _with_estimator(chance, drawn)
-    elif chance.random() < (_MANOEUVRES if drawn.failure is Failure.NOTHING else _FAILS_IN_ONE):
+    elif chance.random() < _manoeuvres(drawn.failure):
         drawn = _with_manoeuvre(chance, drawn)
     if chance.random() < _CANOPIES:
         tangles = Canopy(speed=round(chance.uniform(18.0, 24.0), 1))
@@ -149,6 +149,13 @@ def _with_estimator(chance: random.Random, drawn: Scenario) -> Scenario:
     strength = 0.0 if how == "hovers" else round(strength, 2)
     fault = EstimatorFault(how, begin, round(begin + lasts, 3), strength)
     return _with_one_wrong(drawn, fault)
+
+
+def _manoeuvres(failure: Failure) -> float:
+    """How many of them fly one. A glide that begins in one would not do what it was told."""
+    if failure is Failure.GLIDE:
+        return 0.0
+    return _MANOEUVRES if failure is Failure.NOTHING else _FAILS_IN_ONE
 
 
 def _with_manoeuvre(chance: random.Random, drawn: Scenario) -> Scenario:

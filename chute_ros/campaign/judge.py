@@ -15,7 +15,7 @@ from chute_ros.model import Action
 _REFUSED = "the only parachute refused: by the wrong height that it was told, it stood"
 #: What a person orders has happened by then, s.
 _PERSON_WAITS = 6.0
-#: Lower than this nothing is released, m above take-off.
+#: Nearer to the height of its take-off nothing is released, m.
 _LOWEST = 10.0
 #: A canopy that is out must carry within this, or an alarm and the next parachute follow, s.
 _CARRIES_WITHIN = 3.0
@@ -91,7 +91,7 @@ def _never(flown: Flown) -> Judged | None:
             text = f"{one.decision.action.name} {one.at - flown.up:.2f} s after it was up"
             return Judged(Count.FALSE, f"{text}: {one.decision.rule}: {reasons}")
     opened = flown.opened_by_kill
-    if opened < known or (not math.isnan(opened) and flown.release_height < _LOWEST):
+    if opened < known or (not math.isnan(opened) and abs(flown.release_height) < _LOWEST):
         text = f"a kill alone opened a parachute {opened - flown.up:.2f} s after it was up"
         return Judged(Count.FALSE, f"{text}, at {flown.release_height:.1f} m")
     if flown.scenario.stands and not math.isnan(flown.released):
@@ -117,7 +117,12 @@ def _fallen(flown: Flown) -> Judged | None:
     """It should have been released; None: it should not, or was in time."""
     truth, scenario = flown.truth, flown.scenario
     soft = SOFT_UNDER_DROGUE if scenario.vehicle is Vehicle.ROCKET else SOFT
-    if not truth.falls or flown.released <= truth.latest or flown.landing_speed <= soft:
+    if (
+        not truth.falls
+        or truth.lands_softly
+        or flown.released <= truth.latest
+        or flown.landing_speed <= soft
+    ):
         return None
     enough = enough_time(scenario)
     if not truth.leeway >= enough:

@@ -51,7 +51,8 @@ tell of one that flies well, whose autopilot hangs and whose attitude alone is w
 named as well. So are level sinks while the estimator tells one thing and the barometer another, as
 nothing else tells them; and the time in which something falls past the height of its take-off high
 above other ground, which cannot be known. A canopy that is out and does not carry must be told of,
-or followed by the next parachute, within 3 s; a kill alone must open no parachute below 10 m."""
+or followed by the next parachute, within 3 s; a kill alone must open no parachute within 10 m of
+the height of the take-off."""
 
 #: Seeds that were looked at, flights, how many of each kind.
 _OF_EACH = """\

@@ -38,6 +38,11 @@ class Truth:
         return not math.isnan(self.at)
 
     @property
+    def lands_softly(self) -> bool:
+        """It does so without any release."""
+        return self.leeway >= _LONGEST_FALL - 2.0 * _GRAIN
+
+    @property
     def leeway(self) -> float:
         """How long one may take over it, s; below 0: there is no time at all."""
         return -1.0 if math.isnan(self.latest) else self.latest - self.at

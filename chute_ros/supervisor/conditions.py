@@ -125,10 +125,11 @@ def _denied(
     below = not math.isnan(condition.below)
     claims_a_fall = below if name in _CLAIMED_BELOW else not math.isnan(condition.above)
     by_barometer = name == CLIMB_RATE and not math.isnan(flight.pressure_rate(config, state, now))
-    if not claims_a_fall or by_barometer:
+    if not claims_a_fall:
         return ""
     claim = _CLAIMS[name]
-    return state.denied.get(claim, "") or state.commanded.get(claim, "")
+    denied = "" if by_barometer else state.denied.get(claim, "")
+    return denied or state.commanded.get(name if name == CLIMB_RATE else claim, "")
 
 
 def _link(config: SupervisorConfig, state: State, condition: LinkCondition, now: float) -> Finding:

@@ -19,8 +19,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from statistics import fmean
+from typing import NamedTuple
 
-from chute_ros.supervisor.measurements import ACCELERATION, TILT, VERTICAL_SPEED
+from chute_ros.supervisor.measurements import ACCELERATION, CLIMB_RATE, TILT, VERTICAL_SPEED
 
 GRAVITY = 9.81  # m/s^2
 #: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt); NaN: not known.
@@ -53,6 +54,18 @@ _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
 _LEANS = 0.7071
 
 
+class Rise(NamedTuple):
+    """The barometer's height rose by so much each second, m/s, between these, monotonic s; NaN: it
+    tells nothing."""
+
+    rate: float
+    since: float
+    until: float
+
+
+NOT_TOLD = Rise(math.nan, math.nan, math.nan)
+
+
 def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
     """With one more, if it is far enough from the last."""
     now = moment[0]
@@ -61,22 +74,24 @@ def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
     return (*(one for one in motion if now - one[0] <= KEPT_FOR), moment)
 
 
-def denials(motion: tuple[Moment, ...], baro_rate: float) -> Mapping[str, str]:
-    """Measurement -> why what it claims is not so. baro_rate: of the last second by the barometer,
-    m/s, up positive; NaN: it tells none."""
+def denials(motion: tuple[Moment, ...], barometer: Rise) -> Mapping[str, str]:
+    """Measurement -> why what it claims is not so. barometer: of the last second."""
     denied = {}
-    if why := _sink_denied(motion, baro_rate):
+    if why := _sink_denied(motion, barometer):
         denied[VERTICAL_SPEED] = why
-    if why := _fall_denied(motion, baro_rate):
+    if why := _fall_denied(motion, barometer):
         denied[ACCELERATION] = why
     if why := _tilt_denied(motion):
         denied[TILT] = why
     return denied
 
 
-def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, str]:
+def commanded(
+    attitude_error: float, sink_beyond_target: float, climb_beyond_target: float
+) -> Mapping[str, str]:
     """Measurement -> in words that what it claims was commanded: no accident. Degrees from
-    the commanded attitude, and m/s of sink beyond the commanded one; NaN: not known."""
+    the commanded attitude, and m/s of sink beyond the commanded one, by the estimator and by what
+    tells CLIMB_RATE; NaN: not known."""
     told = {}
     if attitude_error <= _FOLLOWS:
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
@@ -84,6 +99,8 @@ def commanded(attitude_error: float, sink_beyond_target: float) -> Mapping[str, 
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
         # Nor is the force that is missing while it does so.
         told[VERTICAL_SPEED] = told[ACCELERATION] = f"it was commanded ({beyond})"
+    if climb_beyond_target <= _SINKS_AS_TOLD:
+        told[CLIMB_RATE] = f"it was commanded ({climb_beyond_target:+.1f} m/s beyond that)"
     return told
 
 
@@ -91,16 +108,23 @@ def _last(motion: tuple[Moment, ...], seconds: float) -> list[Moment]:
     return [one for one in motion if motion[-1][0] - one[0] <= seconds + _APART / 2.0]
 
 
-def _sink_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
+def _told_meanwhile(motion: tuple[Moment, ...], barometer: Rise) -> float:
+    """The vertical speed over the barometer's time: in a fall that speeds up the newest is twice
+    as much. NaN: none was told, or the barometer tells nothing."""
+    begin, end = barometer.since - _APART, barometer.until + _APART
+    speeds = [one[1] for one in motion if begin <= one[0] <= end and not math.isnan(one[1])]
+    return fmean(speeds) if speeds else math.nan
+
+
+def _sink_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     if not motion or not motion[-1][1] < -1.0:
         return ""
-    if not math.isnan(baro_rate):
-        speeds = [one[1] for one in _last(motion, 1.0) if not math.isnan(one[1])]
-        told = fmean(speeds)
-        if baro_rate - told <= max(_SINK_DIFFERS, _OF_SINK * abs(told)):
-            return ""
-        return f"the barometer tells {baro_rate:+.1f} m/s where it tells {told:+.1f}"
-    return _not_felt(motion)
+    told = _told_meanwhile(motion, barometer)
+    if math.isnan(told):
+        return _not_felt(motion)
+    if barometer.rate - told <= max(_SINK_DIFFERS, _OF_SINK * abs(told)):
+        return ""
+    return f"the barometer tells {barometer.rate:+.1f} m/s where it tells {told:+.1f}"
 
 
 def _not_felt(motion: tuple[Moment, ...]) -> str:
@@ -123,7 +147,7 @@ def _not_felt(motion: tuple[Moment, ...]) -> str:
     return f"it sinks {best:.1f} m/s faster than {over:.1f} s before, of which no force tells"
 
 
-def _fall_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
+def _fall_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     """No speed follows from a force as in a fall."""
     fell: list[Moment] = []
     for one in reversed(motion):
@@ -132,8 +156,7 @@ def _fall_denied(motion: tuple[Moment, ...], baro_rate: float) -> str:
         fell.insert(0, one)
     if len(fell) < 3 or math.isnan(fell[-1][1]) or not _speed_lives(motion):
         return ""
-    speeds = [one[1] for one in _last(motion, 1.0) if not math.isnan(one[1])]
-    if not baro_rate >= fmean(speeds) - _SINK_DIFFERS and not math.isnan(baro_rate):
+    if barometer.rate < _told_meanwhile(motion, barometer) - _SINK_DIFFERS:
         return ""  # the barometer does tell of a fall
     due = 0.0
     for after, before in _backwards(fell):

@@ -34,7 +34,7 @@ _ARMED_SHOWS = 2.0
 #: A vehicle that nobody watched may have climbed as fast, m/s.
 _CLIMBS_UNSEEN = 20.0
 #: Off the ground for so long it was seen to be up, on it to be down, s; no look counts for more.
-_UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 1.0, 1.0, 0.2
+_UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 0.5, 1.0, 0.2
 #: A limit that an age may just reach has passed this much later, s.
 _JUST_AFTER = 1e-6
 
@@ -284,8 +284,8 @@ class _Update(Deploying):
         high = told >= minimum or (told <= -minimum and up_for >= _UP_TAKES)
         if math.isnan(told):
             # One that tells what cannot be is no silence: it may run away on the ground.
-            known = state.measured("height")
-            high = not known.rejected and now >= state.airborne_since + flight.HIGH_AFTER
+            wrong = now < state.measured("height").doubted_at + flight.HIGH_AFTER
+            high = not wrong and now >= state.airborne_since + flight.HIGH_AFTER
         since = state.at_ground_since
         if not flight.at_ground(self.config, state, by_pressure, now):
             since = math.nan

@@ -84,6 +84,7 @@ class RuleEvidence:
         if kept:
             emptied = level <= 0.0 and not self.full(rule)
             kept = () if emptied else tuple([max(0.0, left - passed) for left in kept])
+            kept = kept if any(kept) else ()
         if level == self.level and unknown == self.unknown and kept == self.kept:
             return self
         return replace(self, level=level, unknown=unknown, kept=kept)

@@ -13,7 +13,7 @@ from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY
+from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY, NOT_TOLD, Rise
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
@@ -119,6 +119,14 @@ def pressure_rate(config: SupervisorConfig, state: State, now: float) -> float:
     if state.measured(PRESSURE_ALTITUDE).doubt(PRESSURE_ALTITUDE, now):
         return math.nan
     return _rate_of(config, state, PRESSURE_ALTITUDE, now)[0]
+
+
+def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
+    """By how much, and from when to when, the barometer's height changed in the last second."""
+    if math.isnan(pressure_rate(config, state, now)):
+        return NOT_TOLD
+    (since, before), (until, after) = state.pressure_heights[0], state.pressure_heights[-1]
+    return Rise((after - before) / (until - since), since, until)
 
 
 def pressure_height(config: SupervisorConfig, state: State, now: float) -> float:

@@ -200,6 +200,15 @@ def test_a_level_sink_that_one_tells_and_one_denies_cannot_be_known(fault, way, 
     assert bool(blinded(sinks, 0.0, Need(1.0, 12.0))) is is_hidden
 
 
+def test_an_imu_alone_does_not_tell_a_spiral_from_a_turn() -> None:
+    dive = Descent("spiral dive", 16.0, 2.5, 1.2, 20.0)
+    lost = scenario(Failure.POWER, descent=dive, vehicle_sources=("vehicle/state", "imu"))
+    assert "as it turns in flight" in blinded(lost, 0.0, Need(1.0, 12.0))
+    both = replace(lost, vehicle_sources=("vehicle/state", "imu", "odometry"))
+    assert blinded(both, 0.0, Need(1.0, 12.0)) == ""
+    assert blinded(replace(lost, descent=None), 0.0, Need(1.0, 12.0)) == ""
+
+
 def test_what_sinks_slowly_is_known_once_it_is_faster_than_softly() -> None:
     plain, sinks = scenario(Failure.MOTOR), scenario(Failure.SINK, descent=SINKS)
     assert enough_time(sinks) == pytest.approx(enough_time(plain) + 3.35, abs=0.05)

@@ -53,6 +53,9 @@ def test_one_that_sinks_slowly_has_until_a_canopy_still_opens() -> None:
     assert observe(falling_from(60.0), 0.0).leeway < 4.0
     assert model.armed
     assert touchdown_speed(model, 1e9) == pytest.approx(8.0, abs=0.2)
+    assert not truth.lands_softly
+    model.height = 8.0
+    assert observe(model, 0.0).lands_softly, "it is not so fast yet"
 
 
 def test_over_a_valley_there_is_more_time_and_over_a_hill_less() -> None:

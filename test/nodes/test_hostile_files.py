@@ -103,6 +103,10 @@ class Node:
     def get_fully_qualified_name(self):
         return "/a/node"
 
+    @property
+    def context(self):
+        return SimpleNamespace(get_domain_id=lambda: 7)
+
 
 @pytest.fixture
 def node(tmp_path, monkeypatch):
@@ -126,7 +130,7 @@ def test_the_times_of_signing_begin_anew_and_are_kept_in_its_place(tmp_path, nod
 
 @hostile
 def test_the_memory_of_a_supervisor_starts_fresh(tmp_path, node, kind):
-    path = put(kind, tmp_path / "chute_ros" / "resume" / "a.node.json")
+    path = put(kind, tmp_path / "chute_ros" / "resume" / "a.node@7.json")
     memory = Memory(node, {"resume_within": 30.0}, SupervisorConfig())
     try:
         assert ends(memory.recall) is None

@@ -236,7 +236,15 @@ def test_diagnostics_say_what_is_missing_and_what_is_there(bench, network):
     said = tasks(diagnostics)
     assert set(said) == {
         f"mavlink_parachute: {task}"
-        for task in ("link", "parachute", "autopilot", "kill", "signing", "supervisor")
+        for task in (
+            "link",
+            "parachute",
+            "autopilot",
+            "kill",
+            "signing",
+            "supervisor",
+            "middleware",
+        )
     }
     assert said["mavlink_parachute: link"].level == DiagnosticStatus.WARN
     assert said["mavlink_parachute: parachute"].level == DiagnosticStatus.STALE

@@ -24,7 +24,14 @@ def test_diagnostics_say_what_is_missing_and_what_is_there(bench):
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     bench.until(lambda: "link" in tasks(diagnostics), "they come")
     said = tasks(diagnostics)
-    assert set(said) == {"link", "parachute", "vehicle service", "node ids", "supervisor"}
+    assert set(said) == {
+        "link",
+        "parachute",
+        "vehicle service",
+        "node ids",
+        "supervisor",
+        "middleware",
+    }
     assert (said["link"].level, said["parachute"].level) == (WARN, STALE)
     assert said["link"].message == f"{network.connection} is open, nothing received yet"
     assert said["parachute"].message == "never heard"

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from story import (
     DOWN,
+    IDLING,
     LINK,
     SINKS,
     STANDING,
@@ -318,6 +319,7 @@ def test_after_a_reset_nothing_of_the_last_deploy_is_left() -> None:
     story.at(1.2, story.report(D, Outcome.CONFIRMED))
     story.at(2.0, story.heartbeat(), story.told(**DOWN), i.ResetRequest(6))
     assert story.answer(6).success
+    story.at(2.05, story.heartbeat(), i.VehicleReport(IDLING))
     story.at(2.1, story.heartbeat(), story.told(height=55.0))
     assert story.state.stage is Stage.IN_FLIGHT
     story.at(2.2, i.DeployRequest(7, False, "it falls again"))

@@ -8,7 +8,7 @@ from chute_ros.protocol.mavlink.config import KillMethod
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PILOT, CHUTE = (1, 1), (1, 161)
-KILL, RELEASE = 185, 208
+KILL, RELEASE = 400, 208
 LONG = (
     "parachute 1/161: heartbeat LOST: 12.3 s old; battery 13.9 V, need 14.0 V; mavlink link lost"
 )

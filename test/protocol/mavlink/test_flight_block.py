@@ -177,7 +177,7 @@ def test_an_autopilot_that_asks_may_arm_only_while_flight_is_not_blocked():
     bench.hear(PILOT, may_it_arm((1, 191)))
     generic = d.MAV_ARM_AUTH_DENIED_REASON_GENERIC
     assert answers(bench) == [(d.MAV_RESULT_DENIED, generic, 0, 1, 1)]
-    assert bench.texts()[-1] == "arming denied, flight blocked: no parachute"
+    assert bench.texts()[-1] == "no parachute: flight blocked, arming denied"
     bench.link.flight_block("", bench.now)
     bench.clear()
     bench.hear(PILOT, may_it_arm())

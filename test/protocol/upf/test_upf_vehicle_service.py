@@ -1,7 +1,7 @@
 """flyfire.VehicleService: what devices ask of the vehicle is answered by what really happened."""
 
 import pytest
-from upf_link_bench import Bench, flying, landed, layout_of
+from upf_link_bench import US, Bench, flying, landed, layout_of
 
 from chute_ros.protocol.upf.config import Policy
 from chute_ros.protocol.upf.vehicle_service import KILL_MEMORY, MOST_PENDING
@@ -329,7 +329,7 @@ def test_type_that_is_not_known_is_rejected_and_counted(alone):
 def test_service_that_the_vehicle_does_not_offer_is_counted(alone):
     story = alone()
     puppet = story.puppet(33)
-    puppet.request(10, "flyfire.TriggerService", 0, {}, 16)
+    puppet.request(US, "flyfire.TriggerService", 0, {}, 16)
     story.deliver(puppet)
     assert story.link.counts["requests that we do not serve"] == 1
 
