@@ -26,7 +26,7 @@ from sitl.page import Flown, with_autopilot
 
 _TRIES = 3
 #: A node or a simulator that this machine kept waiting longer has flown in no real time, s.
-HELD_UP = 0.4
+HELD_UP = 0.25
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "real_autopilots.md"
 
 
