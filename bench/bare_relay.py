@@ -16,7 +16,7 @@ from dronecan.dsdl.common import crc16_from_bytes
 
 GROUP = "239.65.82.0"
 _LOOPBACK = socket.inet_aton("127.0.0.1")
-_NODE_ID = 10
+_NODE_ID = 100
 _VEHICLE_SERVICE = 164
 _KILLSWITCH = 1
 _FORCE_DISARM = 21196

@@ -132,7 +132,7 @@ class CanDecoder:
     """Frames to transfers to values, each checked."""
 
     def __init__(self, definitions: Definitions) -> None:
-        self._endpoint = Endpoint(definitions.types, 10)
+        self._endpoint = Endpoint(definitions.types, 100)
 
     def feed(self, data: bytes, now: float) -> int:
         return self._endpoint.receive(data, now) is not None

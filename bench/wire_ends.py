@@ -24,7 +24,7 @@ from chute_ros.transport.can_multicast import CanMulticastWire
 from chute_ros.transport.udp import UdpWire
 
 #: The node id of the controller, and of the vehicle that it asks.
-CONTROLLER, VEHICLE = 33, 10
+CONTROLLER, VEHICLE = 33, 100
 #: How often both ends say how they are, s.
 _INTERVAL = 0.05
 #: What both ends say by themselves, frames a second on either wire.

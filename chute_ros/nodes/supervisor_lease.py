@@ -20,6 +20,8 @@ from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.state import State
 
 #: Only one that has just started gives way to another of its name, s: a forged claim must not end
+#: One that lives claims ten times a second; a single claim may be anybody's.
+_CLAIMS_OF_ONE_THAT_LIVES = 3
 #: one that has been at work.
 _JUST_STARTED = 30.0
 _APART = "end one, or give it a name (-r __node:=NAME), a rank and hot_standby of its own"
@@ -50,6 +52,8 @@ class LeaseKeeper:
         self._started = time.monotonic()
         #: When another of its name was heard last, monotonic s.
         self._namesake_heard = -math.inf
+        #: The namesake heard last: its instance, how often in a row, and for how long it runs.
+        self._rival = ("", 0, -math.inf)
         self._node, self._wall = node, wall
         self._state, self._links_heard = state, links_heard
         self._happened, self._follow = happened, follow
@@ -140,7 +144,8 @@ class LeaseKeeper:
         if message.instance == self.instance:
             return
         now = time.monotonic()
-        if message.name == self.config.name:
+        # A supervisor always gives its instance: without one somebody else made it up.
+        if message.name == self.config.name and message.instance:
             self._namesake(message, now)
         if message.leader == self.config.name:
             here = self.followers(now)
@@ -171,12 +176,16 @@ class LeaseKeeper:
     def _namesake(self, message: SupervisorLease, now: float) -> None:
         """Another of this name is at work: who came later and has no flight goes."""
         self._namesake_heard = now
+        instance, times, ran = self._rival
+        goes_on = message.instance == instance and message.running > ran
+        self._rival = message.instance, times + 1 if goes_on else 1, message.running
         running, state = now - self._started, self._state()
         older = message.running > running + _TOGETHER
         together = abs(message.running - running) <= _TOGETHER
         first = older or (together and message.instance > self.instance)
         idle = not state.flown and state.stage in ON_GROUND
-        if first and idle and running < _JUST_STARTED:
+        lives = self._rival[1] >= _CLAIMS_OF_ONE_THAT_LIVES
+        if lives and first and idle and running < _JUST_STARTED:
             raise NameTakenError(
                 f"another supervisor called {message.name} runs for {message.running:.0f} s "
                 f"already (instance {message.instance[:16]}): {_APART}"

@@ -192,8 +192,13 @@ def _autopilot(
             state.stage is Stage.KILLING and state.killed_in_flight and not state.killed_standing
         )
         stopped = ours and kill is not None and kill.confirmed and not state.kill_only
+        minimum = config.profile.minimum_height
         return Finding(
-            stopped, lambda: "its motors were stopped in flight, as its own state confirms"
+            stopped and state.killed_height >= minimum,
+            lambda: (
+                "its motors were stopped in flight, as its own state confirms, at "
+                f"{state.killed_height:.1f} m (minimum {minimum:g} m)"
+            ),
         )
     if fact is AutopilotFact.DISARMED:
         said = flight.armed(config, state, now)

@@ -56,7 +56,7 @@ _OFF_GROUND, _STANDS_BELOW = 2.5, 1.0
 #: further from upright, degrees: both are flown.
 _CALM_SPEED, _CALM_TILT = 8.0, 60.0
 #: What ends a flight, after which a person may reset one that has been still for so long, s.
-_ENDED, _STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
+_ENDED, STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
 _HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
@@ -321,7 +321,7 @@ def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: f
 def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool:
     """After a kill or a deploy it has not moved for a while: the autopilot of a vehicle that has
     crashed may say for ever that it is in the air."""
-    return state.stage in _ENDED and now >= state.still_since + _STILL_FOR
+    return state.stage in _ENDED and now >= state.still_since + STILL_FOR
 
 
 def is_still(config: SupervisorConfig, state: State, now: float) -> bool:

@@ -129,8 +129,9 @@ class Policy(Reports):
                 continue
             judged = judge(self.config, self.state, rule, self.now)
             rules[rule.name] = self._cleared(rule, judged.evidence)
-            waits = rules[rule.name].put_off and self._falls_on()
-            if (judged.evidence.fulfilled(rule) or waits) and not rules[rule.name].latched:
+            waits = rules[rule.name].put_off
+            due = self._falls_on() if waits else judged.evidence.fulfilled(rule)
+            if due and not rules[rule.name].latched:
                 fulfilled.append(judged)
         self._keep(rules)
         # A stable sort: of two that want the same, the one that the profile names first.

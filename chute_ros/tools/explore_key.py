@@ -50,6 +50,18 @@ LEFT_OUT = frozenset(
         "killed_at",  # as the next, told by the height that is left since
         "killed_height",
         "home",  # from it only the fence is measured, whose rule raises an alarm
+        "reasons",
+        "pressure_heights",  # no pressure, altitude, target or fault is told here
+        "ground_pressure_altitude",
+        "at_ground_since",
+        "home_altitude",
+        "commanded",
+        "faults_told",
+        "motion",  # pictures come too seldom here to contradict each other
+        "denied_since",
+        "unfit",
+        "fitness_since",
+        "armed_by_us",  # after a flight, of devices that the explorer does not look at
     }
 )
 _MEASURED = ("height", "vertical_speed", "tilt_deg", "acceleration", "battery_remaining")
@@ -95,7 +107,9 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         tuple(sorted(state.released_before)),
         tuple(sorted(state.device_blocks)),
         (len(state.kill_tokens) > 0, len(state.deploy_tokens) > 0),
-        (bool(state.alarms), math.isnan(state.alarm_at)),
+        (bool(state.alarms), math.isnan(state.alarm_at), state.canopy_fails, state.kill_only),
+        round(state.up_for, 3),
+        _since(state.still_since, now, flight.STILL_FOR),
     )
 
 
@@ -184,7 +198,7 @@ def _rule(state: State, rule: Rule) -> Hashable:
     unknown = min(round(evidence.unknown, 3), UNKNOWN_STANDS)
     kept = tuple(round(left, 3) for left in evidence.kept)
     sure = evidence.holds, evidence.sure
-    return sure, level, shown, evidence.latched, kept, new, unknown
+    return sure, level, shown, (evidence.latched, evidence.put_off), kept, new, unknown
 
 
 def _number(pending: Pending | None) -> tuple[int, int]:

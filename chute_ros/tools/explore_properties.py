@@ -30,8 +30,8 @@ PROPERTIES = {
     "that it stands or is disarmed, unless it does so since a kill in flight, or says disarmed "
     "since its autopilot started anew in flight",
     "silence": "no rule deploys unless a sign of a fall came within the last second, or a kill "
-    "was decided in flight, so high and so short a time ago that it is not down yet: silence and "
-    "lost links alone never do",
+    "was decided in flight, so high and so short a time ago that it is not down yet, or is "
+    "confirmed: silence and lost links alone never do",
     "at once": "a rule that is fulfilled in flight and not denied kills in the same update, and "
     "it is denied only where the vehicle stands, is disarmed or is too low",
     "confirmed": "no deploy leaves after one was confirmed, until a person forces another",
@@ -211,7 +211,10 @@ class Properties:
             ground = before.stage in ON_GROUND and not self._says_in_air(after)
             self._expect("ground", not ground and not stands, told)
             aloft = memory.height_left(now) + _EPSILON >= self.config.profile.minimum_height
-            self._expect("silence", falls or aloft, told)
+            kill = before.kill
+            stopped = before.stage is Stage.KILLING and kill is not None and kill.confirmed
+            stopped |= after.kill is not None and after.kill.confirmed
+            self._expect("silence", falls or aloft or (stopped and killed), told)
         elif stands and falls:
             self.exercised["ground"] += 1
         elif before.airborne and not falls and now - after.vehicle_received > 1.0:

@@ -158,7 +158,7 @@ class MavlinkLinked(Linked):
     def _turn(self, now: float) -> None:
         super()._turn(now)
         self._link.vehicle_state(now)
-        self._link.doubts()
+        self._link.doubts(self._now)
 
     def _left(self, raw: bytes) -> None:
         frames = self._ear.feed_datagram(raw, self._now)

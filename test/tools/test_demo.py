@@ -89,7 +89,7 @@ def test_it_keeps_the_logs_where_it_is_told_to(runs):
     logs = {file.name: file.read_text() for file in runs["good"][3].glob("*.log")}
     assert set(logs) == {f"{n}.log" for n in ("supervisor", "mavlink", "autopilot", "parachute")}
     assert "RELEASED by" in logs["parachute.log"]
-    assert "FLIGHT TERMINATION" in logs["autopilot.log"]
+    assert "DISARMED" in logs["autopilot.log"]
     assert not any("Traceback" in text for text in logs.values())
 
 

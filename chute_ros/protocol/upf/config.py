@@ -62,7 +62,7 @@ class UpfConfig:
     vehicle_state_age: float = 1.0
     allocator: bool = True
     #: To another allocator on the bus, as an autopilot is one.
-    allocator_yields: bool = False
+    allocator_yields: bool = True
     allocation_table: Mapping[bytes, int] = field(default_factory=dict)
     time_master: bool = True
     #: UTC minus monotonic time at the start.
