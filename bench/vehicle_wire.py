@@ -17,6 +17,7 @@ from bench.flood import attitude
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.status_texts import StatusTexts
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 
@@ -39,6 +40,7 @@ class VehicleWire:
         self._parachute = ParachuteDevice(ParachuteSettings(), [])
         self._decoder = FrameDecoder()
         self._encoder = FrameEncoder(1, 1)
+        self._texts = StatusTexts()
         self._flood_interval = 0.0
         self._flood_at = 0.0
         self._stopping = False
@@ -109,8 +111,10 @@ class VehicleWire:
 
     def _note(self, message: dialect.MAVLink_message, at: int) -> None:
         kind = message.get_type()
-        if kind == "STATUSTEXT" and "flight blocked" in str(message.text):
-            self.blocks.append(at)
+        if kind == "STATUSTEXT":
+            # The reason comes first, so that the word may be in a later chunk.
+            whole = self._texts.feed(message, time.monotonic())
+            self.blocks += [at for text in whole if "flight blocked" in text.text]
         if kind == "COMMAND_LONG" and message.command == dialect.MAV_CMD_DO_PARACHUTE:
             self.releases.append(at)
 
