@@ -14,7 +14,7 @@ from chute_ros.protocol.events import Event, RequestFinished, RequestReport
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.status_texts import chunked
 
-#: The reason of the block is said no more often than this, s; the newest one wins.
+#: Another reason of the block is said no more often than this, s; the newest one wins.
 REASON_INTERVAL = 2.0
 #: Orders whose end is waited for, at most, and texts that wait to be sent.
 _MOST_ORDERS, _MOST_TEXTS = 32, 8
@@ -37,7 +37,9 @@ class Announcements:
         self._last_id = 0
 
     def reason(self, text: str) -> None:
-        """Why flight is blocked; empty: it is not."""
+        """Why flight is blocked; empty: it is not. Whether it is waits for nothing."""
+        if bool(text) != bool(self._reason):
+            self._said_at = -math.inf
         self._reason = text
 
     def say(self, text: str, severity: int = _CRITICAL) -> None:
