@@ -174,18 +174,17 @@ class LeaseKeeper:
             self._complain(trouble)
 
     def _namesake(self, message: SupervisorLease, now: float) -> None:
-        """Another of this name is at work: who came later and has no flight goes."""
+        """Another of this name is at work: who came later goes, in flight as well."""
         self._namesake_heard = now
         instance, times, ran = self._rival
         goes_on = message.instance == instance and message.running > ran
         self._rival = message.instance, times + 1 if goes_on else 1, message.running
-        running, state = now - self._started, self._state()
+        running = now - self._started
         older = message.running > running + _TOGETHER
         together = abs(message.running - running) <= _TOGETHER
         first = older or (together and message.instance > self.instance)
-        idle = not state.flown and state.stage in ON_GROUND
         lives = self._rival[1] >= _CLAIMS_OF_ONE_THAT_LIVES
-        if lives and first and idle and running < _JUST_STARTED:
+        if lives and first and running < _JUST_STARTED:
             raise NameTakenError(
                 f"another supervisor called {message.name} runs for {message.running:.0f} s "
                 f"already (instance {message.instance[:16]}): {_APART}"

@@ -96,6 +96,9 @@ def test_on_another_computer_the_second_refuses_once_it_hears_the_first(
 ):
     """Two computers share no file: they are told apart by what their leases say."""
     kept = flying(pair)
+    pair.bench.until(
+        lambda: "a" in pair.claims and pair.claims["a"][1].running > 3.0, "it was first for sure"
+    )
     elsewhere = Processes(tmp_path)
     start_namesake(pair, elsewhere, **parameters)
     said = refusal(pair, elsewhere)
