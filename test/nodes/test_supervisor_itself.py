@@ -117,7 +117,7 @@ def test_a_late_update_is_reported_and_silence_meanwhile_is_not_held_against_any
         pass  # the whole process is held up, the supervisor with it
     values = scene.await_itself(DiagnosticStatus.ERROR, "updates late")
     assert int(values["updates late"]) >= 1
-    blocked = [one.reasons for one in scene.states[1:] if one.state == SafetyState.BLOCKED]
+    blocked = [one.block_reasons for one in scene.states[1:] if one.state == SafetyState.BLOCKED]
     assert not blocked
 
 
