@@ -60,27 +60,6 @@ class Flight:
         """The motors are armed, as soon as the autopilot can."""
         self.vehicle.again("armed", 60.0, self.pilot.arm, self.station.armed)
 
-    def set(self, name: str, value: float) -> float:
-        """A parameter of the autopilot, and it says that it has it; when it was sent."""
-        sent: list[float] = []
-        self.vehicle.bench.parameters.pop(name, None)
-        self.vehicle.again(
-            f"parameter {name}",
-            10.0,
-            lambda: sent.append(self.pilot.set(name, value)),
-            lambda: name in self.vehicle.bench.parameters,
-        )
-        return sent[-1]
-
-    def get(self, name: str) -> float:
-        """A parameter of the autopilot."""
-        bench = self.vehicle.bench
-        bench.parameters.pop(name, None)
-        self.vehicle.again(
-            f"parameter {name}", 5.0, lambda: bench.request(name), lambda: name in bench.parameters
-        )
-        return bench.parameters[name]
-
     def upload_mission(self, height: float) -> None:
         """The autopilot has the pilot's mission."""
         self.vehicle.again(
@@ -101,7 +80,7 @@ class Flight:
         """Ready, armed, in the air at this height, and the supervisor knows it."""
         self.get_ready()
         if self.kind == PX4:
-            self.set("MIS_TAKEOFF_ALT", height)
+            self.vehicle.set("MIS_TAKEOFF_ALT", height)
         self.change_mode(self.pilot.ready_to_climb())
         self.arm()
         self.climb(height)
@@ -150,8 +129,8 @@ class Flight:
             self.vehicle.must("the failure is injected", 3.0,
                               lambda: self.vehicle.bench.accepted(number))  # fmt: skip
             return sent
-        self.set("SIM_ENGINE_MUL", thrust)
-        return self.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
+        self.vehicle.set("SIM_ENGINE_MUL", thrust)
+        return self.vehicle.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
 
     def see_it_out(self, seconds: float, after: float = 2.0) -> None:
         """Until it is on the ground, or for so long; and a little more."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -122,10 +123,11 @@ def _wings(flight: Flight) -> None:
     _through(flight, _WINGS, 60.0)
 
 
-#: Parameters that spoil a sensor, and for how long; each is healed before the next.
+#: Parameters that spoil a sensor (those that this version has), and for how long; each is healed
+#: before the next.
 _SENSORS: tuple[tuple[str, dict[str, float], float], ...] = (
-    ("no GPS", {"SIM_GPS1_ENABLE": 0}, 8.0),
-    ("GPS 40 m off", {"SIM_GPS1_GLTCH_X": 0.00036}, 8.0),
+    ("no GPS", {"SIM_GPS1_ENABLE": 0, "SIM_GPS_DISABLE": 1}, 8.0),
+    ("GPS 40 m off", {"SIM_GPS1_GLTCH_X": 0.00036, "SIM_GPS_GLITCH_X": 0.00036}, 8.0),
     ("barometer 20 m off", {"SIM_BARO_GLITCH": 20}, 6.0),
     ("barometer drifts 2 m/s", {"SIM_BARO_DRIFT": 2}, 8.0),
     ("no barometer", {"SIM_BARO_DISABLE": 1}, 6.0),
@@ -157,12 +159,15 @@ def _sensors(flight: Flight) -> None:
             vehicle.rest(5.0)
     else:
         for what, values, seconds in _SENSORS:
-            before = {name: flight.get(name) for name in values}
-            for name, value in values.items():
-                flight.pilot.set(name, value)
+            known = {name: vehicle.get(name) for name in values}
+            before = {name: value for name, value in known.items() if not math.isnan(value)}
+            if not before:
+                flight.verdict.happened.append(f"not to be had: {what}")
+            for name in before:
+                flight.pilot.set(name, values[name])
             _see(flight, what, seconds)
             for name, value in before.items():
-                flight.set(name, value)
+                vehicle.set(name, value)
             vehicle.rest(6.0)
     flight.expect(Want.BY_TRUTH, flight.began)
 

@@ -48,7 +48,7 @@ def _on_the_bench(flight: Flight) -> None:
     vehicle = flight.vehicle
     flight.get_ready()
     if flight.kind == PX4:
-        flight.set("COM_DISARM_PRFLT", 60.0)
+        flight.vehicle.set("COM_DISARM_PRFLT", 60.0)
     flight.change_mode("POSCTL" if flight.kind == PX4 else "GUIDED")
     if flight.kind == PX4:
         flight.pilot.sticks(0.0, 0.0, -1.0, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import time
 from collections.abc import Callable, Mapping
@@ -136,6 +137,27 @@ class Vehicle:
                 self.must(what, 0.0, done)
             self.until(pause, done)
 
+    def set(self, name: str, value: float) -> float:
+        """A parameter of the autopilot, and it says that it has it; when it was sent."""
+        sent: list[float] = []
+        self.bench.parameters.pop(name, None)
+        self.again(
+            f"parameter {name}",
+            10.0,
+            lambda: sent.append(self.pilot.set(name, value)),
+            lambda: name in self.bench.parameters,
+        )
+        return sent[-1]
+
+    def get(self, name: str) -> float:
+        """A parameter of the autopilot; NaN: it has none of this name."""
+        self.bench.parameters.pop(name, None)
+        end = time.monotonic() + 2.0
+        while name not in self.bench.parameters and time.monotonic() < end:
+            self.bench.request(name)
+            self.until(0.5, lambda: name in self.bench.parameters)
+        return self.bench.parameters.get(name, math.nan)
+
     def renew(self) -> bool:
         """Make it ready for another story on the ground; False: it needs a new life."""
         if self.autopilot.kind == PX4 or self.height() > GROUND:
@@ -143,7 +165,8 @@ class Vehicle:
         try:
             self.pilot.let_go()
             self.pilot.stop_flying()
-            self.pilot.set("SIM_ENGINE_FAIL", 0)
+            self.set("SIM_ENGINE_FAIL", 0)
+            self.set("SIM_ENGINE_MUL", 1)
             self.again("disarmed", 5.0, lambda: self.pilot.disarm(True),
                        lambda: not self.station.armed())  # fmt: skip
             self.keeper.kill("parachute")

@@ -360,10 +360,17 @@ class DeviceNode(SuiteNode, ABC):
             device_healthy=summary.device_healthy,
             reasons=list(summary.reasons),
             age=summary.age,
+            behind=self._behind(),
         )
         message.header.stamp = self.stamp()
         self._supervisor.beat(message.header.stamp)
         self.publish_heartbeat(message)
+
+    def _behind(self) -> float:
+        """For how long what came may have waited, s: the processor is short."""
+        assert self.loop is not None
+        now = time.monotonic()
+        return max(self.loop.late.most(now), self.inbox.late.most(now))
 
     def _safety_state(self, message: SafetyState) -> None:
         self._supervisor.picture(message, self.get_name())
@@ -407,6 +414,7 @@ class DeviceNode(SuiteNode, ABC):
         faults = {
             "exceptions in the link's thread": self._loop_faults,
             "pictures left out, as the executor did not keep up": self.inbox.left_out,
+            "looked late at what came (s, the most of 5 s)": f"{self._behind():.2f}",
         }
         statuses.append(self._supervisor.task(name, faults | self.decisions.counts()))
         self.diagnostics_publisher.publish(self.stamp(), statuses)

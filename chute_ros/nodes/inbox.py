@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any
+
+from chute_ros.transport.lateness import Lateness
 
 #: Where more events than this wait, pictures are left out: the next one tells the same.
 MOST_WAITING = 2000
@@ -35,6 +39,9 @@ class Inbox:
         self._lock = threading.Lock()
         #: Pictures that were left out.
         self.left_out = 0
+        #: Of taking what waits, and since when something does, monotonic s.
+        self.late = Lateness()
+        self._since = math.nan
 
     def put(self, events: list[Any]) -> None:
         """In the link's turn: hand events to the executor."""
@@ -51,6 +58,8 @@ class Inbox:
                 else:
                     self._waiting.append(event)
         if hurried:
+            if math.isnan(self._since):
+                self._since = time.monotonic()
             self._wake()
 
     def left(self) -> list[Any]:
@@ -60,9 +69,14 @@ class Inbox:
     def drain(self) -> None:
         """In the executor: take what is there. What comes meanwhile waits for its turn: a flood
         must not keep decisions from theirs."""
+        now = time.monotonic()
+        if not math.isnan(self._since):
+            self.late.note(now - self._since, now)
+        self._since = math.nan
         for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
             with self._lock:
                 event = self._waiting.popleft()
             self._take(event)
         if self._waiting:
+            self._since = now
             self._wake()

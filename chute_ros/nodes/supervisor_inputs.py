@@ -69,6 +69,7 @@ class SupervisorInputs:
             message.seq,
             difference,
             tuple(message.reasons),
+            message.behind,
         )
 
     def _parachute(self, message: ParachuteStatus) -> inputs.Input:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 from statistics import fmean, median
 
@@ -170,6 +171,12 @@ def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> t
         heights, height.measured_at
     ):
         return math.nan, "too few heights that can be used"
+    return _rate(heights)
+
+
+@lru_cache(maxsize=16)  # each picture of the vehicle asks for it several times
+def _rate(heights: tuple[tuple[float, float], ...]) -> tuple[float, str]:
+    """What heights (monotonic s, m) tell of a climb, m/s, or NaN and why they tell none."""
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rates = [
         (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)

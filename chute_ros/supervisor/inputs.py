@@ -30,6 +30,8 @@ class LinkHeartbeat:
     clock_difference: float = NAN
     #: Why device_healthy is not so, in words.
     reasons: tuple[str, ...] = ()
+    #: What it says of its device may be older by so much, s: its computer's processor is short.
+    behind: float = 0.0
 
 
 @dataclass(frozen=True)

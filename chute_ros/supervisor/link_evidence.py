@@ -25,6 +25,8 @@ _NOTHING: MappingProxyType[str, ParachuteStatus] = MappingProxyType({})
 MOST_DEVICES = 16
 #: Wall clocks are judged by the heartbeats of at least so long, s.
 _CLOCK_SPELL = 1.0
+#: A node that looks later at what its wire brings tells of what was, s.
+MOST_BEHIND = 0.5
 
 
 class LinkJudgement(enum.IntEnum):
@@ -68,6 +70,8 @@ class LinkEvidence:
     device_healthy: bool = False
     #: Why not, as its node says it.
     reasons: tuple[str, ...] = ()
+    #: What it says may be older by so much, s.
+    behind: float = 0.0
     seq: int = 0
     #: Monotonic s since when it was heard without a break, after it was lost; NaN: never lost.
     regained_at: float = math.nan
@@ -95,6 +99,16 @@ class LinkEvidence:
         only look late, and clocks that differ show in all, so that the smallest counts."""
         unknown = math.isnan(self.clock_least_before)
         return math.nan if unknown else min(self.clock_least, self.clock_least_before)
+
+    @property
+    def looks_late(self) -> str:
+        """That its node does not keep up, in words; empty: it does."""
+        if not self.behind > MOST_BEHIND:
+            return ""
+        return (
+            f"its node looks {self.behind:.2f} s late at what comes (limit {MOST_BEHIND:g} s): "
+            "its computer's processor is short"
+        )
 
     def silent(self, limit: float, now: float) -> bool:
         """The node itself, not only its device, was not heard for limit s, or never.
@@ -138,6 +152,7 @@ class LinkEvidence:
             reported=one.link_state,
             device_healthy=one.device_healthy,
             reasons=one.reasons,
+            behind=one.behind,
             seq=one.seq,
             regained_at=regained_at,
             lost_count=lost_count,

@@ -75,6 +75,11 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
             against += links
     reasons = [problem[link] for link in dict.fromkeys(against)]
     reasons += [
+        f"{link}: {text}"
+        for link in config.links
+        if not problem[link] and (text := state.evidence(link).looks_late)
+    ]
+    reasons += [
         text
         for rung in config.deploy_ladder
         if not problem[rung.link] and (text := _rung_problem(rung, state.evidence(rung.link)))

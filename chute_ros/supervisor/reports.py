@@ -57,6 +57,7 @@ class Reports(Requests):
         if self.state.leading:
             # The alarms of one that follows are those of the leader, which has another clock.
             self._look_at_clock(one.link)
+            self._look_at_delay(one.link, before.looks_late)
         if known and (silent or one.seq <= before.seq):
             # It may know of no decision; what still holds for it is decided anew.
             restarted = one.seq <= before.seq
@@ -81,6 +82,12 @@ class Reports(Requests):
             alarms = tuple(one for one in self.state.alarms if one != text)
             self.state = replace(self.state, alarms=alarms)
             self.outputs.append(i.Say(f"{link}: its wall clock agrees again"))
+
+    def _look_at_delay(self, link: str, before: str) -> None:
+        """On the ground it forbids take-off."""
+        text = self.evidence(link).looks_late
+        if self.state.airborne and text and not before:
+            self.outputs.append(i.Say(f"{link}: {text}", alarm=True))
 
     def parachute(self, one: i.ParachuteReport) -> None:
         """One device on a link tells its picture."""

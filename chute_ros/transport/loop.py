@@ -16,6 +16,7 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from typing import Any, Generic, Protocol, TypeVar
 
+from chute_ros.transport.lateness import Lateness
 from chute_ros.transport.wire import Wire
 from chute_ros.transport.wire_events import LoopFault, WireChange
 from chute_ros.transport.wire_watch import WireWatch
@@ -74,6 +75,10 @@ class WireLoop(Generic[LinkT]):
         self.wire = wire
         self.send_errors = 0
         self.last_run = time.monotonic()
+        #: Of reading what the wire brings.
+        self.late = Lateness()
+        #: Nothing waited to be read, monotonic s.
+        self._caught_up_at = time.monotonic()
         self._deliver = deliver
         self._opened = opened
         self._not_written = not_written
@@ -156,7 +161,7 @@ class WireLoop(Generic[LinkT]):
             if not self.wire.is_open and now >= self._reopen_at:
                 self._reopen(now)
             poll, wait = self._watched(now)
-        ready = poll.poll(wait)
+        ready = self._await(poll, wait)
         if not self._take_turn():
             return
         with self._touched():
@@ -178,6 +183,20 @@ class WireLoop(Generic[LinkT]):
                 self._guarded(self._at_turns_end.popleft(), self.link, now)
                 self._send()
                 self._hand_over()
+
+    def _await(self, poll: select.poll, wait: int) -> list[tuple[int, int]]:
+        """What is ready, within so many ms; how long it may have waited is noted."""
+        ready = poll.poll(0)
+        if not any(file != self._wake_in.fileno() for file, _ in ready):
+            began = self._caught_up_at = time.monotonic()
+            if not ready:
+                ready = poll.poll(wait)
+                # One that was not let run when something came cannot know when that was.
+                self._caught_up_at = min(time.monotonic(), began + wait / 1000.0)
+        now = time.monotonic()
+        if ready:
+            self.late.note(now - self._caught_up_at, now)
+        return ready
 
     def _take_turn(self) -> bool:
         """The lock; False: it ends. A Ctrl-C may have taken it from under the caller who had it,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pytest
+
+from chute_ros.nodes import inbox as inbox_module
 from chute_ros.nodes.inbox import MOST_AT_ONCE, MOST_WAITING, Inbox
 
 
@@ -98,3 +101,18 @@ def test_an_executor_that_does_not_keep_up_loses_pictures_and_nothing_else():
     executor.inbox.put([Picture()])
     executor.inbox.drain()
     assert isinstance(executor.taken[-1], Picture), "and then they come again"
+
+
+def test_how_long_events_waited_is_told(monkeypatch):
+    executor, now = Executor(), [100.0]
+    monkeypatch.setattr(inbox_module.time, "monotonic", lambda: now[0])
+    executor.inbox.put([1])
+    now[0] = 100.2
+    executor.inbox.put([2])
+    now[0] = 100.7
+    executor.inbox.drain()
+    assert executor.inbox.late.most(now[0]) == pytest.approx(0.7)
+    now[0] = 110.0
+    executor.inbox.put([3])
+    executor.inbox.drain()
+    assert executor.inbox.late.most(now[0]) == 0.0, "nothing waited since"
