@@ -143,6 +143,8 @@ def judge(expected: Expectation, events: Events, truth: Truth, verdict: Verdict)
     if before and expected.want is not Want.NOTHING:
         verdict.wrong.append(f"false: killed {since - before[0][0]:.2f} s before it was needed")
     _JUDGES[expected.want](expected, events, truth, verdict)
+    # Of a story in which nothing is to happen no time runs.
+    verdict.times = {what: took for what, took in verdict.times.items() if not math.isnan(took)}
 
 
 def _ways(kills: list[tuple[float, str]]) -> str:

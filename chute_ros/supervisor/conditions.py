@@ -191,7 +191,7 @@ def _autopilot(
         ours = (
             state.stage is Stage.KILLING and state.killed_in_flight and not state.killed_standing
         )
-        stopped = ours and kill is not None and kill.confirmed and not state.kill_only
+        stopped = ours and kill is not None and kill.confirmed
         minimum = config.profile.minimum_height
         return Finding(
             stopped and state.killed_height >= minimum,

@@ -65,6 +65,8 @@ def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
     # Under a canopy that does not carry the next one may be released.
     if not in_flight and not (state.stage is Stage.DEPLOYED and state.airborne):
         return f"the vehicle is {state.stage.name}, not in flight"
+    if state.kill_only and state.stage is Stage.KILLING:
+        return "a person asked for the kill alone; safety/deploy releases"
     killed = _killed(state, now)
     if flight.down_undisputed(config, state, now) and not killed:
         return "the vehicle says that it stands, and nothing contradicts it"

@@ -40,10 +40,13 @@ def test_what_glides_or_is_too_low_is_not(profile: str, height: float) -> None:
 
 def test_a_person_may_ask_for_the_kill_alone() -> None:
     story = killed("multirotor", 50.0, kill_only=True).fly(2.3)
+    off = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
+    story.fall(3.8, height=50.0, **off)
     assert story.fired() == ["KILL"]
+    assert "denied, a person asked for the kill alone; safety/deploy releases" in story.said()
     # Then a person sees it fall, and asks for both.
-    story.at(2.35, i.KillRequest(2, "operator", "it falls"))
-    story.at(2.4, story.report(Action.KILL, Outcome.CONFIRMED))
+    story.at(3.85, i.KillRequest(2, "operator", "it falls"))
+    story.at(3.9, story.report(Action.KILL, Outcome.CONFIRMED))
     assert story.fired()[-1] == "DEPLOY"
 
 

@@ -62,6 +62,33 @@ def test_one_that_was_commanded_is_neither(profile: str, fastest: float) -> None
     assert not any("sinks fast" in one for one in story.alarms())
 
 
+@AIRCRAFT
+@pytest.mark.parametrize("pulls", [3.0, 5.0])
+@pytest.mark.parametrize("barometer", [True, False])
+def test_one_that_pulls_out_of_a_dive_is_no_accident(
+    profile: str, pulls: float, barometer: bool
+) -> None:
+    """ArduPlane, 30 degrees down by the pilot's stick, then CIRCLE, which keeps the height of that
+    moment: below it until it climbs again."""
+    story, height, speed, target = Story(shipped(profile)).ready(), 120.0, 0.0, float("nan")
+    for k in range(120):
+        dives = k < 60
+        fastest = 15.0 if profile == "fixed_wing" else 9.0
+        speed = max(speed - 0.5, -fastest) if dives else min(speed + EVERY * pulls, 0.0)
+        height += EVERY * speed
+        if k == 60:
+            target = height
+        told = {} if dives else {"below_target": target - height, "attitude_error": 5.0}
+        if barometer:
+            told["pressure"] = pressure_at(height + 0.1 * (k % 3))
+        force = 9.8 + 0.1 * (k % 3) + (0.0 if dives else pulls)
+        parts = {"height": height, "vertical_speed": speed, "acceleration": force, "tilt": 20.0}
+        story.at(story.t + EVERY, story.heartbeat(), story.told(**parts, **told))
+        if not dives and speed == 0.0:
+            break
+    assert story.fired() == []
+
+
 @pytest.mark.parametrize(
     "told", [{"below_target": -100.0}, {"below_target": -100.0, "attitude_error": 0.0}]
 )
