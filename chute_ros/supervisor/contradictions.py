@@ -50,6 +50,9 @@ _CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
 #: Faster than that it may have reached the last speed of its fall, m/s; and one that lies on its
 #: side while it is carried along its axis speeds up by more than this in that time, m/s.
 _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
+#: One that lies on its side sinks by its barometer's last second with this at least, m/s: half a
+#: second of free fall, and what gusts of an ordinary flight do not reach.
+_LIES_AND_SINKS = 2.5
 #: Cosine of 45 degrees: a vehicle that leans less claims no fall.
 _LEANS = 0.7071
 
@@ -81,7 +84,7 @@ def denials(motion: tuple[Moment, ...], barometer: Rise) -> Mapping[str, str]:
         denied[VERTICAL_SPEED] = why
     if why := _fall_denied(motion, barometer):
         denied[ACCELERATION] = why
-    if why := _tilt_denied(motion):
+    if why := _tilt_denied(motion, barometer):
         denied[TILT] = why
     return denied
 
@@ -171,14 +174,18 @@ def _fall_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
     return ""
 
 
-def _tilt_denied(motion: tuple[Moment, ...]) -> str:
-    """Carried in full, and not speeding up: it does not lie on its side."""
+def _tilt_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
+    """Carried in full, and not sinking: it does not lie on its side. The vertical speed is of the
+    estimator that tells the tilt, so that the barometer is asked first."""
     known = _carried(motion)
     if not any(one[3] < _LEANS for one in known):
         return ""
+    force = fmean([one[2] for one in known])
+    if barometer.rate >= -_LIES_AND_SINKS:
+        told = f"the barometer tells {barometer.rate:+.1f} m/s"
+        return f"a force of {force:.1f} m/s^2 carries it, and {told}"
     if known[-1][1] < -_FLOWN_SINK or known[-1][1] - known[0][1] < -_SPEEDS_UP:
         return ""
-    force = fmean([one[2] for one in known])
     return f"a force of {force:.1f} m/s^2 carries it, and its vertical speed stays"
 
 
