@@ -100,8 +100,10 @@ def commanded(
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
-        # Nor is the force that is missing while it does so.
-        told[VERTICAL_SPEED] = told[ACCELERATION] = f"it was commanded ({beyond})"
+        told[VERTICAL_SPEED] = f"it was commanded ({beyond})"
+        # So is the force that is missing while it does so, of one that lies as it shall.
+        if not attitude_error > _FOLLOWS:
+            told[ACCELERATION] = told[VERTICAL_SPEED]
     if climb_beyond_target <= _SINKS_AS_TOLD:
         told[CLIMB_RATE] = f"it was commanded ({climb_beyond_target:+.1f} m/s beyond that)"
     return told

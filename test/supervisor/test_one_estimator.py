@@ -262,3 +262,18 @@ def test_in_the_air_for_ever_after_a_crash_a_person_may_reset() -> None:
         teller.tell(**lies, vertical_speed=teller.noise(0.1), tilt=80.0, force=9.8)
     story.at(story.t + 0.01, i.ResetRequest(3))
     assert story.answer(3).success
+
+
+def test_no_force_is_missing_on_command_of_one_that_lies_otherwise_than_it_shall() -> None:
+    """PX4, one of four motors dead in a hover: for its first half second it sinks no faster than
+    3 m/s beyond its command, and its force was taken for commanded until then."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, target_vertical_speed=0.0)
+    for k in range(1, 25):
+        t = 0.05 * k
+        tilt = min(130.0 * t, 125.0)
+        parts = {"tilt": tilt, "attitude_error": tilt, "vertical_speed": -4.0 * t}
+        parts |= {"acceleration": max(9.8 - 20.0 * t, 4.0), "target_vertical_speed": 0.0}
+        story.fly(story.t + 0.05, **parts)
+    assert story.fired() == ["KILL"]
+    assert story.newest(Action.KILL).rule == "excess tilt"
+    assert story.when(Action.KILL) - 2.0 <= 60.0 / 130.0 + 0.05 + 0.3 + 0.1
