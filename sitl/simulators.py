@@ -141,7 +141,8 @@ class Simulator:
             "--instance",
             str(self.instance),
         ]
-        more = ("-r", str(self.line_rate), "-m", "onboard", "-o", str(self.ports.line))
+        mode = ("-m", "onboard_low_bandwidth")  # as docs/mavlink.md has it for slow lines
+        more = ("-r", str(self.line_rate), *mode, "-o", str(self.ports.line))
         for command in (("stop", "-u", local), ("start", "-x", "-u", local, *more)):
             subprocess.run([*mavlink, *command], check=True, timeout=10.0, capture_output=True)
 

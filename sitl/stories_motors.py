@@ -64,7 +64,8 @@ STORIES = (
     Story("motor-60", "one motor dead at 60 m", _dead(60.0, 0b0010)),
     Story("motor-moving", "one motor dead at 10 m/s and 40 m", _moving),
     Story("motor-5", "one motor dead at 5 m: too low for a parachute", _low),
-    Story("motors-two", "two motors dead at 40 m", _dead(40.0, 0b0011)),
+    Story("motors-two", "two motors side by side dead at 40 m", _dead(40.0, 0b0101)),
+    Story("motors-opposite", "two opposite motors dead at 40 m", _partial(40.0, 0b0011, 0.0)),
     Story("motors-all", "all motors dead at 40 m", _all_dead),
     Story(
         "motor-hexa",

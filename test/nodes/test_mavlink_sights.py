@@ -63,7 +63,7 @@ def test_a_stream_that_is_too_slow_is_named_in_the_state_and_in_diagnostics(benc
     state = bench.until(lambda: states and states[-1].faults and states[-1], "it is told")
     (fault,) = state.faults
     assert fault.startswith("GLOBAL_POSITION_INT comes at 2.")
-    assert "(need 5 Hz): something else sets its rate: " in fault
+    assert "(need 5 Hz): something else sets its rate, or the line is full: " in fault
     bench.until(
         lambda: (status := told(diagnostics, "autopilot")) and status.level == b"\x02",
         "diagnostics tell it as well",

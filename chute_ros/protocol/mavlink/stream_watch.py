@@ -168,6 +168,6 @@ _LINE_CURE = (
     "off streams that others ask for on it"
 )
 _STREAM_CURE = (
-    "something else sets its rate: end the ground station or program that asks for it, or its "
-    "stream rates in the autopilot's settings"
+    "something else sets its rate, or the line is full: end the ground station or program that "
+    "asks for it, or its stream rates in the autopilot's settings"
 )
