@@ -16,6 +16,7 @@ NAV_CONTROLLER_OUTPUT; and ArduPilot 4.7.0-dev and PX4 main of 2026-08 for what 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,6 +29,8 @@ Vector = tuple[float, float, float]
 ATTITUDE_TARGET_SILENCE, TARGET_SILENCE = 0.5, 1.0
 #: What a quaternion's length may differ from 1.
 _LENGTH_TOLERANCE = 0.01
+#: The newest attitude target may be so much older than the newest attitude, s: it comes at 10 Hz.
+_BEHIND = 0.15
 #: A target's own time may be so much behind the autopilot's newest one, ms.
 _OLD_MS = 500
 #: Thrust (0 to 1) from which on, and tilt (rad) up to which, no motor can be commanded to do more.
@@ -132,6 +135,8 @@ class Targets:
         self._readings = readings
         self._axis: Vector | None = None
         self._axis_at = -math.inf
+        #: The vehicle's own, lately, with the time, oldest first.
+        self._own: deque[tuple[float, Vector]] = deque()
 
     def attitude_target(self, message: Any, newest_ms: int | None, now: float) -> None:
         """ATTITUDE_TARGET; newest_ms: the autopilot's newest time_boot_ms, None: not known."""
@@ -147,8 +152,16 @@ class Targets:
 
     def attitude(self, axis: Vector, now: float) -> None:
         """The vehicle's vertical axis is this one now (see vertical_axis)."""
+        while self._own and now - self._own[0][0] > _BEHIND:
+            self._own.popleft()
+        self._own.append((now, axis))
         if self._axis is not None and now - self._axis_at <= ATTITUDE_TARGET_SILENCE:
-            cosine = sum(ours * theirs for ours, theirs in zip(axis, self._axis, strict=True))
+            # A flip turns by 60 degrees from one target to the next: the nearest of what it was
+            # since then counts.
+            cosine = max(
+                sum(ours * theirs for ours, theirs in zip(own, self._axis, strict=True))
+                for _, own in self._own
+            )
             self._readings.set("attitude_error", math.acos(max(-1.0, min(1.0, cosine))), now)
 
     def position_target_local_ned(self, message: Any, now: float) -> None:

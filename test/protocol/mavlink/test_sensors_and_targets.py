@@ -277,6 +277,31 @@ def test_upside_down_where_level_was_commanded():
     assert told.at().attitude_error == pytest.approx(math.pi)
 
 
+@pytest.mark.parametrize("rate", [10, 50])
+def test_a_flip_whose_target_is_told_ten_times_a_second_is_followed(rate):
+    """600 degrees a second, flown as commanded; attitudes come between the targets."""
+    told = Told()
+    for step in range(50):
+        now = step / 50
+        angle = math.remainder(math.radians(600.0) * now, 2.0 * math.pi)
+        if step % (50 // rate) == 0:
+            told.hear(attitude(roll=angle), now=now)
+        if step % 5 == 0:
+            told.hear(to_be(turned(roll=angle)), now=now)
+        assert not told.at(now).attitude_error > math.radians(15.0)
+
+
+def test_one_that_does_not_follow_shows_it_soon():
+    told, late = Told().hear(to_be(turned())), []
+    for step in range(50):
+        now = step / 50
+        told.hear(attitude(roll=math.radians(150.0) * now), now=now)
+        told.hear(to_be(turned()), now=now)
+        if told.at(now).attitude_error > math.radians(30.0):
+            late.append(now - 0.2)
+    assert late[0] == pytest.approx(0.15, abs=0.05)
+
+
 def test_each_attitude_is_set_against_the_newest_target_that_is_fresh():
     told = Told().hear(to_be(turned(roll=0.2)), attitude())
     told.hear(attitude(roll=1.2), now=0.5)
