@@ -139,7 +139,7 @@ DEPLOYS = [
         "autopilot lost and falling",
         0.8,
         LOST,
-        vertical_speed=(-6.1, -5.9),
+        vertical_speed=(-7.6, -7.4),
         tilt=(45.1, 44.9),
         acceleration=(3.9, 4.1),
     ),
