@@ -140,7 +140,8 @@ def _fallen(flown: Flown) -> Judged | None:
 def _not_carried(flown: Flown) -> Judged | None:
     """What came out does not carry: somebody must be told, and the next parachute must follow."""
     scenario, out = flown.scenario, flown.released
-    if not flown.another.falls or flown.landing_speed <= SOFT:
+    # Of one that has not come down when its flight ends nobody knows yet.
+    if not flown.another.falls or not flown.landing_speed > SOFT:
         return None
     due = flown.another.at + _CARRIES_WITHIN
     if blind := blinded(scenario, flown.up, Need(flown.another.at, due), _seen(flown)):
