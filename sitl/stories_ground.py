@@ -19,6 +19,7 @@ from sitl.vehicle import Setup
 #: Of a blocked vehicle: so high it may hop before it is disarmed, m.
 HOP = 1.0
 _WATCHED = 6.0  # s, each way
+_LOST_AFTER = 3.0  # s, as delivered, and a little more
 _BLOCKED = Setup(parachute=("--error", "LOW_POWER"))
 #: Ways that motors come to turn, by autopilot.
 _WAYS: dict[str, tuple[str, ...]] = {
@@ -161,9 +162,16 @@ def _restarts_on_the_ground(flight: Flight) -> None:
     vehicle.rest(2.0)
     began = time.monotonic()
     vehicle.simulator.restart()
-    vehicle.must("not READY while the autopilot starts anew", 8.0,
-                 lambda: vehicle.stage(Stage.BLOCKED, Stage.STARTUP))  # fmt: skip
-    flight.verdict.times["restart to BLOCKED"] = time.monotonic() - began
+    heard = flight.station.heard_at["HEARTBEAT"]
+    vehicle.must("the autopilot is heard again", 30.0,
+                 lambda: flight.station.heard_at["HEARTBEAT"] > heard)  # fmt: skip
+    back = time.monotonic() - began
+    flight.verdict.times["restart to its heartbeat"] = back
+    # One that is back before it counts as lost was never gone.
+    if vehicle.until(8.0, lambda: vehicle.stage(Stage.BLOCKED, Stage.STARTUP)):
+        flight.verdict.happened.append("BLOCKED meanwhile")
+    elif back > _LOST_AFTER:
+        flight.verdict.wrong.append(f"missed: READY while it was silent for {back:.1f} s")
     vehicle.must("READY again", 60.0, lambda: vehicle.stage(Stage.READY, Stage.ARMED))
     flight.verdict.times["restart to READY"] = time.monotonic() - began
 

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
 from sitl.judge import Want
@@ -46,6 +47,16 @@ def _slow(flight: Flight) -> None:
     flight.vehicle.rest(8.0)
     _measure(flight, 8.0)
     _motor(flight, _SLOW)
+
+
+def _too_slow(flight: Flight) -> None:
+    """What the rules need does not come through: said before flight, with the stream's name."""
+    vehicle = flight.vehicle
+    vehicle.rest(25.0)
+    why = [one for one in vehicle.watch.safety.block_reasons if "Hz (need" in one]
+    if not vehicle.stage(Stage.BLOCKED) or not why:
+        flight.verdict.wrong.append("missed: not BLOCKED for what comes too seldom")
+    flight.verdict.happened += [f"BLOCKED: {one.partition(': ')[2][:60]}" for one in why[:1]]
 
 
 def _fight(flight: Flight) -> None:
@@ -122,6 +133,10 @@ STORIES = (
     Story("slow-57600", "a serial line of 57600 baud; one motor dead", _slow,
           Setup(line_rate=5760), spoils=True),
     Story("slow-2880", "a serial line of 2880 B/s; one motor dead", _slow, Setup(line_rate=2880),
+          _ARDUPILOT, spoils=True),
+    Story("too-slow", "a serial line of 1200 B/s", _too_slow, Setup(line_rate=1200),
+          _ARDUPILOT, spoils=True),
+    Story("too-slow-px4", "a serial line of 2000 B/s", _too_slow, Setup(line_rate=2000), (PX4,),
           spoils=True),
     Story("forwards", "no router: the parachute hangs on the autopilot, which forwards", _plain,
           Setup(wiring=FORWARDS), _ARDUPILOT, spoils=True),
