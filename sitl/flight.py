@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from chute_ros.model import Action
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUPLANE, PX4
 from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, held_up, judge
@@ -42,10 +43,25 @@ class Flight:
     # -- on the ground --------------------------------------------------------------------------
 
     def get_ready(self) -> None:
-        """The supervisor says READY, and the parachute is armed."""
+        """The supervisor says READY, and the parachute is armed, or will be."""
         vehicle = self.vehicle
         vehicle.must("READY", _READY_WITHIN, lambda: vehicle.stage(Stage.READY))
-        vehicle.arm_parachute()
+        if not vehicle.setup.dronecan:  # such a one arms itself
+            vehicle.arm_parachute()
+
+    def wait_for_position(self) -> None:
+        """Until it could be armed, as far as the autopilot is concerned."""
+        bit = dialect.MAV_SYS_STATUS_PREARM_CHECK
+        station = self.station
+
+        def could() -> bool:
+            if self.kind == PX4:
+                health = station.get("SYS_STATUS", "onboard_control_sensors_health", 0)
+                return bool(int(health) & bit)
+            return any("is using GPS" in text for _, text in station.said)
+
+        self.vehicle.must("the autopilot would arm", 90.0, could)
+        self.vehicle.rest(3.0)
 
     def change_mode(self, name: str, seconds: float = 20.0) -> None:
         """The autopilot is in this mode."""

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
@@ -35,7 +34,7 @@ def _block(flight: Flight) -> None:
     vehicle = flight.vehicle
     flight.expect(Want.NO_RELEASE)
     vehicle.must("BLOCKED", 60.0, lambda: vehicle.stage(Stage.BLOCKED))
-    _wait_for_position(flight)
+    flight.wait_for_position()
     for way in _WAYS[flight.kind]:
         began = time.monotonic()
         _TRY[way](flight)
@@ -46,20 +45,6 @@ def _block(flight: Flight) -> None:
         if highest > HOP:
             return
         vehicle.rest(1.0)
-
-
-def _wait_for_position(flight: Flight) -> None:
-    """Until it could be armed, as far as the autopilot is concerned."""
-    bit = dialect.MAV_SYS_STATUS_PREARM_CHECK
-    station = flight.station
-
-    def could() -> bool:
-        if flight.kind == PX4:
-            return bool(int(station.get("SYS_STATUS", "onboard_control_sensors_health", 0)) & bit)
-        return any("is using GPS" in text for _, text in station.said)
-
-    flight.vehicle.must("the autopilot would arm", 90.0, could)
-    flight.vehicle.rest(3.0)
 
 
 def _judge(flight: Flight, way: str, began: float, ended: float, highest: float,

@@ -15,7 +15,7 @@ from sitl.judge import Want
 from sitl.record import Seen, read
 from sitl.stories import Story
 from sitl.stories_motors import ONE_DEAD
-from sitl.vehicle import FORWARDS, NODE, SUPERVISOR, Setup
+from sitl.vehicle import CAN_NODE, FORWARDS, NODE, SUPERVISOR, Setup
 
 _ARDUPILOT = (ARDUCOPTER, ARDUPLANE)
 _HEIGHT = 40.0
@@ -23,6 +23,8 @@ _HEIGHT = 40.0
 _STREAMS = ("GLOBAL_POSITION_INT", "ATTITUDE", "EXTENDED_SYS_STATE")
 #: On a slow line everything is later, s.
 _SLOW = 1.5
+#: A UPF tells its status ten times a second, s.
+_TOLD = 0.1
 
 
 def _motor(flight: Flight, within: float = ONE_DEAD) -> None:
@@ -47,6 +49,24 @@ def _slow(flight: Flight) -> None:
     flight.vehicle.rest(8.0)
     _measure(flight, 8.0)
     _motor(flight, _SLOW)
+
+
+def _dronecan(flight: Flight) -> None:
+    """The autopilot's node 10 gives out node ids; ours leaves that to it."""
+    vehicle = flight.vehicle
+    flight.wait_for_position()
+    flight.go_up(_HEIGHT)
+    ours = [one for one in vehicle.watch.parachutes.values() if one.link == CAN_NODE]
+    flight.verdict.happened.append(f"on the bus: {', '.join(one.device for one in ours)}")
+    since = flight.fail_motors(0b0001)
+    vehicle.until(6.0, flight.released)
+    took = time.monotonic() - since
+    flight.expect(Want.KILL, since)
+    flight.verdict.times["failure to release (by its status)"] = took
+    if not flight.released():
+        flight.verdict.wrong.append("missed: not released")
+    elif took > ONE_DEAD + _TOLD:
+        flight.verdict.wrong.append(f"late: released after {took:.2f} s, need {ONE_DEAD:g} s")
 
 
 def _too_slow(flight: Flight) -> None:
@@ -140,6 +160,10 @@ STORIES = (
           spoils=True),
     Story("forwards", "no router: the parachute hangs on the autopilot, which forwards", _plain,
           Setup(wiring=FORWARDS), _ARDUPILOT, spoils=True),
+    Story("dronecan", "a UPF parachute without node ids on the autopilot's bus; one motor dead",
+          _dronecan,
+          Setup(dronecan=True, settings={"CAN_P1_DRIVER": 1, "CAN_D1_PROTOCOL": 1}), _ARDUPILOT,
+          spoils=True),
     Story("signed", "MAVLink 2 signing; one motor dead", _signed, Setup(signed=True), _ARDUPILOT,
           spoils=True),
 )  # fmt: skip

@@ -27,7 +27,7 @@ from sitl.station import GROUND_STATION, Station
 from sitl.truth import GROUND, Truth
 
 NAMESPACE = "/sitl"
-NODE, SUPERVISOR = "mavlink_parachute", "safety_supervisor"
+NODE, CAN_NODE, SUPERVISOR = "mavlink_parachute", "upf_can", "safety_supervisor"
 _TRUTH_RATE = 25.0  # Hz
 _BENCH = (254, 190)
 ROUTER, FORWARDS = "router", "autopilot forwards"
@@ -53,6 +53,8 @@ class Setup:
     #: Options of the parachute's simulator.
     parachute: tuple[str, ...] = ()
     signed: bool = False
+    #: The parachute is on the autopilot's DroneCAN bus; the autopilot gives out node ids.
+    dronecan: bool = False
 
 
 class Vehicle:
@@ -67,7 +69,8 @@ class Vehicle:
         #: Changes of safety/state, with the time.
         self.stages: list[tuple[float, str]] = []
         with contextlib.ExitStack() as made:
-            self.watch = Watch(NAMESPACE, (NODE,), (SUPERVISOR,))
+            links = (NODE, CAN_NODE) if setup.dronecan else (NODE,)
+            self.watch = Watch(NAMESPACE, links, (SUPERVISOR,))
             made.callback(self.watch.close)
             self.kill = self.watch.node.create_client(Kill, "safety/kill")
             self.keeper = Keeper(folder, {"ROS_HOME": str(folder / "ros_home")})
@@ -264,11 +267,20 @@ class Vehicle:
             os.chmod(self._key, 0o600)
             values["signing_key_file"] = str(self._key)
         self.start_parachute()
+        supervisor = dict(setup.supervisor)
+        if setup.dronecan:
+            values["expect_parachute"] = "false"
+            supervisor |= _ON_THE_BUS
+            self.keeper.start(CAN_NODE, f"chute_ros.nodes.{CAN_NODE}", *_ros({"connection": _BUS}))
         self.keeper.start(NODE, f"chute_ros.nodes.{NODE}", *_ros(values))
-        self.keeper.start(SUPERVISOR, f"chute_ros.nodes.{SUPERVISOR}", *_ros(setup.supervisor))
+        self.keeper.start(SUPERVISOR, f"chute_ros.nodes.{SUPERVISOR}", *_ros(supervisor))
 
     def start_parachute(self) -> None:
         """A parachute that is not released."""
+        if self.setup.dronecan:
+            ids = ("--controller-node-id", "0", "--trigger-node-id", "0")
+            self.keeper.start("parachute", "chute_ros.sim.sim_upf", "--connection", _BUS, *ids)
+            return
         options = ["--connection", f"udpout:127.0.0.1:{self.ports.parachute}"]
         if self.setup.signed:
             options += ["--signing-key-file", str(self._key)]
@@ -290,6 +302,12 @@ class Vehicle:
 
 
 _KEY = bytes(range(32))
+_BUS = "mcast:0"
+_ON_THE_BUS = {
+    "required_links": f"[{NODE}, {CAN_NODE}]",
+    "deploy_links": f"[{CAN_NODE}]",
+    "deploy_ladder": f"['{CAN_NODE}', '{CAN_NODE}:trigger']",
+}
 
 
 def _ros(values: Mapping[str, str]) -> list[str]:
