@@ -18,7 +18,7 @@ from chute_ros.errors import ChuteError
 from chute_ros.tools.isolation import isolated_ros
 from faults.ending import take_down_when_ended
 from sitl import results, stories
-from sitl.autopilots import WHAT_TO_GIVE, Autopilot, recognise
+from sitl.autopilots import KINDS, WHAT_TO_GIVE, Autopilot, recognise
 from sitl.hangar import Hangar
 from sitl.judge import Verdict
 from sitl.network import enter_own_network
@@ -37,6 +37,10 @@ def main() -> None:
     if chosen.list:
         for one in every.values():
             print(f"{one.name:16s} {one.text} ({', '.join(one.kinds)})")
+        return
+    if not chosen.autopilots and chosen.page and chosen.results:
+        for kind in KINDS:
+            _write_page(chosen.results, kind)
         return
     if not chosen.autopilots:
         _refuse(WHAT_TO_GIVE)
@@ -59,11 +63,17 @@ def main() -> None:
             kept_in = chosen.results or folder / "results.json"
             flown = fly_all(autopilot, picked, chosen.runs, folder, kept_in)
             wrong += sum(bool(one.verdict.wrong) for one in flown)
-            if chosen.page and (every_run := results.load(kept_in, autopilot.kind)):
-                before = PAGE.read_text() if PAGE.exists() else ""
-                PAGE.write_text(with_autopilot(before, every_run))
+            if chosen.page:
+                _write_page(kept_in, autopilot.kind)
     if wrong:
         sys.exit(f"sitl: {wrong} runs were not as they must be")
+
+
+def _write_page(kept_in: Path, kind: str) -> None:
+    """The part of this autopilot, of all runs that are kept there."""
+    if every_run := results.load(kept_in, kind):
+        before = PAGE.read_text() if PAGE.exists() else ""
+        PAGE.write_text(with_autopilot(before, every_run))
 
 
 def fly_all(
@@ -147,7 +157,11 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument("--stories", nargs="+", default=[], metavar="NAME", help="only these")
     options.add_argument("--runs", type=int, default=3, help="of each story (default: 3)")
     options.add_argument("--list", action="store_true", help="say what the stories are")
-    options.add_argument("--page", action="store_true", help=f"write docs/{PAGE.name}")
+    options.add_argument(
+        "--page",
+        action="store_true",
+        help=f"write docs/{PAGE.name}, without AUTOPILOT of --results",
+    )
     options.add_argument("--results", type=Path, metavar="FILE",
                          help="add the runs to those there; the page has all of them")  # fmt: skip
     options.add_argument("--keep", type=Path, metavar="FOLDER", help="keep all records there")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from story import Story, falling, shipped
 
@@ -58,6 +60,24 @@ def test_disarmed_in_the_air_by_whomever_it_is_deployed(profile: str) -> None:
         story.fly(story.t + 0.05, **{**falling(0.05 * k, 80.0), **said})
     assert story.fired() == ["KILL", "DEPLOY"]
     assert story.when(D) - 2.0 < (1.3 if profile == "multirotor" else 2.2)
+
+
+@pytest.mark.parametrize("told_since", [0.0, 1.2])
+def test_a_fall_that_drag_soon_carries_is_seen_as_well(told_since: float) -> None:
+    """PX4's SIH: after a disarm by the ground station it sank with 10 m/s, all of its weight
+    carried; the half second without force may be lost on its way."""
+    story, height = Story(shipped("multirotor")).ready().fly(2.0, height=60.0), 60.0
+    said = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
+    for k in range(1, 60):
+        speed = 10.0 * math.tanh(0.1 * 0.9 * k)
+        height -= 0.1 * speed
+        parts = {"height": height, "vertical_speed": -speed, "acceleration": 0.98 * speed}
+        if 0.1 * k >= told_since:
+            story.at(2.0 + 0.1 * k, story.heartbeat(), story.told(**parts, **said))
+        else:
+            story.at(2.0 + 0.1 * k, story.heartbeat())
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.when(D) - 2.0 < (1.2 if told_since == 0.0 else 3.0)
 
 
 def test_landed_on_a_roof_and_disarmed_it_is_not() -> None:
