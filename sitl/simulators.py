@@ -175,9 +175,9 @@ class Simulator:
         defaults = home / "defaults.parm"
         defaults.write_text("".join(f"{name} {value}\n" for name, value in values.items()))
         model = {ARDUCOPTER: "hexa" if self.hexa else "quad", ARDUPLANE: "quadplane"}
-        # The simulator limits the rate of streams only, not of datagrams.
-        line = "tcpclient" if self.line_rate else "udpclient"
-        ends = (("udpclient", self.ports.bench), (line, self.ports.line),
+        # The simulator limits the rate of streams only; datagrams do not come through then.
+        kind = "tcpclient" if self.line_rate else "udpclient"
+        ends = ((kind, self.ports.bench), (kind, self.ports.line),
                 ("udpclient", self.ports.chute_line))  # fmt: skip
         return [
             str(self.autopilot.path),

@@ -154,7 +154,7 @@ STORIES = (
           Setup(line_rate=5760), spoils=True),
     Story("slow-2880", "a serial line of 2880 B/s; one motor dead", _slow, Setup(line_rate=2880),
           _ARDUPILOT, spoils=True),
-    Story("too-slow", "a serial line of 1200 B/s", _too_slow, Setup(line_rate=1200),
+    Story("too-slow", "a serial line of 600 B/s", _too_slow, Setup(line_rate=600),
           _ARDUPILOT, spoils=True),
     Story("too-slow-px4", "a serial line of 2000 B/s", _too_slow, Setup(line_rate=2000), (PX4,),
           spoils=True),

@@ -252,13 +252,14 @@ class Vehicle:
     def _start_processes(self) -> None:
         ports, setup = self.ports, self.setup
         slow = setup.line_rate and self.autopilot.ardupilot
-        line = f"t{ports.line}" if slow else str(ports.line)
+        stream = "t" if slow else ""
+        line = f"{stream}{ports.line}"
         networks: list[tuple[object, ...]] = [(line, ports.node, ports.station)]
         if setup.wiring == FORWARDS:
             networks.append((ports.chute_line, ports.parachute))
         else:
             networks[0] += (ports.parachute,)
-        networks.append((self.simulator.bench_port(), ports.bench_end))
+        networks.append((f"{stream}{self.simulator.bench_port()}", ports.bench_end))
         texts = [",".join(map(str, one)) for one in networks]
         self.keeper.start("router", "sitl.router", str(self.record), *texts)
         values = {"connection": f"udpout:127.0.0.1:{ports.node}", **setup.node}
