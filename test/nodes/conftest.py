@@ -22,6 +22,7 @@ def pair(bench: Bench) -> Iterator[Pair]:
     """Supervisors to start; what they wrote is shown when the test fails."""
     pair = Pair(bench)
     yield pair
-    pair.processes.end()
+    for each in (pair.processes, *pair.others):
+        each.end()
     for name in pair.started:
         print(pair.processes.tail(name, 40))

@@ -26,6 +26,8 @@ class Pair:
         self.bench = bench
         self.processes = Processes(bench.folder)
         self.claims, self.started = {}, []
+        #: Of other computers, or started beside ours; ended with it.
+        self.others = []
         self.states = bench.follow(SafetyState, "safety/state", qos.LATCHED)
         self.decisions = bench.follow(SafetyDecision, "safety/decision", qos.DECISION)
         bench.client.create_subscription(
@@ -36,6 +38,11 @@ class Pair:
         )
         self.link = bench.add(lambda **options: StubLink("mavlink_parachute", **options))
         self.link.offer_arming()
+
+    def elsewhere(self, folder):
+        """Processes that are watched apart from ours."""
+        self.others.append(Processes(folder))
+        return self.others[-1]
 
     def start(self, name, rank, **parameters):
         self.started.append(name)

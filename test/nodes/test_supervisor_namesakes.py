@@ -13,7 +13,7 @@ from supervisor_processes import QUICK
 from chute_ros.errors import NameTakenError
 from chute_ros.model import Action
 from chute_ros.nodes.one_of_a_name import NameLock
-from chute_ros.tools.processes import ProcessEndedError, Processes
+from chute_ros.tools.processes import ProcessEndedError
 
 ALONE = {"hot_standby": False}
 
@@ -62,7 +62,7 @@ def still_leads(pair, epoch):
 def test_on_one_computer_the_second_refuses_before_it_says_anything(pair, parameters):
     kept = flying(pair)
     epoch, states = pair.epoch("a"), len(pair.states)
-    other = Processes(pair.bench.folder)
+    other = pair.elsewhere(pair.bench.folder)
     other.ros_home = pair.processes.ros_home
     start_namesake(pair, other, **parameters)
     said = refusal(pair, other)
@@ -78,7 +78,7 @@ def test_one_that_hangs_keeps_its_name_and_one_that_was_killed_does_not(pair):
     flying(pair)
     first = pair.epoch("a")
     pair.send_signal("a", signal.SIGSTOP)
-    other = Processes(pair.bench.folder)
+    other = pair.elsewhere(pair.bench.folder)
     other.ros_home = pair.processes.ros_home
     start_namesake(pair, other, **ALONE)
     assert "ended with code 2" in refusal(pair, other)
@@ -99,7 +99,7 @@ def test_on_another_computer_the_second_refuses_once_it_hears_the_first(
     pair.bench.until(
         lambda: "a" in pair.claims and pair.claims["a"][1].running > 3.0, "it was first for sure"
     )
-    elsewhere = Processes(tmp_path)
+    elsewhere = pair.elsewhere(tmp_path)
     start_namesake(pair, elsewhere, **parameters)
     said = refusal(pair, elsewhere)
     assert "ended with code 2" in said
