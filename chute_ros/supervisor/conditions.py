@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.contradictions import DIVE
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
@@ -99,6 +100,8 @@ def _measurement(
     # A limit that is not asked for is NaN, and nothing is beyond it.
     holds = not (value <= condition.above or value >= condition.below)
     denied = _denied(config, state, condition, now) if holds else ""
+    if holds and condition.unless_dived:
+        denied = denied or state.commanded.get(DIVE, "")
 
     def told() -> str:
         weaker = f"; in doubt: {doubt}" if doubt else ""

@@ -44,6 +44,9 @@ _FALLS_FOR, _NO_SPEED = 0.25, 2.0
 #: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
 #: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
 _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
+#: In place of a measurement: that a wing sinks as its commanded attitude makes it. It leans by
+#: this at least, degrees: what falls flat does not.
+DIVE, _DIVES = "dive", 15.0
 #: Carried in full: on the average between these, m/s^2, for so long, s, each so near to gravity,
 #: m/s^2, as motors shake.
 _CARRIED, _CARRIED_FOR, _SHAKES = (7.8, 11.8), 0.5, 4.0
@@ -90,14 +93,16 @@ def denials(motion: tuple[Moment, ...], barometer: Rise) -> Mapping[str, str]:
 
 
 def commanded(
-    attitude_error: float, sink_beyond_target: float, climb_beyond_target: float
+    tilt: float, attitude_error: float, sink_beyond_target: float, climb_beyond_target: float
 ) -> Mapping[str, str]:
-    """Measurement -> in words that what it claims was commanded: no accident. Degrees from
-    the commanded attitude, and m/s of sink beyond the commanded one, by the estimator and by what
-    tells CLIMB_RATE; NaN: not known."""
+    """Measurement (or DIVE) -> in words that what it claims was commanded: no accident. Degrees
+    from upright and from the commanded attitude, and m/s of sink beyond the commanded one, by the
+    estimator and by what tells CLIMB_RATE; NaN: not known."""
     told = {}
     if attitude_error <= _FOLLOWS:
         told[TILT] = f"it was commanded (to {attitude_error:.0f} degrees, limit {_FOLLOWS:g})"
+        if tilt >= _DIVES:
+            told[DIVE] = f"it dives as commanded ({tilt:.0f} degrees, to {attitude_error:.0f})"
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
         told[VERTICAL_SPEED] = f"it was commanded ({beyond})"

@@ -60,7 +60,7 @@ _RULE_KEYS = (
     *("doubted", "action", "clears"),
 )
 _CONDITION_KEYS = ("measurement", "link", "autopilot", "device")
-_LIMIT_KEYS = ("above", "below", "until", "if_unknown")
+_LIMIT_KEYS = ("above", "below", "until", "if_unknown", "unless_dived")
 _PROFILE_KEYS = (
     *("profile", "minimum_height", "below_minimum", "low_height", "moving_speed"),
     *("landed_hold", "measurements", "rules"),
@@ -289,12 +289,20 @@ def _measurement(
     }
     if len(limits) == 2 and not limits["above"] < limits["below"]:
         reader.wrong(where.line, f"{name} in {what} can never be: above must be less than below")
-    if_unknown = False
-    if "if_unknown" in entries:
-        if_unknown = reader.truth(entries["if_unknown"], f"if_unknown of {name} in {what}")
+    said = {
+        key: reader.truth(entries[key], f"{key} of {name} in {what}")
+        for key in ("if_unknown", "unless_dived")
+        if key in entries
+    }
     if "until" in entries:
         limits["until"] = _until(reader, f"until of {name} in {what}", entries["until"], limits)
-    condition = MeasurementCondition(name, weight=weight, if_unknown=if_unknown, **limits)
+    condition = MeasurementCondition(
+        name,
+        weight=weight,
+        if_unknown=said.get("if_unknown", False),
+        unless_dived=said.get("unless_dived", False),
+        **limits,
+    )
     if problem := condition_problem(condition, reader.limits):
         reader.wrong(where.line, f"{name} in {what} {problem}")
     return condition

@@ -244,17 +244,16 @@ class Reports(Requests):
         if motion is state.motion:
             return
         denied = denials(motion, flight.pressure_change(self.config, state, now))
-        error, beyond, rate = (
+        tilt, error, beyond, rate = (
             flight.measured(self.config, state, name, now)
-            for name in ("attitude_error", "sink_beyond_target", CLIMB_RATE)
+            for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
         )
         # An estimator that is wrong follows its command where the vehicle does not.
         climb_beyond = beyond + flight.measured(self.config, state, VERTICAL_SPEED, now) - rate
         since = {name: state.denied_since.get(name, now) for name in denied}
         # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
-        told = (
-            {} if state.vehicle.armed is Armed.DISARMED else commanded(error, beyond, climb_beyond)
-        )
+        off = state.vehicle.armed is Armed.DISARMED
+        told = {} if off else commanded(tilt, error, beyond, climb_beyond)
         self.state = replace(
             state,
             motion=motion,

@@ -79,6 +79,8 @@ class MeasurementCondition:
     #: Once the rule's counter is full, it goes on to hold until it is beyond this (or LINGERS
     #: have passed); NaN: it does not.
     until: float = math.nan
+    #: Of a wing that leans as it was commanded it is a dive, and does not hold.
+    unless_dived: bool = False
     counted: ClassVar[bool] = True
 
     @cached_property

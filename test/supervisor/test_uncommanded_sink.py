@@ -89,6 +89,37 @@ def test_one_that_pulls_out_of_a_dive_is_no_accident(
     assert story.fired() == []
 
 
+def aeroplane_sinks(tilt: float, attitude_error: float) -> Story:
+    """With 17 m/s for seconds, from high up."""
+    story, height, speed = Story(shipped("fixed_wing")).ready(), 300.0, 0.0
+    for k in range(60):
+        speed = max(speed - 0.8, -17.0)
+        height += EVERY * speed
+        parts = {"height": height, "vertical_speed": speed, "tilt": tilt + 0.1 * (k % 3)}
+        parts |= {"acceleration": 9.6 + 0.1 * (k % 3), "attitude_error": attitude_error}
+        parts["pressure"] = pressure_at(height + 0.1 * (k % 3))
+        story.at(story.t + EVERY, story.heartbeat(), story.told(**parts))
+    return story
+
+
+def test_a_dive_that_a_pilot_commands_is_no_critical_sink() -> None:
+    """ArduPlane in FBWA, the stick forward: 30 degrees down, 16 m/s, and its attitude follows."""
+    story = aeroplane_sinks(tilt=31.0, attitude_error=3.0)
+    assert story.fired() == []
+    assert any("sinks fast" in one for one in story.alarms())
+
+
+@pytest.mark.parametrize(
+    ("tilt", "attitude_error"), [(31.0, 60.0), (5.0, 3.0), (31.0, float("nan"))]
+)
+def test_one_that_lies_otherwise_or_flat_or_tells_no_command_is(
+    tilt: float, attitude_error: float
+) -> None:
+    story = aeroplane_sinks(tilt, attitude_error)
+    assert story.fired()[:1] == ["KILL"]
+    assert story.newest(Action.KILL).rule == "critical sink"
+
+
 @pytest.mark.parametrize(
     "told", [{"below_target": -100.0}, {"below_target": -100.0, "attitude_error": 0.0}]
 )
