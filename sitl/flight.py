@@ -112,13 +112,20 @@ class Flight:
             vehicle.again(
                 "it takes off",
                 20.0,
-                lambda: self.pilot.take_off(height),
+                lambda: self._take_off(height),
                 lambda: vehicle.height() > 1.0,
                 3.0,
             )
         near = min(0.9 * height, height - 1.0)
         seconds = 20.0 + height / _CLIMB_RATE
         vehicle.must(f"it climbs to {height:g} m", seconds, lambda: vehicle.height() > near)
+
+    def _take_off(self, height: float) -> None:
+        """Of ArduPilot, which leaves a mode that it could not fly in when it was asked for."""
+        mode = self.pilot.ready_to_climb()
+        if not self.pilot.in_mode(mode):
+            self.pilot.mode(mode)
+        self.pilot.take_off(height)
 
     def come_down(self) -> None:
         """Land, disarmed by itself, and the supervisor says so."""

@@ -20,7 +20,7 @@ from chute_ros.protocol.mavlink.signing import EPOCH_2015, UNITS_PER_SECOND, Sig
 from chute_ros.supervisor.machine import Stage
 from faults.soak_processes import Keeper
 from faults.soak_watch import Watch, ready
-from sitl.autopilots import PX4, Autopilot, version_text
+from sitl.autopilots import ARDUCOPTER, PX4, Autopilot, version_text
 from sitl.pilot import Pilot
 from sitl.simulators import Simulator, ports_for
 from sitl.station import GROUND_STATION, Station
@@ -163,8 +163,8 @@ class Vehicle:
 
     def renew(self) -> bool:
         """Make it ready for another story on the ground; False: it needs a new life."""
-        if self.autopilot.kind == PX4 or self.height() > GROUND:
-            return False  # PX4 lies as it fell, and stays terminated
+        if self.autopilot.kind != ARDUCOPTER or self.height() > GROUND:
+            return False  # PX4 lies as it fell, and stays terminated; ArduPlane climbs no more
         try:
             self.pilot.let_go()
             self.pilot.stop_flying()
