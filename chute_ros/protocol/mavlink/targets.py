@@ -7,7 +7,8 @@ NAV_CONTROLLER_OUTPUT; and ArduPilot 4.7.0-dev and PX4 main of 2026-08 for what 
   POSITION_TARGET_GLOBAL_INT carries a way point that may be of an earlier mission: not read; its
   POSITION_TARGET_LOCAL_NED says the same and more.
 - ArduPilot's aeroplanes send the way point in any mode: not read either. Their height error is
-  that of the controller in the modes below, and old in others.
+  that of the controller in the modes below, and old in others. Their ATTITUDE_TARGET is that of
+  the lift motors: none comes on the wing, where NAV_CONTROLLER_OUTPUT tells the attitude.
 - ArduCopter's height error is up to 4.6 the target less the height, in 4.7.0-dev the opposite, and
   zero where no height is held: not read. A thrust at its upper end says the most important: it is
   commanded not to sink.
@@ -73,6 +74,8 @@ _HEIGHT_HELD: dict[float, frozenset[int]] = {
     dialect.MAV_VTOL_STATE_FW: _ON_THE_WING,
     _ON_LIFT_MOTORS: frozenset({19, 20}),
 }
+#: Its lift motors rest, as far as it tells of them.
+_WINGBORNE = (dialect.MAV_VTOL_STATE_UNDEFINED, dialect.MAV_VTOL_STATE_FW)
 #: EXTENDED_SYS_STATE comes once a second at least, s.
 _VTOL_STATE_SILENCE = 2.5
 
@@ -183,9 +186,15 @@ class Targets:
         self._take("target_height", message.alt, ignored or frame not in _ABOVE_HOME, now)
 
     def nav_controller_output(self, message: Any, now: float) -> None:
-        """NAV_CONTROLLER_OUTPUT: alt_error is the target less the height, m."""
+        """NAV_CONTROLLER_OUTPUT: alt_error is the target less the height, m; on the wing nav_roll
+        and nav_pitch (degrees) are the commanded attitude, of which ATTITUDE_TARGET tells nothing
+        there."""
         if not self.vehicle.arduplane:
             return
+        yaw = self._readings.fresh("yaw", ATTITUDE_TARGET_SILENCE, now)
+        angles = (math.radians(message.nav_roll), math.radians(message.nav_pitch), yaw)
+        if self._vtol_state(now) in _WINGBORNE and all(map(math.isfinite, angles)):
+            self._axis, self._axis_at = vertical_axis(*angles), now
         modes = _HEIGHT_HELD.get(self._vtol_state(now), frozenset())
         self._take("height_error", message.alt_error, self.vehicle.custom_mode not in modes, now)
 

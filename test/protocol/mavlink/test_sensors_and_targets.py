@@ -259,6 +259,23 @@ ANGLES = st.floats(-1.5, 1.5)
 HEADINGS = st.floats(-3.1, 3.1)
 
 
+@pytest.mark.parametrize("state", [ON_WING, vtol(d.MAV_VTOL_STATE_UNDEFINED)])
+def test_on_the_wing_the_controllers_output_tells_the_commanded_attitude(state):
+    """ArduPlane in FBWA, its pilot's stick forward: nav_pitch -30 degrees, and it follows."""
+    dives = d.MAVLink_nav_controller_output_message(10.0, -30.0, 0, 0, 0, 0.0, 0.0, 0.0)
+    banked = attitude(1000, math.radians(10.0), math.radians(-30.0), 2.0)
+    told = Told().hear(plane(5), state, banked, dives, banked)
+    assert told.at().attitude_error == pytest.approx(0.0, abs=2e-3)
+    told.hear(attitude(1100, math.radians(10.0), math.radians(10.0), 2.0), now=0.3)
+    assert math.degrees(told.at(0.3).attitude_error) == pytest.approx(40.0, abs=1.0)
+
+
+def test_on_its_lift_motors_it_does_not():
+    dives = d.MAVLink_nav_controller_output_message(0.0, -30.0, 0, 0, 0, 0.0, 0.0, 0.0)
+    told = Told().hear(plane(17), ON_LIFT_MOTORS, attitude(), dives, attitude())
+    assert math.isnan(told.at().attitude_error)
+
+
 @given(ANGLES, ANGLES, HEADINGS)
 def test_a_vehicle_that_obeys_has_no_error_of_attitude(roll, pitch, yaw):
     told = Told().hear(to_be(turned(roll, pitch, yaw)), attitude(1000, roll, pitch, yaw))
