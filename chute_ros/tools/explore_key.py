@@ -51,6 +51,7 @@ LEFT_OUT = frozenset(
         "killed_height",
         "home",  # from it only the fence is measured, whose rule raises an alarm
         "reasons",
+        "behind",  # every node here keeps up
         "pressure_heights",  # no pressure, altitude, target or fault is told here
         "ground_pressure_altitude",
         "at_ground_since",

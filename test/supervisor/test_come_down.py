@@ -20,13 +20,13 @@ STANDS = {"height": 0.0, "vertical_speed": 0.0, **DOWN}
 
 
 def killed(profile: str = "multirotor", outcome: Outcome = Outcome.CONFIRMED) -> Story:
-    """A person has stopped the motors 12 m above the ground."""
+    """A person has stopped the motors 9 m above the ground."""
     story = Story(shipped(profile)).ready().fly(3.0, height=40.0)
     story.at(
         3.05,
         story.heartbeat(),
-        story.told(height=12.0),
-        i.KillRequest(9, "operator", "stop", kill_only=True),
+        story.told(height=9.0),  # too low for a deploy to follow at once
+        i.KillRequest(9, "operator", "stop"),
     )
     story.at(3.1, story.heartbeat(), story.report(K, outcome))
     return story
