@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
-from sitl.autopilots import PX4
+from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
 from sitl.judge import Want
 from sitl.stories import Story
@@ -102,8 +102,18 @@ def _note_answer(flight: Flight, answer: object) -> None:
         flight.verdict.wrong.append(f"error: {flight.vehicle.watch.safety.state_text}")
 
 
-def _with(method: str) -> Setup:
-    return Setup(node={"kill_method": method})
+def _no_kill(flight: Flight) -> None:
+    """ArduPlane refuses a termination without AFS: said before flight, with the setting's name."""
+    vehicle = flight.vehicle
+    vehicle.rest(20.0)
+    why = [one for one in vehicle.watch.safety.block_reasons if "AFS_ENABLE" in one]
+    if not vehicle.stage(Stage.BLOCKED) or not why:
+        flight.verdict.wrong.append("missed: not BLOCKED, though no kill is possible")
+    flight.verdict.happened += [f"BLOCKED: {one[:120]}" for one in why[:1]]
+
+
+def _with(method: str, **settings: float) -> Setup:
+    return Setup(node={"kill_method": method}, settings=settings)
 
 
 STORIES = (
@@ -115,9 +125,14 @@ STORIES = (
     Story("station-disarm", "the ground station disarms by force at 40 m", _station("disarm")),
     Story("station-terminate", "the ground station terminates at 40 m", _station("termination")),
     Story("kill-termination", "safety/kill at 40 m, kill_method flight_termination", _person,
-          _with("flight_termination")),
+          _with("flight_termination"), (ARDUCOPTER, PX4)),
     Story("bench-termination", "safety/kill on the ground, kill_method flight_termination",
-          _on_the_bench, _with("flight_termination")),
+          _on_the_bench, _with("flight_termination"), (ARDUCOPTER, PX4)),
+    Story("no-termination", "kill_method flight_termination, AFS_ENABLE 0", _no_kill,
+          _with("flight_termination"), (ARDUPLANE,)),
+    Story("kill-termination-afs",
+          "safety/kill at 40 m, kill_method flight_termination, AFS_ENABLE 1, AFS_TERM_ACTION 42",
+          _person, _with("flight_termination", AFS_ENABLE=1, AFS_TERM_ACTION=42), (ARDUPLANE,)),
     Story("kill-disarm", "safety/kill at 40 m, kill_method forced_disarm", _person,
           _with("forced_disarm")),
 )  # fmt: skip
