@@ -39,6 +39,8 @@ _COPTER = {
     "WPNAV_SPEED_UP": 600,
 }  # fmt: skip
 _QUADPLANE = {
+    # As docs/mavlink.md has it: a device that hears its height must not hear that it stands.
+    "HOME_RESET_ALT": -1,
     "Q_ENABLE": 1, "Q_FRAME_CLASS": 1, "Q_FRAME_TYPE": 1, "Q_GUIDED_MODE": 1,
     "Q_WP_SPEED_UP": 600, "RC3_TRIM": 1000,
     "SERVO1_FUNCTION": 4, "SERVO2_FUNCTION": 19, "SERVO3_FUNCTION": 70, "SERVO4_FUNCTION": 21,

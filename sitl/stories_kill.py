@@ -14,8 +14,8 @@ from sitl.vehicle import Setup
 
 #: From an operator's call to the release, s.
 OPERATOR = 0.3
-#: From the ground station's own kill, which only the fall tells of, s.
-SEEN = 1.3
+#: From the ground station's own kill, which only the fall tells of, s; a wing carries for a while.
+_SEEN = {ARDUCOPTER: 1.3, ARDUPLANE: 2.0, PX4: 1.3}
 _HEIGHT = 40.0
 _METHODS = ("flight_termination", "forced_disarm")
 
@@ -77,7 +77,7 @@ def _station(order: str) -> Callable[[Flight], None]:
             flight.vehicle.rest(3.0)
             flight.come_down()
             return
-        flight.expect(Want.RELEASE, since, SEEN, "order")
+        flight.expect(Want.RELEASE, since, _SEEN[flight.kind], "order")
         flight.see_it_out(6.0, 0.0)
 
     return fly
