@@ -230,7 +230,10 @@ PROFILE_KEYS = (
     "measurements, rules"
 )
 RULE_KEYS = "says, source, states, conditions, needed, for, leak, samples, doubted, action, clears"
-CONDITION_KEYS = "measurement, link, autopilot, device, above, below, until, if_unknown, unless_dived, is, counted, weight"
+CONDITION_KEYS = (
+    "measurement, link, autopilot, device, above, below, until, if_unknown, unless_dived, is, "
+    "counted, weight"
+)
 LIMIT_KEYS = "minimum, maximum, rate, jump, max_age, stuck_after"
 FLYING = "its states may be IN_FLIGHT, KILLING and DEPLOYED"
 KINDS = "needs one of measurement, link, autopilot, device; it has"
