@@ -63,6 +63,14 @@ class Flight:
         self.vehicle.must("the autopilot would arm", 90.0, could)
         self.vehicle.rest(3.0)
 
+    def expect_block(self, seconds: float, word: str, otherwise: str) -> None:
+        """So long after its start it is BLOCKED, for a reason with this word in it."""
+        self.vehicle.rest(seconds)
+        why = [one for one in self.vehicle.watch.safety.block_reasons if word in one]
+        if not self.vehicle.stage(Stage.BLOCKED) or not why:
+            self.verdict.wrong.append(f"missed: not BLOCKED, {otherwise}")
+        self.verdict.happened += [f"BLOCKED: {one[:120]}" for one in why[:1]]
+
     def change_mode(self, name: str, seconds: float = 20.0) -> None:
         """The autopilot is in this mode."""
         self.vehicle.again(

@@ -104,12 +104,7 @@ def _note_answer(flight: Flight, answer: object) -> None:
 
 def _no_kill(flight: Flight) -> None:
     """ArduPlane refuses a termination without AFS: said before flight, with the setting's name."""
-    vehicle = flight.vehicle
-    vehicle.rest(20.0)
-    why = [one for one in vehicle.watch.safety.block_reasons if "AFS_ENABLE" in one]
-    if not vehicle.stage(Stage.BLOCKED) or not why:
-        flight.verdict.wrong.append("missed: not BLOCKED, though no kill is possible")
-    flight.verdict.happened += [f"BLOCKED: {one[:120]}" for one in why[:1]]
+    flight.expect_block(20.0, "AFS_ENABLE", "though no kill is possible")
 
 
 def _with(method: str, **settings: float) -> Setup:

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 
 from chute_ros.protocol.mavlink.dialect import dialect
-from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
 from sitl.judge import Want
@@ -71,12 +70,7 @@ def _dronecan(flight: Flight) -> None:
 
 def _too_slow(flight: Flight) -> None:
     """What the rules need does not come through: said before flight, with the stream's name."""
-    vehicle = flight.vehicle
-    vehicle.rest(25.0)
-    why = [one for one in vehicle.watch.safety.block_reasons if "Hz (need" in one]
-    if not vehicle.stage(Stage.BLOCKED) or not why:
-        flight.verdict.wrong.append("missed: not BLOCKED for what comes too seldom")
-    flight.verdict.happened += [f"BLOCKED: {one.partition(': ')[2][:60]}" for one in why[:1]]
+    flight.expect_block(25.0, "Hz (need", "though what the rules need comes too seldom")
 
 
 def _fight(flight: Flight) -> None:

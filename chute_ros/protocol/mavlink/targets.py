@@ -193,9 +193,10 @@ class Targets:
             return
         yaw = self._readings.fresh("yaw", ATTITUDE_TARGET_SILENCE, now)
         angles = (math.radians(message.nav_roll), math.radians(message.nav_pitch), yaw)
-        if self._vtol_state(now) in _WINGBORNE and all(map(math.isfinite, angles)):
+        state = self._vtol_state(now)
+        if state in _WINGBORNE and all(map(math.isfinite, angles)):
             self._axis, self._axis_at = vertical_axis(*angles), now
-        modes = _HEIGHT_HELD.get(self._vtol_state(now), frozenset())
+        modes = _HEIGHT_HELD.get(state, frozenset())
         self._take("height_error", message.alt_error, self.vehicle.custom_mode not in modes, now)
 
     def at(self, now: float) -> tuple[float, float, float]:
