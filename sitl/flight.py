@@ -156,7 +156,7 @@ class Flight:
         """They fail now; when."""
         if self.kind == PX4:
             number = 420
-            sent = self.pilot.fail_motors(mask, thrust)
+            sent = self.pilot.fail_motors(mask)
             self.vehicle.must("the failure is injected", 3.0,
                               lambda: self.vehicle.bench.accepted(number))  # fmt: skip
             return sent

@@ -98,14 +98,11 @@ class Pilot:
             return self.bench.set_parameter(name, raw, _INT32)
         return self.bench.set_parameter(name, float(value), _REAL32)
 
-    def fail_motors(self, mask: int, thrust: float = 0.0) -> float:
-        """Motors of this mask (bit 0: the first) have this part of their thrust from now on."""
-        if self.kind == PX4:
-            unit, off = dialect.FAILURE_UNIT_SYSTEM_MOTOR, dialect.FAILURE_TYPE_OFF
-            number = dialect.MAV_CMD_INJECT_FAILURE
-            return self.bench.command(number, unit, off, math.nan, mask)
-        self.set("SIM_ENGINE_MUL", thrust)
-        return self.set("SIM_ENGINE_FAIL", mask << (4 if self.kind == ARDUPLANE else 0))
+    def fail_motors(self, mask: int) -> float:
+        """Motors of this mask (bit 0: the first) of a PX4 are dead from now on."""
+        unit, off = dialect.FAILURE_UNIT_SYSTEM_MOTOR, dialect.FAILURE_TYPE_OFF
+        number = dialect.MAV_CMD_INJECT_FAILURE
+        return self.bench.command(number, unit, off, math.nan, mask)
 
     # -- hands ----------------------------------------------------------------------------------
 

@@ -17,7 +17,6 @@ OPERATOR = 0.3
 #: From the ground station's own kill, which only the fall tells of, s; a wing carries for a while.
 _SEEN = {ARDUCOPTER: 1.3, ARDUPLANE: 2.0, PX4: 1.3}
 _HEIGHT = 40.0
-_METHODS = ("flight_termination", "forced_disarm")
 
 
 def _person(flight: Flight) -> None:
