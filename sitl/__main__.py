@@ -39,6 +39,8 @@ def main() -> None:
             print(f"{one.name:16s} {one.text} ({', '.join(one.kinds)})")
         return
     if not chosen.autopilots and chosen.page and chosen.results:
+        if not chosen.results.is_file():
+            _refuse(f"sitl: --results {chosen.results}: no such file, so that there is no page")
         for kind in KINDS:
             _write_page(chosen.results, kind)
         return
