@@ -5,12 +5,13 @@ from __future__ import annotations
 import functools
 import gc
 import math
-import multiprocessing
 import signal
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from multiprocessing import get_context
 from pathlib import Path
 
 from chute_ros.campaign.draw import draw
@@ -124,7 +125,8 @@ def run(
     """Flights with these seeds, in their order, added to tally, which has the first of them
     already. folder: of the profiles.
 
-    Ended by Ctrl-C, it returns those until then: hours of flights are not lost."""
+    Ended by Ctrl-C it returns those until then: hours of flights are not lost. BrokenProcessPool:
+    one of its processes ended by itself; tally has those until then."""
     begun = time.monotonic() - tally.took
     try:
         for line in _all(folder, seeds[tally.flights :], jobs):
@@ -149,5 +151,8 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
         gc.freeze()
     # Ctrl-C reaches every process of a terminal: ours ends them.
     ignores = (signal.SIGINT, signal.SIG_IGN)
-    with multiprocessing.get_context("fork").Pool(jobs, signal.signal, ignores) as pool:
-        yield from pool.imap(one, seeds, _BATCH)
+    pool = ProcessPoolExecutor(jobs, get_context("fork"), signal.signal, ignores)
+    try:
+        yield from pool.map(one, seeds, chunksize=_BATCH)
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -110,6 +110,8 @@ class AutopilotDevice(AutopilotTelemetry):
             self._parameter(frame)
         elif message.get_type() == "COMMAND_ACK":
             self._authorized(message)
+        elif message.get_type() == "TIMESYNC" and message.tc1 == 0:
+            self.send(dialect.MAVLink_timesync_message(self.boot_ms() * 1_000_000, message.ts1))
         released = message.get_type() == "PARACHUTE_STATUS" and message.deployment_status
         if released and frame.system_id == self.system_id and math.isnan(self.model.released_for):
             self.say(f"CANOPY at {self.model.height:.1f} m")

@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 from chute_ros.campaign import campaign, kept_tally
@@ -82,7 +83,11 @@ def main() -> None:
     except RecordError as error:
         options.error(f"argument --resume: {error}")
     progress = _Progress(len(seeds), chosen.failures, kept)
-    tally = campaign.run(profiles, seeds, chosen.jobs, progress.look, tally)
+    broken = False
+    try:
+        campaign.run(profiles, seeds, chosen.jobs, progress.look, tally)
+    except BrokenProcessPool:
+        broken = True
     kept.keep(tally)
     for count in Count:
         print(f"{tally.counts[count]:8d}  {count.value}")
@@ -97,11 +102,19 @@ def main() -> None:
         how = f"{chosen.jobs} at a time on {machine()}"
         of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
         _write(tally, chosen.page, chosen.seed, how, of_each)
+    if broken:
+        sys.exit(_BROKEN)
     if tally.wrong:
         sys.exit(1)
     if tally.flights < len(seeds):
         # What was flown until then is told; now it ends as every tool does.
         raise KeyboardInterrupt
+
+
+_BROKEN = (
+    "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault of "
+    "its interpreter); the flights until then are told, and with --resume FILE it goes on from them"
+)
 
 
 def _told(line: campaign.Line) -> str:

@@ -1,11 +1,13 @@
 """The command line of the campaign: mistakes are said before any flight, results are kept."""
 
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -234,6 +236,26 @@ def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
     flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
     assert flown >= int(first.split()[0]) > 0
     assert f"`make campaign FLIGHTS={flown} SEED=0`" in page.read_text()
+
+
+def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
+    """As the system does that has no memory left."""
+    kept = tmp_path / "kept.json"
+    command = [sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"]
+    command += ["--jobs", "2", "--failures", str(tmp_path), "--resume", str(kept)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stderr.readline()
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        os.kill(int(children[0]), signal.SIGKILL)
+        out, err = process.communicate(timeout=60.0)
+    assert process.returncode == 1, err
+    assert err.splitlines()[-1].startswith("campaign: one of its processes ended by itself")
+    assert "Traceback" not in err
+    flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
+    assert flown > 0
+    assert json.loads(kept.read_text())["flights"] == flown
 
 
 def test_a_changed_scenario_can_be_flown(monkeypatch, tmp_path, capsys):

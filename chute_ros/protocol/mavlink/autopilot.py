@@ -17,6 +17,7 @@ from chute_ros.protocol.mavlink.firmware import firmware_of
 from chute_ros.protocol.mavlink.motor_signs import MotorSigns
 from chute_ros.protocol.mavlink.optional_streams import OptionalStreams
 from chute_ros.protocol.mavlink.readings import Readings
+from chute_ros.protocol.mavlink.round_trip import RoundTrip
 from chute_ros.protocol.mavlink.sensors import FURTHER_ACCELEROMETERS, PRESSURE
 from chute_ros.protocol.mavlink.stream_rate import StreamRate
 from chute_ros.protocol.mavlink.stream_watch import Ask, StreamWatch
@@ -94,6 +95,7 @@ class AutopilotTracker:
         self.vehicle_type = 0
         self.settings = AutopilotSettings()
         self.motor_signs = MotorSigns()
+        self.round_trip = RoundTrip()
         #: How often it was seen to arm.
         self.arming_count = 0
         self._system_status = 0
@@ -175,7 +177,7 @@ class AutopilotTracker:
             return needed
         targets = self._readers.targets.vehicle.target_messages
         wanted = {**PRESSURE, **targets, **FURTHER_ACCELEROMETERS}
-        if self._streams.line_is_slow(now):
+        if self._streams.line_is_slow(now) or self.round_trip.late(now):
             return self._optional.give_up(wanted, now)
         return self._optional.due(wanted, self._rates, interval, now)
 
@@ -191,6 +193,8 @@ class AutopilotTracker:
         self.motor_signs.heard(message, now)
         if kind in ("PARAM_VALUE", "PARAM_ERROR"):
             self.settings.heard(message)
+        elif kind == "TIMESYNC":
+            self.round_trip.heard(message, now)
         self._streams.received(len(message.get_msgbuf()))
         if not self._readers.read(message, now):
             return False
@@ -255,9 +259,10 @@ class AutopilotTracker:
     def _faults(self, now: float) -> tuple[str, ...]:
         # Of one that is not heard that is the reason, not its rates.
         heard = self.liveness.state is LinkState.OK
-        return tuple(self._streams.faults(now)) if heard else ()
+        return (*self._streams.faults(now), *self.round_trip.faults(now)) if heard else ()
 
     def _begin_streams(self) -> None:
+        self.round_trip = RoundTrip()
         self._streams.begin()
         self._optional.begin()
         self._rates.clear()
