@@ -7,11 +7,11 @@ import gc
 import math
 import signal
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, field
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 
 from chute_ros.campaign.draw import draw
@@ -22,6 +22,8 @@ from chute_ros.campaign.shipped import Shipped
 
 #: Flights that one process flies before it tells of them.
 _BATCH = 10
+#: Batches for each process that are given out before the oldest is told of.
+_AHEAD = 4
 
 
 @dataclass(frozen=True)
@@ -138,10 +140,19 @@ def run(
     return tally
 
 
+def _batch(folder: Path, seeds: Sequence[int]) -> list[Line]:
+    return [_line(folder, seed) for seed in seeds]
+
+
+def _leave_the_end_to_its_parent() -> None:
+    """Ctrl-C reaches every process of a terminal, and the one whose it is ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
 def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
-    one = functools.partial(_line, folder)
     if jobs == 1:
-        yield from map(one, seeds)
+        yield from (_line(folder, seed) for seed in seeds)
         return
     # Read before the processes part, so that they share it.
     shipped = _shipped(folder)
@@ -149,10 +160,17 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     # No collection of garbage looks through it again (4 % of a flight); PyPy's works otherwise.
     if hasattr(gc, "freeze"):
         gc.freeze()
-    # Ctrl-C reaches every process of a terminal: ours ends them.
-    ignores = (signal.SIGINT, signal.SIG_IGN)
-    pool = ProcessPoolExecutor(jobs, get_context("fork"), signal.signal, ignores)
+    pool = ProcessPoolExecutor(jobs, get_context("fork"), _leave_the_end_to_its_parent)
+    ordered: deque[Future[list[Line]]] = deque()
     try:
-        yield from pool.map(one, seeds, chunksize=_BATCH)
+        for first in range(0, len(seeds), _BATCH):
+            ordered.append(pool.submit(_batch, folder, seeds[first : first + _BATCH]))
+            if len(ordered) > _AHEAD * jobs:
+                yield from ordered.popleft().result()
+        for batch in ordered:
+            yield from batch.result()
     finally:
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(wait=False)
+        # One whose neighbour died waits for work without end.
+        for process in active_children():
+            process.kill()

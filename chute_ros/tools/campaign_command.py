@@ -112,8 +112,8 @@ def main() -> None:
 
 
 _BROKEN = (
-    "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault of "
-    "its interpreter); the flights until then are told, and with --resume FILE it goes on from them"
+    "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault "
+    "of its interpreter); what was flown until then is told, and --resume FILE goes on from it"
 )
 
 

@@ -66,8 +66,10 @@ class RoundTrip:
         """That it is late, and what to do about it; empty: it is not."""
         if not self.late(now):
             return []
-        return [
-            f"answers after {self.seconds(now):.1f} s (TIMESYNC; limit {LIMIT:g} s), so what it "
-            "tells comes late: the line to it is full: raise its baud rate, or switch off streams "
-            "that others ask for on it"
-        ]
+        took = f"answers after {self.seconds(now):.1f} s (TIMESYNC; limit {LIMIT:g} s)"
+        return [f"{took}, so what it tells comes late: {_CURE}"]
+
+
+_CURE = (
+    "the line to it is full: raise its baud rate, or switch off streams that others ask for on it"
+)
