@@ -32,6 +32,8 @@ class Details:
     vehicle: model.VehicleState
     #: Of each message that is read of the autopilot, Hz.
     rates: Mapping[str, float]
+    #: How long the autopilot takes to answer, s; NaN: it does not.
+    round_trip: float
     doubts: tuple[str, ...]
     received: int
     sent: int
@@ -52,6 +54,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
         tuple(map(parachute, link.parachutes.all())),
         link.vehicle_state(now),
         link.autopilot_rates(now),
+        link.autopilot_round_trip(now),
         tuple(link.doubts(now)),
         link.received_count,
         link.sent_count,
@@ -127,6 +130,7 @@ def autopilot_task(name: str, details: Details) -> DiagnosticStatus:
         "battery (V)": vehicle.battery_voltage,
         "restarts": vehicle.reboot_count,
         "rates (Hz)": ", ".join(f"{kind} {hz:.1f}" for kind, hz in sorted(details.rates.items())),
+        "answers after (s, TIMESYNC)": details.round_trip,
         "not seen": "; ".join(not_seen(details.rates)),
     }
     return diagnostics.status(name, "autopilot", level, text, values, vehicle.source)

@@ -51,6 +51,10 @@ def test_diagnostics_tell_rates_and_what_is_not_seen(bench):
     status = bench.until(autopilot, "the rates are told")
     assert "no SCALED_PRESSURE: a wrong estimator" in value(status, "not seen")
     assert "a level sink that nobody commanded" in value(status, "not seen")
+    bench.until(
+        lambda: value(told(diagnostics, "autopilot"), "answers after (s, TIMESYNC)") != "nan",
+        "two answers came",
+    )
 
 
 def test_a_stream_that_is_too_slow_is_named_in_the_state_and_in_diagnostics(bench):

@@ -236,6 +236,11 @@ class MavlinkLink:
         autopilot = self._devices.chosen_autopilot()
         return {} if autopilot is None else autopilot.rates(now)
 
+    def autopilot_round_trip(self, now: float) -> float:
+        """How long our autopilot takes to answer, s; NaN: it does not."""
+        autopilot = self._devices.chosen_autopilot()
+        return math.nan if autopilot is None else autopilot.round_trip.seconds(now)
+
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
         return self._devices.doubts(now)
