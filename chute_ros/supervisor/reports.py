@@ -34,6 +34,9 @@ _SPEEDS_DIFFER = 10.0
 _FORCES_DIFFER = 6.0
 #: What the newest pressure counts in that of the ground.
 _OF_NEWEST = 0.1
+#: What an estimator claims and was denied stays so while the barometer tells nothing, for so long,
+#: s: messages that are lost for a while, and a second of heights after it.
+_DENIED_FOR = 2.0
 #: No force without any speed is that of a fall for so long, s.
 _NEVER_FALLS_FOR = 3.0
 #: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); it is found
@@ -243,7 +246,17 @@ class Reports(Requests):
         motion = noted(state.motion, moment)
         if motion is state.motion:
             return
-        denied = denials(motion, flight.pressure_change(self.config, state, now))
+        barometer = flight.pressure_change(self.config, state, now)
+        denied = dict(denials(motion, barometer))
+        at = dict.fromkeys(denied, now)
+        if math.isnan(barometer.rate):
+            # One that was just found wrong is not right as what denied it is silent.
+            for name in (VERTICAL_SPEED, TILT):
+                if (
+                    name not in denied
+                    and now <= state.denied_at.get(name, -math.inf) + _DENIED_FOR
+                ):
+                    denied[name], at[name] = state.denied[name], state.denied_at[name]
         tilt, error, beyond, rate = (
             flight.measured(self.config, state, name, now)
             for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
@@ -257,8 +270,9 @@ class Reports(Requests):
         self.state = replace(
             state,
             motion=motion,
-            denied=MappingProxyType(dict(denied)),
+            denied=MappingProxyType(denied),
             denied_since=MappingProxyType(since),
+            denied_at=MappingProxyType(at),
             commanded=MappingProxyType(dict(told)),
         )
         last = state.motion[-1][0] if state.motion else now
