@@ -34,8 +34,8 @@ _SPEEDS_DIFFER = 10.0
 _FORCES_DIFFER = 6.0
 #: What the newest pressure counts in that of the ground.
 _OF_NEWEST = 0.1
-#: What an estimator claims and was denied stays so while the barometer tells nothing, for so long,
-#: s: messages that are lost for a while, and a second of heights after it.
+#: What an estimator claims and the barometer denied stays so as that falls silent, for so long, s:
+#: messages that are lost for a while, and a second of heights after it.
 _DENIED_FOR = 2.0
 #: No force without any speed is that of a fall for so long, s.
 _NEVER_FALLS_FOR = 3.0
@@ -248,15 +248,12 @@ class Reports(Requests):
             return
         barometer = flight.pressure_change(self.config, state, now)
         denied = dict(denials(motion, barometer))
-        at = dict.fromkeys(denied, now)
         if math.isnan(barometer.rate):
-            # One that was just found wrong is not right as what denied it is silent.
-            for name in (VERTICAL_SPEED, TILT):
-                if (
-                    name not in denied
-                    and now <= state.denied_at.get(name, -math.inf) + _DENIED_FOR
-                ):
-                    denied[name], at[name] = state.denied[name], state.denied_at[name]
+            # What it has just found wrong is not right as soon as it is silent.
+            at = {one: t for one, t in state.denied_at.items() if now <= t + _DENIED_FOR}
+            denied = {one: state.denied[one] for one in at} | denied
+        else:
+            at = {name: now for name in denied if name in (VERTICAL_SPEED, TILT)}
         tilt, error, beyond, rate = (
             flight.measured(self.config, state, name, now)
             for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from story import LINK, Story, falling, parachute, shipped
+import pytest
+from story import LINK, Story, falling, parachute, pressure_at, shipped
 
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import inputs as i
@@ -12,8 +13,11 @@ from chute_ros.supervisor.machine import Stage
 TWO = (Rung(LINK, "1/161"), Rung(LINK, "1/162"))
 
 
-def under_canopy(speed: float, seconds: float, *ladder: Rung) -> Story:
-    """It tumbled and was deployed; under its canopy it comes down so fast, m/s."""
+def under_canopy(
+    speed: float, seconds: float, *ladder: Rung, estimator_hovers: bool = False
+) -> Story:
+    """It tumbled and was deployed; under its canopy it comes down so fast, m/s, which an estimator
+    that hovers does not tell."""
     story = Story(shipped("multirotor", deploy_ladder=ladder)).ready()
     story.at(0.0, parachute(device="1/161"), parachute(device="1/162"))
     story.fly(2.0, height=300.0)
@@ -29,7 +33,10 @@ def under_canopy(speed: float, seconds: float, *ladder: Rung) -> Story:
     for k in range(round(seconds / 0.05)):
         now += min(max(-speed - now, -0.5), 0.5)
         height += 0.05 * now
-        story.fly(story.t + 0.05, height=height, vertical_speed=now, tilt=20.0 + k % 3)
+        told = {"height": height, "vertical_speed": now, "tilt": 20.0 + k % 3}
+        if estimator_hovers:
+            told |= {"height": 290.0, "vertical_speed": 0.0, "pressure": pressure_at(height)}
+        story.fly(story.t + 0.05, **told)
     return story
 
 
@@ -61,3 +68,13 @@ def test_without_another_it_is_an_alarm_that_does_not_stop() -> None:
     before = len(story.alarms())
     story.fly(story.t + 5.0, height=0.0, **down)
     assert len(story.alarms()) == before
+
+
+@pytest.mark.parametrize(("speed", "alarmed"), [(16.0, True), (12.0, True), (6.0, False)])
+def test_one_whose_estimator_hovers_under_it_is_an_alarm_by_the_barometer(
+    speed: float, alarmed: bool
+) -> None:
+    story = under_canopy(speed, 6.0, *TWO, estimator_hovers=True)
+    said = [one for one in story.alarms() if "sinks fast under a canopy" in one]
+    assert bool(said) is alarmed
+    assert story.fired() == ["KILL", "DEPLOY"]

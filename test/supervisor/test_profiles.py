@@ -352,6 +352,7 @@ def test_every_rule_has_its_story(name: str) -> None:
     # test_motors_stopped.py, test_uncommanded_sink.py, test_canopy.py.
     told |= {"tipped over at take-off", "killed aloft and silent", "motors stopped in flight"}
     told |= {"disarmed in flight", "uncommanded sink", "sinks fast", "canopy does not carry"}
+    told |= {"sinks fast under a canopy"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
