@@ -92,7 +92,6 @@ def followed(state: State, text: str, now: float) -> State:
         motion=state.motion,
         denied=state.denied,
         denied_since=state.denied_since,
-        denied_at=state.denied_at,
         commanded=state.commanded,
         unfit=state.unfit,
         fitness_since=state.fitness_since,

@@ -34,9 +34,6 @@ _SPEEDS_DIFFER = 10.0
 _FORCES_DIFFER = 6.0
 #: What the newest pressure counts in that of the ground.
 _OF_NEWEST = 0.1
-#: What an estimator claims and the barometer denied stays so as that falls silent, for so long, s:
-#: messages that are lost for a while, and a second of heights after it.
-_DENIED_FOR = 2.0
 #: No force without any speed is that of a fall for so long, s.
 _NEVER_FALLS_FOR = 3.0
 #: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); it is found
@@ -246,14 +243,7 @@ class Reports(Requests):
         motion = noted(state.motion, moment)
         if motion is state.motion:
             return
-        barometer = flight.pressure_change(self.config, state, now)
-        denied = dict(denials(motion, barometer))
-        if math.isnan(barometer.rate):
-            # What it has just found wrong is not right as soon as it is silent.
-            at = {one: t for one, t in state.denied_at.items() if now <= t + _DENIED_FOR}
-            denied = {one: state.denied[one] for one in at} | denied
-        else:
-            at = {name: now for name in denied if name in (VERTICAL_SPEED, TILT)}
+        denied = denials(motion, flight.pressure_change(self.config, state, now))
         tilt, error, beyond, rate = (
             flight.measured(self.config, state, name, now)
             for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
@@ -267,9 +257,8 @@ class Reports(Requests):
         self.state = replace(
             state,
             motion=motion,
-            denied=MappingProxyType(denied),
+            denied=MappingProxyType(dict(denied)),
             denied_since=MappingProxyType(since),
-            denied_at=MappingProxyType(at),
             commanded=MappingProxyType(dict(told)),
         )
         last = state.motion[-1][0] if state.motion else now

@@ -135,11 +135,9 @@ class State:
     #: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt) of the last
     #: seconds, the oldest first; NaN: not known, or in doubt.
     motion: tuple[tuple[float, float, float, float], ...] = ()
-    #: Measurement -> why what it claims of a fall is not so; since when, and when the barometer
-    #: last told so, monotonic s.
+    #: Measurement -> why what it claims of a fall is not so; and since when, monotonic s.
     denied: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     denied_since: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    denied_at: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     #: Measurement -> in words that what it claims of a fall was commanded.
     commanded: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     #: Measurement -> what it told that cannot be; it is not used until it tells what can.

@@ -60,7 +60,6 @@ LEFT_OUT = frozenset(
         "faults_told",
         "motion",  # pictures come too seldom here to contradict each other
         "denied_since",
-        "denied_at",
         "unfit",
         "fitness_since",
         "armed_by_us",  # after a flight, of devices that the explorer does not look at

@@ -148,48 +148,6 @@ def test_an_estimator_that_sinks_while_the_vehicle_hovers_ends_no_flight(
     assert any("vertical_speed is contradicted" in one for one in teller.story.alarms())
 
 
-def lean_over(teller: Teller, seconds: float, silent_from: float, silent: float) -> None:
-    """A vehicle that hovers at 60 m, whose estimator leans over and, believing that, sinks, while
-    for some time nothing comes."""
-    story, speed, height = teller.story, 0.0, 60.0
-    for k in range(round(seconds / EVERY)):
-        lean = min(95.0, 40.0 * EVERY * k)
-        speed -= 0.981 * (1.0 - math.cos(math.radians(lean)))
-        height += EVERY * speed
-        if silent_from <= k * EVERY < silent_from + silent:
-            story.at(story.t + EVERY, story.heartbeat())
-        else:
-            told = {"vertical_speed": speed, "tilt": lean}
-            teller.tell(height=height, force=9.8, true_height=60.0, **told)
-
-
-@pytest.mark.parametrize("silent", [0.0, 0.6, 0.8, 1.0])
-@pytest.mark.parametrize("silent_from", [1.6, 2.0, 2.5])
-def test_an_estimator_that_was_denied_is_not_believed_as_messages_come_again(
-    silent_from: float, silent: float
-) -> None:
-    """The barometer needs a while until it tells a rate again."""
-    teller = told_to("multirotor")
-    teller.stand(1.0, true_height=0.0)
-    teller.hover(3.0, 60.0, true_height=60.0)
-    lean_over(teller, 6.0, silent_from, silent)
-    assert teller.story.fired() == []
-
-
-def test_one_that_was_denied_for_a_moment_long_ago_is_believed_without_a_barometer() -> None:
-    """Given a barometer that is silent for good from then on, and a true fall 2 s later."""
-    teller = told_to("multirotor")
-    teller.stand(1.0, true_height=0.0)
-    teller.hover(3.0, 60.0, true_height=60.0)
-    lean_over(teller, 1.6, 9.0, 0.0)
-    for _ in range(20):
-        teller.tell(height=60.0, vertical_speed=0.0, tilt=3.0, force=9.8)
-    for k in range(20):
-        speed = -0.98 * k
-        teller.tell(height=60.0 - 0.049 * k**2, vertical_speed=speed, tilt=120.0, force=0.5)
-    assert "KILL" in teller.story.fired()
-
-
 @settings(max_examples=25)
 @given(
     pushes=st.lists(st.floats(-8.0, 8.0), min_size=2, max_size=6),
