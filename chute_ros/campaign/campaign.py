@@ -144,12 +144,6 @@ def _batch(folder: Path, seeds: Sequence[int]) -> list[Line]:
     return [_line(folder, seed) for seed in seeds]
 
 
-def _leave_the_end_to_its_parent() -> None:
-    """Ctrl-C reaches every process of a terminal, and the one whose it is ends the others."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-
-
 def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     if jobs == 1:
         yield from (_line(folder, seed) for seed in seeds)
@@ -160,7 +154,9 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     # No collection of garbage looks through it again (4 % of a flight); PyPy's works otherwise.
     if hasattr(gc, "freeze"):
         gc.freeze()
-    pool = ProcessPoolExecutor(jobs, get_context("fork"), _leave_the_end_to_its_parent)
+    # Ctrl-C reaches every process of a terminal: ours ends them.
+    ignores = (signal.SIGINT, signal.SIG_IGN)
+    pool = ProcessPoolExecutor(jobs, get_context("fork"), signal.signal, ignores)
     ordered: deque[Future[list[Line]]] = deque()
     try:
         for first in range(0, len(seeds), _BATCH):
@@ -171,6 +167,6 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
             yield from batch.result()
     finally:
         pool.shutdown(wait=False)
-        # One whose neighbour died waits for work without end.
+        # Nobody waits for what they fly now.
         for process in active_children():
             process.kill()

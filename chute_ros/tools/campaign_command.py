@@ -34,6 +34,10 @@ _TELL_EVERY = 5.0  # s
 _KEEP_EVERY = 60.0  # s
 #: So many of those that must not be are told; all are saved.
 _MOST_TOLD = 20
+_BROKEN = (
+    "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault "
+    "of its interpreter); what was flown until then is told, and --resume FILE goes on from it"
+)
 
 
 def main() -> None:
@@ -109,12 +113,6 @@ def main() -> None:
     if tally.flights < len(seeds):
         # What was flown until then is told; now it ends as every tool does.
         raise KeyboardInterrupt
-
-
-_BROKEN = (
-    "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault "
-    "of its interpreter); what was flown until then is told, and --resume FILE goes on from it"
-)
 
 
 def _told(line: campaign.Line) -> str:

@@ -1,5 +1,6 @@
 """The command line of the campaign: mistakes are said before any flight, results are kept."""
 
+import contextlib
 import json
 import os
 import re
@@ -218,22 +219,41 @@ def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_pa
     assert "not saved, name another folder with --failures: " in capsys.readouterr().out
 
 
+@contextlib.contextmanager
+def flying(*arguments):
+    """A campaign of hours that has begun, in processes of its own; none of them is left."""
+    command = [sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"]
+    with subprocess.Popen(
+        [*command, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def flown_by(out):
+    return int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
     """As in a terminal, where every process of the command gets the signal."""
     page = tmp_path / "campaign.md"
-    command = [sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"]
-    command += ["--jobs", str(jobs), "--page", str(page), "--failures", str(tmp_path)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
+    options = ("--jobs", str(jobs), "--page", str(page), "--failures", str(tmp_path))
+    with flying(*options) as process:
         first = process.stderr.readline()
         os.killpg(process.pid, signal.SIGINT)
         out, err = process.communicate(timeout=60.0)
     assert process.returncode == 130, err
     assert err.splitlines()[-1] == "campaign: interrupted"
     assert "Traceback" not in err
-    flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
+    flown = flown_by(out)
     assert flown >= int(first.split()[0]) > 0
     assert f"`make campaign FLIGHTS={flown} SEED=0`" in page.read_text()
 
@@ -241,11 +261,7 @@ def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
 def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
     """As the system does that has no memory left."""
     kept = tmp_path / "kept.json"
-    command = [sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"]
-    command += ["--jobs", "2", "--failures", str(tmp_path), "--resume", str(kept)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    with flying("--jobs", "2", "--failures", str(tmp_path), "--resume", str(kept)) as process:
         process.stderr.readline()
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         os.kill(int(children[0]), signal.SIGKILL)
@@ -253,9 +269,8 @@ def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
     assert process.returncode == 1, err
     assert err.splitlines()[-1].startswith("campaign: one of its processes ended by itself")
     assert "Traceback" not in err
-    flown = int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
-    assert flown > 0
-    assert json.loads(kept.read_text())["flights"] == flown
+    assert flown_by(out) > 0
+    assert json.loads(kept.read_text())["flights"] == flown_by(out)
 
 
 def test_a_changed_scenario_can_be_flown(monkeypatch, tmp_path, capsys):

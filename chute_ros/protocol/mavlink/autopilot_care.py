@@ -1,6 +1,7 @@
 """What is asked of our autopilot, and undone, without anybody's request.
 
-Its settings are read and told, its heartbeats are had sooner, its arming is undone while flight is
+Its settings are read and told, how long it takes to answer is measured, its heartbeats are had
+sooner, its arming is undone while flight is
 blocked, and its question whether it may arm is answered.
 """
 
@@ -66,6 +67,8 @@ class AutopilotCare:
         self._now = now
         self.block.observe(autopilot, now)
         self._settings(autopilot, now)
+        if (question := autopilot.round_trip.question(now)) is not None:
+            self._outbox.send(question, now)
         undone = bool(self.block.reason) and self._config.disarm_when_blocked
         for ask in self._heartbeats.due(autopilot, faster, undone, now):
             self._requests.commands.send_once(ask, now)

@@ -311,8 +311,6 @@ class MavlinkLink:
         autopilot = self._devices.chosen_autopilot()
         if autopilot is None or autopilot.liveness.state is not LinkState.OK:
             return
-        if (question := autopilot.round_trip.question(now)) is not None:
-            self._outbox.send(question, now)
         rate = self.config.autopilot_message_rate
         self._care.look(autopilot, rate > 0, now)
         if rate > 0:

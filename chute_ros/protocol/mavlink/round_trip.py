@@ -15,6 +15,7 @@ from collections import deque
 from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.stream_watch import LINE_CURE
 
 #: It is asked so often, s.
 EACH = 1.0
@@ -67,9 +68,4 @@ class RoundTrip:
         if not self.late(now):
             return []
         took = f"answers after {self.seconds(now):.1f} s (TIMESYNC; limit {LIMIT:g} s)"
-        return [f"{took}, so what it tells comes late: {_CURE}"]
-
-
-_CURE = (
-    "the line to it is full: raise its baud rate, or switch off streams that others ask for on it"
-)
+        return [f"{took}, so what it tells comes late: {LINE_CURE}"]

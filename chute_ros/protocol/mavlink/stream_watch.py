@@ -135,7 +135,7 @@ class StreamWatch:
 
     def faults(self, now: float) -> list[str]:
         """What is too slow, and what to do about it."""
-        cure = _LINE_CURE if self.line_is_slow(now) else _STREAM_CURE
+        cure = LINE_CURE if self.line_is_slow(now) else _STREAM_CURE
         return [
             f"{name} comes at {rate:.1f} Hz (need {self._needed:g} Hz): {cure}"
             for name, rate in self.slow(now).items()
@@ -163,7 +163,8 @@ class StreamWatch:
         return True
 
 
-_LINE_CURE = (
+#: What a person can do about a line that is full.
+LINE_CURE = (
     "the line to the autopilot is too slow for what it carries: raise its baud rate, or switch "
     "off streams that others ask for on it"
 )

@@ -81,8 +81,8 @@ def test_one_that_is_heard_anew_is_measured_anew():
 
 
 class Line:
-    """The autopilot's side of a serial line: so many bytes a second (now or from when on), what
-    waits is kept. The other way is free."""
+    """The autopilot's side of a serial line: so many bytes a second, and what waits is
+    kept. The other way is free."""
 
     def __init__(self, rate):
         self.rate, self.t = rate, 0.0
