@@ -13,6 +13,7 @@ from chute_ros.supervisor.conditions import Finding, find
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import Look, RuleEvidence
 from chute_ros.supervisor.gate import against_any_rule, against_rule, too_low
+from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.reports import Reports
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
@@ -216,7 +217,7 @@ class Policy(Reports):
 
     def _deny(self, rule: Rule, why: str, reasons: tuple[str, ...]) -> None:
         evidence = self.state.rule(rule.name)
-        if _kind(evidence.denied) != _kind(why):
+        if kind(evidence.denied) != kind(why):
             self.outputs.append(
                 i.Say(f"rule '{rule.name}' wants a deploy ({'; '.join(reasons)}): denied, {why}")
             )
@@ -228,8 +229,3 @@ class Policy(Reports):
     def _keep(self, rules: dict[str, RuleEvidence]) -> None:
         if rules != self.state.rules:
             self.state = replace(self.state, rules=MappingProxyType(rules))
-
-
-def _kind(why: str) -> str:
-    """A reason without the height in it, which changes all the time: it is said once."""
-    return why.rpartition(" is below")[2]

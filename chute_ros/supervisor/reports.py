@@ -10,6 +10,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.contradictions import commanded, denials, noted
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
+from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.machine import Stage, Stimulus
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
@@ -300,7 +301,8 @@ class Reports(Requests):
 
     def _note_faults(self, faults: tuple[str, ...]) -> None:
         """In flight what forbids a take-off is an alarm, each once as long as it lasts."""
-        new = tuple(one for one in faults if one not in self.state.faults_told)
+        told = set(map(kind, self.state.faults_told))
+        new = [one for one in faults if kind(one) not in told]
         if self.state.airborne:
             self.outputs += [i.Say(f"vehicle: {one}", alarm=True) for one in new]
         if faults != self.state.faults_told:

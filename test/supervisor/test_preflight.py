@@ -329,3 +329,17 @@ def test_after_the_flight_the_parachutes_that_were_armed_are_disarmed() -> None:
     # Then the devices fail to: nobody waits for an answer, so that it is an alarm.
     story.at(10.1, i.ArmDone(0, False, False, "no answer"))
     assert any("not disarmed after the flight" in one for one in story.alarms())
+
+
+def test_in_flight_a_fault_whose_figure_changes_is_one_alarm_and_another_fault_another() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    for tenths in range(6, 30):
+        late = f"answers after {tenths / 10:.1f} s (limit 0.5 s): it is late"
+        slow = f"ATTITUDE comes at {tenths / 10:.1f} Hz (need 5 Hz)"
+        story.fly(story.t + 0.1, faults=(late,) if tenths < 20 else (late, slow))
+    assert len(story.alarms()) == 2
+    assert "answers after 0.6 s" in story.alarms()[0]
+    assert "ATTITUDE comes at 2.0 Hz" in story.alarms()[1]
+    story.fly(story.t + 1.0)
+    story.fly(story.t + 0.1, faults=("answers after 0.9 s (limit 0.5 s): it is late",))
+    assert len(story.alarms()) == 3
