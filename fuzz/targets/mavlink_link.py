@@ -169,6 +169,9 @@ class MavlinkLinked(Linked):
             return
         if message.get_type() in ("PARAM_REQUEST_READ", "COMMAND_ACK") and message.target_system:
             return  # the autopilot's settings, and its question whether it may arm
+        asks = message.get_type() == "TIMESYNC" and message.tc1 == 0
+        if asks and abs(self._now - message.ts1 / 1e9) < 1e-3:
+            return  # how long it takes to answer
         if message.get_type() != "COMMAND_LONG" or message.command not in _COMMANDS:
             raise WrongError(f"this left the link: {message}")
         if not message.target_system:
