@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from chute_ros.campaign.bus import CAN, MAVLINK, Bus, Plug
@@ -20,6 +21,7 @@ from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.upf import parameters as p
+from chute_ros.sim.autopilot_kinds import KINDS, AutopilotKind
 from chute_ros.sim.flight import GRAVITY, FlightModel
 from chute_ros.sim.home import Home, Homing
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
@@ -40,8 +42,9 @@ _FAILED_MOTORS = (Failure.MOTOR, Failure.SINK, Failure.GLIDE, Failure.STALL)
 _NEAR = 10.0
 #: So long after its release a canopy carries; faster than this it does not, s and m/s.
 _CARRIES_AFTER, _NOT_CARRIED = 2.0, 1.5 * SOFT
-#: GLOBAL_POSITION_INT, COMMAND_INT and COMMAND_LONG: all that the simulators react to.
-_HEARD = (b"\x21\0\0", b"\x4b\0\0", b"\x4c\0\0")
+#: PARAM_REQUEST_READ, PARAM_SET, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG and TIMESYNC: all
+#: that the simulators react to.
+_HEARD = tuple(bytes([number, 0, 0]) for number in (20, 23, 33, 75, 76, 111))
 
 
 def _is_for_devices(data: bytes) -> bool:
@@ -55,6 +58,14 @@ def _heights_are_true(scenario: Scenario) -> bool:
     autopilot = scenario.autopilot
     stays = autopilot.homing is Homing.STAYS and not autopilot.home_drift
     return stays and not moves and not scenario.ground
+
+
+def _kind_of(scenario: Scenario) -> AutopilotKind:
+    """Whose autopilot it is; the same one flies multirotors and aeroplanes."""
+    kind = KINDS[scenario.autopilot.kind]
+    if scenario.profile == "fixed_wing" and kind.vehicle_type == dialect.MAV_TYPE_QUADROTOR:
+        return replace(kind, vehicle_type=dialect.MAV_TYPE_FIXED_WING)
+    return kind
 
 
 def _is_for(node: UpfDevice) -> Callable[[bytes], bool]:
@@ -116,10 +127,9 @@ class Aircraft(Rig):
         self.controller: UpfController | None = None
         self.only_parachute: ReleasedParachute | None = None
         bus = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
-        self.autopilot = CampaignAutopilot(self.model, self.sensors)
         traits = scenario.autopilot
+        self.autopilot = CampaignAutopilot(self.model, self.sensors, _kind_of(scenario))
         self.autopilot.home = Home(drift=traits.home_drift, homing=traits.homing)
-        self.autopilot.releases = traits.releases
         if traits.imus > 1:
             self.autopilot.add_second_imu()
         plug = Plug(bus, "autopilot", self.autopilot, _is_for_devices)

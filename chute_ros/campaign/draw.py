@@ -63,6 +63,8 @@ _STANDBY_WAYS = ("to the standby", "from the standby")
 #: So many aircraft have one, of so many of these one goes wrong, and so many fly as high as this,
 #: m: from there even the slowest rule is in time.
 _WITH_SECOND, _SECOND_FAULT, _WITH_SECOND_HIGH, _HIGH = 0.3, 0.4, 0.3, (120.0, 300.0)
+#: Of the people who kill so many want no deploy after it.
+_KILL_ONLY = 0.4
 #: Heights are looked at for a second, of which the flight has settled for 0.3 s.
 _CARRIED_UNTIL = 0.7
 
@@ -99,8 +101,8 @@ def draw(seed: int) -> Scenario:
     )
     if is_rocket:
         return drawn
-    # Drawn last: a flight without one stays as it is.
-    return _with_second_source(chance, in_the_world(chance, drawn), around)
+    # Drawn last: a flight without them stays as it is.
+    return _kill_only(chance, _with_second_source(chance, in_the_world(chance, drawn), around))
 
 
 def _one_of(chance: random.Random, likely: dict[KindT, int]) -> KindT:
@@ -111,6 +113,13 @@ def _person(chance: random.Random, earliest: float) -> Person | None:
     if chance.random() > 0.12:
         return None
     return Person(chance.choice(("deploy", "kill")), round(chance.uniform(0.5, 4.0) + earliest, 3))
+
+
+def _kill_only(chance: random.Random, drawn: Scenario) -> Scenario:
+    person = drawn.person
+    if person is None or person.does != "kill" or chance.random() >= _KILL_ONLY:
+        return drawn
+    return replace(drawn, person=replace(person, does="kill_only"))
 
 
 def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool) -> Fault:

@@ -20,6 +20,7 @@ from chute_ros.campaign.scenario import (
     sensors_of,
 )
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.sim.autopilot_kinds import ARDUCOPTER, ARDUPLANE, GENERIC, PX4
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
@@ -84,8 +85,14 @@ def _autopilot(chance: random.Random, profile: str) -> Autopilot:
     }
     homing = chance.choices(list(often), list(often.values()))[0]
     drifts = round(chance.uniform(-0.5, 0.5), 2) if chance.random() < _DRIFTS else 0.0
-    releases = homing is Homing.FOLLOWS and chance.random() < 0.6
-    return Autopilot(homing, drifts, releases, chance.choice((1, 2)))
+    kind = GENERIC
+    if homing is Homing.FOLLOWS and chance.random() < 0.6:
+        kind = PX4
+    elif homing is Homing.ZEROED and profile == "fixed_wing":
+        kind = ARDUPLANE
+    elif homing is Homing.STAYS and profile == "multirotor":
+        kind = ARDUCOPTER
+    return Autopilot(homing, drifts, kind.name, chance.choice((1, 2)))
 
 
 def _with_body(chance: random.Random, drawn: Scenario) -> Scenario:

@@ -23,6 +23,7 @@ from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import Truth
 from chute_ros.model import Action, Decision
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
 
 _READY_WITHIN, _UP_WITHIN = 15.0, 6.0  # s
@@ -93,20 +94,18 @@ class Flight:
         kind: type[Rig] = RocketRig if scenario.vehicle is Vehicle.ROCKET else Aircraft
         self.rig: Rig = kind(scenario, shipped)
         self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
-        wish = self._deploy if scenario.person and scenario.person.does == "deploy" else self._kill
-        self._person = Call(self.rig, wish)
+        self._person = Call(self.rig, self._wish)
         self.up = math.nan
         self._took_off = math.nan
         self._arms_at = math.nan
         self.rig.world.post(_FIRST_LOOK, self._look)
 
-    @staticmethod
-    def _deploy(token: int) -> i.Input:
-        return i.DeployRequest(token, False, "a person saw it")
-
-    @staticmethod
-    def _kill(token: int) -> i.Input:
-        return i.KillRequest(token, "operator", "a person saw it")
+    def _wish(self, token: int) -> i.Input:
+        person, why = self.scenario.person, "a person saw it"
+        if person is not None and person.does == "deploy":
+            return i.DeployRequest(token, False, why)
+        kill_only = person is not None and person.does == "kill_only"
+        return i.KillRequest(token, OPERATOR, why, kill_only)
 
     def run(self) -> Flown:
         """Live through it."""

@@ -11,6 +11,7 @@ from chute_ros.campaign.flight import Flown
 from chute_ros.campaign.scenario import Vehicle
 from chute_ros.campaign.truth import SOFT, SOFT_UNDER_DROGUE
 from chute_ros.model import Action
+from chute_ros.supervisor.gate import OPERATOR
 
 _REFUSED = "the only parachute refused: by the wrong height that it was told, it stood"
 #: What a person orders has happened by then, s.
@@ -62,10 +63,12 @@ def judge(flown: Flown) -> Judged:
     """The gravest that is true of it."""
     if flown.grounded:
         return Judged(Count.GROUNDED, flown.grounded)
+    alone = _killed_alone_at(flown)
     return (
         _never(flown)
-        or _fallen(flown)
-        or _not_carried(flown)
+        or (
+            _fallen(flown) or _not_carried(flown) if alone == math.inf else _followed(flown, alone)
+        )
         or _ordered(flown)
         or Judged(Count.RIGHT)
     )
@@ -110,6 +113,29 @@ def _never(flown: Flown) -> Judged | None:
     for one in fired:
         if not one.decision.rule or not one.decision.reasons:
             return Judged(Count.UNEXPLAINED, f"decision {one.decision.epoch}.{one.decision.id}")
+    return None
+
+
+def _killed_alone_at(flown: Flown) -> float:
+    """When a person's kill that no deploy shall follow was decided, before any deploy; infinity:
+    it was not."""
+    person = flown.scenario.person
+    if person is None or person.does != "kill_only":
+        return math.inf
+    for at, one in flown.decided:
+        if one.action is Action.DEPLOY:
+            break
+        if one.action is Action.KILL and one.rule == OPERATOR:
+            return at
+    return math.inf
+
+
+def _followed(flown: Flown, alone: float) -> Judged | None:
+    """A deploy followed a person's kill that asked for none; None: none did."""
+    for at, one in flown.decided:
+        if at >= alone and one.action is Action.DEPLOY:
+            text = f"DEPLOY {at - alone:.2f} s after a person's kill that asked for nothing more"
+            return Judged(Count.FALSE, f"{text}: {one.rule}: {'; '.join(one.reasons)}")
     return None
 
 
@@ -172,7 +198,7 @@ def _ordered(flown: Flown) -> Judged | None:
     latest = min(due + _PERSON_WAITS, math.inf if math.isnan(flown.landed) else flown.landed)
     kills = [one.at for one in flown.acted if one.decision.action is Action.KILL]
     done = flown.released <= latest
-    if person.does == "kill":
+    if person.does != "deploy":
         done |= bool(kills) and kills[0] <= latest
     if done or latest - due < enough_time(scenario):
         return None

@@ -39,7 +39,7 @@ def _world(scenario: Scenario) -> Hashable:
     return (
         *(scenario.profile, scenario.failure, scenario.canopy.carries),
         *(flown.kind if flown is not None else "", way.name if way is not None else ""),
-        *(scenario.ground > 0.0, scenario.ground < 0.0, autopilot.homing, autopilot.releases),
+        *(scenario.ground > 0.0, scenario.ground < 0.0, autopilot.homing, autopilot.kind),
     )
 
 

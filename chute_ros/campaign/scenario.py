@@ -11,6 +11,7 @@ from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import SOFT
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
+from chute_ros.sim.autopilot_kinds import GENERIC
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
@@ -145,7 +146,8 @@ Fault = WayFault | Stop | Stalls | ClockJump | SensorFault | EstimatorFault | Ho
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody at the supervisor's services. does: deploy or kill."""
+    """Somebody at the supervisor's services. does: deploy, kill, or kill_only: the kill, and no
+    deploy after it."""
 
     does: str
     at: float
@@ -166,12 +168,12 @@ class Canopy:
 
 @dataclass(frozen=True)
 class Autopilot:
-    """Whose it is shows in what it does besides flying. home_drift: m/s; releases: it orders the
-    release of a parachute itself when it terminates the flight; imus: accelerometers, 1 or 2."""
+    """Whose it is (sim/autopilot_kinds.py) shows in what it does besides flying. home_drift: m/s;
+    imus: accelerometers, 1 or 2."""
 
     homing: Homing = Homing.STAYS
     home_drift: float = 0.0
-    releases: bool = False
+    kind: str = GENERIC.name
     imus: int = 1
 
 

@@ -13,8 +13,8 @@ from chute_ros.campaign.manoeuvre import Manoeuvre, Motion
 from chute_ros.campaign.sensors import Sensors
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
+from chute_ros.sim.autopilot_kinds import AutopilotKind, Termination
 from chute_ros.sim.flight import GRAVITY, FlightModel
-from chute_ros.sim.mavlink_device import Params
 
 #: Gusts change within about this time, s.
 _GUST_TIME = 1.0
@@ -100,20 +100,19 @@ class Nature:
 class CampaignAutopilot(AutopilotDevice):
     """Tells what its estimator and its sensors say; nature moves the vehicle."""
 
-    def __init__(self, model: FlightModel, sensors: Sensors) -> None:
-        super().__init__(1, [], model)
+    def __init__(self, model: FlightModel, sensors: Sensors, kind: AutopilotKind) -> None:
+        super().__init__(1, [], model, kind)
         self._sensors = sensors
         self.estimator = Estimator()
         self._told = 0.0
-        #: It orders the release of a parachute itself when it terminates the flight; when it did.
-        self.releases = False
+        #: When it ordered the release of a parachute itself, as it terminated the flight.
         self.released_at = math.nan
 
-    def step(self, now: float) -> None:
+    def _fly(self, now: float) -> None:
         """Nature does."""
 
     def next_step(self) -> float:
-        return math.inf
+        return min([when for when, _ in self._later], default=math.inf)
 
     def _global_position_int(self) -> Any:
         message: Any = super()._global_position_int()
@@ -157,12 +156,7 @@ class CampaignAutopilot(AutopilotDevice):
             message.base_mode = 0
         return message
 
-    def _terminate(self, params: Params) -> int:
-        result = super()._terminate(params)
-        if self.releases and result == dialect.MAV_RESULT_ACCEPTED:
+    def _end_flight(self) -> None:
+        super()._end_flight()
+        if self.kind.termination is Termination.RELEASES:
             self.released_at = self.now
-            release, parachute = dialect.PARACHUTE_RELEASE, dialect.MAV_COMP_ID_PARACHUTE
-            command = (self.system_id, parachute, dialect.MAV_CMD_DO_PARACHUTE, 0)
-            nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            self.send(dialect.MAVLink_command_long_message(*command, float(release), *nothing))
-        return result

@@ -83,13 +83,21 @@ class AutopilotDevice(AutopilotTelemetry):
         self._stepped_to = self.now
 
     def step(self, now: float) -> None:
-        """Fly on to now."""
+        """Live on to now."""
+        self._act_late(now)
+        self._fly(now)
+
+    def _act_late(self, now: float) -> None:
+        """Do what was ordered and took its time."""
         for entry in [entry for entry in self._later if now >= entry[0]]:
             self._later.remove(entry)
             entry[1]()
         if (order := self._authorization.overdue(now)) is not None:
             self.say("ARM AUTHORIZATION: no response")
             self._acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+
+    def _fly(self, now: float) -> None:
+        """Move the vehicle on to now."""
         while now - self._stepped_to >= STEP:
             was_flying = not self.model.on_ground
             self.model.step(STEP)

@@ -29,6 +29,7 @@ from chute_ros.campaign.scenario import (
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import SOFT
 from chute_ros.model import Action
+from chute_ros.sim.autopilot_kinds import KINDS
 from chute_ros.sim.home import Homing
 
 AIRCRAFT = (Vehicle.MAVLINK, Vehicle.UPF, Vehicle.BOTH)
@@ -215,7 +216,8 @@ def test_every_world_is_drawn() -> None:
     wrong = [f for one in every for f in one.faults if isinstance(f, EstimatorFault)]
     assert {one.how for one in wrong} == {"diverges", "leans", "hovers"}
     assert {one.autopilot.homing for one in every} == set(Homing)
-    assert {one.autopilot.releases for one in every} == {False, True}
+    assert {one.autopilot.kind for one in every} == set(KINDS)
+    assert {one.person.does for one in every if one.person} == {"deploy", "kill", "kill_only"}
     assert {one.autopilot.imus for one in every} == {1, 2}
     grounds = [one.ground for one in every]
     assert min(grounds) < -60.0 < 0.0 < max(grounds)

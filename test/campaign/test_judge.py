@@ -17,6 +17,7 @@ from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import Truth
 from chute_ros.sim.flight import Descent
+from chute_ros.supervisor.gate import OPERATOR
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +50,22 @@ def test_what_a_person_orders_is_never_false(good: Flown) -> None:
     assert judge(replace(good, acted=early)).count is Count.FALSE
     wanted = replace(good.scenario, person=Person("kill", 0.4))
     assert judge(replace(good, acted=early, scenario=wanted)).count is Count.RIGHT
+
+
+def test_what_follows_a_kill_that_asks_for_nothing_more_is_false(good: Flown) -> None:
+    """The fall that it brings about is what was asked for."""
+    kill, deploy = (act.decision for act in fired(good))
+    asked = replace(kill, rule=OPERATOR)
+    hard = {"landed": good.truth.latest + 1.0, "landing_speed": 20.0, "released": math.nan}
+    person = replace(good.scenario, person=Person("kill_only", 0.5))
+    alone = replace(good, scenario=person, decided=((good.killed, asked),), **hard)
+    assert judge(alone).count is Count.RIGHT
+    followed = replace(alone, decided=((good.killed, asked), (good.released, deploy)))
+    assert judge(followed).count is Count.FALSE
+    assert "asked for nothing more" in judge(followed).why
+    # A rule's kill was there first: its deploy was due.
+    late = replace(alone, decided=((good.killed, kill), (good.released, asked)))
+    assert judge(replace(late, decided=late.decided[:1])).count is Count.MISSED
 
 
 def test_what_the_only_parachute_refuses_in_time_is_not_missed(good: Flown) -> None:

@@ -13,6 +13,7 @@ from chute_ros.campaign.judge import Count, judge
 from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.scenario import Autopilot, Canopy, Failure, HomeMove, Person, Vehicle
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.sim.autopilot_kinds import KINDS
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
@@ -43,6 +44,26 @@ def test_from_a_roof_it_is_released_once_it_is_below_it(vehicle: Vehicle) -> Non
     assert judge(end).count is Count.RIGHT
     assert end.release_height < -9.0
     assert end.landing_speed <= 6.5 or math.isnan(end.landed)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+@pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
+def test_what_a_person_alone_kills_is_not_released_by_any_autopilot(
+    kind: str, profile: str
+) -> None:
+    person, autopilot = Person("kill_only", 1.0), Autopilot(kind=kind)
+    end = flown(Failure.NOTHING, person=person, autopilot=autopilot, profile=profile)
+    assert judge(end).count is Count.RIGHT
+    assert end.killed < end.up + 1.3
+    assert math.isnan(end.released)
+    assert not math.isnan(end.landed)
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_on_every_autopilot_the_kill_is_before_the_release_and_soon(kind: str) -> None:
+    end = flown(Failure.MOTOR, autopilot=Autopilot(kind=kind))
+    assert judge(end).count is Count.RIGHT
+    assert end.killed < end.released < end.truth.at + 1.0
 
 
 @pytest.mark.parametrize("homing", list(Homing))
