@@ -28,7 +28,9 @@ class CtrlC:
     """A handler of SIGINT that raises KeyboardInterrupt, as Python's own does, but may be held."""
 
     def __init__(self) -> None:
-        self._held = self._came = False
+        self._held = False
+        #: Somebody pressed it.
+        self.came = False
 
     def install(self) -> None:
         """Where who started us wants something else of it, that stays."""
@@ -37,9 +39,9 @@ class CtrlC:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Python calls this, in the main thread."""
+        self.came = True
         if not self._held:
             raise KeyboardInterrupt
-        self._came = True
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -49,5 +51,5 @@ class CtrlC:
             yield
         finally:
             self._held = False
-        if self._came:
+        if self.came:
             raise KeyboardInterrupt

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 
-from chute_ros.interrupts import at_ctrl_c
+from chute_ros.interrupts import CtrlC, at_ctrl_c
 
 #: The exit code of what a Ctrl-C ended, as shells have it.
 INTERRUPTED = 128 + signal.SIGINT
@@ -25,9 +25,14 @@ def run(name: str, module: str) -> None:
     with at_ctrl_c(end):
         # Here: it takes up to a second.
         main = importlib.import_module(f"chute_ros.tools.{module}").main
+    ctrl_c = CtrlC()
+    ctrl_c.install()
     try:
         main()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Exception) as error:
+        # In the middle of a conversion rclpy's binding makes an error of its own of it.
+        if not ctrl_c.came and not isinstance(error, KeyboardInterrupt):
+            raise
         _tell(name)
         sys.exit(INTERRUPTED)
     finally:

@@ -74,6 +74,45 @@ def test_while_it_explores():
     assert interrupted(started) == (130, "explore: interrupted\n")
 
 
+#: A Ctrl-C comes, and what was called makes an error of its own of it, or there is none and it
+#: fails all the same.
+BINDING = """
+import signal
+import sys
+import types
+
+
+def main():
+    try:
+        signal.raise_signal({number})
+    except KeyboardInterrupt:
+        raise RuntimeError("Unable to convert call argument") from None
+    raise RuntimeError("a mistake")
+
+
+module = types.ModuleType("chute_ros.tools.binding")
+module.main = main
+sys.modules[module.__name__] = module
+from chute_ros.tools.entry import run
+run("binding", "binding")
+"""
+
+
+def test_in_the_middle_of_a_binding_that_makes_an_error_of_it():
+    code = BINDING.format(number="signal.SIGINT")
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert (done.returncode, done.stderr) == (130, "binding: interrupted\n")
+
+
+def test_an_error_of_another_cause_is_one():
+    code = BINDING.format(number="signal.SIGCONT")
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
+    assert done.returncode == 1
+    assert done.stderr.endswith("RuntimeError: a mistake\n")
+
+
 def test_one_that_is_to_ignore_it_goes_on(recording):
     """As a shell starts what is to run behind its back."""
     started = start(
