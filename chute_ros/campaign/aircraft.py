@@ -37,6 +37,9 @@ from chute_ros.sim.upf_trigger import UpfTrigger
 _ARMED_TRIGGERS = 12
 #: How long the autopilot that hangs does, s.
 _HANGS = 6.0
+#: From its arming until it leaves the ground, s: PX4 spools up for 1 s (COM_SPOOLUP_TIME) and
+#: then ramps up its thrust, ArduCopter waits for 2 s.
+_SPOOLS_UP = 2.0
 _FAILED_MOTORS = (Failure.MOTOR, Failure.SINK, Failure.GLIDE, Failure.STALL)
 #: So near to where it took off the ground may be, for all that anybody knows, m.
 _NEAR = 10.0
@@ -154,7 +157,7 @@ class Aircraft(Rig):
         for source in scenario.second_sources:
             self.add_source(source, self.model)
         self._speed = 0.0
-        self._flew = False
+        self._left = self._flew = False
         self._light_until = math.nan
         self._first_out = ""
         self._opened_by_kill = math.nan
@@ -176,12 +179,15 @@ class Aircraft(Rig):
 
     def take_off(self, now: float) -> None:
         self.autopilot.act("arm")
-        self.autopilot.act(f"takeoff={self.scenario.height}")
-        self.nature.lifts = True
         self.world.stir(self.plugs["autopilot"])
+        self.world.post(now + _SPOOLS_UP, self._leave)
+
+    def _leave(self, now: float) -> None:
+        self.autopilot.act(f"takeoff={self.scenario.height}")
+        self.nature.lifts = self._left = True
 
     def is_up(self) -> bool:
-        return (self._flew or self.scenario.stands) and not self.nature.lifts
+        return self._left and (self._flew or self.scenario.stands) and not self.nature.lifts
 
     def refused_at(self) -> float:
         return math.nan if self.only_parachute is None else self.only_parachute.misled_at

@@ -97,29 +97,26 @@ def draw(seed: int) -> Scenario:
         standby,
         aps=chance.random() < 0.5,
         arms=is_rocket or chance.random() < 0.3,
-        person=_person(chance, apogee + 1.0),
+        person=_person(chance, seed, apogee + 1.0),
     )
     if is_rocket:
         return drawn
-    # Drawn last: a flight without them stays as it is.
-    return _kill_only(chance, _with_second_source(chance, in_the_world(chance, drawn), around))
+    # Drawn last: a flight without one stays as it is.
+    return _with_second_source(chance, in_the_world(chance, drawn), around)
 
 
 def _one_of(chance: random.Random, likely: dict[KindT, int]) -> KindT:
     return chance.choices(list(likely), list(likely.values()))[0]
 
 
-def _person(chance: random.Random, earliest: float) -> Person | None:
+def _person(chance: random.Random, seed: int, earliest: float) -> Person | None:
     if chance.random() > 0.12:
         return None
-    return Person(chance.choice(("deploy", "kill")), round(chance.uniform(0.5, 4.0) + earliest, 3))
-
-
-def _kill_only(chance: random.Random, drawn: Scenario) -> Scenario:
-    person = drawn.person
-    if person is None or person.does != "kill" or chance.random() >= _KILL_ONLY:
-        return drawn
-    return replace(drawn, person=replace(person, does="kill_only"))
+    does = chance.choice(("deploy", "kill"))
+    # By a chance of its own: all else of the flight stays as it is.
+    if does == "kill" and random.Random(f"{seed} kill only").random() < _KILL_ONLY:
+        does = "kill_only"
+    return Person(does, round(chance.uniform(0.5, 4.0) + earliest, 3))
 
 
 def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool) -> Fault:

@@ -26,7 +26,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
 
-_READY_WITHIN, _UP_WITHIN = 15.0, 6.0  # s
+_READY_WITHIN, _UP_WITHIN = 15.0, 9.0  # s
 #: A pilot looks at the vehicle so often, and not before, s.
 _LOOKS, _FIRST_LOOK = 0.05, 0.5
 #: From its height on, before anything may happen: attitude and landed state have been told, s.

@@ -54,6 +54,8 @@ class AutopilotDevice(AutopilotTelemetry):
             dialect.MAVLINK_MSG_ID_SCALED_IMU: self._scaled_imu,
         }
         self.streams |= own
+        if kind.targets_of_a_wing:
+            self.tell_targets_of_a_wing()
         # Attitude and acceleration only on request, as many autopilots are delivered.
         self.default_intervals |= dict.fromkeys(own, 1.0)
         self.default_intervals[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT] = 0.2
@@ -237,7 +239,7 @@ class AutopilotDevice(AutopilotTelemetry):
         if self.terminated:
             state = dialect.MAV_STATE_FLIGHT_TERMINATION
         return dialect.MAVLink_heartbeat_message(
-            self.kind.vehicle_type, self.kind.autopilot, armed, 0, state, 3
+            self.kind.vehicle_type, self.kind.autopilot, armed, self.kind.custom_mode, state, 3
         )
 
     def _system_time(self) -> object:

@@ -44,6 +44,10 @@ class AutopilotKind:
     settles: float = 0.0
     #: From a take-off that was ordered to IN_AIR, whatever the height.
     early_in_air: float = math.inf
+    #: HEARTBEAT.custom_mode.
+    custom_mode: int = 0
+    #: What is commanded comes with NAV_CONTROLLER_OUTPUT alone.
+    targets_of_a_wing: bool = False
 
 
 GENERIC = AutopilotKind("generic")
@@ -88,5 +92,7 @@ ARDUPLANE = AutopilotKind(
     },
     quick_heartbeat=False,
     early_in_air=0.05,
+    custom_mode=15,  # GUIDED
+    targets_of_a_wing=True,
 )
 KINDS = {kind.name: kind for kind in (GENERIC, PX4, ARDUCOPTER, ARDUPLANE)}

@@ -51,6 +51,17 @@ class AutopilotTelemetry(MavlinkDevice):
         self.streams[dialect.MAVLINK_MSG_ID_SCALED_IMU2] = self._scaled_imu2
         self.default_intervals[dialect.MAVLINK_MSG_ID_SCALED_IMU2] = math.inf
 
+    def tell_targets_of_a_wing(self) -> None:
+        """As ArduPlane does, in place of attitude and position targets."""
+        for target in (
+            dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET,
+            dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
+        ):
+            del self.streams[target], self.default_intervals[target]
+        wing = dialect.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT
+        self.streams[wing] = self._nav_controller_output
+        self.default_intervals[wing] = math.inf
+
     @abstractmethod
     def _global_position_int(self) -> Any:
         """What the estimator says of height and speed."""
@@ -90,9 +101,24 @@ class AutopilotTelemetry(MavlinkDevice):
             self.boot_ms(), 0, 0, -milli_g, 0, 0, 0, 0, 0, 0
         )
 
+    def _commanded_roll(self) -> float:
+        """rad; what is out of control was last told to be upright."""
+        return self.model.roll if self.model.controlled else 0.0
+
+    def _commanded_height(self) -> float:
+        """m above take-off; of what does as it is told, that is what it does."""
+        if self.model.controlled or self.model.on_ground:
+            return self._told_height()[0] + self._height_error()
+        return self.model.target_height
+
+    def _nav_controller_output(self) -> Any:
+        too_low = self._commanded_height() - self._told_height()[0]
+        return dialect.MAVLink_nav_controller_output_message(
+            math.degrees(self._commanded_roll()), 0.0, 0, 0, 0, too_low, 0.0, 0.0
+        )
+
     def _attitude_target(self) -> Any:
-        # What is out of control was last told to be upright.
-        roll = self.model.roll if self.model.controlled else 0.0
+        roll = self._commanded_roll()
         # A controller that cannot hold it gives all that it has.
         thrust = 1.0 if self.model.armed and self.model.motors_failed else 0.5
         turned = [math.cos(roll / 2.0), math.sin(roll / 2.0), 0.0, 0.0]
@@ -101,12 +127,8 @@ class AutopilotTelemetry(MavlinkDevice):
         )
 
     def _position_target(self) -> Any:
-        model = self.model
-        height, speed = model.target_height, 0.0
-        if model.controlled or model.on_ground:
-            # It does what it is told to: what it was told is what it does.
-            height = self._told_height()[0] + self._height_error()
-            speed = model.vertical_speed
+        model, height = self.model, self._commanded_height()
+        speed = model.vertical_speed if model.controlled or model.on_ground else 0.0
         return dialect.MAVLink_position_target_local_ned_message(
             *(self.boot_ms(), dialect.MAV_FRAME_LOCAL_NED, _HEIGHT_AND_SPEED),
             *(0.0, 0.0, -height, 0.0, 0.0, -speed, 0.0, 0.0, 0.0, 0.0, 0.0),
