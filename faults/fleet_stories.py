@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import closing
@@ -18,6 +17,7 @@ from faults.fleet import GROUND, HEIGHT, Fleet, hosts_for, name_of, newest_state
 from faults.fleet_load import Usage, busy, usage
 from faults.ground_station_link import GroundStationLink, Told
 from faults.network import Network
+from faults.stories import fly_stories
 
 #: How long a fleet that flies is measured, and how long is waited for what must not happen, s.
 MEASURED, WATCHED = 10.0, 5.0
@@ -266,13 +266,4 @@ def _seconds(value: float) -> str:
 
 def fly_all(names: tuple[str, ...] = ()) -> list[Flown]:
     """Every size, or those whose names contain one of names."""
-    every = []
-    for size in SIZES:
-        if names and not any(name in size.name for name in names):
-            continue
-        print(f"-- {size.name}", flush=True)
-        with tempfile.TemporaryDirectory(prefix="chute_ros_fleet_") as folder:
-            flown = fly(size, Path(folder))
-        print(f"   {flown.wrong or 'as it must be'}", flush=True)
-        every.append(flown)
-    return every
+    return fly_stories(SIZES, names, lambda size, folder, _: fly(size, folder))

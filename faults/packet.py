@@ -9,7 +9,6 @@ from __future__ import annotations
 import enum
 import math
 import os
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from faults.flight import Flight
 from faults.gap_packet import Stranger, gap_packet
 from faults.network import Network
 from faults.respawned import RESPAWN_DELAY, RespawnedProcesses
+from faults.stories import flown, fly_stories
 
 VEHICLE, STRANGER = "vehicle", "stranger"
 HOSTS = (VEHICLE, STRANGER)
@@ -58,12 +58,15 @@ class Story:
     fails: When = When.BACK
     #: Nobody is there meanwhile who could deploy.
     may_miss: bool = False
+    #: It is thrown again at each that is started, for so long, s.
+    again_for: float = 0.0
 
 
 STORIES = (
     Story("the supervisor, without a memory limit", SUPERVISOR, unbounded=True),
     *(Story("the supervisor", SUPERVISOR, fails=when, may_miss=when is When.END) for when in When),
     *(Story("`mavlink_parachute`", DEVICE_NODE, fails=when) for when in (When.PACKET, When.BACK)),
+    Story("the supervisor, each time it is started again", SUPERVISOR, again_for=30.0),
     Story(
         "the leader, whose standby and device node keep to the host",
         SUPERVISOR,
@@ -139,6 +142,21 @@ class Scene(Flight):
         self.stranger.send(packet, self.network.address(VEHICLE))
         return time.monotonic()
 
+    def attack_again(self, until: float) -> None:
+        """Who got it and was started again gets it again, until then, monotonic s."""
+        victim, thrown = self.story.victim, 1
+        while time.monotonic() < until:
+            ended = sum(one.name == victim for one in self.processes.ended)
+            self.stranger.listen(0.1)
+            self.spin(0.1)
+            if ended < thrown or math.isnan(self.processes.memory(victim)):
+                continue
+            own = self.stranger.prefix_of(os.getpid())
+            prefix = self.stranger.prefix_of(self.processes.number(victim))
+            if own is not None and prefix is not None:
+                self.stranger.send(gap_packet(own, prefix), self.network.address(VEHICLE))
+                thrown += 1
+
     def goes_on(self) -> Callable[[], bool]:
         """Whether the victim is back: the flight and the vehicle are told of from now on."""
         victim, since = self.story.victim, time.monotonic() + RESPAWN_DELAY
@@ -166,14 +184,9 @@ def run(network: Network, story: Story, folder: Path, namespace: str) -> Told:
     told = Told(story)
     with _memory_limit("0" if story.unbounded else None):
         scene = Scene(network, folder, namespace, story)
-        try:
+        with flown(scene, told):
             scene.take_off()
             _fly(scene, told)
-        except StepFailedError as error:
-            told.wrong = str(error).splitlines()[0]
-            print(error)
-        finally:
-            scene.close()
     return told
 
 
@@ -208,6 +221,11 @@ def _fly(scene: Scene, told: Told) -> None:
     end = processes.first_end(story.victim)
     assert end is not None
     told.ended, told.peak, told.how = end.at - sent_at, end.peak, f"ended by signal {-end.code}"
+    if story.again_for:
+        scene.attack_again(sent_at + story.again_for)
+        ends = sum(one.name == story.victim for one in processes.ended)
+        told.how += f", {ends} times in {story.again_for:g} s"
+        sent_at = time.monotonic()
     if story.fails is When.END:
         _fail_motor(scene, told)
     if story.fails is When.BACK:
@@ -272,13 +290,6 @@ def table(every: list[Told]) -> str:
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:
     """Every story, or those whose names contain one of names."""
-    every = []
-    for number, story in enumerate(STORIES):
-        if names and not any(name in story.name for name in names):
-            continue
-        print(f"-- {story.name}", flush=True)
-        with tempfile.TemporaryDirectory(prefix="chute_ros_hosts_") as folder:
-            told = run(network, story, Path(folder), f"/packet{number}")
-        print(f"   {told.wrong or 'as it must be'}", flush=True)
-        every.append(told)
-    return every
+    return fly_stories(
+        STORIES, names, lambda story, folder, n: run(network, story, folder, f"/packet{n}")
+    )

@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.pilot import Pilot
 from faults.network import Network
+from faults.patience import Patient
 from faults.soak_clock import WallClock
 from faults.soak_plan import NODES, SUPERVISORS
 from faults.soak_processes import Keeper
@@ -46,8 +47,10 @@ class Told:
     line: str
 
 
-class Vehicle:
+class Vehicle(Patient):
     """One vehicle that lives for the whole run. folder: for all that it writes."""
+
+    failure = SoakError
 
     def __init__(self, network: Network, folder: Path, ports: Ports, supervisors: int) -> None:
         self.network, self.ports = network, ports
@@ -100,24 +103,9 @@ class Vehicle:
         self.held_up = max(self.held_up, now - before)
         self.told += [Told(now, name, line) for name, line in lines if name not in NODES]
 
-    def until(self, seconds: float, condition: Callable[[], bool]) -> bool:
-        """Look until condition holds, or for so long; whether it does."""
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() >= end:
-                return False
-            self.turn()
-        return True
-
-    def must(self, what: str, seconds: float, condition: Callable[[], bool]) -> None:
-        """The same; SoakError if it does not."""
-        if not self.until(seconds, condition):
-            said = "; ".join(self.watch.complaints())
-            raise SoakError(f"{what}: not within {seconds:g} s ({said})")
-
-    def rest(self, seconds: float) -> None:
-        """Look on."""
-        self.until(seconds, lambda: False)
+    def complaints(self) -> list[str]:
+        """As its supervisors and nodes tell them."""
+        return self.watch.complaints()
 
     # -- flying ---------------------------------------------------------------------------------
 

@@ -6,7 +6,6 @@ after the kill, by one order; healed, one of the two must lead.
 
 from __future__ import annotations
 
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +15,9 @@ from chute_msgs.msg import SupervisorLease
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.demo_director import StepFailedError
 from faults.flight import Flight, reported
 from faults.network import Network
+from faults.stories import flown, fly_stories
 
 VEHICLE, FIRST, SECOND = "vehicle", "first", "second"
 HOSTS = (VEHICLE, FIRST, SECOND)
@@ -131,15 +130,10 @@ def run(network: Network, story: Story, folder: Path, namespace: str) -> Told:
     """Fly it; what went wrong is in the answer."""
     told = Told(story)
     scene = Scene(network, folder, namespace)
-    try:
+    with flown(scene, told):
         scene.take_off()
         _fly(scene, story, told)
         told.wrong = _wrong(scene)
-    except StepFailedError as error:
-        told.wrong = str(error).splitlines()[0]
-        print(error)
-    finally:
-        scene.close()
     return told
 
 
@@ -206,13 +200,6 @@ def table(every: list[Told]) -> str:
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:
     """Every story, or those whose names contain one of names."""
-    every = []
-    for number, story in enumerate(STORIES):
-        if names and not any(name in story.name for name in names):
-            continue
-        print(f"-- {story.name}", flush=True)
-        with tempfile.TemporaryDirectory(prefix="chute_ros_hosts_") as folder:
-            told = run(network, story, Path(folder), f"/story{number}")
-        print(f"   {told.wrong or 'as it must be'}", flush=True)
-        every.append(told)
-    return every
+    return fly_stories(
+        STORIES, names, lambda story, folder, n: run(network, story, folder, f"/story{n}")
+    )

@@ -84,7 +84,7 @@ def fly_all(
     """Each story so many times; stories with the same setup on one vehicle, if it lasts. kept_in:
     the file that each run is added to."""
     every = []
-    with Hangar(autopilot, folder) as hangar:
+    with contextlib.closing(Hangar(autopilot, folder)) as hangar:
         for run in range(1, runs + 1):
             for story in picked:
                 flown = fly_one(hangar, story, f"{story.name} {run}/{runs}")
@@ -119,13 +119,13 @@ def _fly_once(hangar: Hangar, story: stories.Story, what: str) -> Flown:
             story.fly(flight)
         except ChuteError as error:
             flight.verdict.wrong.append(f"error: {error}")
-            hangar.scrap()
+            hangar.close()
         verdict = flight.end(notes)
         if story.spoils:
-            hangar.scrap()
+            hangar.close()
     except ChuteError as error:
         verdict.wrong.append(f"error: {error}")
-        hangar.scrap()
+        hangar.close()
     times = [f"{name} {took:.2f} s" for name, took in verdict.times.items()]
     print(
         f"{hangar.autopilot.kind} {hangar.version}  {what} ({time.monotonic() - began:.0f} s): "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 
 from sitl.autopilots import PX4, Autopilot
 from sitl.flight import Flight
@@ -11,7 +10,7 @@ from sitl.vehicle import Setup, Vehicle
 
 
 class Hangar:
-    """Of one autopilot. folder: for all that is written."""
+    """Of one autopilot, until it is closed. folder: for all that is written."""
 
     def __init__(self, autopilot: Autopilot, folder: Path) -> None:
         self.autopilot, self.folder = autopilot, folder
@@ -19,27 +18,16 @@ class Hangar:
         self._vehicle: Vehicle | None = None
         self._count = 0
 
-    def __enter__(self) -> Hangar:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.scrap()
-
     def flight(self, setup: Setup) -> Flight:
         """On a vehicle that is put together so."""
         vehicle = self._vehicle
         if vehicle is None or vehicle.setup != setup or not vehicle.renew():
-            self.scrap()
+            self.close()
             vehicle = self._new(setup)
         return Flight(vehicle)
 
-    def scrap(self) -> None:
-        """The vehicle is of no use any more."""
+    def close(self) -> None:
+        """The vehicle is of no use any more, if there is one."""
         vehicle, self._vehicle = self._vehicle, None
         if vehicle is not None:
             vehicle.close()

@@ -158,6 +158,5 @@ STORIES = (
           _dronecan,
           Setup(dronecan=True, settings={"CAN_P1_DRIVER": 1, "CAN_D1_PROTOCOL": 1}), _ARDUPILOT,
           spoils=True),
-    Story("signed", "MAVLink 2 signing; one motor dead", _signed, Setup(signed=True), _ARDUPILOT,
-          spoils=True),
+    Story("signed", "MAVLink 2 signing; one motor dead", _signed, Setup(signed=True), spoils=True),
 )  # fmt: skip

@@ -18,6 +18,7 @@ from chute_ros.errors import ChuteError
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.signing import EPOCH_2015, UNITS_PER_SECOND, Signer, SigningClock
 from chute_ros.supervisor.machine import Stage
+from faults.patience import Patient
 from faults.soak_processes import Keeper
 from faults.soak_watch import Watch, ready
 from sitl.autopilots import ARDUCOPTER, PX4, Autopilot, version_text
@@ -57,8 +58,10 @@ class Setup:
     dronecan: bool = False
 
 
-class Vehicle:
+class Vehicle(Patient):
     """One, for one run of a story. folder: for all that it writes."""
+
+    failure = StoryError
 
     def __init__(self, autopilot: Autopilot, setup: Setup, folder: Path) -> None:
         self.autopilot, self.setup, self.folder = autopilot, setup, folder
@@ -81,12 +84,9 @@ class Vehicle:
             made.callback(self.simulator.end)
             self._key = folder / "key"
             self._start_processes()
-            signer = None
-            if setup.signed:
-                signer = Signer(_KEY, SigningClock(time.time() - time.monotonic()), 1)
-            self.station = Station(self.ports.station, GROUND_STATION, signer)
+            self.station = Station(self.ports.station, GROUND_STATION, self._signer(1))
             made.callback(self.station.close)
-            self.bench = Station(self.ports.bench_end, _BENCH)
+            self.bench = Station(self.ports.bench_end, _BENCH, self._signer(2))
             made.callback(self.bench.close)
             self.pilot = Pilot(autopilot.kind, self.station, self.bench)
             self._made = made.pop_all()
@@ -110,25 +110,10 @@ class Vehicle:
         if not self.stages or self.stages[-1][1] != text:
             self.stages.append((time.monotonic(), text))
 
-    def until(self, seconds: float, condition: Callable[[], bool]) -> bool:
-        """Look until condition holds, or for so long; whether it does."""
-        end = time.monotonic() + seconds
-        while not condition():
-            if time.monotonic() >= end:
-                return False
-            self.turn()
-        return True
-
-    def must(self, what: str, seconds: float, condition: Callable[[], bool]) -> None:
-        """The same; StoryError if it does not."""
-        if not self.until(seconds, condition):
-            told = [text for _, text in self.station.said[-4:]]
-            why = "; ".join([*self.watch.complaints(), *self.watch.safety.block_reasons, *told])
-            raise StoryError(f"{what}: not within {seconds:g} s ({why})")
-
-    def rest(self, seconds: float) -> None:
-        """Look on."""
-        self.until(seconds, lambda: False)
+    def complaints(self) -> list[str]:
+        """As nodes and supervisor tell them, and what the ground station read last."""
+        told = [text for _, text in self.station.said[-4:]]
+        return [*self.watch.complaints(), *self.watch.safety.block_reasons, *told]
 
     def again(self, what: str, seconds: float, order: Callable[[], Any],
               done: Callable[[], bool], pause: float = 1.0) -> None:  # fmt: skip
@@ -228,8 +213,14 @@ class Vehicle:
             self.rest(1.0)
         raise StoryError(f"safety/arm: {why}")
 
+    def _signer(self, link: int) -> Signer | None:
+        """Of one who speaks; None: nobody signs."""
+        if not self.setup.signed:
+            return None
+        return Signer(_KEY, SigningClock(time.time() - time.monotonic()), link)
+
     def give_key(self) -> None:
-        """The autopilot signs, and hears only what is signed, but on its first port, the bench."""
+        """The autopilot signs, and hears only what is signed."""
         key = list(_KEY)
         stamp = int((time.time() - EPOCH_2015) * UNITS_PER_SECOND)
         self.bench.send(dialect.MAVLink_setup_signing_message(1, 1, key, stamp))

@@ -23,11 +23,13 @@ or two.
 Frames and messages are lost, doubled, delayed, overtaken, damaged; cables flap; processes hang,
 stall, or die and start again; devices lose their power; wall clocks are set; sensors stick, drift,
 jump, are noisy or silent: up to {MOST_FAULTS} of these at a time, most of them around the failure.
-Some vehicles are armed by a person, some are killed or deployed by one.
+Some vehicles are armed by a person, some are killed or deployed by one; where that one wants the
+kill alone, no deploy may follow.
 Three of ten aircraft have an IMU, odometry or both besides their autopilot (`vehicle_sources`): on
 power of its own, in a process and over a way of its own, and sometimes with one more fault there.
-Home is set anew or drifts in flight, and moves with a vehicle that is disarmed in the air; some
-autopilots order a release themselves when they terminate the flight. The ground is elsewhere than
+The autopilots answer, refuse, terminate and tell what they command as PX4, ArduCopter, ArduPlane
+or none of them (PX4 orders a release itself when it terminates the flight). Home is set anew or
+drifts in flight, and moves with a vehicle that is disarmed in the air. The ground is elsewhere than
 where it took off: beside a roof, in a valley, on a hill. An estimator is wrong with itself, in
 height, speed and attitude together. Flips, dives, throws and fast descents are flown on purpose,
 with one sensor wrong or none. Some lose a part of their thrust and sink upright; aeroplanes glide,
