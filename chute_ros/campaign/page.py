@@ -29,11 +29,11 @@ Three of ten aircraft have an IMU, odometry or both besides their autopilot (`ve
 power of its own, in a process and over a way of its own, and sometimes with one more fault there.
 The autopilots answer, refuse, terminate and tell what they command as PX4, ArduCopter, ArduPlane
 or none of them (PX4 orders a release itself when it terminates the flight). Home is set anew or
-drifts in flight, and moves with a vehicle that is disarmed in the air. The ground is elsewhere than
-where it took off: beside a roof, in a valley, on a hill. An estimator is wrong with itself, in
-height, speed and attitude together. Flips, dives, throws and fast descents are flown on purpose,
-with one sensor wrong or none. Some lose a part of their thrust and sink upright; aeroplanes glide,
-stall, spin and dive. Some canopies open late, or tangle and do not carry.
+drifts in flight, and moves with a vehicle that is disarmed in the air. The ground is elsewhere
+than where it took off: beside a roof, in a valley, on a hill. An estimator is wrong with itself,
+in height, speed and attitude together. Flips, dives, throws and fast descents are flown on
+purpose, with one sensor wrong or none. Some lose a part of their thrust and sink upright;
+aeroplanes glide, stall, spin and dive. Some canopies open late, or tangle and do not carry.
 
 The truth comes from the flight models: since when only a parachute helps (a rocket: since when it
 comes down and no drogue will come by itself), and until when its release still lands it softly.

@@ -4,7 +4,8 @@ Height, vertical speed and attitude of an autopilot are one estimator: when it g
 wrong with itself. The barometer and the accelerometer are origins of their own. A claim that they
 contradict is denied, with the reason:
 
-- a sink of the estimator, where the barometer tells none; without a barometer, where no force was
+- a sink of the estimator, where the barometer tells none, or has not come down by what it takes to
+  speed up so much since it was last heard; without a barometer, where no force was
   missing while it is said to have speeded up;
 - a force as in a fall, where no speed follows from it (what is not carried by a force f speeds up
   downwards by 9.8 - f at least);
@@ -35,6 +36,8 @@ _FORCE_LIVES, _SPEED_LIVES, _SPEED_STEADY = 0.02, 0.003, 3.0
 _GAP = 0.35
 #: A sink is denied if it differs by so much, m/s, and this part of itself, from the barometer's.
 _SINK_DIFFERS, _OF_SINK = 2.0, 0.5
+#: Two heights of a barometer that lives differ by no more than this from what they are, m.
+_BAROMETER_ERRS = 2.5
 #: Speeded up by so much more than was felt, m/s, in this time at least, s.
 _NOT_FELT, _FELT_OVER = 4.0, 1.0
 #: Below this a force is that of a fall, m/s^2: half of what a body at rest feels.
@@ -69,7 +72,16 @@ class Rise(NamedTuple):
     until: float
 
 
+class Drop(NamedTuple):
+    """The barometer tells so much less than before its last silence, m, so long ago, s; NaN: it
+    was not silent lately, or tells nothing."""
+
+    by: float
+    passed: float
+
+
 NOT_TOLD = Rise(math.nan, math.nan, math.nan)
+NO_DROP = Drop(math.nan, math.nan)
 
 
 def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
@@ -80,10 +92,12 @@ def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
     return (*(one for one in motion if now - one[0] <= KEPT_FOR), moment)
 
 
-def denials(motion: tuple[Moment, ...], barometer: Rise) -> Mapping[str, str]:
+def denials(
+    motion: tuple[Moment, ...], barometer: Rise, drop: Drop = NO_DROP
+) -> Mapping[str, str]:
     """Measurement -> why what it claims is not so. barometer: of the last second."""
     denied = {}
-    if why := _sink_denied(motion, barometer):
+    if why := _sink_denied(motion, barometer, drop):
         denied[VERTICAL_SPEED] = why
     if why := _fall_denied(motion, barometer):
         denied[ACCELERATION] = why
@@ -126,15 +140,36 @@ def _told_meanwhile(motion: tuple[Moment, ...], barometer: Rise) -> float:
     return fmean(speeds) if speeds else math.nan
 
 
-def _sink_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:
+def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str:
     if not motion or not motion[-1][1] < -1.0:
         return ""
     told = _told_meanwhile(motion, barometer)
     if math.isnan(told):
-        return _not_felt(motion)
+        return _not_fallen(motion, drop) or _not_felt(motion)
     if barometer.rate - told <= max(_SINK_DIFFERS, _OF_SINK * abs(told)):
         return ""
     return f"the barometer tells {barometer.rate:+.1f} m/s where it tells {told:+.1f}"
+
+
+def least_drop(sink: float, passed: float) -> float:
+    """How far what sinks with this, m/s, has come down at least from the highest that it was in
+    the last seconds, m: nothing speeds up downwards by more than gravity does."""
+    sped_up = min(passed, sink / GRAVITY)
+    return sink * sped_up - GRAVITY * sped_up**2 / 2.0
+
+
+def _not_fallen(motion: tuple[Moment, ...], drop: Drop) -> str:
+    """It sinks so fast that it must have come down further since its barometer was last heard, as
+    long as that tells no rate again: who climbs and falls within one silence is believed then."""
+    if math.isnan(drop.by):
+        return ""
+    least = least_drop(-motion[-1][1], drop.passed)
+    if drop.by + _BAROMETER_ERRS >= _OF_SINK * least:
+        return ""
+    return (
+        f"it tells {motion[-1][1]:+.1f} m/s, for which it came down by {least:.1f} m at least in "
+        f"{drop.passed:.1f} s, and the barometer tells {drop.by:.1f} m"
+    )
 
 
 def _not_felt(motion: tuple[Moment, ...]) -> str:

@@ -14,7 +14,7 @@ from statistics import fmean, median
 
 from chute_ros.model import Armed, LandedState
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY, NOT_TOLD, Rise
+from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY, NO_DROP, NOT_TOLD, Drop, Rise
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
@@ -53,6 +53,8 @@ _SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
 PARTS = {"tilt_deg": "attitude"}
 #: A barometer that stands drifts by less than this, m, and tells less than this, m/s.
 _OFF_GROUND, _STANDS_BELOW = 2.5, 1.0
+#: What a barometer told longer ago says nothing of a fall, s.
+_DROP_WITHIN = 12.0
 #: An estimator that says that it is up is believed at first where it is not faster, m/s, and not
 #: further from upright, degrees: both are flown.
 _CALM_SPEED, _CALM_TILT = 8.0, 60.0
@@ -128,6 +130,16 @@ def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
         return NOT_TOLD
     (since, before), (until, after) = state.pressure_heights[0], state.pressure_heights[-1]
     return Rise((after - before) / (until - since), since, until)
+
+
+def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
+    """By how much the barometer tells less than before it was last silent."""
+    known = state.measured(PRESSURE_ALTITUDE)
+    passed = known.measured_at - state.pressure_before[0]
+    told = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
+    if known.doubt(PRESSURE_ALTITUDE, now) or not passed <= _DROP_WITHIN:
+        return NO_DROP
+    return Drop(state.pressure_before[1] - told, passed)
 
 
 def pressure_height(config: SupervisorConfig, state: State, now: float) -> float:

@@ -89,6 +89,7 @@ def followed(state: State, text: str, now: float) -> State:
         heights=state.heights,
         climb_told_at=state.climb_told_at,
         pressure_heights=state.pressure_heights,
+        pressure_before=state.pressure_before,
         motion=state.motion,
         denied=state.denied,
         denied_since=state.denied_since,

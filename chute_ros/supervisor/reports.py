@@ -35,6 +35,8 @@ _SPEEDS_DIFFER = 10.0
 _FORCES_DIFFER = 6.0
 #: What the newest pressure counts in that of the ground.
 _OF_NEWEST = 0.1
+#: A barometer that was not heard for longer was silent, s.
+_SILENCE = 0.5
 #: No force without any speed is that of a fall for so long, s.
 _NEVER_FALLS_FOR = 3.0
 #: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); it is found
@@ -212,7 +214,15 @@ class Reports(Requests):
         pressure_heights = self._kept(PRESSURE_ALTITUDE, self.state.pressure_heights)
         if heights is self.state.heights and pressure_heights is self.state.pressure_heights:
             return
-        self.state = replace(self.state, heights=heights, pressure_heights=pressure_heights)
+        before, known = self.state.pressure_before, self.state.pressure_heights
+        if known and pressure_heights[-1][0] - known[-1][0] > _SILENCE:
+            before = known[-1]
+        self.state = replace(
+            self.state,
+            heights=heights,
+            pressure_heights=pressure_heights,
+            pressure_before=before,
+        )
         if not math.isnan(flight.measured(self.config, self.state, CLIMB_RATE, self.now)):
             self.state = replace(self.state, climb_told_at=self.now)
 
@@ -244,7 +254,11 @@ class Reports(Requests):
         motion = noted(state.motion, moment)
         if motion is state.motion:
             return
-        denied = denials(motion, flight.pressure_change(self.config, state, now))
+        denied = denials(
+            motion,
+            flight.pressure_change(self.config, state, now),
+            flight.pressure_drop(self.config, state, now),
+        )
         tilt, error, beyond, rate = (
             flight.measured(self.config, state, name, now)
             for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)

@@ -132,6 +132,8 @@ class State:
     #: (monotonic s, m) of the heights of the last second, the oldest first; and by the barometer.
     heights: tuple[tuple[float, float], ...] = ()
     pressure_heights: tuple[tuple[float, float], ...] = ()
+    #: The same of the barometer before it was last silent; NaN: it was not.
+    pressure_before: tuple[float, float] = (math.nan, math.nan)
     #: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt) of the last
     #: seconds, the oldest first; NaN: not known, or in doubt.
     motion: tuple[tuple[float, float, float, float], ...] = ()

@@ -53,6 +53,7 @@ LEFT_OUT = frozenset(
         "reasons",
         "behind",  # every node here keeps up
         "pressure_heights",  # no pressure, altitude, target or fault is told here
+        "pressure_before",
         "ground_pressure_altitude",
         "at_ground_since",
         "home_altitude",

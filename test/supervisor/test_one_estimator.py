@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from story import DOWN, Story, pressure_at, shipped
+from story import DOWN, Story, falling, pressure_at, shipped
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.supervisor.contradictions import GRAVITY, least_drop
 from chute_ros.supervisor.machine import Stage
 
 EVERY = 0.1
@@ -166,6 +167,91 @@ def test_whatever_way_one_estimator_runs_in_a_level_hover_it_ends_no_flight(
         height += EVERY * speed
         teller.tell(height=height, vertical_speed=speed, tilt=tilt, force=9.8, true_height=60.0)
     assert teller.story.fired() == []
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("gap", [1.5, 3.0, 6.0])
+@pytest.mark.parametrize("drift", [3.0, 5.0])
+def test_one_that_runs_away_while_nothing_is_heard_of_it_ends_no_flight(
+    profile: str, gap: float, drift: float
+) -> None:
+    """Given an autopilot that hangs, or whose messages are lost, while its estimator sinks and
+    leans over ever more: as it is back, its barometer tells how far it has not come down."""
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 90.0, true_height=90.0)
+    story, silent_at = teller.story, teller.story.t
+    while story.t < silent_at + gap - EVERY:
+        story.at(story.t + EVERY, story.heartbeat())
+    for k in range(20):
+        ran = gap + k * EVERY
+        height, speed = 90.0 - drift * ran**2 / 2.0, -drift * ran
+        tilt = min(130.0, 15.0 * ran)
+        teller.tell(height=height, vertical_speed=speed, tilt=tilt, force=9.8, true_height=90.0)
+    assert story.fired() == []
+
+
+@given(
+    forces=st.lists(st.floats(0.0, 30.0), min_size=1, max_size=60),
+    begin=st.floats(-30.0, 30.0),
+    back=st.integers(1, 60),
+)
+def test_what_falls_has_come_down_by_what_is_asked_of_it(
+    forces: list[float], begin: float, back: int
+) -> None:
+    """Given any force upwards, and any speed when the silence began; from its highest on."""
+    sinks, lost = [begin], [0.0]
+    for force in forces:
+        sinks.append(sinks[-1] + EVERY * (GRAVITY - force))
+        lost.append(lost[-1] + EVERY * (sinks[-2] + sinks[-1]) / 2.0)
+    before = max(0, len(lost) - 1 - back)
+    passed = EVERY * (len(lost) - 1 - before)
+    if sinks[-1] > 0.0:
+        assert lost[-1] - min(lost[before:]) >= least_drop(sinks[-1], passed) - 1e-6
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("gap", [0.6, 1.5, 3.0])
+@pytest.mark.parametrize("heard_before", [0.3, 1.0])
+def test_one_that_falls_while_nothing_is_heard_of_it_is_released_no_later_with_a_barometer(
+    profile: str, gap: float, heard_before: float
+) -> None:
+    """Given the same silence, which begins so long before its motors stop; then in any order."""
+    released = {}
+    for barometer in (True, False):
+        teller = told_to(profile)
+        teller.stand(1.0, true_height=0.0) if barometer else teller.stand(1.0)
+        high = {"true_height": 200.0} if barometer else {}
+        teller.hover(4.0, 200.0, **high)
+        story, fell_at = teller.story, teller.story.t + heard_before
+        while story.t < fell_at - heard_before + gap - EVERY:
+            story.at(story.t + EVERY, story.heartbeat())
+        while not deployed(teller) and story.t < fell_at + 8.0:
+            told = falling(max(0.0, story.t + EVERY - fell_at), 200.0)
+            force = told.pop("acceleration") if story.t > fell_at else 9.8
+            truth = {"true_height": told["height"]} if barometer else {}
+            tilt = 3.0 if story.t < fell_at else 120.0
+            teller.tell(force=force, tilt=tilt, **told, **truth)
+        released[barometer] = story.t - fell_at
+    assert released[True] <= released[False] + EVERY + 1e-6
+
+
+@AIRCRAFT
+def test_one_that_climbs_and_falls_while_nothing_is_heard_of_it_is_released(profile: str) -> None:
+    """Given a silence of 4 s in which it climbs by 20 m and then falls for 1.5 s: it is higher
+    than before, and is believed as soon as its barometer tells a rate."""
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 200.0, true_height=200.0)
+    story, fell_at = teller.story, teller.story.t + 2.5
+    back_at = fell_at + 1.5
+    while story.t < back_at - EVERY:
+        story.at(story.t + EVERY, story.heartbeat())
+    while not deployed(teller) and story.t < back_at + 5.0:
+        told = falling(story.t + EVERY - fell_at, 220.0)
+        force = told.pop("acceleration")
+        teller.tell(force=force, tilt=120.0, **told, true_height=told["height"])
+    assert story.t < back_at + 1.5
 
 
 def test_an_estimator_that_says_hover_hides_no_fall_from_the_barometer() -> None:
