@@ -11,7 +11,7 @@ import math
 from typing import Generic
 
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect_phases import ENDED, Happening, Phase, next_phase
+from chute_ros.protocol.effect_phases import ENDED, TRANSITIONS, Happening, Phase
 from chute_ros.protocol.goal import (
     NO_ANSWER,
     Answer,
@@ -21,6 +21,7 @@ from chute_ros.protocol.goal import (
     Goal,
     Report,
 )
+from chute_ros.transitions import after
 
 __all__ = ["NO_ANSWER", "Answer", "EffectFinished", "EffectLimits", "EffectLoop", "Goal", "Report"]
 
@@ -259,7 +260,7 @@ class EffectLoop(Generic[CommandT]):
         return "sent once" if self._sends == 1 else f"sent {self._sends} times"
 
     def _take(self, happening: Happening) -> None:
-        self.phase = next_phase(self.phase, happening)
+        self.phase = after(TRANSITIONS, self.phase, happening)
 
     def _end(self, success: bool, message: str) -> None:
         # What was given up, or has come, needs no other way.

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import enum
 
-from chute_ros.errors import TransitionError
-
 
 class Phase(enum.Enum):
     """Where the loop is."""
@@ -50,11 +48,3 @@ TRANSITIONS: dict[tuple[Phase, Happening], Phase] = {
 
 #: Nothing more comes of these.
 ENDED = (Phase.CONFIRMED, Phase.FAILED)
-
-
-def next_phase(phase: Phase, happening: Happening) -> Phase:
-    """The phase after happening; TransitionError for a pair that the table does not list."""
-    try:
-        return TRANSITIONS[phase, happening]
-    except KeyError:
-        raise TransitionError(f"'{happening.value}' while {phase.value}") from None

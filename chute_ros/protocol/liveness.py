@@ -15,8 +15,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState
+from chute_ros.transitions import after
 
 
 class Stimulus(enum.Enum):
@@ -35,16 +36,6 @@ TRANSITIONS: dict[tuple[LinkState, Stimulus], LinkState] = {
     (LinkState.STALE, Stimulus.LOST_LIMIT): LinkState.LOST,
     (LinkState.LOST, Stimulus.HEARD): LinkState.OK,
 }
-
-
-def next_state(state: LinkState, stimulus: Stimulus) -> LinkState:
-    """The state after stimulus; TransitionError for a pair that the table does not list."""
-    try:
-        return TRANSITIONS[state, stimulus]
-    except KeyError:
-        raise TransitionError(
-            f"a link that is {state.name} cannot take '{stimulus.value}'"
-        ) from None
 
 
 @dataclass(frozen=True)
@@ -130,7 +121,7 @@ class Liveness:
 
     def _take(self, stimulus: Stimulus, now: float, silence: float) -> list[LinkChange]:
         before = self.state
-        self.state = next_state(before, stimulus)
+        self.state = after(TRANSITIONS, before, stimulus)
         if self.state is before:
             return []
         self.since = now

@@ -26,6 +26,7 @@ from chute_ros.sim.upf_errors import error_places, told_errors
 from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
 from chute_ros.sim.upf_node import NodeSettings, UpfNode
 from chute_ros.sim.upf_peers import Peers
+from chute_ros.transitions import after
 
 #: A trigger that has not fired is told again by itself after this time at the earliest, s.
 FIRE_AGAIN = 1.0
@@ -184,7 +185,7 @@ class UpfController(UpfNode):
     # -- states ----------------------------------------------------------------------------------
 
     def _move(self, stimulus: Stimulus) -> None:
-        self._enter(machine.next_state(self.state, stimulus))
+        self._enter(after(machine.TRANSITIONS, self.state, stimulus))
 
     def _enter(self, state: ParachuteState) -> None:
         if state is not self.state or state is _S.NOT_READY:

@@ -10,9 +10,10 @@ import enum
 import math
 from dataclasses import dataclass
 
-from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.errors import ParameterError
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.quick_replace import replace
+from chute_ros.transitions import after
 
 #: One whose decisions a device refused as older does not lead for so long, s.
 _STAND_BACK = 5.0
@@ -46,14 +47,6 @@ TRANSITIONS: dict[tuple[Role, Event], Role] = {
     (Role.LEADING, Event.REFUSED): Role.FOLLOWING,
     (Role.LEADING, Event.OVERTAKES): Role.LEADING,
 }
-
-
-def next_role(role: Role, event: Event) -> Role:
-    """The role after event; TransitionError for a pair that the table does not list."""
-    try:
-        return TRANSITIONS[role, event]
-    except KeyError:
-        raise TransitionError(f"one that is {role.value} cannot take '{event.value}'") from None
 
 
 @dataclass(frozen=True)
@@ -210,6 +203,6 @@ class Lease:
         return epoch_above(max(self.highest, own), config.rank)
 
     def _moved(self, event: Event, now: float) -> Lease:
-        role = next_role(self.role, event)
+        role = after(TRANSITIONS, self.role, event)
         lease = replace(self, role=role, waiting_since=now, leader="", leader_heard=math.nan)
         return replace(lease, hears_more_since=math.nan)

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import enum
 
-from chute_ros.errors import TransitionError
-
 
 class Stage(enum.IntEnum):
     """State of the vehicle; numbers of chute_msgs/SafetyState."""
@@ -90,14 +88,6 @@ TRANSITIONS: dict[tuple[Stage, Stimulus], Stage] = {
     (_S.FAULT, _E.KILL): _S.KILLING,
     (_S.FAULT, _E.RESET): _S.STARTUP,
 }
-
-
-def next_stage(stage: Stage, stimulus: Stimulus) -> Stage:
-    """The stage after stimulus; TransitionError for a pair that the table does not list."""
-    try:
-        return TRANSITIONS[stage, stimulus]
-    except KeyError:
-        raise TransitionError(f"{stage.name} cannot take '{stimulus.value}'") from None
 
 
 def listed(stage: Stage, stimulus: Stimulus) -> bool:

@@ -9,9 +9,10 @@ from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence
-from chute_ros.supervisor.machine import Stage, Stimulus, next_stage
+from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import Pending, State
+from chute_ros.transitions import after
 
 #: A decision that may be on its way; a number is that of the deploy's step, from 0.
 Slot = Literal["block", "kill"] | int
@@ -33,11 +34,11 @@ class Steps:
     def move(self, stimulus: Stimulus, why: str = "") -> None:
         """To the stage that the table names."""
         before = self.state.stage
-        after = next_stage(before, stimulus)
-        if after is before:
+        stage = after(TRANSITIONS, before, stimulus)
+        if stage is before:
             return
-        self.state = replace(self.state, stage=after, stage_since=self.now)
-        text = f"{before.name} -> {after.name}: {stimulus.value}"
+        self.state = replace(self.state, stage=stage, stage_since=self.now)
+        text = f"{before.name} -> {stage.name}: {stimulus.value}"
         self.outputs.append(i.Say(f"{text} ({why})" if why else text))
 
     @property

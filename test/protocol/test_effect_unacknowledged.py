@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from chute_ros.errors import TransitionError
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import NO_ANSWER, EffectLimits, EffectLoop, Goal
-from chute_ros.protocol.effect_phases import Happening, Phase, next_phase
+from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase
+from chute_ros.transitions import after
 
 SHOWN = "telemetry says open"
 
@@ -220,10 +221,10 @@ def test_what_is_acknowledged_does_not_take_sent_for_it():
 @pytest.mark.parametrize("phase", Phase, ids=lambda one: one.name)
 def test_sent_moves_on_only_what_waits_for_it(phase):
     if phase is Phase.WAIT_ACKNOWLEDGEMENT:
-        assert next_phase(phase, Happening.SENT_UNACKNOWLEDGED) is Phase.WAIT_EFFECT
+        assert after(TRANSITIONS, phase, Happening.SENT_UNACKNOWLEDGED) is Phase.WAIT_EFFECT
     else:
         with pytest.raises(TransitionError):
-            next_phase(phase, Happening.SENT_UNACKNOWLEDGED)
+            after(TRANSITIONS, phase, Happening.SENT_UNACKNOWLEDGED)
 
 
 STEPS = st.lists(st.tuples(st.floats(0, 1.5), st.sampled_from(["send", "show", "hide"])))

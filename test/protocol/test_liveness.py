@@ -14,8 +14,8 @@ from chute_ros.protocol.liveness import (
     Liveness,
     LivenessLimits,
     Stimulus,
-    next_state,
 )
+from chute_ros.transitions import after
 
 LIMITS = LivenessLimits(stale_after=2.5, lost_after=5.0)
 PAIRS = list(itertools.product(LinkState, Stimulus))
@@ -24,10 +24,10 @@ PAIRS = list(itertools.product(LinkState, Stimulus))
 @pytest.mark.parametrize(("state", "stimulus"), PAIRS, ids=lambda one: one.name)
 def test_a_pair_is_in_the_table_or_raises(state, stimulus):
     if (state, stimulus) in TRANSITIONS:
-        assert next_state(state, stimulus) is TRANSITIONS[state, stimulus]
+        assert after(TRANSITIONS, state, stimulus) is TRANSITIONS[state, stimulus]
     else:
         with pytest.raises(TransitionError, match=state.name):
-            next_state(state, stimulus)
+            after(TRANSITIONS, state, stimulus)
 
 
 def test_a_link_that_was_never_heard_is_neither_stale_nor_lost():

@@ -17,8 +17,8 @@ from chute_ros.supervisor.lease import (
     Lease,
     LeaseConfig,
     Role,
-    next_role,
 )
+from chute_ros.transitions import after
 
 FIRST = LeaseConfig("a", 0, standby=True, timeout=0.5, listen=4.0)
 SECOND = LeaseConfig("b", 1, standby=True, timeout=0.5, listen=4.0)
@@ -40,10 +40,10 @@ def following(config: LeaseConfig, heard: float = T) -> Lease:
 @pytest.mark.parametrize(("role", "event"), list(product(Role, Event)))
 def test_a_pair_that_the_table_does_not_list_raises(role: Role, event: Event) -> None:
     if (role, event) in TRANSITIONS:
-        assert next_role(role, event) is TRANSITIONS[role, event]
+        assert after(TRANSITIONS, role, event) is TRANSITIONS[role, event]
     else:
         with pytest.raises(TransitionError, match=event.value):
-            next_role(role, event)
+            after(TRANSITIONS, role, event)
 
 
 def test_one_that_is_alone_leads_at_once_however_long_it_slept() -> None:

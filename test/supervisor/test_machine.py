@@ -5,7 +5,8 @@ import itertools
 import pytest
 
 from chute_ros.errors import TransitionError
-from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus, listed, next_stage
+from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus, listed
+from chute_ros.transitions import after
 
 PAIRS = list(itertools.product(Stage, Stimulus))
 
@@ -14,11 +15,11 @@ PAIRS = list(itertools.product(Stage, Stimulus))
 def test_a_pair_is_listed_or_raises(stage: Stage, stimulus: Stimulus) -> None:
     if (stage, stimulus) in TRANSITIONS:
         assert listed(stage, stimulus)
-        assert next_stage(stage, stimulus) is TRANSITIONS[stage, stimulus]
+        assert after(TRANSITIONS, stage, stimulus) is TRANSITIONS[stage, stimulus]
     else:
         assert not listed(stage, stimulus)
         with pytest.raises(TransitionError, match=stage.name):
-            next_stage(stage, stimulus)
+            after(TRANSITIONS, stage, stimulus)
 
 
 def test_every_stage_is_reachable_from_the_start() -> None:

@@ -15,7 +15,6 @@ import enum
 import math
 from dataclasses import dataclass, replace
 
-from chute_ros.errors import TransitionError
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
 from chute_ros.protocol.events import Notice, RequestFinished, RequestReport, Severity
@@ -24,6 +23,7 @@ from chute_ros.protocol.umbilical.config import MemoryLimits
 from chute_ros.protocol.umbilical.sayings import MemoryText, WipeBegan, WipeEnded, WipeProgress
 from chute_ros.protocol.umbilical.scheduler import Command
 from chute_ros.protocol.umbilical.stream import DumpBegan, DumpBytes, DumpEnded
+from chute_ros.transitions import after
 
 #: A progress of a dump is told each so many bytes.
 _TELL_EACH = 256 * 1024
@@ -53,14 +53,6 @@ STEPS: dict[tuple[Step, Sign], Step] = {
     (Step.BEGUN, Sign.TOKEN_SENT): Step.BEGUN,
     (Step.BEGUN, Sign.FIRST_SIGN): Step.BEGUN,
 }
-
-
-def next_step(step: Step, sign: Sign) -> Step:
-    """The step after sign; TransitionError for a pair that the table does not list."""
-    try:
-        return STEPS[step, sign]
-    except KeyError:
-        raise TransitionError(f"'{sign.value}' while {step.value}") from None
 
 
 @dataclass(frozen=True)
@@ -115,7 +107,7 @@ class MemoryWorks:
         work = self.work
         if work is not None and self.waits_for(command):
             self.work = replace(
-                work, step=next_step(work.step, Sign.TOKEN_SENT), last=now, sent=True
+                work, step=after(STEPS, work.step, Sign.TOKEN_SENT), last=now, sent=True
             )
             report = Report(work.token, Outcome.SENT, f"{work.name} sent")
             self._events.append(RequestReport(report))
@@ -232,7 +224,7 @@ class MemoryWorks:
         if work is None:
             work = Work(name, 0, Step.ASKED, now)
         begun = work.step is Step.BEGUN
-        self.work = replace(work, step=next_step(work.step, Sign.FIRST_SIGN), last=now)
+        self.work = replace(work, step=after(STEPS, work.step, Sign.FIRST_SIGN), last=now)
         if suffix and not begun:
             memory = name.removeprefix("dump_")
             self._events.append(events.DumpStarted(work.token, memory, suffix))

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import enum
 
-from chute_ros.errors import TransitionError
 from chute_ros.model import ParachuteState
 
 
@@ -72,16 +71,6 @@ DEPLOYED = frozenset({_S.LAUNCHED, _S.TOUCHDOWN})
 _CAUSES: dict[tuple[ParachuteState, ParachuteState], list[Stimulus]] = {}
 for (_before, _stimulus), _after in TRANSITIONS.items():
     _CAUSES.setdefault((_before, _after), []).append(_stimulus)
-
-
-def next_state(state: ParachuteState, stimulus: Stimulus) -> ParachuteState:
-    """The state after stimulus; TransitionError for a pair that the table does not list."""
-    try:
-        return TRANSITIONS[state, stimulus]
-    except KeyError:
-        raise TransitionError(
-            f"a controller that is {state.name} cannot take '{stimulus.value}'"
-        ) from None
 
 
 def causes(before: ParachuteState, after: ParachuteState) -> list[Stimulus]:

@@ -6,7 +6,8 @@ from umbilical_link_bench import ASCENT, STANDBY, STARTUP, Bench, ready
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.protocol.umbilical.config import MemoryLimits
 from chute_ros.protocol.umbilical.events import DumpData, DumpFinished, DumpStarted, Progress
-from chute_ros.protocol.umbilical.memory import STEPS, Sign, Step, next_step
+from chute_ros.protocol.umbilical.memory import STEPS, Sign, Step
+from chute_ros.transitions import after
 
 CSV = b"time,mode\n1,2\n3,4\n"
 BINARY = bytes(range(256)) * 3 + b"$TELEM,1,2\n---[INFO"
@@ -39,10 +40,12 @@ def wiping(name="wipe_flash"):
 def test_a_step_is_in_the_table_or_raises(step, sign):
     if (step, sign) == (Step.SENT, Sign.TOKEN_SENT):
         with pytest.raises(TransitionError, match="its token was sent"):
-            next_step(step, sign)
+            after(STEPS, step, sign)
     else:
         began = sign is Sign.FIRST_SIGN or step is Step.BEGUN
-        assert next_step(step, sign) is STEPS[step, sign] is (Step.BEGUN if began else Step.SENT)
+        assert (
+            after(STEPS, step, sign) is STEPS[step, sign] is (Step.BEGUN if began else Step.SENT)
+        )
 
 
 # -- flash dump ---------------------------------------------------------------------------------
