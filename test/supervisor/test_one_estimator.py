@@ -207,7 +207,9 @@ def test_what_falls_has_come_down_by_what_is_asked_of_it(
     before = max(0, len(lost) - 1 - back)
     passed = EVERY * (len(lost) - 1 - before)
     if sinks[-1] > 0.0:
-        assert lost[-1] - min(lost[before:]) >= least_drop(sinks[-1], passed) - 1e-6
+        # Between two steps it may have been a little higher still.
+        highest = min(lost[before:]) - EVERY**2 * 30.0 / 8.0
+        assert lost[-1] - highest >= least_drop(sinks[-1], passed)
 
 
 @AIRCRAFT
