@@ -35,6 +35,7 @@ SEED ?= 0
 EACH ?=
 PYPY ?=
 CAMPAIGN_ARGS ?=
+WITHOUT_ARGS ?=
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -52,7 +53,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo test bench campaign hosts soak sitl build lint docs explore mutate fuzz lock clean distclean
+.PHONY: help demo test bench campaign without hosts soak sitl build lint docs explore mutate fuzz lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -71,6 +72,11 @@ campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n o
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
 	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) $(CAMPAIGN_ARGS) \
 	    $(if $(EACH),--each $(EACH) --page docs/campaign_of_each.md,--page docs/campaign.md)
+
+without: build ## fly the campaign without a rule or heuristic, to see what needs it (WITHOUT_ARGS="--together ...")
+	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3) \
+	    scripts/without.py --flights $(FLIGHTS) --seed $(SEED) \
+	    $(if $(PYPY),--python "$(PYPY) $(PYPY_JIT)") $(WITHOUT_ARGS)
 
 hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write docs/hosts.md (PARTS=...)
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults $(PARTS)

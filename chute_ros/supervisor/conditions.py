@@ -10,13 +10,11 @@ from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.contradictions import DIVE
-from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
-    HEIGHT,
     TILT,
     VERTICAL_ACCELERATION,
     VERTICAL_SPEED,
@@ -35,8 +33,6 @@ from chute_ros.supervisor.rules import (
 from chute_ros.supervisor.state import ASK_LASTS, State
 
 _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
-#: A height is not as low as it says if the barometer tells more by this, m.
-_HEIGHTS_DIFFER = 5.0
 #: Measurement -> the one of which it is said that it is denied; those that claim it by being low.
 _CLAIMS = {
     VERTICAL_SPEED: VERTICAL_SPEED,
@@ -53,14 +49,12 @@ _CLAIMED_BELOW = (VERTICAL_SPEED, CLIMB_RATE, VERTICAL_ACCELERATION, ACCELERATIO
 class Finding(NamedTuple):
     """holds None: it cannot be said. tell: says what was found, asked only where somebody reads
     it. samples: so many distinct ones came so far; -1: none do. doubted: the sensor that tells it
-    has just told what cannot be. expected: what cannot be said now was said a moment ago.
-    presumed: it is not known, and taken to be so."""
+    has just told what cannot be. presumed: it is not known, and taken to be so."""
 
     holds: bool | None
     tell: Callable[[], str]
     samples: int = -1
     doubted: bool = False
-    expected: bool = True
     presumed: bool = False
     #: It does not hold, but goes on to where it did until the rule's counter was full.
     lingers: bool = False
@@ -90,8 +84,7 @@ def _measurement(
 
         if condition.if_unknown:
             return Finding(True, tell, presumed=True)
-        gap = now - flight.last_usable(config, state, name) <= UNKNOWN_STANDS
-        return Finding(None, tell, samples, expected=gap)
+        return Finding(None, tell, samples)
     doubt = flight.doubt(state, name, value, now)
     if name == CLIMB_RATE or value != known.value:
         samples = flight.rate_count(config, state, now)  # told by heights instead
@@ -119,10 +112,6 @@ def _denied(
 ) -> str:
     """Why what this claims of a fall is not so, by other origins; empty: none denies it."""
     name = condition.measurement
-    if name == HEIGHT and not math.isnan(condition.below):
-        by_pressure = flight.pressure_height(config, state, now)
-        higher = by_pressure > condition.below + _HEIGHTS_DIFFER
-        return f"the barometer tells {by_pressure:.1f} m" if higher else ""
     if not (state.denied or state.commanded) or name not in _CLAIMS:
         return ""
     below = not math.isnan(condition.below)

@@ -29,14 +29,12 @@ LINGERS = 5.0
 class Look(NamedTuple):
     """A condition as it was found. holds None: it cannot be said. samples: so many of what it
     rests on have come so far; -1: none come. doubted: it counts only the rule's part of it.
-    expected False: what cannot be said has not been for long, and keeps nothing that was counted.
     lingers: it holds only as it goes on.
     """
 
     holds: bool | None
     samples: int = -1
     doubted: bool = False
-    expected: bool = True
     lingers: bool = False
 
 
@@ -96,7 +94,7 @@ class RuleEvidence:
         last = self.seen if known else (-1,) * len(found)
         shown, now_seen = [], []
         weight = possible = sure = 0.0
-        for condition, (holds, seen, doubted, expected, _), count, old in zip(
+        for condition, (holds, seen, doubted, _), count, old in zip(
             rule.conditions, found, before, last, strict=True
         ):
             counts = condition.weight * (rule.doubted if doubted else 1.0)
@@ -111,7 +109,7 @@ class RuleEvidence:
             if holds or presumed:
                 weight += counts
             # What cannot be said keeps no more than it has shown itself.
-            stands = holds is None and expected and (seen < 0 or count > 0.0)
+            stands = holds is None and (seen < 0 or count > 0.0)
             if holds or presumed or stands:
                 possible += counts
         enough = rule.needed - _WEIGHTS_ROUNDING
@@ -133,9 +131,7 @@ class RuleEvidence:
         full = self.full(rule)
         before = self.kept if len(self.kept) == len(found) else (0.0,) * len(found)
         kept = []
-        for (holds, seen, doubted, _, lingers), count, left in zip(
-            found, shown, before, strict=True
-        ):
+        for (holds, seen, doubted, lingers), count, left in zip(found, shown, before, strict=True):
             if holds and not lingers:
                 sure = full and not doubted and seen >= 0 and count >= rule.samples
                 kept.append(LINGERS if sure else left)

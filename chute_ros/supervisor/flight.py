@@ -7,7 +7,6 @@ of an autopilot takes a steady fall for standing still, and must not veto the pa
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 from statistics import fmean, median
@@ -28,8 +27,6 @@ from chute_ros.supervisor.measurements import (
 )
 from chute_ros.supervisor.state import State
 
-#: An autopilot that started anew in flight must say for so long that it stands, s.
-_LANDED_HOLD_AFTER_REBOOT = 10.0
 #: One that is armed and says so higher than a deploy needs, on a roof or a hill, for so long, s:
 #: the land detectors of autopilots have erred in a hover.
 _LANDED_HOLD_ALOFT = 5.0
@@ -46,9 +43,6 @@ _FALLS_AFTER = 1.0
 _HEARD_BEFORE = 1.0
 #: Height and speed are of the same time if the speed is at most so much newer, s.
 _SAME_TIME = 0.2
-#: The heights lie so near to a climb with the rate that they tell, m, and so much more for each
-#: m/s of it: a second of free fall bends them by 0.4 m, one of ten times the gravity by 4 m.
-_SCATTER, _SCATTER_OF_RATE = 1.5, 0.1
 #: Measurement -> the part of vehicle/state that tells it, where that has another name.
 PARTS = {"tilt_deg": "attitude"}
 #: A barometer that stands drifts by less than this, m, and tells less than this, m/s.
@@ -97,16 +91,6 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     if PARTS.get(name, name) in state.disputed:
         return "another source told otherwise"
     return state.measured(name).doubt(name, now)
-
-
-def last_usable(config: SupervisorConfig, state: State, name: str) -> float:
-    """Until when what tells a measurement could be used, monotonic s; -infinity: never."""
-    times = [state.climb_told_at] if name in (CLIMB_RATE, VERTICAL_SPEED) else []
-    if name == VERTICAL_ACCELERATION:
-        name = VERTICAL_SPEED
-    if name != CLIMB_RATE:
-        times.append(state.measured(name).last_usable(config.profile.limits[name]))
-    return max([time for time in times if not math.isnan(time)], default=-math.inf)
 
 
 def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
@@ -183,12 +167,12 @@ def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> t
         heights, height.measured_at
     ):
         return math.nan, "too few heights that can be used"
-    return _rate(heights)
+    return _rate(heights), ""
 
 
 @lru_cache(maxsize=16)  # each picture of the vehicle asks for it several times
-def _rate(heights: tuple[tuple[float, float], ...]) -> tuple[float, str]:
-    """What heights (monotonic s, m) tell of a climb, m/s, or NaN and why they tell none."""
+def _rate(heights: tuple[tuple[float, float], ...]) -> float:
+    """What heights (monotonic s, m) tell of a climb, m/s."""
     # The middle one of the single rates: one step of a height, however high, is no climb.
     rates = [
         (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)
@@ -197,15 +181,7 @@ def _rate(heights: tuple[tuple[float, float], ...]) -> tuple[float, str]:
     # The noise of neighbours has a middle one as well; over the whole second it is small, where a
     # step is large. What both of them tell is flown.
     over = _slope(heights)
-    flown = min(rate, over, key=abs) if rate * over > 0.0 else 0.0
-    # And where it is no noise but nonsense, the heights do not follow the rate.
-    rests = [value - rate * at for at, value in heights]
-    middle = median(rests)
-    scatter = fmean([abs(one - middle) for one in rests])
-    limit = _SCATTER + _SCATTER_OF_RATE * abs(rate)
-    if scatter > limit:
-        return math.nan, f"the heights scatter by {scatter:.1f} m (limit {limit:.1f} m)"
-    return flown, ""
+    return min(rate, over, key=abs) if rate * over > 0.0 else 0.0
 
 
 def _enough(heights: tuple[tuple[float, float], ...], newest: float) -> bool:
@@ -218,12 +194,6 @@ def _slope(heights: tuple[tuple[float, float], ...]) -> float:
     weights = [at - middle for at, _ in heights]
     ways = [weight * height for weight, (_, height) in zip(weights, heights, strict=True)]
     return sum(ways) / sum([weight**2 for weight in weights])
-
-
-def height_not_jumped_to(config: SupervisorConfig, state: State, now: float) -> float:
-    """The height, m; of one that has just jumped the lower one. NaN: it cannot be used."""
-    height, known = measured(config, state, "height", now), state.measured("height")
-    return min(height, known.before_jump) if known.has_jumped(now) else height
 
 
 def silent_since_kill(config: SupervisorConfig, state: State, now: float) -> bool:
@@ -279,15 +249,6 @@ def low_at(config: SupervisorConfig, state: State, falls: bool, now: float) -> f
     sank = speed.value < 0.0 and speed.measured_at <= told_at + _SAME_TIME
     sinking = -speed.value if sank else 0.0
     return told_at + (math.sqrt(sinking**2 + 2.0 * GRAVITY * above) - sinking) / GRAVITY
-
-
-def lowest_height(config: SupervisorConfig, state: State, now: float) -> float:
-    """The height, m, also one that does not change any more: it may be that low. NaN: absent."""
-    height = measured(config, state, "height", now)
-    if math.isnan(height) and not state.rebooted:
-        never_stuck = replace(config.profile.limits["height"], stuck_after=0.0)
-        return state.measured("height").usable(never_stuck, now)
-    return height
 
 
 def above_its_ground(state: State, height: float) -> float:
@@ -443,8 +404,6 @@ def down_after_kill_at(config: SupervisorConfig, state: State) -> float:
 def landed_hold(config: SupervisorConfig, state: State) -> float:
     """For how long one must say that it stands, s."""
     hold = config.profile.landed_hold
-    if state.rebooted:
-        return max(hold, _LANDED_HOLD_AFTER_REBOOT)
     if hold > 0.0 and state.vehicle.armed is Armed.ARMED and _told_high(config, state):
         return max(hold, _LANDED_HOLD_ALOFT)
     return hold

@@ -95,7 +95,7 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
     minimum = profile.minimum_height
-    height = flight.lowest_height(config, state, now)
+    height = flight.measured(config, state, "height", now)
     known = state.measured("height")
     if known.has_jumped(now) and known.value < known.before_jump:
         height = math.nan  # it has jumped down: that it is low may be as wrong as before

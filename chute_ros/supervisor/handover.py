@@ -87,7 +87,6 @@ def followed(state: State, text: str, now: float) -> State:
         disputed=state.disputed,
         measurements=state.measurements,
         heights=state.heights,
-        climb_told_at=state.climb_told_at,
         pressure_heights=state.pressure_heights,
         pressure_before=state.pressure_before,
         motion=state.motion,

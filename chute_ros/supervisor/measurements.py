@@ -15,10 +15,6 @@ from chute_ros.errors import ParameterError
 from chute_ros.model import VehicleState
 from chute_ros.supervisor.quick_replace import replace
 
-#: Of its rate a height may differ by so much from what the vertical speed tells: in a gap of lost
-#: messages a wrong height comes as far as one that flies. A speed of more than as much denies no
-#: height: that of one that stands would be denied by a speed that lies.
-_BESIDE_SPEED = 0.5
 #: Samples in a row that must agree before a jump, or a clock that was set back, is believed.
 CONFIRMING_SAMPLES = 3
 #: Two messages may tell the same sample: what was measured less than this apart is one, s.
@@ -201,12 +197,6 @@ class Measured:
         )
         return min([turn for turn in turns if turn >= now], default=math.inf)
 
-    def last_usable(self, limits: Limits) -> float:
-        """Until when it could be used, or can be, monotonic s; NaN: it never could."""
-        if limits.stuck_after > 0.0:
-            return min(self.measured_at, self.same_since + limits.stuck_after)
-        return self.measured_at
-
     def has_jumped(self, now: float) -> bool:
         """A moment ago it was another, and which of the two is right nobody knows."""
         return now < self.jumped_at + JUMP_DOUBTED
@@ -225,9 +215,8 @@ class Measured:
         """The value, or NaN where it cannot be used."""
         return math.nan if self.unusable(limits, now) else self.value
 
-    def with_sample(self, sample: Sample, limits: Limits, speed: float = math.nan) -> Measured:
-        """After one sample; the same one told again changes nothing. speed: unit/s with which it
-        changes, where another sensor tells it."""
+    def with_sample(self, sample: Sample, limits: Limits) -> Measured:
+        """After one sample; the same one told again changes nothing."""
         if not math.isfinite(sample.measured_at):
             return self
         for value, at in (
@@ -249,9 +238,9 @@ class Measured:
                 candidate_at=math.nan,
                 candidates=0,
             )
-        doubtful = self._doubtful(sample, limits, speed)
+        doubtful = self._doubtful(sample, limits)
         # A date that went back puts the value in no doubt.
-        leaps = bool(doubtful) and _jumps(self.value, self.measured_at, sample, limits, speed)
+        leaps = bool(doubtful) and _jumps(self.value, self.measured_at, sample, limits)
         if doubtful:
             agrees = not _jumps(self.candidate, self.candidate_at, sample, limits)
             candidates = self.candidates + 1 if agrees else 1
@@ -271,7 +260,7 @@ class Measured:
         nearer = abs(sample.value - self.candidate) < abs(sample.value - self.value)
         jumped_at, before_jump = self.jumped_at, self.before_jump
         candidate = Sample(self.candidate, self.candidate_at)
-        if leaps or (nearer and _jumps(self.value, self.measured_at, candidate, limits, speed)):
+        if leaps or (nearer and _jumps(self.value, self.measured_at, candidate, limits)):
             # A jump back to what it was before ends what the first one has put in doubt.
             back = abs(sample.value - before_jump) <= limits.jump
             jumped_at, before_jump = (
@@ -298,7 +287,7 @@ class Measured:
             return f"{sample.value:g} is out of {limits.minimum:g} to {limits.maximum:g}"
         return ""
 
-    def _doubtful(self, sample: Sample, limits: Limits, speed: float) -> str:
+    def _doubtful(self, sample: Sample, limits: Limits) -> str:
         if math.isnan(self.measured_at):
             return ""
         if sample.measured_at < self.measured_at - _JITTER:
@@ -306,22 +295,15 @@ class Measured:
         # After a silence nobody knows what lay between: only what follows closely can jump.
         if sample.measured_at - self.measured_at > limits.max_age:
             return ""
-        if _jumps(self.value, self.measured_at, sample, limits, speed):
+        if _jumps(self.value, self.measured_at, sample, limits):
             step = sample.value - self.value
             return f"jumped by {step:+g} in {sample.measured_at - self.measured_at:.3f} s"
         return ""
 
 
-def _jumps(
-    value: float, at: float, sample: Sample, limits: Limits, speed: float = math.nan
-) -> bool:
-    passed = sample.measured_at - at
-    step = sample.value - value
-    if abs(step) > limits.jump + limits.rate * abs(passed):
-        return True
-    rate = limits.rate * _BESIDE_SPEED
-    # What is not a number denies nothing.
-    return abs(speed) <= rate and abs(step - speed * passed) > limits.jump + rate * abs(passed)
+def _jumps(value: float, at: float, sample: Sample, limits: Limits) -> bool:
+    passed, step = sample.measured_at - at, sample.value - value
+    return abs(step) > limits.jump + limits.rate * abs(passed)
 
 
 def samples_of(

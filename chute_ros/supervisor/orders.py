@@ -102,7 +102,7 @@ class Orders(Steps):
                     killed_in_flight=self.state.airborne,
                     killed_standing=stood,
                     killed_at=self.now,
-                    killed_height=flight.height_not_jumped_to(self.config, self.state, self.now),
+                    killed_height=flight.measured(self.config, self.state, "height", self.now),
                     killed_sinking=max(sinking, 0.0),
                 )
             self.move(Stimulus.KILL, why)

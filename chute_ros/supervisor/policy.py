@@ -55,7 +55,6 @@ def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Jud
             one.holds,
             one.samples,
             one.doubted or (weak and one.presumed),
-            one.expected,
             bool(one.holds) and one.lingers,
         )
         for one in findings

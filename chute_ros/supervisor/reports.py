@@ -20,7 +20,6 @@ from chute_ros.supervisor.measurements import (
     PRESSURE_ALTITUDE,
     TILT,
     VERTICAL_SPEED,
-    Measured,
     pressure_altitude,
     samples_of,
 )
@@ -141,13 +140,7 @@ class Reports(Requests):
         measurements = {
             name: before[name].with_sample(sample, limits[name])
             for name, sample in samples.items()
-            if name != HEIGHT
         }
-        told, speed = samples[HEIGHT], math.nan
-        # A smaller step is possible whatever the speed is.
-        if abs(told.value - before[HEIGHT].value) > limits[HEIGHT].jump:
-            speed = self._believed_speed(measurements[VERTICAL_SPEED], one.disputed)
-        measurements[HEIGHT] = before[HEIGHT].with_sample(told, limits[HEIGHT], speed)
         was_disarmed = state.vehicle.armed is Armed.DISARMED
         differ = new.acceleration_spread > _FORCES_DIFFER
         self.state = replace(
@@ -173,21 +166,12 @@ class Reports(Requests):
         known = not math.isnan(state.killed_height + state.killed_sinking)
         if known or state.stage is not Stage.KILLING or not state.killed_in_flight:
             return
-        height = flight.height_not_jumped_to(self.config, state, self.now)
+        height = flight.measured(self.config, state, HEIGHT, self.now)
         sinking = -flight.measured(self.config, state, VERTICAL_SPEED, self.now)
         heard = not math.isnan(height + sinking)
         if heard and self.now <= state.killed_at + _HEARD_AFTER_KILL:
             sinking = max(sinking, 0.0)
             self.state = replace(state, killed_height=height, killed_sinking=sinking)
-
-    def _believed_speed(self, speed: Measured, disputed: frozenset[str]) -> float:
-        """A vertical speed by which a height can be denied, m/s; NaN: there is none. One that the
-        heights until now deny is as likely to be wrong as the next of them."""
-        if VERTICAL_SPEED in disputed or speed.doubt(VERTICAL_SPEED, self.now):
-            return math.nan
-        told = speed.usable(self.config.profile.limits[VERTICAL_SPEED], self.now)
-        by_heights = flight.climb_rate(self.config, self.state, self.now)
-        return math.nan if abs(told - by_heights) > _SPEEDS_DIFFER else told
 
     def _note_home(self, new: VehicleState) -> None:
         """What heights are above, as long as it has not taken off: an autopilot that moves its
@@ -223,8 +207,6 @@ class Reports(Requests):
             pressure_heights=pressure_heights,
             pressure_before=before,
         )
-        if not math.isnan(flight.measured(self.config, self.state, CLIMB_RATE, self.now)):
-            self.state = replace(self.state, climb_told_at=self.now)
 
     def _kept(
         self, name: str, before: tuple[tuple[float, float], ...]

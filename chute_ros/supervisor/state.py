@@ -150,8 +150,6 @@ class State:
     #: as they were on the ground before this flight.
     home_altitude: float = math.nan
     ground_pressure_altitude: float = math.nan
-    #: When they last told a rate, monotonic s.
-    climb_told_at: float = math.nan
     rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
     #: Until then time alone changes nothing of what is known of the vehicle, monotonic s;
     #: -infinity: nobody has looked.

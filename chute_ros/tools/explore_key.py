@@ -167,7 +167,6 @@ def _vehicle(config: SupervisorConfig, state: State, now: float) -> Hashable:
         vehicle.system_status,
         vehicle.reboot_count,
         state.disputed,
-        _since(state.climb_told_at, now, UNKNOWN_STANDS),
     )
 
 

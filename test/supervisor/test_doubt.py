@@ -11,7 +11,6 @@ from story import START, Story, shipped, vehicle
 from chute_ros.model import Action, LinkState, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
 
@@ -234,17 +233,3 @@ def test_a_supervisor_that_stalls_shortly_goes_on_counting() -> None:
     assert "silence meanwhile does not count" in story.said()
     story.fly(story.t + 0.3, tilt=80.0, **LOST)
     assert story.fired()[0] == "KILL"
-
-
-@pytest.mark.parametrize(("every", "fires"), [(1.2, False), (0.1, True)])
-def test_heights_too_seldom_for_a_rate_tell_none(every: float, fires: bool) -> None:
-    """Given a force that is noise, and heights: only where these told a rate a moment ago does a
-    gap in it keep what was counted."""
-    story = flying().fly(4.0, 0.05, vertical_speed=math.nan, height=math.nan)
-    for step in range(20):
-        told = {"vertical_speed": math.nan, "height": 50.0 + step * 1e-3}
-        story.fly(story.t + 0.05, 0.05, **told)
-        rest = {"vertical_speed": math.nan, "height": math.nan}
-        story.fly(story.t + every - 0.05, 0.05, **rest)
-    known = flight.last_usable(story.config, story.state, "vertical_speed")
-    assert (START + story.t - known <= UNKNOWN_STANDS) is fires

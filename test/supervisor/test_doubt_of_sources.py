@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -11,7 +10,6 @@ import pytest
 from story import START, Story, shipped
 
 from chute_ros.model import Action, LinkState
-from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits, Measured, Sample
 
 LOST = {"link_state": LinkState.LOST}
@@ -25,75 +23,6 @@ def heights(*samples: tuple[float, float]) -> Measured:
     for value, at in samples:
         known = known.with_sample(Sample(value, at), HEIGHT)
     return known
-
-
-# -- a height beside a vertical speed -------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("step", "speed", "taken"),
-    [
-        # Without a speed: 10 m and 60 m/s for 0.4 s.
-        (-33.9, math.nan, True),
-        (-34.1, math.nan, False),
-        # Beside one: 10 m and 30 m/s for 0.4 s about what it flew.
-        (-21.9, 0.0, True),
-        (-22.1, 0.0, False),
-        (22.1, 0.0, False),
-        (-25.9, -10.0, True),
-        (-26.1, -10.0, False),
-        (17.9, -10.0, True),
-        (18.1, -10.0, False),
-        # And never more than without.
-        (-34.1, -29.9, False),
-        # A speed of more than half the rate denies nothing.
-        (-0.1, 29.9, True),
-        (0.0, -30.1, True),
-        (33.9, -30.1, True),
-        (22.1, -30.0, False),
-    ],
-)
-def test_a_height_changes_as_the_vertical_speed_tells(
-    step: float, speed: float, taken: bool
-) -> None:
-    known = heights((100.0, 0.0)).with_sample(Sample(100.0 + step, 0.4), HEIGHT, speed)
-    assert (known.rejected == "") is taken
-    assert known.doubted_at == pytest.approx(math.nan if taken else 0.4, nan_ok=True)
-
-
-def test_three_heights_that_agree_are_believed_whatever_the_speed_tells() -> None:
-    known = heights((100.0, 0.0))
-    for at in (0.3, 0.35, 0.4):
-        known = known.with_sample(Sample(75.0 - at, at), HEIGHT, 0.0)
-    assert (known.value, known.jumped_at, known.before_jump) == (74.6, 0.4, 100.0)
-
-
-def test_so_are_those_that_time_makes_possible_and_are_remembered_as_a_jump() -> None:
-    """Given a height that the speed denies for 0.4 s after the gap and not for 0.6 s."""
-    known = heights((100.0, 0.0))
-    for at in (0.4, 0.6):
-        known = known.with_sample(Sample(75.0 - at, at), HEIGHT, 0.0)
-    assert (known.value, known.jumped_at, known.before_jump) == (74.4, 0.6, 100.0)
-
-
-@pytest.mark.parametrize(
-    ("report", "taken"),
-    [
-        (lambda told: told, False),
-        (lambda told: replace(told, disputed=frozenset({"vertical_speed"})), True),
-        (lambda told: replace(told, state=replace(told.state, vertical_speed=math.nan)), True),
-        (lambda told: replace(told, state=replace(told.state, vertical_speed=-400.1)), True),
-    ],
-    ids=["told", "disputed", "not told", "impossible"],
-)
-def test_only_a_speed_in_no_doubt_denies_a_height(
-    report: Callable[[i.VehicleReport], i.VehicleReport], taken: bool
-) -> None:
-    """Given a gap of 0.4 s in the messages, and a height that is 25 m lower after it."""
-    story = Story(shipped("multirotor")).ready().fly(1.0)
-    before = story.state.measured("height").value
-    story.at(story.t + 0.4, story.heartbeat(), report(story.told(height=before - 25.0)))
-    assert (story.state.measured("height").rejected == "") is taken
 
 
 # -- doubt belongs to a source --------------------------------------------------------------------
@@ -195,25 +124,6 @@ def test_by_a_speed_that_lies_upwards_a_fall_is_not_hidden(
     story = told_beside_a_lie(profile, speed, every, gap, falls=True)
     assert story.fired()[:1] == ["KILL"]
     assert story.newest(Action.KILL).rule == "excess tilt"
-
-
-@pytest.mark.parametrize(("sinks", "taken"), [(0.0, True), (8.0, True), (12.0, False)])
-def test_a_speed_that_the_heights_until_then_deny_denies_none_after_them(
-    sinks: float, taken: bool
-) -> None:
-    """Given a speed of -20 m/s, a gap of 0.4 s, and a height that is 20 m higher after it."""
-    story = Story(shipped("multirotor")).ready().fly(1.0, height=100.0)
-    for step in range(30):
-        told = {"height": 100.0 - sinks * step * 0.05, "vertical_speed": -20.0}
-        story.fly(story.t + 0.05, **told)
-    for _ in range(300):
-        told["height"] -= sinks * 0.05
-        story.fly(story.t + 0.05, **told)
-    assert story.state.measured("vertical_speed").doubt("vertical_speed", START + story.t) == ""
-    story.at(
-        story.t + 0.4, story.heartbeat(), story.told(**{**told, "height": told["height"] + 15})
-    )
-    assert (story.state.measured("height").rejected == "") is taken
 
 
 # -- who tells nothing ----------------------------------------------------------------------------

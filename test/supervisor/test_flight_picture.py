@@ -142,18 +142,6 @@ def test_a_landing_that_a_falling_vehicle_reports_is_not_believed(sign: dict[str
     assert story.state.stage is Stage.READY
 
 
-def test_an_autopilot_that_started_anew_must_say_for_long_that_it_stands() -> None:
-    story = Story(landing()).flying()
-    anew = {"reboot_count": 1, "rebooted_in_flight": True, "armed": Armed.DISARMED}
-    story.fly(9.5, landed_state=GROUND, **anew)
-    assert story.state.rebooted
-    assert story.state.stage is Stage.IN_FLIGHT
-    assert not flight.disarmed(story.config, story.state, START + story.t)
-    story.fly(10.5, landed_state=GROUND, **anew)
-    assert story.state.stage is Stage.READY
-    assert not story.state.rebooted
-
-
 def test_the_height_of_an_autopilot_that_started_anew_is_not_used() -> None:
     story = Story(landing()).flying()
     story.fly(0.5, height=80.0)

@@ -147,13 +147,6 @@ def test_one_whose_kill_failed_and_that_flew_on_is_not_deployed() -> None:
     assert silence(story, 15.0).fired() == ["KILL"]
 
 
-def test_a_height_that_has_just_jumped_up_is_not_counted_on() -> None:
-    story = Story(shipped("multirotor")).flying().fly(1.0, height=3.0).fly(2.0, height=60.0)
-    story.at(2.0, i.KillRequest(1, "operator", "it flies away"))
-    assert story.state.killed_height == pytest.approx(3.0, abs=0.1)
-    assert silence(story, 9.0).fired() == ["KILL"]
-
-
 def test_one_whose_speed_or_force_is_told_is_judged_by_that() -> None:
     for still in ("vertical_speed", "acceleration"):
         told = {name: value for name, value in SILENT.items() if name != still}

@@ -247,15 +247,12 @@ def test_a_landing_is_noted_with_its_time_and_ends_what_belonged_to_the_flight()
     story = Story(with_rules()).flying()
     story.at(0.1, story.told(reboot_count=1, rebooted_in_flight=True))
     assert story.state.rebooted
-    for tick in range(2, 102):
-        told = {"landed_state": LandedState.ON_GROUND, "vertical_speed": 0.0}
-        story.at(tick * 0.1, story.heartbeat(), story.told(reboot_count=1, **told))
-    assert story.state.stage is Stage.IN_FLIGHT, "started anew: it is not believed so soon"
-    story.at(10.25)
+    told = {"landed_state": LandedState.ON_GROUND, "vertical_speed": 0.0}
+    story.at(0.2, story.heartbeat(), story.told(reboot_count=1, **told))
     state = story.state
     assert state.stage is Stage.LANDED
     assert (state.airborne, state.rebooted) == (False, False)
-    assert state.landed_at == pytest.approx(START + 10.2)
+    assert state.landed_at == pytest.approx(START + 0.2)
 
 
 def test_an_armed_vehicle_that_has_landed_stays_landed() -> None:

@@ -36,19 +36,6 @@ def known(
     )
 
 
-def test_a_height_that_is_stuck_may_be_the_lowest_all_the_same() -> None:
-    stuck = Measured(4.0, measured_at=NOW, same_since=NOW - 60.0, count=99)
-    state = replace(known(), measurements=MappingProxyType({"height": stuck}))
-    assert math.isnan(flight.measured(CONFIG, state, "height", NOW))
-    assert flight.lowest_height(CONFIG, state, NOW) == 4.0
-    assert math.isnan(flight.lowest_height(CONFIG, state, NOW + 9.0)), "an old one may not"
-    again = replace(state, rebooted=True)
-    assert math.isnan(flight.lowest_height(CONFIG, again, NOW)), "nor one that counts anew"
-    assert flight.unusable(CONFIG, again, "height", NOW) == (
-        "the autopilot started anew in flight, and its height with it"
-    )
-
-
 @pytest.mark.parametrize(
     ("told", "in_air"),
     [
@@ -129,18 +116,6 @@ def test_without_a_landed_state_it_flies_above_the_height_of_a_take_off(
     assert flight.in_air(CONFIG, state, NOW) is in_air
 
 
-@pytest.mark.parametrize(
-    ("rebooted", "hold", "believed_after"),
-    [(False, 1.0, 1.0), (True, 1.0, 10.0), (True, 15.0, 15.0)],
-)
-def test_how_long_one_must_say_that_it_stands(
-    rebooted: bool, hold: float, believed_after: float
-) -> None:
-    config = SupervisorConfig(profile=Profile("tested", (), landed_hold=hold))
-    state = replace(known(), down_since=NOW, rebooted=rebooted)
-    assert flight.landed_at(config, state) == NOW + believed_after
-
-
 def test_one_without_a_height_is_taken_to_be_high_enough_just_so_long_after_its_take_off() -> None:
     profile = {"minimum_height": 10.0, "below_minimum": BelowMinimum.KILL}
     story = Story(with_rules(profile=profile)).flying()
@@ -175,20 +150,6 @@ def test_where_the_middle_and_the_whole_tell_opposite_ways_it_neither_climbs_nor
 
 def test_a_slow_climb_is_one() -> None:
     assert told_rate(*[0.05 * n for n in range(9)])[0] == pytest.approx(0.5)
-
-
-def test_the_heights_may_scatter_by_just_so_much() -> None:
-    assert told_rate(0.0, 0.0, 0.0, 3.0, 3.0, 3.0) == (0.0, "")
-    value, why = told_rate(0.0, 0.0, 0.0, 3.01, 3.01, 3.01)
-    assert math.isnan(value)
-    assert why == "the heights scatter by 1.5 m (limit 1.5 m)"
-
-
-@pytest.mark.parametrize(("jumped_at", "height"), [(NOW - 9.99, 8.0), (NOW - 10.0, 60.0)])
-def test_how_long_the_lower_height_counts_after_a_jump(jumped_at: float, height: float) -> None:
-    jumped = Measured(60.0, NOW, NOW, 9, jumped_at=jumped_at, before_jump=8.0)
-    state = replace(known(), measurements=MappingProxyType({"height": jumped}))
-    assert flight.height_not_jumped_to(CONFIG, state, NOW) == height
 
 
 # -- since a kill --------------------------------------------------------------------------------

@@ -59,11 +59,6 @@ def test_it_cannot_be_said_while_what_is_not_known_could_be_enough(
     assert judged(rule(TILTS, SINKS), **told) is holds
 
 
-@pytest.mark.parametrize(("since", "holds"), [(3.0, None), (3.1, False)])
-def test_what_is_not_known_for_long_is_not_waited_for(since: float, holds: bool | None) -> None:
-    assert judged(rule(TILTS, SINKS), since, tilt=90.0) is holds
-
-
 def test_what_was_never_known_is_not_waited_for() -> None:
     story = Story(with_rules(one := rule(TILTS, SINKS)))
     story.at(0.0, vehicle(tilt=90.0))

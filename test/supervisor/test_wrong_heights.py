@@ -63,13 +63,6 @@ def test_a_climb_rate_that_changes_as_a_vehicle_does_is_none_that_scatters(
     assert value == pytest.approx(acceleration * 0.5, abs=abs(acceleration) * 0.2 + 1e-6)
 
 
-def test_heights_that_scatter_say_so() -> None:
-    value, why = rate(*[50.0, 57.0] * 6)
-    assert math.isnan(value)
-    assert why.startswith("the heights scatter by ")
-    assert "limit" in why
-
-
 def test_an_upright_sink_is_seen_although_the_height_is_stuck() -> None:
     story = Story(shipped("multirotor")).flying().fly(2.0)
     for step in range(1, 151):

@@ -1,0 +1,310 @@
+"""Flies a campaign as it is, and once more without parts of what decides: a rule of a profile, a
+condition of a rule, a heuristic that is named below. What no flight needs any more can go.
+
+The flights that were stored since they once went wrong are flown as well. A line tells which
+flights are wrong without a part and were right with it, and the other way round. --together takes
+all that are named away at once, flies each flight that differs again without each of them alone,
+and so asks far more flights in the same time.
+
+    make without [FLIGHTS=1000] [SEED=0] [WITHOUT_ARGS="--together 'multirotor: falling' ..."]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+from chute_ros.campaign.draw import draw
+from chute_ros.campaign.flight import Flight
+from chute_ros.campaign.judge import WRONG, judge
+from chute_ros.campaign.scenario import PROFILES, Scenario, Vehicle
+from chute_ros.campaign.scenario_text import scenario_of
+from chute_ros.campaign.shipped import Shipped
+from chute_ros.model import Action
+from chute_ros.supervisor import (
+    contradictions,
+    counter,
+    flight,
+    measurements,
+    reports,
+)
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.profile_reader import read_profile
+from chute_ros.supervisor.rules import MeasurementCondition, Profile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "config" / "profiles"
+STORED = ROOT / "test" / "campaign" / "regressions"
+
+_known = measurements.Measured
+
+
+def _nan(*_: Any) -> float:
+    return math.nan
+
+
+def _no(*_: Any) -> bool:
+    return False
+
+
+def _no_words(*_: Any) -> str:
+    return ""
+
+
+#: Heuristic -> where it is, its name there, and what stands in its place.
+HEURISTICS: dict[str, tuple[Any, str, Any]] = {
+    "flight: a landed state is believed later of one armed aloft": (
+        flight,
+        "_LANDED_HOLD_ALOFT",
+        0.0,
+    ),
+    "flight: a landed state is believed later after a kill": (flight, "_DOWN_AFTER_KILL", 0.0),
+    "flight: one that says that it stands falls all the same": (
+        flight,
+        "_falls_against_its_word",
+        _no,
+    ),
+    "flight: a word of later says that what was killed does not fall": (
+        flight,
+        "_seen_not_to_fall",
+        _no,
+    ),
+    "flight: an estimator in a rush has not taken off": (flight, "_CALM_SPEED", math.inf),
+    "flight: an estimator that leans has not taken off": (flight, "_CALM_TILT", math.inf),
+    "flight: without a height it is high after a while": (flight, "HIGH_AFTER", 0.0),
+    "flight: the heights tell the speed where nothing else does": (flight, "climb_rate", _nan),
+    "flight: the kill is waited for less below low_height": (
+        *(flight, "low_at"),
+        lambda *_: math.inf,
+    ),
+    "flight: a ground below home": (flight, "above_its_ground", _nan),
+    "measurements: a jump that was believed is doubted": (measurements, "JUMP_DOUBTED", 0.0),
+    "measurements: what follows one that was not taken is doubted": (
+        *(measurements, "REJECTION_DOUBTED"),
+        0.0,
+    ),
+    "measurements: an acceleration of exactly 0 is doubted": (
+        *(measurements, "_FAILED_ACCELERATION"),
+        math.nan,
+    ),
+    "measurements: a doubt is of its source alone": (
+        *(_known, "told_by"),
+        lambda self, source: self,
+    ),
+    "measurements: one that is lower than commanded sinks uncommanded": (
+        *(measurements, "_MISSES_TARGET"),
+        math.inf,
+    ),
+    "counter: it stands while nothing can be said": (counter, "UNKNOWN_STANDS", 0.0),
+    "counter: a sign goes on to its last limit": (counter, "LINGERS", 0.0),
+    "contradictions: a sink of which no force tells": (contradictions, "_not_felt", _no_words),
+    "contradictions: a force that no speed follows": (contradictions, "_fall_denied", _no_words),
+    "contradictions: a tilt that is carried": (contradictions, "_tilt_denied", _no_words),
+    "contradictions: a sink that the barometer does not tell": (
+        *(contradictions, "_sink_denied"),
+        lambda motion, *_: contradictions._not_felt(motion),
+    ),
+    "contradictions: a speed that is noise denies nothing": (
+        *(contradictions, "_speed_lives"),
+        lambda _: True,
+    ),
+    "contradictions: what is commanded is no accident": (
+        *(reports, "commanded"),
+        lambda *_: {},
+    ),
+}
+
+
+def profile_parts() -> Iterator[str]:
+    """Each rule that fires, and each of its conditions where it has more than one."""
+    for name in PROFILES:
+        for rule in read_profile((FOLDER / f"{name}.yaml").read_text(), name, ("any",)).rules:
+            if rule.action is Action.NONE:
+                continue
+            yield f"{name}: {rule.name}"
+            for number, one in enumerate(rule.conditions):
+                if len(rule.conditions) > 1 and isinstance(one, MeasurementCondition):
+                    yield f"{name}: {rule.name}: {number + 1}, {one.measurement}"
+
+
+def changed(profile: Profile, what: str) -> Profile:
+    """Without the rule, or the condition, that is named so; as it is if it has none."""
+    of, _, rest = what.partition(": ")
+    rule_name, _, condition = rest.partition(": ")
+    if of != profile.name:
+        return profile
+    rules = []
+    for rule in profile.rules:
+        if rule.name != rule_name:
+            rules.append(rule)
+        elif condition:
+            gone = int(condition.partition(",")[0]) - 1
+            left = tuple(one for n, one in enumerate(rule.conditions) if n != gone)
+            # Where all of them are needed, all that are left are.
+            every = sum(one.weight for one in rule.conditions)
+            weight = rule.conditions[gone].weight
+            needed = rule.needed - weight if rule.needed >= every - 1e-9 else rule.needed
+            rules.append(replace(rule, conditions=left, needed=needed))
+    return replace(profile, rules=tuple(rules))
+
+
+def scenario_named(name: str) -> Scenario:
+    """A seed, or a stored flight."""
+    if name.isdigit():
+        return draw(int(name))
+    return scenario_of((STORED / f"{name}.json").read_text(encoding="utf-8"), name)[0]
+
+
+def concerns(names: Sequence[str], profile: str) -> bool:
+    """A part of one profile changes nothing of a flight with another."""
+    of = [name.partition(": ")[0] for name in names]
+    return not names or any(one not in PROFILES or one == profile for one in of)
+
+
+class Without(Shipped):
+    """The profiles without parts of them."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        super().__init__(FOLDER)
+        self._names = names
+
+    def config(self, vehicle: Vehicle, profile: str, standby: bool, rank: int) -> SupervisorConfig:
+        """The settings of a supervisor."""
+        config = super().config(vehicle, profile, standby, rank)
+        left = config.profile
+        # Of several conditions of a rule the last one first: their numbers stay.
+        for name in sorted(self._names, reverse=True):
+            left = changed(left, name)
+        return replace(config, profile=left)
+
+
+def fly(names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
+    """Flight -> how it is counted, for all that are wrong."""
+    for name in names:
+        if name in HEURISTICS:
+            where, attribute, instead = HEURISTICS[name]
+            setattr(where, attribute, instead)
+    shipped, wrong = Without(names), {}
+    for flight_name in flights:
+        scenario = scenario_named(flight_name)
+        if concerns(names, scenario.profile):
+            judged = judge(Flight(scenario, shipped).run())
+            if judged.count in WRONG:
+                wrong[flight_name] = judged.count.name
+    return wrong
+
+
+def in_own_process(python: str, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
+    """Fly there: what was taken away comes back with it. A process that dies is started again."""
+    work = json.dumps({"names": names, "flights": flights})
+    for _ in range(3):
+        done = subprocess.run(
+            [*python.split(), __file__, "--work"],
+            input=work,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if not done.returncode:
+            return dict(json.loads(done.stdout))
+    sys.exit(f"{names}: {done.stderr.strip().splitlines()[-1:] or done.returncode}")
+
+
+class Pool:
+    """Flies in as many processes as there are jobs."""
+
+    def __init__(self, python: str, jobs: int) -> None:
+        self._python, self._jobs = python, jobs
+        self._threads = ThreadPoolExecutor(jobs)
+
+    def each(
+        self, works: Sequence[tuple[Sequence[str], Sequence[str]]]
+    ) -> Iterator[dict[str, str]]:
+        """What is wrong of each (names, flights), in their order."""
+        return self._threads.map(lambda one: in_own_process(self._python, *one), works)
+
+    def shared(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
+        """The same of one, by all processes."""
+        parts = [(names, flights[n :: self._jobs]) for n in range(self._jobs)]
+        return {name: count for wrong in self.each(parts) for name, count in wrong.items()}
+
+
+def differing(
+    names: Sequence[str], base: dict[str, str], wrong: dict[str, str]
+) -> tuple[list[str], list[str]]:
+    """The flights that are wrong without these and were right with them, and the others."""
+    worse = [name for name in wrong if name not in base]
+    right = [name for name in base if name not in wrong]
+    return worse, [name for name in right if concerns(names, scenario_named(name).profile)]
+
+
+def some(flights: Sequence[str], counts: dict[str, str]) -> str:
+    """How many, and the first of them."""
+    first = ", ".join(f"{name} {counts[name]}" for name in flights[:4])
+    return f"{len(flights)} ({first})" if flights else "0"
+
+
+def each_alone(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
+    """A table with a line for each."""
+    base = pool.shared((), flights)
+    print("| without | wrong, right with it | right, wrong with it |\n|---|---|---|", flush=True)
+    flown = pool.each([((name,), flights) for name in names])
+    for name, wrong in zip(names, flown, strict=True):
+        worse, better = differing((name,), base, wrong)
+        print(f"| {name} | {some(worse, wrong)} | {some(better, base)} |", flush=True)
+
+
+def together(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
+    """A table with a line for each that a flight needs by itself."""
+    base = pool.shared((), flights)
+    print(f"{len(base)} of {len(flights)} are wrong with all", flush=True)
+    wrong = pool.shared(names, flights)
+    worse, better = differing(names, base, wrong)
+    print(f"without: wrong {some(worse, wrong)}; right {some(better, base)}", flush=True)
+    differ = (*worse, *better)
+    alone = list(pool.each([((name,), differ) for name in names]))
+    print("| without | wrong, right with it | right, wrong with it |\n|---|---|---|")
+    unclear = set(differ)
+    base = {name: count for name, count in base.items() if name in differ}
+    for name, found in zip(names, alone, strict=True):
+        worse, better = differing((name,), base, found)
+        unclear -= {*worse, *better}
+        print(f"| {name} | {some(worse, found)} | {some(better, base)} |")
+    print(f"by none of them alone: {', '.join(sorted(unclear)) or 'none'}")
+
+
+def main() -> None:
+    """Run."""
+    parser = argparse.ArgumentParser("without", description=__doc__)
+    parser.add_argument("what", nargs="*", help="only these")
+    parser.add_argument("--together", action="store_true", help="all of them at once")
+    parser.add_argument("--flights", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--python", default=sys.executable, help="command of the interpreter")
+    parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.work:
+        print(json.dumps(fly(**json.load(sys.stdin))))
+        return
+    every = [*HEURISTICS, *profile_parts()]
+    chosen = options.what or every
+    if unknown := [name for name in chosen if name not in every]:
+        sys.exit(f"there is no {unknown[0]!r}: need one of {'; '.join(every)}")
+    flights = [str(seed) for seed in range(options.seed, options.seed + options.flights)]
+    flights += sorted(path.stem for path in STORED.glob("*.json"))
+    pool = Pool(options.python, options.jobs)
+    (together if options.together else each_alone)(pool, chosen, flights)
+
+
+if __name__ == "__main__":
+    main()

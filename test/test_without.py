@@ -1,0 +1,55 @@
+"""scripts/without.py takes away what it names, and nothing else."""
+
+from __future__ import annotations
+
+import pytest
+import without
+from without import FOLDER, HEURISTICS, changed, concerns, differing, fly, profile_parts
+
+from chute_ros.campaign.scenario import PROFILES
+from chute_ros.supervisor.profile_reader import read_profile
+
+
+@pytest.mark.parametrize("name", HEURISTICS)
+def test_each_heuristic_is_where_it_is_said_to_be(name: str) -> None:
+    where, attribute, instead = HEURISTICS[name]
+    before = getattr(where, attribute)
+    assert callable(before) is callable(instead)
+    assert before != instead
+
+
+def test_each_part_of_a_profile_is_taken_from_that_one() -> None:
+    for name in PROFILES:
+        profile = read_profile((FOLDER / f"{name}.yaml").read_text(), name, ("any",))
+        for part in profile_parts():
+            left = changed(profile, part)
+            if not part.startswith(f"{name}: "):
+                assert left == profile
+                continue
+            rule = part.split(": ")[1]
+            others = [one for one in left.rules if one.name != rule]
+            assert others == [one for one in profile.rules if one.name != rule]
+            (before,) = (one for one in profile.rules if one.name == rule)
+            after = [one for one in left.rules if one.name == rule]
+            if ": " not in part.removeprefix(f"{name}: "):
+                assert after == []
+            else:
+                assert len(after[0].conditions) == len(before.conditions) - 1
+                assert 0.0 < after[0].needed <= before.needed
+
+
+def test_a_part_of_one_profile_is_not_flown_with_another() -> None:
+    assert concerns((), "rocket")
+    assert not concerns(("multirotor: falling",), "rocket")
+    assert concerns(("multirotor: falling", "rocket: critical sink"), "rocket")
+    assert concerns(("flight: a ground below home",), "rocket")
+
+
+def test_what_differs_is_told_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, wrong = {"1": "LATE", "2": "FALSE"}, {"2": "FALSE", "3": "MISSED"}
+    assert differing(("flight: a ground below home",), base, wrong) == (["3"], ["1"])
+    # 910000025 sinks level, without its thrust.
+    rule = "multirotor: uncommanded sink"
+    assert fly((), ("910000025",)) == {}
+    assert fly((rule,), ("910000025",)) == {"910000025": "MISSED"}
+    assert without.some(["3"], wrong) == "1 (3 MISSED)"
