@@ -11,13 +11,14 @@ from typing import Any
 import pytest
 from story import LINK, Story, parachute, shipped
 
-from chute_ros.model import Action, LinkState, Outcome, ParachuteState, ParachuteStatus
+from chute_ros.model import Action, Armed, LinkState, Outcome, ParachuteState, ParachuteStatus
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 
 K, D = Action.KILL, Action.DEPLOY
 EVERY = 0.05
 LOST = {"link_state": LinkState.LOST}
+OFF = {"armed": Armed.DISARMED}
 REBOOTED = {"reboot_count": 1, "rebooted_in_flight": True}
 #: m/s between two samples.
 STEP = 5
@@ -185,16 +186,16 @@ DEPLOYS = [
     *sinks("fixed_wing", hold=1.0, sink=15.0, before=-5.0),
     Case(
         "fixed_wing",
-        "free fall",
-        {"acceleration": 2.9, "vertical_speed": -4.1},
-        {"acceleration": 2.9, "vertical_speed": -3.9},
+        "disarmed in flight",
+        {**OFF, "vertical_speed": -6.6, "acceleration": 2.9},
+        {**OFF, "vertical_speed": -6.4, "acceleration": 2.9},
         0.6,
     ),
     Case(
         "fixed_wing",
-        "free fall",
-        {"acceleration": 2.9, "vertical_speed": -4.1},
-        {"acceleration": 3.1, "vertical_speed": -4.1},
+        "disarmed in flight",
+        {**OFF, "vertical_speed": -6.6, "acceleration": 2.9},
+        {**OFF, "vertical_speed": -6.6, "acceleration": 3.1},
         0.6,
     ),
     *falls(
