@@ -68,8 +68,9 @@ Fast DDS 2.14.5, which the wheels of Jazzy have, takes memory for as long as the
 packet of 68 bytes (CVE-2025-64438; [security.md](security.md) says what it is and what cures it).
 A stranger on the vehicle's network hears who is there and sends it once, in flight, or to each
 process that is started in place of one that it has ended. What ends is started again after 0.5 s,
-as by `launch/vehicle.launch.py`. Times: from the (last) packet to the end of the process, and until
-its flight goes on; from the motor's failure to the parachute's own "deployed". "keep to the host": `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`.
+as by `launch/vehicle.launch.py`. Times: from the (last) packet to the end of the process, and
+until its flight goes on; from the motor's failure to the parachute's own "deployed". "keep to the
+host": `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`.
 """,
 }
 _MARK = "<!-- part {} -->"

@@ -143,19 +143,14 @@ class Scene(Flight):
         return time.monotonic()
 
     def attack_again(self, until: float) -> None:
-        """Who got it and was started again gets it again, until then, monotonic s."""
-        victim, thrown = self.story.victim, 1
+        """Who got it and was started again gets it again and again, until then, monotonic s."""
         while time.monotonic() < until:
-            ended = sum(one.name == victim for one in self.processes.ended)
-            self.stranger.listen(0.1)
-            self.spin(0.1)
-            if ended < thrown or math.isnan(self.processes.memory(victim)):
-                continue
+            self.stranger.listen(0.2)
+            self.spin(0.2)
             own = self.stranger.prefix_of(os.getpid())
-            prefix = self.stranger.prefix_of(self.processes.number(victim))
+            prefix = self.stranger.prefix_of(self.processes.number(self.story.victim))
             if own is not None and prefix is not None:
                 self.stranger.send(gap_packet(own, prefix), self.network.address(VEHICLE))
-                thrown += 1
 
     def goes_on(self) -> Callable[[], bool]:
         """Whether the victim is back: the flight and the vehicle are told of from now on."""
