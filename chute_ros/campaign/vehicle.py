@@ -127,6 +127,10 @@ class CampaignAutopilot(AutopilotDevice):
     def _height_error(self) -> float:
         return self.model.height - self._told
 
+    def _controlled_height(self) -> float:
+        # A sensor's fault is one of the telling.
+        return self.estimator.picture(self.model, self.now).height
+
     def _pressure_height(self) -> float:
         return self._sensors.read("pressure", self.model.height, self.now)
 

@@ -111,8 +111,12 @@ class AutopilotTelemetry(MavlinkDevice):
             return self._told_height()[0] + self._height_error()
         return self.model.target_height
 
+    def _controlled_height(self) -> float:
+        """Where its controller takes itself to be, m above take-off."""
+        return self._told_height()[0]
+
     def _nav_controller_output(self) -> Any:
-        too_low = self._commanded_height() - self._told_height()[0]
+        too_low = self._commanded_height() - self._controlled_height()
         return dialect.MAVLink_nav_controller_output_message(
             math.degrees(self._commanded_roll()), 0.0, 0, 0, 0, too_low, 0.0, 0.0
         )

@@ -186,6 +186,27 @@ DEPLOYS = [
     *sinks("fixed_wing", hold=1.0, sink=15.0, before=-5.0),
     Case(
         "fixed_wing",
+        "free fall",
+        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 45.1},
+        {"acceleration": 3.1, "vertical_speed": -4.1, "attitude_error": 45.1},
+        0.5,
+    ),
+    Case(
+        "fixed_wing",
+        "free fall",
+        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 45.1},
+        {"acceleration": 2.9, "vertical_speed": -3.9, "attitude_error": 45.1},
+        0.5,
+    ),
+    Case(
+        "fixed_wing",
+        "free fall",
+        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 45.1},
+        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 44.9},
+        0.5,
+    ),
+    Case(
+        "fixed_wing",
         "disarmed in flight",
         {**OFF, "vertical_speed": -6.6, "acceleration": 2.9},
         {**OFF, "vertical_speed": -6.4, "acceleration": 2.9},
