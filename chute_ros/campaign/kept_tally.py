@@ -101,5 +101,7 @@ def _written(line: Line) -> list[Any]:
 
 
 def _read(values: list[Any]) -> Line:
-    *who, count, why, kill, release, lost, faults, second = values
+    seed, vehicle, profile, failure, count, *numbers, faults, second = values
+    who = (seed, vehicle, profile, failure)
+    why, kill, release, lost = numbers
     return Line(*who, Count[count], why, kill, release, lost, tuple(faults), second)

@@ -75,8 +75,8 @@ def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
                 values[name] = kind(**values[name])
         return Scenario(**values), str(whole["was"])
     except (KeyError, TypeError, ValueError) as error:
-        kind = type(error).__name__
-        raise RecordError(f"{named} is no scenario of a campaign: {kind}: {error}") from None
+        what = type(error).__name__
+        raise RecordError(f"{named} is no scenario of a campaign: {what}: {error}") from None
 
 
 def _short(fault: Fault) -> dict[str, Any]:

@@ -220,7 +220,7 @@ class SafetySupervisorNode(SuiteNode):
         else:
             self._afterwards.tell(partial(self._log, output))
 
-    def _log(self, output: inputs.Log) -> None:
+    def _log(self, output: inputs.Say) -> None:
         log = self.get_logger()
         log.error(output.text) if output.alarm else log.info(output.text)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from chute_ros.model import (
     Action,
@@ -95,11 +96,12 @@ def steps() -> list[Step]:
         Step("a device asks for a kill", lambda *_: (i.KillRequest(0, f"{SECOND} 33", "why"),)),
         Step("a device blocks flight", lambda *_: (i.BlockRequest(SECOND, "33", True, "why"),)),
     ]
-    found += [
-        Step(f"mode {mode.name}", _asked(lambda n, mode=mode: i.ModeRequest(n, mode, True)))
-        for mode in i.Mode
-    ]
+    found += [Step(f"mode {mode.name}", _asked(_to(mode))) for mode in i.Mode]
     return found
+
+
+def _to(mode: i.Mode) -> Callable[[int], i.Input]:
+    return lambda number: i.ModeRequest(number, mode, True)
 
 
 def _vehicle(
@@ -181,13 +183,13 @@ _LONG = (
 )
 
 
-def _beats(differs: dict[str, dict[str, object]] | None = None) -> Make:
+def _beats(differs: dict[str, dict[str, Any]] | None = None) -> Make:
     def make(state: State, _now: float, _number: int) -> tuple[i.Input, ...]:
         made = []
         for link in LINKS:
             seq = state.evidence(link).seq + 1
-            told = {"link_state": LinkState.OK, "device_healthy": True, "seq": seq}
-            made.append(i.LinkHeartbeat(link, **{**told, **(differs or {}).get(link, {})}))
+            beat = i.LinkHeartbeat(link, LinkState.OK, True, seq)
+            made.append(replace(beat, **(differs or {}).get(link, {})))
         return tuple(made)
 
     return make

@@ -44,7 +44,7 @@ class Pilot:
                 for frame in self._decoder.feed_datagram(data, now):
                     if frame.message.get_type() == "COMMAND_ACK":
                         self.results[frame.message.command] = frame.message.result
-        return self.results.get(command) == dialect.MAV_RESULT_ACCEPTED
+        return bool(self.results.get(command) == dialect.MAV_RESULT_ACCEPTED)
 
     def close(self) -> None:
         """Close the socket."""

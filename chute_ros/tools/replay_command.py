@@ -50,7 +50,7 @@ def main() -> None:
         code = UNREADABLE
     except BrokenPipeError:
         # Whoever read the table has seen enough; the interpreter must not complain of it.
-        sys.stdout = None  # type: ignore[assignment]
+        sys.stdout = None
         code = UNREADABLE
     sys.exit(code)
 

@@ -166,7 +166,7 @@ class _Sheet:
         self._label(level.label, _LEVEL)
         points = within(level.points, self._start, self._end, steps=True)
         bottom, inner = self._y + _LEVEL, _LEVEL - 6
-        path = []
+        path: list[str] = []
         x = y = 0.0
         for at, share in thinned(points, self._start, self._end):
             x = self._x(at)

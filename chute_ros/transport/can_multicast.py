@@ -150,8 +150,10 @@ class CanMulticastWire:
             return self._drop("error frames")
         return pack(frame)
 
-    def _drop(self, reason: str) -> None:
+    def _drop(self, reason: str) -> bytes | None:
+        """No frame, and why not."""
         self.counts[reason] += 1
+        return None
 
 
 def is_of_this_host(host: str) -> bool:
