@@ -40,6 +40,21 @@ def test_what_glides_or_is_too_low_is_not(profile: str, height: float) -> None:
     assert story.fired() == ["KILL"]
 
 
+@pytest.mark.parametrize(("sink", "deploys"), [(5.0, False), (12.0, True)])
+def test_an_aeroplane_that_was_killed_glides_or_dives(sink: float, deploys: bool) -> None:
+    """Carried in full, as in a glide and as in a spiral."""
+    story, off = killed("fixed_wing", 120.0), {"armed": Armed.DISARMED}
+    sinking, height = 0.0, 120.0
+    for _ in range(80):
+        sinking = min(sinking + 0.3, sink)
+        height -= 0.05 * sinking
+        story.fly(story.t + 0.05, vertical_speed=-sinking, height=height, **off)
+    assert story.fired() == ["KILL", "DEPLOY"][: 2 if deploys else 1]
+    if deploys:
+        assert story.newest(D).rule == "killed and falling"
+        assert story.when(D) - 2.05 < 3.0
+
+
 def test_a_person_may_ask_for_the_kill_alone() -> None:
     story = killed("multirotor", 50.0, kill_only=True).fly(2.3)
     off = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
