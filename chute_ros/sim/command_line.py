@@ -186,7 +186,7 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     knobs = FaultKnobs(options.loss, options.duplicate, options.corrupt, options.delay)
     link = FaultyLink(device, knobs, options.seed)
     wires = [make_wire(parse_address(text)) for text in _connections(options)]
-    _run_link(device, link, wires, options)
+    _run_link(device, link, wires, options, _ended())
 
 
 def run_on_can(
@@ -211,14 +211,17 @@ def run_on_can(
     wires: list[Wire] = [
         make_can_wire(parse_can_address(text, options.bitrate)) for text in _connections(options)
     ]
+    ended = _ended()
     with beside():
-        _run_link(device, link, wires, options)
+        _run_link(device, link, wires, options, ended)
 
 
 def run_on_pty(device: Acting, options: argparse.Namespace) -> None:
     """The same on a pseudo terminal, whose path is the first line that is printed."""
     # First, so that a mistake in it leaves no link behind.
     _check_script(device, options)
+    # Whoever sees the link may end it at once.
+    ended = _ended()
     wire = PtyWire(options.link)
     try:
         wire.open()
@@ -226,15 +229,27 @@ def run_on_pty(device: Acting, options: argparse.Namespace) -> None:
         raise ParameterError(f"--link {options.link!r}: {error}") from None
     if not options.quiet:
         print(wire.path + (f" linked from {options.link}" if options.link else ""), flush=True)
-    _run_link(device, device, [wire], options)
+    _run_link(device, device, [wire], options, ended)
 
 
 def _connections(options: argparse.Namespace) -> list[str]:
     return options.connection or [options.default_connection]
 
 
+def _ended() -> threading.Event:
+    """Set by SIGINT and SIGTERM, from now on."""
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    return ended
+
+
 def _run_link(
-    device: Acting, link: ProtocolLink, wires: list[Wire], options: argparse.Namespace
+    device: Acting,
+    link: ProtocolLink,
+    wires: list[Wire],
+    options: argparse.Namespace,
+    ended: threading.Event,
 ) -> None:
     _check_script(device, options)
     started = time.monotonic()
@@ -245,9 +260,6 @@ def _run_link(
             if not options.quiet or isinstance(event, LoopFault):
                 print(f"{time.monotonic() - started:8.3f} {plain(text)}", flush=True)
 
-    ended = threading.Event()
-    for number_ in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number_, lambda *_: ended.set())
     loop = WireLoop(link, WireBundle(wires), show)
     loop.start()
     ended.wait()

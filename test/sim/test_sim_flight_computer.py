@@ -107,6 +107,34 @@ def fail(*arguments):
     return done.stderr
 
 
+#: Sends itself a Ctrl-C as the link is made.
+EARLY = """
+import os
+import signal
+import sys
+
+make = os.symlink
+
+
+def interrupted(*arguments, **more):
+    make(*arguments, **more)
+    signal.raise_signal(signal.SIGINT)
+
+
+os.symlink = interrupted
+from chute_ros.sim.sim_flight_computer import main
+sys.exit(main())
+"""
+
+
+def test_a_ctrl_c_as_soon_as_its_link_is_there_ends_it(link):
+    command = [sys.executable, "-c", EARLY, *PROGRAM[3:], "--link", str(link)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not os.path.lexists(link)
+
+
 def test_its_first_line_is_its_path_and_link(start, link, await_until):
     running = start()
     await_until(lambda: running.lines, "it prints")
