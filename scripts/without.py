@@ -12,6 +12,7 @@ and so asks far more flights in the same time.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import math
 import os
@@ -30,13 +31,7 @@ from chute_ros.campaign.scenario import PROFILES, Scenario, Vehicle
 from chute_ros.campaign.scenario_text import scenario_of
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.model import Action
-from chute_ros.supervisor import (
-    contradictions,
-    counter,
-    flight,
-    measurements,
-    reports,
-)
+from chute_ros.supervisor import contradictions, counter, flight, measurements, reports
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import MeasurementCondition, Profile
@@ -44,8 +39,6 @@ from chute_ros.supervisor.rules import MeasurementCondition, Profile
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "config" / "profiles"
 STORED = ROOT / "test" / "campaign" / "regressions"
-
-_known = measurements.Measured
 
 
 def _nan(*_: Any) -> float:
@@ -83,25 +76,30 @@ HEURISTICS: dict[str, tuple[Any, str, Any]] = {
     "flight: without a height it is high after a while": (flight, "HIGH_AFTER", 0.0),
     "flight: the heights tell the speed where nothing else does": (flight, "climb_rate", _nan),
     "flight: the kill is waited for less below low_height": (
-        *(flight, "low_at"),
+        flight,
+        "low_at",
         lambda *_: math.inf,
     ),
     "flight: a ground below home": (flight, "above_its_ground", _nan),
     "measurements: a jump that was believed is doubted": (measurements, "JUMP_DOUBTED", 0.0),
     "measurements: what follows one that was not taken is doubted": (
-        *(measurements, "REJECTION_DOUBTED"),
+        measurements,
+        "REJECTION_DOUBTED",
         0.0,
     ),
     "measurements: an acceleration of exactly 0 is doubted": (
-        *(measurements, "_FAILED_ACCELERATION"),
+        measurements,
+        "_FAILED_ACCELERATION",
         math.nan,
     ),
     "measurements: a doubt is of its source alone": (
-        *(_known, "told_by"),
+        measurements.Measured,
+        "told_by",
         lambda self, source: self,
     ),
     "measurements: one that is lower than commanded sinks uncommanded": (
-        *(measurements, "_MISSES_TARGET"),
+        measurements,
+        "_MISSES_TARGET",
         math.inf,
     ),
     "counter: it stands while nothing can be said": (counter, "UNKNOWN_STANDS", 0.0),
@@ -110,15 +108,18 @@ HEURISTICS: dict[str, tuple[Any, str, Any]] = {
     "contradictions: a force that no speed follows": (contradictions, "_fall_denied", _no_words),
     "contradictions: a tilt that is carried": (contradictions, "_tilt_denied", _no_words),
     "contradictions: a sink that the barometer does not tell": (
-        *(contradictions, "_sink_denied"),
+        contradictions,
+        "_sink_denied",
         lambda motion, *_: contradictions._not_felt(motion),
     ),
     "contradictions: a speed that is noise denies nothing": (
-        *(contradictions, "_speed_lives"),
+        contradictions,
+        "_speed_lives",
         lambda _: True,
     ),
     "contradictions: what is commanded is no accident": (
-        *(reports, "commanded"),
+        reports,
+        "commanded",
         lambda *_: {},
     ),
 }
@@ -175,16 +176,13 @@ class Without(Shipped):
 
     def __init__(self, names: Sequence[str]) -> None:
         super().__init__(FOLDER)
-        self._names = names
+        # Of several conditions of a rule the last one first: their numbers stay.
+        self._names = sorted(names, reverse=True)
 
     def config(self, vehicle: Vehicle, profile: str, standby: bool, rank: int) -> SupervisorConfig:
         """The settings of a supervisor."""
         config = super().config(vehicle, profile, standby, rank)
-        left = config.profile
-        # Of several conditions of a rule the last one first: their numbers stay.
-        for name in sorted(self._names, reverse=True):
-            left = changed(left, name)
-        return replace(config, profile=left)
+        return replace(config, profile=functools.reduce(changed, self._names, config.profile))
 
 
 def fly(names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:

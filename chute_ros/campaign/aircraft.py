@@ -45,9 +45,18 @@ _FAILED_MOTORS = (Failure.MOTOR, Failure.SINK, Failure.GLIDE, Failure.STALL)
 _NEAR = 10.0
 #: So long after its release a canopy carries; faster than this it does not, s and m/s.
 _CARRIES_AFTER, _NOT_CARRIED = 2.0, 1.5 * SOFT
-#: PARAM_REQUEST_READ, PARAM_SET, GLOBAL_POSITION_INT, COMMAND_INT, COMMAND_LONG and TIMESYNC: all
-#: that the simulators react to.
-_HEARD = tuple(bytes([number, 0, 0]) for number in (20, 23, 33, 75, 76, 111))
+#: All that the simulators react to, as a frame has its number.
+_HEARD = tuple(
+    number.to_bytes(3, "little")
+    for number in (
+        dialect.MAVLINK_MSG_ID_PARAM_REQUEST_READ,
+        dialect.MAVLINK_MSG_ID_PARAM_SET,
+        dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        dialect.MAVLINK_MSG_ID_COMMAND_INT,
+        dialect.MAVLINK_MSG_ID_COMMAND_LONG,
+        dialect.MAVLINK_MSG_ID_TIMESYNC,
+    )
+)
 
 
 def _is_for_devices(data: bytes) -> bool:

@@ -63,15 +63,7 @@ def judge(flown: Flown) -> Judged:
     """The gravest that is true of it."""
     if flown.grounded:
         return Judged(Count.GROUNDED, flown.grounded)
-    alone = _killed_alone_at(flown)
-    return (
-        _never(flown)
-        or (
-            _fallen(flown) or _not_carried(flown) if alone == math.inf else _followed(flown, alone)
-        )
-        or _ordered(flown)
-        or Judged(Count.RIGHT)
-    )
+    return _never(flown) or _owed(flown) or _ordered(flown) or Judged(Count.RIGHT)
 
 
 def _never(flown: Flown) -> Judged | None:
@@ -114,6 +106,15 @@ def _never(flown: Flown) -> Judged | None:
         if not one.decision.rule or not one.decision.reasons:
             return Judged(Count.UNEXPLAINED, f"decision {one.decision.epoch}.{one.decision.id}")
     return None
+
+
+def _owed(flown: Flown) -> Judged | None:
+    """A release that should have been and was not in time; of what a person killed, and wanted no
+    more, one that followed. None: neither."""
+    alone = _killed_alone_at(flown)
+    if alone < math.inf:
+        return _followed(flown, alone)
+    return _fallen(flown) or _not_carried(flown)
 
 
 def _killed_alone_at(flown: Flown) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
-from dataclasses import astuple
+from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
 
@@ -101,7 +101,5 @@ def _written(line: Line) -> list[Any]:
 
 
 def _read(values: list[Any]) -> Line:
-    seed, vehicle, profile, failure, count, *numbers, faults, second = values
-    who = (seed, vehicle, profile, failure)
-    why, kill, release, lost = numbers
-    return Line(*who, Count[count], why, kill, release, lost, tuple(faults), second)
+    told = dict(zip((one.name for one in fields(Line)), values, strict=True))
+    return Line(**{**told, "count": Count[told["count"]], "faults": tuple(told["faults"])})

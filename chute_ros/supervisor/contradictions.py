@@ -92,9 +92,7 @@ def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
     return (*(one for one in motion if now - one[0] <= KEPT_FOR), moment)
 
 
-def denials(
-    motion: tuple[Moment, ...], barometer: Rise, drop: Drop = NO_DROP
-) -> Mapping[str, str]:
+def denials(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> Mapping[str, str]:
     """Measurement -> why what it claims is not so. barometer: of the last second."""
     denied = {}
     if why := _sink_denied(motion, barometer, drop):

@@ -58,8 +58,8 @@ class Director:
 
     def close(self) -> None:
         """Leave ROS, which a Ctrl-C has already done."""
-        self.node.destroy_node()  # type: ignore[no-untyped-call]
-        rclpy.try_shutdown()  # type: ignore[attr-defined]
+        self.node.destroy_node()
+        rclpy.try_shutdown()
 
     # -- telling --------------------------------------------------------------------------------
 

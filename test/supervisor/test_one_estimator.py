@@ -42,6 +42,12 @@ class Teller:
             inputs.append(story.report(fired[-1].action, Outcome.CONFIRMED))
         story.at(story.t + EVERY, *inputs)
 
+    def silence(self, until: float) -> None:
+        """Nothing is told of the vehicle but what comes next, at that time."""
+        story = self.story
+        while story.t < until - EVERY:
+            story.at(story.t + EVERY, story.heartbeat())
+
     def stand(self, seconds: float, **told: Any) -> None:
         down = {**DOWN, "height": 0.0, "vertical_speed": 0.0, "tilt": 1.0, "force": 9.8}
         for _ in range(round(seconds / EVERY)):
@@ -180,9 +186,8 @@ def test_one_that_runs_away_while_nothing_is_heard_of_it_ends_no_flight(
     teller = told_to(profile)
     teller.stand(1.0, true_height=0.0)
     teller.hover(4.0, 90.0, true_height=90.0)
-    story, silent_at = teller.story, teller.story.t
-    while story.t < silent_at + gap - EVERY:
-        story.at(story.t + EVERY, story.heartbeat())
+    story = teller.story
+    teller.silence(story.t + gap)
     for k in range(20):
         ran = gap + k * EVERY
         height, speed = 90.0 - drift * ran**2 / 2.0, -drift * ran
@@ -226,8 +231,7 @@ def test_one_that_falls_while_nothing_is_heard_of_it_is_released_no_later_with_a
         high = {"true_height": 200.0} if barometer else {}
         teller.hover(4.0, 200.0, **high)
         story, fell_at = teller.story, teller.story.t + heard_before
-        while story.t < fell_at - heard_before + gap - EVERY:
-            story.at(story.t + EVERY, story.heartbeat())
+        teller.silence(fell_at - heard_before + gap)
         while not deployed(teller) and story.t < fell_at + 8.0:
             told = falling(max(0.0, story.t + EVERY - fell_at), 200.0)
             force = told.pop("acceleration") if story.t > fell_at else 9.8
@@ -247,8 +251,7 @@ def test_one_that_climbs_and_falls_while_nothing_is_heard_of_it_is_released(prof
     teller.hover(4.0, 200.0, true_height=200.0)
     story, fell_at = teller.story, teller.story.t + 2.5
     back_at = fell_at + 1.5
-    while story.t < back_at - EVERY:
-        story.at(story.t + EVERY, story.heartbeat())
+    teller.silence(back_at)
     while not deployed(teller) and story.t < back_at + 5.0:
         told = falling(story.t + EVERY - fell_at, 220.0)
         force = told.pop("acceleration")

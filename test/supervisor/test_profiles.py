@@ -84,6 +84,17 @@ def falls(profile: str, rule: str, hold: float, less: dict[str, Any], **signs: A
     ]
 
 
+def all_needed(
+    profile: str, rule: str, hold: float, besides: dict[str, Any] | None = None, **signs: Any
+) -> list[Case]:
+    """Cases of a rule that needs all of these signs; besides: what is told with them."""
+    over = {**(besides or {}), **{name: one for name, (one, _) in signs.items()}}
+    return [
+        Case(profile, rule, over, {**over, name: under}, hold)
+        for name, (_, under) in signs.items()
+    ]
+
+
 def sinks(profile: str, hold: float, sink: float, before: float = 0.1) -> list[Case]:
     """It sinks too fast, and one more sign says so; or only the one sensor."""
     over, under = {"vertical_speed": -sink - 0.1}, {"vertical_speed": -sink}
@@ -107,34 +118,10 @@ def tips(profile: str, hold: float, tilt: float, sink: float) -> list[Case]:
 DEPLOYS = [
     *tips("multirotor", hold=0.3, tilt=60.0, sink=3.0),
     *sinks("multirotor", hold=0.5, sink=12.0),
-    Case(
-        "multirotor",
-        "falling",
-        {"acceleration": 3.9, "vertical_speed": -7.1},
-        {"acceleration": 3.9, "vertical_speed": -6.9},
-        0.2,
+    *all_needed(
+        "multirotor", "falling", 0.2, vertical_speed=(-7.1, -6.9), acceleration=(3.9, 4.1)
     ),
-    Case(
-        "multirotor",
-        "falling",
-        {"acceleration": 3.9, "vertical_speed": -7.1},
-        {"acceleration": 4.1, "vertical_speed": -7.1},
-        0.2,
-    ),
-    Case(
-        "multirotor",
-        "free fall",
-        {"acceleration": 1.9, "tilt": 45.1},
-        {"acceleration": 1.9, "tilt": 44.9},
-        0.3,
-    ),
-    Case(
-        "multirotor",
-        "free fall",
-        {"acceleration": 1.9, "tilt": 45.1},
-        {"acceleration": 2.1, "tilt": 45.1},
-        0.3,
-    ),
+    *all_needed("multirotor", "free fall", 0.3, acceleration=(1.9, 2.1), tilt=(45.1, 44.9)),
     *falls(
         "multirotor",
         "autopilot lost and falling",
@@ -184,40 +171,21 @@ DEPLOYS = [
     ),
     *tips("fixed_wing", hold=0.7, tilt=80.0, sink=5.0),
     *sinks("fixed_wing", hold=1.0, sink=15.0, before=-5.0),
-    Case(
+    *all_needed(
         "fixed_wing",
         "free fall",
-        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 45.1},
-        {"acceleration": 3.1, "vertical_speed": -4.1, "attitude_error": 45.1},
         0.5,
+        acceleration=(2.9, 3.1),
+        vertical_speed=(-4.1, -3.9),
+        attitude_error=(45.1, 44.9),
     ),
-    Case(
-        "fixed_wing",
-        "free fall",
-        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 45.1},
-        {"acceleration": 2.9, "vertical_speed": -3.9, "attitude_error": 45.1},
-        0.5,
-    ),
-    Case(
-        "fixed_wing",
-        "free fall",
-        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 45.1},
-        {"acceleration": 2.9, "vertical_speed": -4.1, "attitude_error": 44.9},
-        0.5,
-    ),
-    Case(
+    *all_needed(
         "fixed_wing",
         "disarmed in flight",
-        {**OFF, "vertical_speed": -4.1, "acceleration": 4.9},
-        {**OFF, "vertical_speed": -3.9, "acceleration": 4.9},
         0.4,
-    ),
-    Case(
-        "fixed_wing",
-        "disarmed in flight",
-        {**OFF, "vertical_speed": -4.1, "acceleration": 4.9},
-        {**OFF, "vertical_speed": -4.1, "acceleration": 5.1},
-        0.4,
+        OFF,
+        vertical_speed=(-4.1, -3.9),
+        acceleration=(4.9, 5.1),
     ),
     *falls(
         "fixed_wing",

@@ -43,9 +43,8 @@ def test_a_step_is_in_the_table_or_raises(step, sign):
             after(STEPS, step, sign)
     else:
         began = sign is Sign.FIRST_SIGN or step is Step.BEGUN
-        assert (
-            after(STEPS, step, sign) is STEPS[step, sign] is (Step.BEGUN if began else Step.SENT)
-        )
+        wanted = Step.BEGUN if began else Step.SENT
+        assert after(STEPS, step, sign) is STEPS[step, sign] is wanted
 
 
 # -- flash dump ---------------------------------------------------------------------------------
