@@ -12,17 +12,20 @@ and so asks far more flights in the same time.
 from __future__ import annotations
 
 import argparse
+import difflib
 import functools
 import json
 import math
 import os
 import pathlib
+import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
+from typing import Any, NoReturn
 
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flight
@@ -30,15 +33,20 @@ from chute_ros.campaign.judge import WRONG, judge
 from chute_ros.campaign.scenario import PROFILES, Scenario, Vehicle
 from chute_ros.campaign.scenario_text import scenario_of
 from chute_ros.campaign.shipped import Shipped
+from chute_ros.interrupts import at_ctrl_c
 from chute_ros.model import Action
 from chute_ros.supervisor import contradictions, counter, flight, measurements, reports
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import MeasurementCondition, Profile
+from chute_ros.tools.campaign_command import positive
+from chute_ros.tools.entry import INTERRUPTED
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "config" / "profiles"
 STORED = ROOT / "test" / "campaign" / "regressions"
+#: So often a process is started that ends by itself, as PyPy does now and then.
+_STARTS = 3
 
 
 def _nan(*_: Any) -> float:
@@ -201,39 +209,46 @@ def fly(names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
     return wrong
 
 
-def in_own_process(python: str, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
-    """Fly there: what was taken away comes back with it. A process that dies is started again."""
-    work = json.dumps({"names": names, "flights": flights})
-    for _ in range(3):
-        done = subprocess.run(
-            [*python.split(), __file__, "--work"],
-            input=work,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if not done.returncode:
-            return dict(json.loads(done.stdout))
-    sys.exit(f"{names}: {done.stderr.strip().splitlines()[-1:] or done.returncode}")
-
-
 class Pool:
-    """Flies in as many processes as there are jobs."""
+    """Flies in as many processes as there are jobs. python: the command of their interpreter."""
 
-    def __init__(self, python: str, jobs: int) -> None:
+    def __init__(self, python: Sequence[str], jobs: int) -> None:
         self._python, self._jobs = python, jobs
         self._threads = ThreadPoolExecutor(jobs)
+        self._running: set[subprocess.Popen[str]] = set()
 
     def each(
         self, works: Sequence[tuple[Sequence[str], Sequence[str]]]
     ) -> Iterator[dict[str, str]]:
         """What is wrong of each (names, flights), in their order."""
-        return self._threads.map(lambda one: in_own_process(self._python, *one), works)
+        return self._threads.map(lambda one: self._in_own_process(*one), works)
 
     def shared(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
         """The same of one, by all processes."""
         parts = [(names, flights[n :: self._jobs]) for n in range(self._jobs)]
         return {name: count for wrong in self.each(parts) for name, count in wrong.items()}
+
+    def end(self, *_: object) -> NoReturn:
+        """At a Ctrl-C: nobody waits for what they fly now."""
+        for process in tuple(self._running):
+            process.kill()
+        print("without: interrupted", file=sys.stderr, flush=True)
+        os._exit(INTERRUPTED)
+
+    def _in_own_process(self, names: Sequence[str], flights: Sequence[str]) -> dict[str, str]:
+        """What was taken away comes back with it. A process that dies is started again."""
+        work = json.dumps({"names": names, "flights": flights})
+        command = [*self._python, __file__, "--work"]
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        for _ in range(_STARTS):
+            process = subprocess.Popen(command, text=True, **pipes)
+            self._running.add(process)
+            out, err = process.communicate(work)
+            self._running.remove(process)
+            if not process.returncode:
+                return dict(json.loads(out))
+        why = "".join(err.strip().splitlines()[-1:]) or f"exit code {process.returncode}"
+        sys.exit(f"without: one of its processes ended {_STARTS} times: {why}")
 
 
 def differing(
@@ -245,6 +260,11 @@ def differing(
     return worse, [name for name in right if concerns(names, scenario_named(name).profile)]
 
 
+def says(what: str) -> None:
+    """What takes its time now."""
+    print(f"without: {what} ...", file=sys.stderr, flush=True)
+
+
 def some(flights: Sequence[str], counts: dict[str, str]) -> str:
     """How many, and the first of them."""
     first = ", ".join(f"{name} {counts[name]}" for name in flights[:4])
@@ -253,7 +273,9 @@ def some(flights: Sequence[str], counts: dict[str, str]) -> str:
 
 def each_alone(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
     """A table with a line for each."""
+    says(f"flies {len(flights)} flights as they are")
     base = pool.shared((), flights)
+    says(f"and as often without each of {len(names)}")
     print("| without | wrong, right with it | right, wrong with it |\n|---|---|---|", flush=True)
     flown = pool.each([((name,), flights) for name in names])
     for name, wrong in zip(names, flown, strict=True):
@@ -263,12 +285,15 @@ def each_alone(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None
 
 def together(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
     """A table with a line for each that a flight needs by itself."""
+    says(f"flies {len(flights)} flights as they are")
     base = pool.shared((), flights)
     print(f"{len(base)} of {len(flights)} are wrong with all", flush=True)
+    says(f"and without all of {len(names)}")
     wrong = pool.shared(names, flights)
     worse, better = differing(names, base, wrong)
     print(f"without: wrong {some(worse, wrong)}; right {some(better, base)}", flush=True)
     differ = (*worse, *better)
+    says(f"{len(differ)} that differ, without each of {len(names)}")
     alone = list(pool.each([((name,), differ) for name in names]))
     print("| without | wrong, right with it | right, wrong with it |\n|---|---|---|")
     unclear = set(differ)
@@ -280,28 +305,51 @@ def together(pool: Pool, names: Sequence[str], flights: Sequence[str]) -> None:
     print(f"by none of them alone: {', '.join(sorted(unclear)) or 'none'}")
 
 
+def command(text: str) -> list[str]:
+    """Of an interpreter; argparse tells a user why it is none."""
+    words = shlex.split(text)
+    if not words or not shutil.which(words[0]):
+        raise argparse.ArgumentTypeError(f"{text!r} is no command here: name a Python or PyPy")
+    return words
+
+
+def part(text: str) -> str:
+    """A name of a part; argparse tells a user why it is none."""
+    every = [*HEURISTICS, *profile_parts()]
+    if text not in every:
+        near = (
+            ", ".join(map(repr, difflib.get_close_matches(text, every))) or "one that --list has"
+        )
+        raise argparse.ArgumentTypeError(f"there is no {text!r}: need {near}")
+    return text
+
+
 def main() -> None:
     """Run."""
     parser = argparse.ArgumentParser("without", description=__doc__)
-    parser.add_argument("what", nargs="*", help="only these")
+    parser.add_argument("what", nargs="*", type=part, help="only these (default: each)")
+    parser.add_argument("--list", action="store_true", help="name all, and end")
     parser.add_argument("--together", action="store_true", help="all of them at once")
-    parser.add_argument("--flights", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--python", default=sys.executable, help="command of the interpreter")
+    parser.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
+    parser.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
+    parser.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument(
+        "--python", type=command, default=[sys.executable], help="their interpreter"
+    )
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.work:
         print(json.dumps(fly(**json.load(sys.stdin))))
         return
-    every = [*HEURISTICS, *profile_parts()]
-    chosen = options.what or every
-    if unknown := [name for name in chosen if name not in every]:
-        sys.exit(f"there is no {unknown[0]!r}: need one of {'; '.join(every)}")
+    chosen = options.what or [*HEURISTICS, *profile_parts()]
+    if options.list:
+        print("\n".join(chosen))
+        return
     flights = [str(seed) for seed in range(options.seed, options.seed + options.flights)]
     flights += sorted(path.stem for path in STORED.glob("*.json"))
     pool = Pool(options.python, options.jobs)
-    (together if options.together else each_alone)(pool, chosen, flights)
+    with at_ctrl_c(pool.end):
+        (together if options.together else each_alone)(pool, chosen, flights)
 
 
 if __name__ == "__main__":

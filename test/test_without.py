@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 import without
 from without import FOLDER, HEURISTICS, changed, concerns, differing, fly, profile_parts
@@ -53,3 +56,32 @@ def test_what_differs_is_told_both_ways(monkeypatch: pytest.MonkeyPatch) -> None
     assert fly((), ("910000025",)) == {}
     assert fly((rule,), ("910000025",)) == {"910000025": "MISSED"}
     assert without.some(["3"], wrong) == "1 (3 MISSED)"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["multirotor: fallin"], "there is no 'multirotor: fallin': need 'multirotor: falling'"),
+        (["no such thing"], "need one that --list has"),
+        (["--jobs", "0"], "0: need a whole number, 1 or more"),
+        (["--python", "/no/such"], "'/no/such' is no command here"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(arguments: list[str], told: str) -> None:
+    done = started(*arguments)
+    assert done.returncode == 2
+    assert told in done.stderr.splitlines()[-1]
+
+
+def test_a_process_that_ends_by_itself_is_started_again_and_then_told() -> None:
+    done = started("--flights", "1", "--python", "false", "rocket: critical sink")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == (
+        "without: one of its processes ended 3 times: exit code 1"
+    )
+
+
+def started(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """The command, at its end."""
+    command = [sys.executable, without.__file__, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
