@@ -82,7 +82,8 @@ def test_an_attitude_that_is_wrong_one_time_in_ten_ends_no_flight_however_long(
 def weightless(low: int, carried: int) -> Callable[[int], dict[str, Any]]:
     """So many samples without weight, then so many with it, over and over, in a gentle descent."""
     forces = cycle((*[1.0] * low, *[9.8] * carried))
-    return lambda _: {"acceleration": next(forces), "vertical_speed": -4.6}
+    told = {"vertical_speed": -4.6, "attitude_error": 60.0}
+    return lambda _: {"acceleration": next(forces), **told}
 
 
 @pytest.mark.parametrize("lasts", [0.8, 1.3])
@@ -92,7 +93,7 @@ def test_an_aeroplane_that_is_pushed_over_to_no_weight_is_not_ended(lasts: float
     start = story.t
     while story.t < start + lasts:
         speed = 9.81 * (lasts / 2.0 - (story.t - start)) - 4.0
-        story.fly(story.t + 0.05, vertical_speed=speed, acceleration=0.3)
+        story.fly(story.t + 0.05, vertical_speed=speed, acceleration=0.3, attitude_error=10.0)
     story.fly(story.t + 3.0, vertical_speed=-1.0)
     assert story.fired() == []
 
@@ -102,3 +103,10 @@ def test_an_aeroplane_that_is_thrown_about_in_a_descent_is_not_ended() -> None:
     story = descending("fixed_wing", 4.6)
     fly(story, 12.0, TWENTY_HERTZ, weightless(6, 6))
     assert story.fired() == []
+
+
+def test_an_aeroplane_that_falls_is_deployed_though_it_is_carried_now_and_again() -> None:
+    """One sample of four: a fall that swings."""
+    story = descending("fixed_wing", 4.6)
+    fly(story, 1.5, TWENTY_HERTZ, weightless(3, 1))
+    assert story.fired()[:1] == ["KILL"]
