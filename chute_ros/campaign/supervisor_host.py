@@ -7,12 +7,21 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.sensor_messages import Imu, Odometry
 from chute_ros.campaign.vehicle_hearing import VehicleHearing
 from chute_ros.model import Action, Decision
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
+from chute_ros.runtime.supervisor_inputs import input_of
+from chute_ros.runtime.topics import (
+    ActionTold,
+    DeviceBeat,
+    DeviceRequest,
+    SafetyPicture,
+    SupervisorBeat,
+)
 from chute_ros.supervisor import handover
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
@@ -30,30 +39,9 @@ _STATE_INTERVAL = 1.0  # s, at the latest
 #: Finding each other takes no time here: one that starts looks so long for a leader, s.
 _LISTEN = 0.6
 #: What it hears of device nodes, besides their heartbeats and the vehicle.
-_HEARD: tuple[type[i.Input], ...] = (
-    *(i.ParachuteReport, i.ActionReport, i.KillRequest, i.BlockRequest),
-)
+_HEARD = (i.ParachuteReport, ActionTold, DeviceRequest)
 #: What source of vehicle_sources says what.
 _SOURCES: dict[str, type] = {VEHICLE_STATE: i.VehicleReport, IMU: Imu, ODOMETRY: Odometry}
-
-
-@dataclass(frozen=True)
-class SupervisorBeat:
-    """Its own heartbeat (safety/heartbeat)."""
-
-    name: str
-    leading: bool
-
-
-@dataclass(frozen=True)
-class SafetyPicture:
-    """Of safety/state what device nodes look at."""
-
-    blocked: bool
-    device_blocks: frozenset[str]
-    #: Whose it is, and the stamp of the newest heartbeat of each link.
-    supervisor: str
-    stamps: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -96,7 +84,7 @@ class SupervisorHost:
         for source in vehicle_sources:
             # One alone is passed on as it comes, as by the node.
             ros.subscribe(_SOURCES[source], process, self._take if alone else self._vehicle)
-        ros.subscribe(i.LinkHeartbeat, process, self._heartbeat)
+        ros.subscribe(DeviceBeat, process, self._heartbeat)
         if config.standby:
             ros.subscribe(LeaseClaim, process, self._claim)
 
@@ -114,7 +102,7 @@ class SupervisorHost:
             state.vehicle.link_state,
             now,
         )
-        self._stamps: dict[str, float] = {}
+        self._stamps: dict[str, int] = {}
         self._callers.clear()
 
     @property
@@ -170,11 +158,11 @@ class SupervisorHost:
 
     # -- what comes ------------------------------------------------------------------------------
 
-    def _take(self, one: i.Input, difference: float, now: float) -> None:
+    def _take(self, one: Any, difference: float, now: float) -> None:
         released = isinstance(one, i.ParachuteReport) and one.status.deployed
         if released and math.isnan(self.knew_release):
             self.knew_release = now
-        self._turn((one,), now)
+        self._turn((input_of(one, difference),), now)
 
     def _vehicle(
         self, one: i.VehicleReport | Imu | Odometry, difference: float, now: float
@@ -185,12 +173,9 @@ class SupervisorHost:
     def _vehicle_told(self, report: i.VehicleReport, now: float) -> None:
         self._turn((report,), now)
 
-    def _heartbeat(self, one: i.LinkHeartbeat, difference: float, now: float) -> None:
-        self._stamps[one.link] = now + self.process.clock - difference
-        self._turn(
-            (i.LinkHeartbeat(one.link, one.link_state, one.device_healthy, one.seq, difference),),
-            now,
-        )
+    def _heartbeat(self, one: DeviceBeat, difference: float, now: float) -> None:
+        self._stamps[one.link] = self.process.wall(now) - round(difference * 1e9)
+        self._take(one, difference, now)
 
     def _claim(self, told: LeaseClaim, difference: float, now: float) -> None:
         self.lease, event = self.lease.heard(self._lease_config, self._own(now), told.claim, now)
@@ -252,7 +237,7 @@ class SupervisorHost:
         self._kept = state
         block = state.block.decision if state.block is not None else None
         blocked = block is not None and block.action is Action.FLIGHT_BLOCK and not block.shadow
-        blocks = frozenset(state.device_blocks)
+        blocks = tuple(state.device_blocks)
         picture = SafetyPicture(blocked, blocks, self.process.name, dict(self._stamps))
         self._ros.publish(self.process, picture)
 

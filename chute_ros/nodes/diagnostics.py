@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from rclpy.node import Node
 from chute_ros.nodes import qos
 from chute_ros.nodes.middleware_diagnostics import middleware_task
 from chute_ros.protocol.liveness import Liveness
+from chute_ros.runtime.watch import WatchPicture
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -66,6 +68,29 @@ def wire_task(
         level, text = WARN, f"{text}, nothing received yet"
     every = {**values, **{f"dropped: {reason}": n for reason, n in sorted(dropped.items())}}
     return status(node, "link", level, text, every, wire.connection)
+
+
+def supervisor_task(
+    node: str, one: WatchPicture, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    """How the supervisor is heard, with values beside."""
+    level, text = OK, "heard"
+    if math.isnan(one.silence):
+        level, text = STALE, "never heard"
+    elif one.lost:
+        level, text = ERROR, f"silent for {one.silence:.1f} s"
+    elif one.delay:
+        level, text = ERROR, f"clocks differ: its heartbeat seems {one.delay:.3f} s old"
+    elif one.offset:
+        text = f"heard; a wall clock was set, or differs, by {one.offset:.3f} s"
+        level = WARN
+    every = {
+        "heartbeat age (s)": one.silence,
+        "times lost": one.times_lost,
+        "clock set by (s)": one.offset,
+        **values,
+    }
+    return status(node, "supervisor", level, text, every, "")
 
 
 def never_heard(node: str, task: str = "parachute") -> DiagnosticStatus:

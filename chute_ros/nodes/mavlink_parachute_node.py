@@ -16,33 +16,29 @@ from chute_msgs.srv import (
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
+from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes.device_node import DeviceNode, Summary
+from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.nodes.mavlink_diagnostics import (
+    Details,
     autopilot_task,
     details_of,
     kill_task,
     link_task,
     parachute_tasks,
 )
-from chute_ros.nodes.mavlink_health import health
 from chute_ros.nodes.mavlink_parameters import PARAMETERS, config_from
 from chute_ros.nodes.signing_memory import SigningMemory
-from chute_ros.protocol.effect import EffectFinished
-from chute_ros.protocol.events import (
-    RequestFinished,
-    VehicleChanged,
-)
-from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.protocol.mavlink.parachute import component_information
+from chute_ros.runtime.device import Summary
+from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire import make_wire
 
-#: How a flight block is reported by a node that must leave arming alone.
-_NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
 #: COMPONENT_INFORMATION_BASIC.
 _INFORMATION: int = dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC
 
@@ -59,11 +55,17 @@ class MavlinkParachuteNode(DeviceNode):
         self.at_end.callback(self._signing.finish)
         #: Why take-off is forbidden, as it was last told.
         self._doubts: set[str] = set()
+        settings = self.settings(MavlinkSettings)
+        self.runtime = MavlinkRuntime(self.get_name(), settings, self, self._details)
         link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, frames=lambda: link.received_count
         )
-        self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
+        vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
+        self.follow(
+            VehicleReport,
+            lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at)),
+        )
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
         self.serve(RequestMessage, "~/request_message", self._request_message)
@@ -73,43 +75,9 @@ class MavlinkParachuteNode(DeviceNode):
 
     # -- what DeviceNode asks for ---------------------------------------------------------------
 
-    def summarise(self, link: MavlinkLink, now: float) -> Summary:
+    def _details(self, link: MavlinkLink, now: float) -> Details:
         self._signing.keep(now)
-        details = details_of(link, now)
-        state, age, reasons = health(link, details.vehicle, self.values["expect_parachute"], now)
-        return Summary(state, not reasons, age, details, reasons)
-
-    def link_event(self, event: Any) -> None:
-        if isinstance(event, VehicleChanged):
-            self._vehicle_publisher.publish(messages.vehicle_state(event.state, self.stamp()))
-
-    def failed_end(self, token: int, text: str) -> RequestFinished:
-        finished = EffectFinished(token, False, False, results.NO_ACKNOWLEDGEMENT, text)
-        return RequestFinished(finished)
-
-    def carry_out(self, decision: model.Decision) -> None:
-        if decision.action is model.Action.KILL:
-            self.desk.request_once(
-                decision,
-                lambda link, token, now: link.kill(token, now),
-                MavlinkLink.has_autopilot,
-                self.values["give_up_after"],
-            )
-        elif decision.action is model.Action.DEPLOY:
-            force, device = self.values["deploy_arms_trigger"], decision.device
-            self.deploy_for(
-                decision, lambda link, token, now: link.deploy(token, force, now, device)
-            )
-        elif decision.action is not model.Action.NONE:
-            undone = self.values["disarm_when_blocked"]
-            blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
-            self.carry_out_flight_block(decision, blocked, "arming is left alone")
-
-    def arm_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
-        link.arm(token, request.arm, request.triggers, now)
-
-    def deploy_link(self, link: MavlinkLink, token: int, request: Any, now: float) -> None:
-        link.deploy(token, request.force, now)
+        return details_of(link, now)
 
     def parameter_changed(self, name: str, value: Any) -> None:
         if name == "autopilot_message_rate" and self.loop is not None:

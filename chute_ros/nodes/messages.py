@@ -13,15 +13,112 @@ from chute_msgs.msg import (
     LinkHeartbeat,
     ParachuteStatus,
     SafetyDecision,
+    SafetyRequest,
+    SafetyState,
     VehicleState,
 )
 
 from chute_ros import model
+from chute_ros.protocol.upf.vehicle_service import Ask
+from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest, SafetyPicture
+from chute_ros.supervisor import inputs
 
 
 def seconds(stamp: Time) -> float:
     """A stamp as Unix seconds."""
     return float(stamp.sec) + stamp.nanosec * 1e-9
+
+
+def nanoseconds(stamp: Time) -> int:
+    """A stamp as Unix nanoseconds."""
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+
+
+def device_beat(one: DeviceBeat, stamp: Time) -> LinkHeartbeat:
+    """As it is published on safety/heartbeat."""
+    message = LinkHeartbeat(
+        link=one.link,
+        link_state=int(one.link_state),
+        device_healthy=one.device_healthy,
+        seq=one.seq,
+        reasons=list(one.reasons),
+        age=one.age,
+        behind=one.behind,
+    )
+    message.header.stamp = stamp
+    return message
+
+
+def device_beat_from(message: LinkHeartbeat) -> DeviceBeat:
+    """What a device node published on safety/heartbeat; an unknown link state reads as
+    NEVER_SEEN."""
+    return DeviceBeat(
+        message.link,
+        _known(model.LinkState, message.link_state),
+        message.device_healthy,
+        message.seq,
+        message.age,
+        tuple(message.reasons),
+        message.behind,
+    )
+
+
+def action_told(told: ActionTold, stamp: Time) -> ActionReport:
+    """As it is published on safety/action."""
+    report = told.report
+    message = ActionReport(
+        epoch=report.epoch,
+        id=report.id,
+        action=int(told.action),
+        outcome=int(report.outcome),
+        link=report.link,
+        detail=report.detail,
+        newest_epoch=report.newest_epoch,
+        newest_id=report.newest_id,
+    )
+    message.header.stamp = stamp
+    return message
+
+
+def action_told_from(message: ActionReport) -> ActionTold:
+    """What somebody published on safety/action; a number without a name reads as NONE."""
+    report = inputs.ActionReport(
+        message.epoch,
+        message.id,
+        message.link,
+        _known(model.Outcome, message.outcome),
+        message.detail,
+        message.newest_epoch,
+        message.newest_id,
+    )
+    return ActionTold(_known(model.Action, message.action), report)
+
+
+def device_request(one: DeviceRequest, stamp: Time) -> SafetyRequest:
+    """As it is published on safety/request."""
+    message = SafetyRequest(
+        link=one.link, device=one.device, request=int(one.ask), reason=one.reason
+    )
+    message.header.stamp = stamp
+    return message
+
+
+def device_request_from(message: SafetyRequest) -> DeviceRequest | None:
+    """What somebody published on safety/request; None: it asks for what does not exist."""
+    if message.request not in Ask._value2member_map_:
+        return None
+    return DeviceRequest(message.link, message.device, Ask(message.request), message.reason)
+
+
+def safety_picture(message: SafetyState) -> SafetyPicture:
+    """Of what a supervisor published on safety/state what device nodes look at."""
+    stamps = map(nanoseconds, message.link_stamps)
+    return SafetyPicture(
+        message.flight_blocked,
+        tuple(message.device_blocks),
+        message.supervisor,
+        dict(zip(message.links, stamps, strict=False)),
+    )
 
 
 def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> ParachuteStatus:
@@ -90,16 +187,6 @@ def parachute_from(message: ParachuteStatus) -> model.ParachuteStatus:
         packed_date=message.packed_date,
         faults=tuple(message.faults),
     )
-
-
-def link_state(message: LinkHeartbeat) -> model.LinkState:
-    """The link's state, by a heartbeat."""
-    return _known(model.LinkState, message.link_state)
-
-
-def outcome(message: ActionReport) -> model.Outcome:
-    """How far a device node got, by its report; an unknown number reads as NONE."""
-    return _known(model.Outcome, message.outcome)
 
 
 def decision(one: model.Decision, stamp: Time) -> SafetyDecision:

@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from itertools import count
 from operator import attrgetter
 from typing import Any
 
@@ -82,6 +83,7 @@ class SafetySupervisorNode(SuiteNode):
         self.at_end.callback(self._afterwards.look, math.inf)
         self.services_offered = SupervisorServices(self, self.wall, self._turn)
         self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
+        self._seq = count()
         self._beat_at = now
         self._state_at = now
         self._published: State | None = None
@@ -271,13 +273,15 @@ class SafetySupervisorNode(SuiteNode):
         self._health.beat_late = now - self._beat_at
         self._beat_at = max(self._beat_at + HEARTBEAT_INTERVAL, now)
         message = LinkHeartbeat(
+            link=self.get_name(),
+            seq=next(self._seq) % 2**32,
             link_state=LinkHeartbeat.LINK_OK,
             device_healthy=self.lease.leading,
             age=0.0,
             supervisor=True,
         )
         message.header.stamp = self.stamp()
-        self.publish_heartbeat(message)
+        self.heartbeat_publisher.publish(message)
         self.lease.tell(now)
         self.services_offered.tidy()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from itertools import count
 from typing import Any
 
 from chute_msgs.msg import LinkHeartbeat
@@ -36,8 +35,7 @@ class SuiteNode(Node):
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)
         #: With the namespace, so that the diagnostics of several vehicles can be told apart.
         self.diagnostic_name = self.get_fully_qualified_name().lstrip("/")
-        self._seq = count()
-        self._heartbeat_publisher = self.create_publisher(
+        self.heartbeat_publisher = self.create_publisher(
             LinkHeartbeat, "safety/heartbeat", qos.STATUS
         )
         self.diagnostics_publisher = diagnostics.DiagnosticsPublisher(self)
@@ -67,8 +65,3 @@ class SuiteNode(Node):
     def stamp(self) -> Any:
         """The wall clock, for headers."""
         return self.wall.now().to_msg()
-
-    def publish_heartbeat(self, message: LinkHeartbeat) -> None:
-        """On safety/heartbeat, as this node's next one; it has its stamp."""
-        message.link, message.seq = self.get_name(), next(self._seq) % 2**32
-        self._heartbeat_publisher.publish(message)

@@ -15,6 +15,7 @@ from rclpy.node import Node
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.supervisor_health import Health
+from chute_ros.runtime.supervisor_inputs import input_of
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.config import SupervisorConfig
 
@@ -62,37 +63,18 @@ class SupervisorInputs:
             self.stamps[message.link] = message.header.stamp
         sent = messages.seconds(message.header.stamp)
         difference = messages.seconds(self._wall.now().to_msg()) - sent if sent else math.nan
-        return inputs.LinkHeartbeat(
-            message.link,
-            messages.link_state(message),
-            message.device_healthy,
-            message.seq,
-            difference,
-            tuple(message.reasons),
-            message.behind,
-        )
+        return input_of(messages.device_beat_from(message), difference)
 
     def _parachute(self, message: ParachuteStatus) -> inputs.Input:
         return inputs.ParachuteReport(message.link, messages.parachute_from(message))
 
     def _action(self, message: ActionReport) -> inputs.Input:
-        return inputs.ActionReport(
-            message.epoch,
-            message.id,
-            message.link,
-            messages.outcome(message),
-            message.detail,
-            message.newest_epoch,
-            message.newest_id,
-        )
+        return messages.action_told_from(message).report
 
     def _request(self, message: SafetyRequest) -> inputs.Input | None:
-        device, reason = f"{message.link} {message.device}".strip(), message.reason
-        if message.request == SafetyRequest.KILL:
-            return inputs.KillRequest(0, device, reason)
-        if message.request in (SafetyRequest.FLIGHT_BLOCK, SafetyRequest.FLIGHT_BLOCK_RELEASE):
-            block = message.request == SafetyRequest.FLIGHT_BLOCK
-            return inputs.BlockRequest(message.link, message.device, block, reason)
+        if (asked := messages.device_request_from(message)) is not None:
+            return input_of(asked, math.nan)
+        device = f"{message.link} {message.device}".strip()
         if message.link not in self._misasked and len(self._misasked) < MOST_MISASKED:
             self._misasked.add(message.link)
             self._node.get_logger().error(

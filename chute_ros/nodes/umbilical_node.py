@@ -5,15 +5,16 @@ from __future__ import annotations
 import datetime
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from chute_msgs.msg import Telem, VehicleState
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from chute_ros import model
 from chute_ros.errors import ParameterError
+from chute_ros.links.umbilical.runtime import UmbilicalRuntime, UmbilicalSettings
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes.device_node import DeviceNode, Summary, block_reason
+from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.nodes.dump_files import DumpFiles
-from chute_ros.nodes.link_log import log_event
+from chute_ros.nodes.link_log import log_notice
 from chute_ros.nodes.telem_message import telem, unfit, without_place
 from chute_ros.nodes.umbilical_diagnostics import (
     computer_task,
@@ -24,12 +25,12 @@ from chute_ros.nodes.umbilical_diagnostics import (
 )
 from chute_ros.nodes.umbilical_parameters import PARAMETERS, config_from
 from chute_ros.nodes.umbilical_services import UmbilicalServices
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
-from chute_ros.protocol.events import Notice, RequestFinished, VehicleChanged
+from chute_ros.protocol.events import Notice
 from chute_ros.protocol.umbilical import events
 from chute_ros.protocol.umbilical.link import UmbilicalLink
-from chute_ros.protocol.umbilical.reasons import reasons_of
 from chute_ros.protocol.umbilical.sayings import LogLine
+from chute_ros.runtime.device import Summary
+from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_serial_address
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.telem_layouts import load_layouts
@@ -38,8 +39,6 @@ from chute_ros.transport.wire import make_wire
 
 class UmbilicalNode(DeviceNode):
     """The node umbilical."""
-
-    PICTURES = (*DeviceNode.PICTURES, events.TelemetryReceived, LogLine)
 
     def __init__(self, **options: Any) -> None:
         super().__init__("umbilical", PARAMETERS, **options)
@@ -53,6 +52,8 @@ class UmbilicalNode(DeviceNode):
                 self.get_logger().warning(text)
         self.files = DumpFiles(self.values["dump_folder"])
         self.at_end.callback(self._end_dump)
+        settings = self.settings(UmbilicalSettings)
+        self.runtime = UmbilicalRuntime(self.get_name(), settings, self, details_of)
         link = UmbilicalLink(config_from(self.values), layouts)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written
@@ -61,11 +62,21 @@ class UmbilicalNode(DeviceNode):
         # The flight computer's own log, told apart from ours by the logger's name.
         self._its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
-        self._vehicle_publisher = None
         if self.values["publish_vehicle_state"]:
-            self._vehicle_publisher = self.create_publisher(
-                VehicleState, "vehicle/state", qos.STATUS
+            vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
+            self.follow(
+                VehicleReport,
+                lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at)),
             )
+        for kind, follower in (
+            (events.TelemetryReceived, self._telemetry),
+            (LogLine, self._log_line),
+            (events.Progress, self._progressed),
+            (events.DumpData, self._dump_data),
+            (events.DumpStarted, self._dump_started),
+            (events.DumpFinished, self._dump_finished),
+        ):
+            self.follow(kind, follower)
         self.offered = UmbilicalServices(self)
         self.begin()
 
@@ -76,62 +87,20 @@ class UmbilicalNode(DeviceNode):
                 self.files.write(event.data)
         self.files.finish(False)
 
-    # -- what DeviceNode asks for ---------------------------------------------------------------
+    # -- what only this node's link tells -------------------------------------------------------
 
-    def summarise(self, link: UmbilicalLink, now: float) -> Summary:
-        details = details_of(link, now)
-        status = details.status
-        stale_after = link.config.telemetry.stale_after
-        reasons = reasons_of(status, details.received_bytes, stale_after)
-        state = link.computer.liveness.state
-        return Summary(state, status.healthy, details.record_age, details, reasons)
+    def _telemetry(self, event: events.TelemetryReceived, stamp: Time) -> None:
+        self._telem_publisher.publish(telem(event.record, event.sequence, stamp))
 
-    def link_event(self, event: Any) -> None:
-        if isinstance(event, events.TelemetryReceived):
-            self._telem_publisher.publish(telem(event.record, event.sequence, self.stamp()))
-        elif isinstance(event, VehicleChanged):
-            if self._vehicle_publisher is not None:
-                message = messages.vehicle_state(event.state, self.stamp())
-                self._vehicle_publisher.publish(message)
-        elif isinstance(event, LogLine):
-            log_event(self._its_log, Notice(event.severity, event.text))
-        elif isinstance(event, events.Progress):
-            self._progress = event.text
-            self.get_logger().info(event.text, throttle_duration_sec=1.0)
-        elif isinstance(event, events.DumpData):
-            self.files.write(event.data)
-        elif isinstance(event, events.DumpStarted):
-            self._dump_started(event)
-        elif isinstance(event, events.DumpFinished):
-            self._dump_finished(event)
+    def _log_line(self, event: LogLine, stamp: Time) -> None:
+        log_notice(self._its_log, Notice(event.severity, event.text))
 
-    def failed_end(self, token: int, text: str) -> RequestFinished:
-        return RequestFinished(EffectFinished(token, False, False, NO_ANSWER, text))
+    def _progressed(self, event: events.Progress, stamp: Time) -> None:
+        self._progress = event.text
+        self.get_logger().info(event.text, throttle_duration_sec=1.0)
 
-    def carry_out(self, decision: model.Decision) -> None:
-        if decision.action is model.Action.KILL:
-            # The motor's valve is closed: that is what stops a hybrid motor.
-            # And nothing launches after it until the supervisor releases flight.
-            reason = self._decided_block = f"killed: {block_reason(decision)}"
-
-            def kill(link: UmbilicalLink, token: int, now: float) -> None:
-                link.flight_block(reason, now)
-                link.command(token, "safe", True, now)
-
-            self.desk.request_for(decision, kill)
-        elif decision.action is model.Action.DEPLOY:
-            force = self.values["decided_deploy_forces"]
-            self.deploy_for(decision, lambda link, token, now: link.deploy(token, force, now))
-        elif decision.action is not model.Action.NONE:
-            self.carry_out_flight_block(
-                decision, "launch is refused", "launch is left to the gate"
-            )
-
-    def arm_link(self, link: UmbilicalLink, token: int, request: Any, now: float) -> None:
-        link.arm(token, request.arm, request.triggers, now)
-
-    def deploy_link(self, link: UmbilicalLink, token: int, request: Any, now: float) -> None:
-        link.deploy(token, request.force, now, again=request.force)
+    def _dump_data(self, event: events.DumpData, stamp: Time) -> None:
+        self.files.write(event.data)
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         assert self.loop is not None
@@ -150,13 +119,13 @@ class UmbilicalNode(DeviceNode):
 
     # -- inside ---------------------------------------------------------------------------------
 
-    def _dump_started(self, event: events.DumpStarted) -> None:
+    def _dump_started(self, event: events.DumpStarted, stamp: Time) -> None:
         wanted = self.offered.dump_paths.pop(event.token, "")
         now = datetime.datetime.now(datetime.timezone.utc)
         path = self.files.start(event.memory, event.suffix, wanted, now)
         self.get_logger().info(f"{event.memory} dump begins, to {path}")
 
-    def _dump_finished(self, event: events.DumpFinished) -> None:
+    def _dump_finished(self, event: events.DumpFinished, stamp: Time) -> None:
         result = self.files.finish(event.complete)
         if event.token:
             self.offered.dump_results[event.token] = result

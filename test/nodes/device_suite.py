@@ -432,8 +432,9 @@ class DeviceSuite:
         def broken(*_: Any) -> None:
             raise RuntimeError("a mistake of ours")
 
-        through = node.deploy_for
-        monkeypatch.setattr(node, "deploy_for", lambda decision, _: through(decision, broken))
+        runtime = node.runtime
+        through = runtime.deploy_for
+        monkeypatch.setattr(runtime, "deploy_for", lambda decision, _: through(decision, broken))
         decision = self.decide(Action.DEPLOY)
         report = self.await_report(Outcome.FAILED, decision)
         assert report.detail == "RuntimeError: a mistake of ours"

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from builtin_interfaces.msg import Time
 from chute_msgs.msg import SafetyDecision
 from node_bench import Bench, stamped
-from rclpy.node import Node
 
 from chute_ros.model import Action, Decision
 from chute_ros.nodes import qos
-from chute_ros.nodes.decision_carrier import DecisionCarrier
+from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 
 
 class Hung:
@@ -19,19 +17,16 @@ class Hung:
     def __init__(self, bench: Bench) -> None:
         self.bench = bench
         self.done: list[tuple[int, Action]] = []
-        self.node = Node("hung", namespace=bench.namespace)
-        bench.nodes.append(self.node)
-        self.carrier = DecisionCarrier(self.node, 0.5, self._age, self._carry_out)
-        self.carrier.begin()
+        self.node = bench.add(MavlinkParachuteNode, connection="udpin:127.0.0.1:0")
+        bench.executor.remove_node(self.node)
+        self.carrier = self.node.runtime.decisions
+        self.carrier._carry_out = self._carry_out
         # After it: what this one has heard, it has been given as well.
         self._heard = bench.follow(SafetyDecision, "safety/decision", qos.newest(qos.DECISION))
         self._publisher = bench.client.create_publisher(
             SafetyDecision, "safety/decision", qos.DECISION
         )
         bench.until(lambda: self._publisher.get_subscription_count() == 2, "both listen")
-
-    def _age(self, stamp: Time) -> float:
-        return 0.0
 
     def _carry_out(self, decision: Decision) -> None:
         if decision.action is Action.NONE:
@@ -43,7 +38,7 @@ class Hung:
     ) -> None:
         """Each with its number, what it wants, and its epoch where that is another."""
         for number, action, *other in decisions:
-            message = SafetyDecision(id=number, action=int(action), targets=["hung"])
+            message = SafetyDecision(id=number, action=int(action), targets=["mavlink_parachute"])
             message.epoch = other[0] if other else epoch
             self._publisher.publish(stamped(self.bench.client, message))
         last = decisions[-1][0]

@@ -1,7 +1,6 @@
 """The supervisor watches itself, and the device nodes watch the supervisor."""
 
 import itertools
-import math
 import time
 
 import pytest
@@ -10,13 +9,11 @@ from chute_msgs.srv import Kill
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, do
 from node_bench import stamped
-from rclpy.clock import Clock, ClockType
 from supervisor_bench import Scene
 
 from chute_ros.model import Action
 from chute_ros.nodes import safety_supervisor_node
 from chute_ros.nodes.supervisor_health import Health
-from chute_ros.nodes.supervisor_watch import SupervisorWatch
 from chute_ros.sim.parachute_device import ParachuteSettings
 from chute_ros.supervisor import core, inputs
 
@@ -150,7 +147,10 @@ class Overseen:
         self.seq = itertools.count()
         self.speaks = True
         bench.client.create_timer(0.1, self.beat)
-        bench.until(lambda: self.network.node._supervisor.look() is None, "it is not lost")
+        bench.until(lambda: self.watch().silence < 0.5, "it is heard")
+
+    def watch(self):
+        return self.network.node.runtime.watch.tell(time.monotonic())
 
     def beat(self):
         if self.speaks:
@@ -196,40 +196,23 @@ def test_without_its_supervisor_a_node_keeps_the_vehicle_on_the_ground(bench):
 @pytest.mark.parametrize("policy", ["hold"])
 def test_a_node_that_shall_hold_does_nothing(bench, policy):
     scene = Overseen(bench, on_supervisor_lost=policy)
-    bench.until(lambda: scene.network.node._supervisor._heard > 0.0, "the supervisor is heard")
+    bench.until(lambda: scene.watch().silence < 0.5, "the supervisor is heard")
     scene.arm()
     bench.until(lambda: scene.autopilot.model.armed, "it is armed")
     scene.speaks = False
-    bench.until(lambda: scene.network.node._supervisor._times_lost, "the supervisor is lost")
+    bench.until(lambda: scene.watch().times_lost, "the supervisor is lost")
     bench.turns(0.5)
     assert scene.autopilot.model.armed
 
 
 def test_a_supervisor_that_only_looks_on_does_not_count(bench):
     scene = Overseen(bench)
-    bench.until(lambda: scene.network.node._supervisor._heard > 0.0, "the leader is heard")
+    bench.until(lambda: scene.watch().silence < 0.5, "the leader is heard")
     scene.speaks = False
     for number in range(40):
         follower = LinkHeartbeat(link="b", seq=number, supervisor=True, device_healthy=False)
         bench.publish(stamped(bench.client, follower), "safety/heartbeat")
-        if scene.network.node._supervisor._times_lost:
+        if scene.watch().times_lost:
             break
         bench.turns(0.1)
-    assert scene.network.node._supervisor._times_lost == 1
-
-
-def test_a_supervisor_of_a_fifth_name_counts_once_another_is_gone():
-    """Given four that were heard before: made-up names, or supervisors that were renamed."""
-    watch = SupervisorWatch(0.5, 0.2, Clock(clock_type=ClockType.SYSTEM_TIME))
-    for name in "abcd":
-        watch.heartbeat(LinkHeartbeat(link=name, supervisor=True))
-    leads = LinkHeartbeat(link="e", supervisor=True, device_healthy=True)
-    watch.heartbeat(leads)
-    assert math.isnan(watch._heard), "four are there"
-    end = time.monotonic() + 5.0
-    while math.isnan(watch._heard):
-        assert time.monotonic() < end, "a place becomes free"
-        for name in "bcd":
-            watch.heartbeat(LinkHeartbeat(link=name, supervisor=True))
-        watch.heartbeat(leads)
-    assert set(watch._clocks) == set("bcde")
+    assert scene.watch().times_lost == 1

@@ -122,14 +122,14 @@ def test_one_request_that_cannot_be_published_keeps_no_other_back(bench):
         AskSupervisor(ask, "33", "a test")
         for ask in (Ask.FLIGHT_BLOCK, Ask.KILL, Ask.FLIGHT_BLOCK_RELEASE)
     ]
-    published = node.ask_supervisor
+    published = node.publish
 
-    def broken(request, device, reason):
-        if request != SafetyRequest.KILL:
+    def broken(one):
+        if one.ask is not Ask.KILL:
             raise RuntimeError("the middleware takes none")
-        published(request, device, reason)
+        return published(one)
 
-    node.ask_supervisor = broken
+    node.publish = broken
     with pytest.raises(RuntimeError):
         node.deliver(asks)
     asking.await_request(SafetyRequest.KILL)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
-from rclpy.task import Future
+from chute_ros.model import Decision, Outcome
+from chute_ros.runtime.shell import Shell
 
-from chute_ros import model
-
+#: Calls the link: (link, token, now).
 Begin = Callable[[Any, int, float], None]
 #: Of a link: the device that a request needs was heard.
 Ready = Callable[[Any], bool]
@@ -25,19 +25,13 @@ class CallFailed:
 
 
 class RequestDesk:
-    """call: has a function called in the link's turn; deliver: hands events to the executor;
-    report: tells the supervisor how far a decision got."""
+    """report: tells the supervisor how far a decision got."""
 
-    def __init__(
-        self,
-        call: Callable[[Callable[[Any, float], None]], None],
-        deliver: Callable[[list[Any]], None],
-        report: Callable[[model.Decision, model.Outcome, str], None],
-    ) -> None:
-        self._in_link, self._deliver, self._report = call, deliver, report
+    def __init__(self, shell: Shell, report: Callable[[Decision, Outcome, str], None]) -> None:
+        self._shell, self._report = shell, report
         self._tokens = count(1)
-        self._waiting: dict[int, Future] = {}
-        self._decisions: dict[int, model.Decision] = {}
+        self._waiting: dict[int, Callable[[Any], None]] = {}
+        self._decisions: dict[int, Decision] = {}
         #: Those that wait for their device: (token, begin, ready, until). Of the link's turn.
         self._held: list[tuple[int, Begin, Ready, float]] = []
 
@@ -46,21 +40,20 @@ class RequestDesk:
         """A request waits for its device."""
         return bool(self._held)
 
-    def request(self, begin: Begin) -> Future:
-        """Have begin(link, token, now) called in the link's turn; the future is its end."""
+    def request(self, begin: Begin, answered: Callable[[Any], None]) -> None:
+        """Have begin called in the link's turn; answered gets its end."""
         token = next(self._tokens)
-        self._waiting[token] = future = Future()
+        self._waiting[token] = answered
         self._call(token, begin)
-        return future
 
-    def request_for(self, decision: model.Decision, begin: Begin) -> None:
+    def request_for(self, decision: Decision, begin: Begin) -> None:
         """The same on behalf of a decision: its steps are reported on safety/action."""
         token = next(self._tokens)
         self._decisions[token] = decision
         self._call(token, begin)
 
     def request_once(
-        self, decision: model.Decision, begin: Begin, ready: Ready, give_up_after: float
+        self, decision: Decision, begin: Begin, ready: Ready, give_up_after: float
     ) -> None:
         """The same once ready says that there is a device for it: a node that has just started
         has heard none yet, and waits for it at most give_up_after s. try_held is called often
@@ -74,7 +67,7 @@ class RequestDesk:
             else:
                 self._held.append((token, begin, ready, now + give_up_after))
 
-        self._in_link(begin_or_hold)
+        self._shell.in_link(begin_or_hold)
 
     def try_held(self, link: Any, now: float) -> None:
         """In the link's turn: begin those that waited for their device, or for too long."""
@@ -89,23 +82,23 @@ class RequestDesk:
     def finished(self, token: int, end: Any) -> None:
         """A request ended: its caller gets end."""
         self._decisions.pop(token, None)
-        future = self._waiting.pop(token, None)
-        if future is not None:
-            future.set_result(end)
+        answered = self._waiting.pop(token, None)
+        if answered is not None:
+            answered(end)
 
-    def report(self, token: int, outcome: model.Outcome, detail: str) -> None:
+    def report(self, token: int, outcome: Outcome, detail: str) -> None:
         """A request got a step further; if a decision stands behind it, the supervisor is told."""
         decision = self._decisions.get(token)
         if decision is not None:
             self._report(decision, outcome, detail)
 
     def _call(self, token: int, begin: Begin) -> None:
-        self._in_link(lambda link, now: self._begin(link, token, begin, now))
+        self._shell.in_link(lambda link, now: self._begin(link, token, begin, now))
 
     def _begin(self, link: Any, token: int, begin: Begin, now: float) -> None:
         try:
             begin(link, token, now)
         except Exception as error:
             # Whoever waits must get an answer; the loop reports the mistake itself.
-            self._deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
+            self._shell.deliver([CallFailed(token, f"{type(error).__name__}: {error}")])
             raise

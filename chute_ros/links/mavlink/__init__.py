@@ -1,0 +1,1 @@
+"""A parachute on a MAVLink network, and the autopilot beside it."""

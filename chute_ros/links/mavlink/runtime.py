@@ -1,0 +1,56 @@
+"""What mavlink_parachute does with decisions, and when its device is healthy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chute_ros.links.mavlink.health import health
+from chute_ros.model import Action, Decision
+from chute_ros.protocol.effect import EffectFinished
+from chute_ros.protocol.events import RequestFinished
+from chute_ros.protocol.mavlink import results
+from chute_ros.protocol.mavlink.link import MavlinkLink
+from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+
+#: How a flight block is reported by a node that must leave arming alone.
+_NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
+
+
+@dataclass(frozen=True)
+class MavlinkSettings(DeviceSettings):
+    """The parameters of the same names."""
+
+    expect_parachute: bool = True
+    deploy_arms_trigger: bool = True
+    disarm_when_blocked: bool = True
+
+
+class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
+    """Its link is a MavlinkLink."""
+
+    def summarise(self, link: MavlinkLink, now: float) -> Summary:
+        vehicle = link.vehicle_state(now)
+        state, age, reasons = health(link, vehicle, self.settings.expect_parachute, now)
+        return Summary(state, not reasons, age, reasons)
+
+    def failed_end(self, token: int, text: str) -> RequestFinished:
+        finished = EffectFinished(token, False, False, results.NO_ACKNOWLEDGEMENT, text)
+        return RequestFinished(finished)
+
+    def carry_out(self, decision: Decision) -> None:
+        if decision.action is Action.KILL:
+            self.desk.request_once(
+                decision,
+                lambda link, token, now: link.kill(token, now),
+                MavlinkLink.has_autopilot,
+                self.settings.give_up_after,
+            )
+        elif decision.action is Action.DEPLOY:
+            force, device = self.settings.deploy_arms_trigger, decision.device
+            self.deploy_for(
+                decision, lambda link, token, now: link.deploy(token, force, now, device)
+            )
+        elif decision.action is not Action.NONE:
+            undone = self.settings.disarm_when_blocked
+            blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
+            self.carry_out_flight_block(decision, blocked, "arming is left alone")

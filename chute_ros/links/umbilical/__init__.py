@@ -1,0 +1,1 @@
+"""The ground side of a rocket's serial umbilical."""

@@ -1,0 +1,69 @@
+"""What umbilical does with decisions, and when the flight computer is healthy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.model import NAN, Action, Decision
+from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
+from chute_ros.protocol.events import RequestFinished, VehicleChanged
+from chute_ros.protocol.umbilical.events import TelemetryReceived
+from chute_ros.protocol.umbilical.link import UmbilicalLink
+from chute_ros.protocol.umbilical.reasons import reasons_of
+from chute_ros.protocol.umbilical.sayings import LogLine
+from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary, block_reason
+
+
+@dataclass(frozen=True)
+class UmbilicalSettings(DeviceSettings):
+    """The parameters of the same names."""
+
+    decided_deploy_forces: bool = True
+    publish_vehicle_state: bool = False
+
+
+class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
+    """Its link is an UmbilicalLink."""
+
+    PICTURES = (*DeviceRuntime.PICTURES, TelemetryReceived, LogLine)
+
+    def summarise(self, link: UmbilicalLink, now: float) -> Summary:
+        computer = link.computer
+        status, record = computer.status(now, link.pause), computer.record
+        reasons = reasons_of(status, link.received_bytes, link.config.telemetry.stale_after)
+        age = NAN if record is None else now - record.received
+        return Summary(computer.liveness.state, status.healthy, age, reasons)
+
+    def failed_end(self, token: int, text: str) -> RequestFinished:
+        return RequestFinished(EffectFinished(token, False, False, NO_ANSWER, text))
+
+    def take(self, event: Any, now: float) -> None:
+        if not isinstance(event, VehicleChanged) or self.settings.publish_vehicle_state:
+            super().take(event, now)
+
+    def deploy(self, force: bool, answered: Callable[[Any], None]) -> None:
+        """A person who forces it wants it fired again as well."""
+        self.desk.request(
+            lambda link, token, now: link.deploy(token, force, now, again=force), answered
+        )
+
+    def carry_out(self, decision: Decision) -> None:
+        if decision.action is Action.KILL:
+            # The motor's valve is closed: that is what stops a hybrid motor.
+            # And nothing launches after it until the supervisor releases flight.
+            reason = self.decided_block = f"killed: {block_reason(decision)}"
+
+            def kill(link: UmbilicalLink, token: int, now: float) -> None:
+                link.flight_block(reason, now)
+                link.command(token, "safe", True, now)
+
+            self.desk.request_for(decision, kill)
+        elif decision.action is Action.DEPLOY:
+            force = self.settings.decided_deploy_forces
+            self.deploy_for(decision, lambda link, token, now: link.deploy(token, force, now))
+        elif decision.action is not Action.NONE:
+            self.carry_out_flight_block(
+                decision, "launch is refused", "launch is left to the gate"
+            )

@@ -1,0 +1,1 @@
+"""A Flyfire UPF parachute on a DroneCAN bus."""

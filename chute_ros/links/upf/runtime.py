@@ -1,0 +1,139 @@
+"""What upf_can does with decisions and for its device, and when that is healthy."""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.model import NAN, Action, Decision, LinkState, Outcome, VehicleState
+from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
+from chute_ros.protocol.events import Notice, Severity
+from chute_ros.protocol.upf.errands import ErrandDone
+from chute_ros.protocol.upf.events import ErrandFinished
+from chute_ros.protocol.upf.link import UpfLink
+from chute_ros.protocol.upf.reasons import reasons_of
+from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
+from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+from chute_ros.runtime.topics import ActionTold, DeviceRequest, SafetyPicture
+from chute_ros.supervisor.config import TRIGGER
+
+#: Kills that were confirmed are remembered, so many.
+_MOST_KILLS = 50
+
+
+@dataclass(frozen=True)
+class UpfSettings(DeviceSettings):
+    """The parameter of the same name."""
+
+    decided_deploy_forces: bool = True
+
+
+@dataclass(frozen=True)
+class FailedEnd:
+    """The end of a request that could not be begun, whichever kind it was."""
+
+    finished: EffectFinished
+    done: ErrandDone
+
+
+class UpfRuntime(DeviceRuntime[UpfSettings]):
+    """Its link is an UpfLink."""
+
+    BLOCKS_FLIGHT = False
+    # Has left by then, and the supervisor needs the processor now.
+    UNHURRIED = (AskSupervisor,)
+
+    def __init__(self, *options: Any, **more: Any) -> None:
+        super().__init__(*options, **more)
+        #: Kills that were confirmed: (epoch, id, link) of the newest reports.
+        self._kills: deque[tuple[int, int, str]] = deque(maxlen=_MOST_KILLS)
+
+    def summarise(self, link: UpfLink, now: float) -> Summary:
+        troubles = link.bus.troubles()
+        picture = link.devices.picture(now)
+        reasons = reasons_of(link.config, link.devices, picture, troubles, now)
+        if picture is None:
+            return Summary(LinkState.NEVER_SEEN, False, NAN, reasons)
+        device = link.devices.controller() or link.devices.trigger()
+        assert device is not None
+        # Doubt about who is on the bus, or a trigger that is in trouble, forbids take-off, but
+        # takes nothing back in flight.
+        sound = not troubles and all(one.sound for one in link.devices.triggers.values())
+        healthy = picture.healthy and (sound or link.in_air(now))
+        liveness = device.liveness
+        return Summary(liveness.state, healthy, liveness.age(now), () if healthy else reasons)
+
+    def failed_end(self, token: int, text: str) -> FailedEnd:
+        finished = EffectFinished(token, False, False, NO_ANSWER, text)
+        return FailedEnd(finished, ErrandDone(False, text, 0))
+
+    def carry_out(self, decision: Decision) -> None:
+        if decision.action is Action.DEPLOY:
+            self._deploy_decided(decision)
+        elif decision.action is Action.KILL:
+            text = "a UPF parachute stops no motors: take upf_can out of kill_links"
+            self.decisions.report(decision, Outcome.FAILED, text)
+        elif decision.action is not Action.NONE:
+            # The device asks for it and does nothing about it itself.
+            text = "noted; nothing goes to the device"
+            self.decisions.report(decision, Outcome.CONFIRMED, text)
+
+    def _deploy_decided(self, decision: Decision) -> None:
+        force, device = self.settings.decided_deploy_forces, decision.device
+        if device == TRIGGER:
+            self.deploy_for(decision, lambda link, token, now: link.fire_triggers(token, now))
+        elif device and not device.isdecimal():
+            text = f'device {device!r}: need a DroneCAN node id or "{TRIGGER}"; nothing was sent'
+            self.decisions.report(decision, Outcome.FAILED, text)
+        else:
+            node_id = int(device or 0)
+
+            def begin(link: UpfLink, token: int, now: float) -> None:
+                link.kill_waited_for(now)
+                link.deploy(token, force, now, node_id)
+
+            self.deploy_for(decision, begin)
+
+    # -- what the device asks -------------------------------------------------------------------
+
+    def in_turn(self, events: list[Any]) -> None:
+        """What a device asks for leaves at once: a kill does not wait for the owner."""
+        with ExitStack() as each:  # from the last to the first, each whatever the others raise
+            for event in reversed(events):
+                if isinstance(event, AskSupervisor):
+                    asked = DeviceRequest(self.name, event.device, event.ask, event.reason)
+                    each.callback(self.shell.publish, asked)
+
+    def event(self, event: Any) -> None:
+        if isinstance(event, AskSupervisor):
+            text = f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
+            lets_go = event.ask is Ask.FLIGHT_BLOCK_RELEASE
+            self.shell.log(Notice(Severity.INFO if lets_go else Severity.WARNING, text))
+        elif isinstance(event, ErrandFinished):
+            self.desk.finished(event.token, event)
+        else:
+            super().event(event)
+
+    # -- what the device is told ----------------------------------------------------------------
+
+    def heard_vehicle(self, state: VehicleState) -> None:
+        """vehicle/state came."""
+        self.shell.in_link(lambda link, now: link.vehicle(state, now))
+
+    def heard_action(self, told: ActionTold) -> None:
+        """How far another node got with a decision."""
+        one = told.report
+        report = (one.epoch, one.id, one.link)
+        confirmed = told.action is Action.KILL and one.outcome is Outcome.CONFIRMED
+        if confirmed and report not in self._kills:
+            # Once: a report is said again when its decision is, long after it happened.
+            self._kills.append(report)
+            self.shell.in_link(lambda link, now: link.kill_confirmed(now))
+
+    def picture(self, one: SafetyPicture) -> None:
+        prefix = f"{self.name} "
+        blocks = one.device_blocks
+        standing = [text.removeprefix(prefix) for text in blocks if text.startswith(prefix)]
+        self.shell.in_link(lambda link, now: link.supervisor_said(one.blocked, standing, now))

@@ -1,0 +1,61 @@
+"""What goes from one runtime to another over ROS. Who carries it puts the stamp on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chute_ros.model import Action, LinkState
+from chute_ros.protocol.upf.vehicle_service import Ask
+from chute_ros.supervisor.inputs import ActionReport
+
+
+@dataclass(frozen=True)
+class DeviceBeat:
+    """A device node's heartbeat (safety/heartbeat); fields as of chute_msgs/LinkHeartbeat."""
+
+    link: str
+    link_state: LinkState
+    device_healthy: bool
+    seq: int
+    #: Since the device was heard, s.
+    age: float
+    reasons: tuple[str, ...]
+    #: For how long what came may have waited, s.
+    behind: float
+
+
+@dataclass(frozen=True)
+class SupervisorBeat:
+    """A supervisor's heartbeat (safety/heartbeat)."""
+
+    name: str
+    leading: bool
+
+
+@dataclass(frozen=True)
+class SafetyPicture:
+    """Of safety/state what device nodes look at."""
+
+    blocked: bool
+    device_blocks: tuple[str, ...]
+    #: Whose it is, and the stamp of the newest heartbeat of each link, ns.
+    supervisor: str
+    stamps: dict[str, int]
+
+
+@dataclass(frozen=True)
+class ActionTold:
+    """How far a device node got with a decision that wants this action (safety/action)."""
+
+    action: Action
+    report: ActionReport
+
+
+@dataclass(frozen=True)
+class DeviceRequest:
+    """What a device wants of the supervisor (safety/request)."""
+
+    link: str
+    device: str
+    ask: Ask
+    reason: str

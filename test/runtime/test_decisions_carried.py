@@ -1,0 +1,90 @@
+"""Decisions through the gate of a node, and what is reported of them."""
+
+from __future__ import annotations
+
+import pytest
+from runtime_shell import Shell
+
+from chute_ros.model import Action, Decision, Outcome
+from chute_ros.protocol.events import Severity
+from chute_ros.runtime.decisions import MOST_REPORTS, DecisionCarrier
+
+
+class Carried:
+    """What a node did, in order. A decision to do nothing fails here."""
+
+    def __init__(self, shell: Shell) -> None:
+        self.done: list[int] = []
+        self.shell = shell
+        self.carrier = DecisionCarrier("upf_can", 0.5, shell, lambda age: age, self._carry_out)
+
+    def _carry_out(self, decision: Decision) -> None:
+        if decision.action is Action.NONE:
+            raise ZeroDivisionError
+        self.done.append(decision.id)
+
+    def hear(self, *told: tuple[int, Action], age: float = 0.01, epoch: int = 8) -> None:
+        waiting = [(decision(number, action, epoch), age) for number, action in told]
+        self.carrier.heard(waiting, self.shell.now)
+
+
+def decision(number: int, action: Action, epoch: int = 8) -> Decision:
+    return Decision(epoch, number, action, "a rule", ("it fell",), ("upf_can",), False)
+
+
+def test_what_waited_is_done_in_the_order_in_which_it_was_decided(shell: Shell) -> None:
+    node = Carried(shell)
+    node.hear((8, Action.DEPLOY), (7, Action.KILL), (8, Action.DEPLOY))
+    assert node.done == [7, 8]
+
+
+def test_one_that_fails_keeps_no_other_back(shell: Shell) -> None:
+    node = Carried(shell)
+    with pytest.raises(ZeroDivisionError):
+        node.hear((1, Action.NONE), (2, Action.KILL), (3, Action.DEPLOY))
+    assert node.done == [2, 3]
+
+
+def test_one_that_is_said_again_gets_its_newest_report_again(shell: Shell) -> None:
+    node = Carried(shell)
+    node.hear((7, Action.DEPLOY))
+    node.hear((7, Action.DEPLOY))
+    assert shell.published == [], "it has not got anywhere yet"
+    for outcome in (Outcome.SENT, Outcome.CONFIRMED):
+        node.carrier.report(decision(7, Action.DEPLOY), outcome, "a test")
+    node.hear((7, Action.DEPLOY))
+    told = [(one.action, one.report.id, one.report.outcome) for one in shell.published]
+    confirmed = (Action.DEPLOY, 7, Outcome.CONFIRMED)
+    assert told == [(Action.DEPLOY, 7, Outcome.SENT), confirmed, confirmed]
+    assert node.done == [7], "and is done once"
+
+
+def test_one_of_before_is_answered_with_the_newest_that_was_seen(shell: Shell) -> None:
+    node = Carried(shell)
+    node.hear((7, Action.FLIGHT_BLOCK), epoch=16)
+    node.hear((9, Action.DEPLOY), epoch=8)
+    (told,) = shell.published
+    assert (told.report.outcome, told.report.newest_epoch, told.report.newest_id) == (
+        Outcome.FAILED,
+        16,
+        7,
+    )
+
+
+def test_a_late_one_is_complained_of_once_a_second_and_counted_each_time(shell: Shell) -> None:
+    node = Carried(shell)
+    for _ in range(25):
+        node.hear((7, Action.DEPLOY), age=0.6)
+        shell.now += 0.1
+    assert node.done == []
+    assert node.carrier.counts()["decisions: came too late"] == 25
+    assert [one.severity for one in shell.logged] == [Severity.ERROR] * 3
+
+
+def test_reports_of_long_ago_are_forgotten(shell: Shell) -> None:
+    node = Carried(shell)
+    numbers = range(1, MOST_REPORTS + 2)
+    for number in numbers:
+        node.hear((number, Action.FLIGHT_BLOCK))
+        node.carrier.report(decision(number, Action.FLIGHT_BLOCK), Outcome.CONFIRMED, "told")
+    assert set(node.carrier._reports) == {(8, number) for number in numbers[1:]}
