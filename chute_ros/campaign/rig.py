@@ -26,6 +26,7 @@ from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.truth import Truth
 from chute_ros.campaign.world import World
+from chute_ros.runtime.arming import Answered
 from chute_ros.sim.flight import FlightModel
 from chute_ros.supervisor import inputs as i
 
@@ -57,7 +58,7 @@ class Rig(ABC):
             config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
             process = self.process(name)
             sources = scenario.vehicle_sources
-            host = SupervisorHost(config, sources, process, self.ros, self._arm_devices)
+            host = SupervisorHost(config, sources, process, self.ros, self._call_arm)
             self.supervisors.append(host)
             self._restart[name] = host.start_again
             self.world.add(host)
@@ -195,20 +196,10 @@ class Rig(ABC):
         self._processes[who].start(now)
         self._restart[who](now)
 
-    # -- what people and supervisors ask ---------------------------------------------------------
+    # -- what supervisors ask --------------------------------------------------------------------
 
-    def _arm_devices(self, host: SupervisorHost, order: i.ArmDevices) -> None:
-        answers: dict[str, tuple[bool, str]] = {}
+    def _call_arm(self, link: str, order: i.ArmDevices, answered: Answered) -> None:
+        def told(success: bool, message: str) -> None:
+            answered(success, message, self.world.now)
 
-        def answered(link: str, success: bool, message: str) -> None:
-            answers[link] = (success, message)
-            if len(answers) == len(order.links):
-                good = all(success for success, _ in answers.values())
-                text = "; ".join(f"{name}: {text}" for name, (_, text) in answers.items())
-                now = self.world.now
-                self.world.post(
-                    now, lambda _: host.armed(i.ArmDone(order.token, order.arm, good, text))
-                )
-
-        for link in order.links:
-            self.nodes[link].arm(order.arm, order.triggers, partial(answered, link))
+        self.nodes[link].arm(order.arm, order.triggers, told)

@@ -1,60 +1,52 @@
-"""The supervisor's core in its process, and what its node does between core and ROS: a loop that
-may be late, hang, or die and start again; a lease, where there are two."""
+"""A supervisor's runtime in a process that may be late, hang, or die and start again."""
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.sensor_messages import Imu, Odometry
-from chute_ros.campaign.vehicle_hearing import VehicleHearing
-from chute_ros.model import Action, Decision
+from chute_ros.model import Decision, LinkState
+from chute_ros.protocol import vehicle_readings as readings
+from chute_ros.protocol.events import Notice
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
-from chute_ros.runtime.supervisor_inputs import input_of
+from chute_ros.runtime.arming import Answered
+from chute_ros.runtime.supervisor import Start, SupervisorRuntime, Turn
 from chute_ros.runtime.topics import (
     ActionTold,
     DeviceBeat,
     DeviceRequest,
+    LeaseClaim,
     SafetyPicture,
-    SupervisorBeat,
+    SafetyTold,
 )
-from chute_ros.supervisor import handover
+from chute_ros.runtime.vehicle_hearing import VehicleHearing
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
-from chute_ros.supervisor.epochs import epoch_above
-from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.lease import LeaseConfig
 from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written
 from chute_ros.supervisor.state import State
 
 _BOOT = _SETTINGS = "the same"
 _RESUME_WITHIN = 30.0  # s
-_HEARTBEAT_INTERVAL = 0.1  # s
-_STATE_INTERVAL = 1.0  # s, at the latest
 #: Finding each other takes no time here: one that starts looks so long for a leader, s.
 _LISTEN = 0.6
+#: The wall clock's seconds, of which an epoch is made, as the first one starts.
+_FIRST_EPOCH = 8
 #: What it hears of device nodes, besides their heartbeats and the vehicle.
 _HEARD = (i.ParachuteReport, ActionTold, DeviceRequest)
 #: What source of vehicle_sources says what.
 _SOURCES: dict[str, type] = {VEHICLE_STATE: i.VehicleReport, IMU: Imu, ODOMETRY: Odometry}
 
-
-@dataclass(frozen=True)
-class LeaseClaim:
-    """On safety/lease. state: the leader's."""
-
-    claim: Claim
-    state: str
+#: Calls the arm service of the device node of this name.
+CallArm = Callable[[str, i.ArmDevices, Answered], None]
 
 
 class SupervisorHost:
-    """One of the supervisors. vehicle_sources: as its node's parameter; arm_devices: calls the arm
-    services that an order names."""
+    """The shell of a supervisor's runtime in virtual time. vehicle_sources: as its node's
+    parameter."""
 
     def __init__(
         self,
@@ -62,66 +54,120 @@ class SupervisorHost:
         vehicle_sources: tuple[str, ...],
         process: Process,
         ros: Ros,
-        arm_devices: Callable[[SupervisorHost, i.ArmDevices], None],
+        call_arm: CallArm,
     ) -> None:
         self.config, self.process, self._ros = config, process, ros
-        self._arm_devices, self._vehicle_sources = arm_devices, vehicle_sources
-        self._lease_config = LeaseConfig(process.name, config.rank, config.standby, listen=_LISTEN)
-        self._tokens = itertools.count(1)
-        self._callers: dict[int, Callable[[i.Finish], None]] = {}
+        self._call_arm, self._vehicle_sources = call_arm, vehicle_sources
+        self._lease_config = LeaseConfig(
+            process.name,
+            config.rank,
+            config.standby,
+            listen=_LISTEN,
+            deaf_after=max(config.limits(link).lost_after for link in config.links),
+        )
         #: When each decision was first made, in their order.
         self.decided: list[tuple[float, Decision]] = []
+        self._numbers: set[tuple[int, int]] = set()
         self.said: list[tuple[float, str]] = []
         #: Those of them that were alarms.
         self.alarmed: list[tuple[float, str]] = []
         #: When it was first told that a parachute is out.
         self.knew_release = math.nan
         self._kept: State | None = None
-        self._begin(State(epoch_above(8, config.rank), 0.0, leading=not config.standby), 0.0)
+        self._begin(_FIRST_EPOCH, None, 0.0)
         for kind in _HEARD:
             ros.subscribe(kind, process, self._take)
-        alone = vehicle_sources == (VEHICLE_STATE,)
         for source in vehicle_sources:
-            # One alone is passed on as it comes, as by the node.
-            ros.subscribe(_SOURCES[source], process, self._take if alone else self._vehicle)
+            ros.subscribe(_SOURCES[source], process, self._vehicle)
         ros.subscribe(DeviceBeat, process, self._heartbeat)
         if config.standby:
             ros.subscribe(LeaseClaim, process, self._claim)
 
-    def _begin(self, state: State, now: float) -> None:
-        self.state = state
-        self.lease = Lease.begin(self._lease_config, now)
-        self._experienced = False
-        self._beat_at = self._state_at = now
-        self._published: tuple[object, ...] = ()
-        self._deadline = now
+    def _begin(self, epoch: int, before: State | None, now: float) -> None:
+        start = Start(epoch, f"{self.process.name} {now}", before=before)
+        self.runtime = SupervisorRuntime(self.config, self._lease_config, self, start, now)
         self._hearing = VehicleHearing(
             self._vehicle_sources,
             self.config.vehicle_state_age,
             self._vehicle_told,
-            state.vehicle.link_state,
+            LinkState.NEVER_SEEN if before is None else before.vehicle.link_state,
             now,
         )
-        self._stamps: dict[str, int] = {}
-        self._callers.clear()
+
+    @property
+    def state(self) -> State:
+        """The core's."""
+        return self.runtime.state
 
     @property
     def leading(self) -> bool:
         """What it decides is sent."""
-        return self.lease.role is Role.LEADING
+        return self.runtime.lease.leading
 
     # -- for a person ----------------------------------------------------------------------------
 
     def call(self, make: Callable[[int], i.Input], answered: Callable[[i.Finish], None]) -> None:
         """One of its services is called."""
-        token = next(self._tokens)
-        self._callers[token] = answered
-        self._turn((make(token),), self._ros.world.now)
+        self.runtime.ask(make, answered, self._ros.world.now)
+        self._ros.world.stir(self)
 
-    def armed(self, done: i.ArmDone) -> None:
-        """What came of an order to arm devices."""
-        if self.process.runs(self._ros.world.now):
-            self._turn((done,), self._ros.world.now)
+    # -- the runtime's shell ---------------------------------------------------------------------
+
+    def publish(self, message: Any) -> int:
+        """On its topic."""
+        if isinstance(message, SafetyTold):
+            state = message.state
+            message = SafetyPicture(
+                state.flight_blocked,
+                tuple(state.device_blocks),
+                message.supervisor,
+                message.stamps,
+            )
+        elif isinstance(message, Decision):
+            number = (message.epoch, message.id)
+            if number not in self._numbers:
+                self._numbers.add(number)
+                self.decided.append((self._ros.world.now, message))
+        return self._ros.publish(self.process, message)
+
+    def log(self, notice: Notice) -> None:
+        """Who leads, above all."""
+        self.said.append((self._ros.world.now, notice.text))
+
+    def say(self, said: i.Say) -> None:
+        """To the judge."""
+        told = (self._ros.world.now, said.text)
+        self.said.append(told)
+        if said.alarm:
+            self.alarmed.append(told)
+
+    def record(self, turn: Turn) -> None:
+        """The judge looks at what comes of it."""
+
+    def keep(self, state: State) -> None:
+        """Until the next start."""
+        self._kept = state
+
+    def offer(self, offered: bool) -> None:
+        """Who calls asks the one that leads."""
+
+    def failed(self, error: Exception, new: tuple[i.Input, ...]) -> str:
+        """A flight in which the core fails is broken."""
+        raise error
+
+    def arm(self, link: str, order: i.ArmDevices, answered: Answered) -> str:
+        """Call a device node's arm service; its answer comes in a turn of its own."""
+
+        def answer(success: bool, message: str, now: float) -> None:
+            if self.process.runs(now):
+                answered(success, message, now)
+                self._ros.world.stir(self)
+
+        def post(success: bool, message: str, now: float) -> None:
+            self._ros.world.post(now, lambda then: answer(success, message, then))
+
+        self._call_arm(link, order, post)
+        return ""
 
     # -- time ------------------------------------------------------------------------------------
 
@@ -135,26 +181,20 @@ class SupervisorHost:
             self._turn((), now)
 
     def next_deadline(self) -> float:
-        """Of the core, the lease, its heartbeat and what is told of the vehicle, but not before it
-        runs again."""
-        lease = self.lease.deadline(self._lease_config)
-        deadline = min(self._deadline, self._beat_at, lease, self._hearing.due)
+        """Of all that it does, but not before it runs again."""
+        deadline = min(self.runtime.core_due, self.runtime.due, self._hearing.due)
         return max(deadline, self.process.stopped_until)
 
     def start_again(self, now: float) -> None:
         """It was killed; what it left is what it goes on with."""
         left, self._kept = self._kept, None
-        rank, standby = self.config.rank, self.config.standby
+        before = None
+        if left is not None and worth_leaving(left):
+            text = written(Left(_BOOT, _SETTINGS, left))
+            before = resumed(text, _BOOT, _SETTINGS, _RESUME_WITHIN, now)
         # The epoch is made of the wall clock's seconds, which have moved on.
-        epoch = epoch_above(self.state.epoch, rank)
-        if left is None or not worth_leaving(left):
-            self._begin(State(epoch, now, leading=not standby), now)
-            self._turn((), now)
-            return
-        text = written(Left(_BOOT, _SETTINGS, left))
-        state = resumed(text, _BOOT, _SETTINGS, _RESUME_WITHIN, now)
-        self._begin(state, now)
-        self._turn(() if standby else (i.TakeOver(epoch),), now)
+        self._begin(self.state.epoch, before, now)
+        self._turn((), now)
 
     # -- what comes ------------------------------------------------------------------------------
 
@@ -162,105 +202,32 @@ class SupervisorHost:
         released = isinstance(one, i.ParachuteReport) and one.status.deployed
         if released and math.isnan(self.knew_release):
             self.knew_release = now
-        self._turn((input_of(one, difference),), now)
+        self.runtime.heard(one, difference, now)
+        self._ros.world.stir(self)
+
+    def _heartbeat(self, one: DeviceBeat, difference: float, now: float) -> None:
+        stamp = self.process.wall(now) - round(difference * 1e9)
+        self.runtime.heard_beat(one, stamp, difference, now)
+        self._ros.world.stir(self)
 
     def _vehicle(
         self, one: i.VehicleReport | Imu | Odometry, difference: float, now: float
     ) -> None:
-        self._hearing.hear(one, now)
+        if isinstance(one, i.VehicleReport):
+            self._hearing.hear_state(one.state, now)
+        elif isinstance(one, Imu):
+            self._hearing.hear(IMU, readings.imu(one), now)
+        else:
+            self._hearing.hear(ODOMETRY, readings.odometry(one), now)
         self._ros.world.stir(self)
 
     def _vehicle_told(self, report: i.VehicleReport, now: float) -> None:
         self._turn((report,), now)
 
-    def _heartbeat(self, one: DeviceBeat, difference: float, now: float) -> None:
-        self._stamps[one.link] = self.process.wall(now) - round(difference * 1e9)
-        self._take(one, difference, now)
-
     def _claim(self, told: LeaseClaim, difference: float, now: float) -> None:
-        self.lease, event = self.lease.heard(self._lease_config, self._own(now), told.claim, now)
-        if event is not None:
-            self._happened(event, now)
-        if told.claim.leading and self.lease.leader == told.claim.name and told.state:
-            self.state = handover.followed(self.state, told.state, now)
-            self._experienced = True
+        self.runtime.claim(told, now)
         self._ros.world.stir(self)
-
-    # -- the loop --------------------------------------------------------------------------------
 
     def _turn(self, new: tuple[i.Input, ...], now: float) -> None:
-        heard = self.state.newest_heartbeat() if self.config.standby else math.nan
-        self.lease, event = self.lease.looked(self._lease_config, now, heard)
-        if event is not None:
-            self._happened(event, now)
-        self.state, outputs = update(self.config, self.state, new, now)
-        if outputs:
-            self._carry_out(outputs, now)
-        if now >= self._beat_at:
-            self._beat_at = max(self._beat_at + _HEARTBEAT_INTERVAL, now)
-            self._ros.publish(self.process, SupervisorBeat(self.process.name, self.leading))
-            self._tell(now)
-        if self.leading:
-            self._publish_state(now)
-        self._deadline = next_deadline(self.config, self.state, now)
+        self.runtime.turn(new, now)
         self._ros.world.stir(self)
-
-    def _carry_out(self, outputs: tuple[i.Output, ...], now: float) -> None:
-        if any(isinstance(output, i.Decide) for output in outputs):
-            self._tell(now)
-            self._kept = self.state
-        for output in outputs:
-            if isinstance(output, i.Decide):
-                if not output.again:
-                    self.decided.append((now, output.decision))
-                self._ros.publish(self.process, output.decision)
-            elif isinstance(output, i.Say):
-                self.said.append((now, output.text))
-                if output.alarm:
-                    self.alarmed.append((now, output.text))
-            elif isinstance(output, i.Finish):
-                caller = self._callers.pop(output.token, None)
-                if caller is not None:
-                    caller(output)
-            elif isinstance(output, i.ArmDevices):
-                self._arm_devices(self, output)
-            elif self.leading:
-                self.lease, event = self.lease.refused(output.newest_epoch, now)
-                self._happened(event, now)
-
-    def _publish_state(self, now: float) -> None:
-        state = self.state
-        told = (state.stage, state.mode, state.next_id, state.alarms, state.device_blocks)
-        if told == self._published and now < self._state_at:
-            return
-        self._published, self._state_at = told, now + _STATE_INTERVAL
-        self._kept = state
-        block = state.block.decision if state.block is not None else None
-        blocked = block is not None and block.action is Action.FLIGHT_BLOCK and not block.shadow
-        blocks = tuple(state.device_blocks)
-        picture = SafetyPicture(blocked, blocks, self.process.name, dict(self._stamps))
-        self._ros.publish(self.process, picture)
-
-    # -- the lease -------------------------------------------------------------------------------
-
-    def _happened(self, event: Event, now: float) -> None:
-        if self.leading:
-            epoch = self.lease.next_epoch(self._lease_config, self.state.epoch)
-            new: i.Input = i.TakeOver(epoch)
-        else:
-            new = i.StepDown(event.value)
-        self.said.append((now, f"{'leads' if self.leading else 'looks on'}: {event.value}"))
-        self.state, outputs = update(self.config, self.state, (new,), now)
-        self._carry_out(outputs, now)
-        self._tell(now)
-
-    def _own(self, now: float) -> Claim:
-        state, config = self.state, self._lease_config
-        empty = not self._experienced and not state.flown and state.stage in ON_GROUND
-        heard = state.links_heard(self.config, now)
-        return Claim(config.name, config.rank, state.epoch, self.leading, empty, heard)
-
-    def _tell(self, now: float) -> None:
-        if self.config.standby:
-            state = handover.told(self.state, now) if self.leading else ""
-            self._ros.publish(self.process, LeaseClaim(self._own(now), state))

@@ -15,13 +15,21 @@ from chute_msgs.msg import (
     SafetyDecision,
     SafetyRequest,
     SafetyState,
+    SupervisorLease,
     VehicleState,
 )
 
 from chute_ros import model
 from chute_ros.protocol.upf.vehicle_service import Ask
-from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest, SafetyPicture
+from chute_ros.runtime.topics import (
+    ActionTold,
+    DeviceBeat,
+    DeviceRequest,
+    LeaseClaim,
+    SafetyPicture,
+)
 from chute_ros.supervisor import inputs
+from chute_ros.supervisor.lease import Claim
 
 
 def seconds(stamp: Time) -> float:
@@ -119,6 +127,44 @@ def safety_picture(message: SafetyState) -> SafetyPicture:
         message.supervisor,
         dict(zip(message.links, stamps, strict=False)),
     )
+
+
+def stamp_of(nanoseconds: int) -> Time:
+    """Unix nanoseconds as a stamp."""
+    seconds, rest = divmod(nanoseconds, 10**9)
+    return Time(sec=seconds, nanosec=rest)
+
+
+def lease_claim(told: LeaseClaim, stamp: Time) -> SupervisorLease:
+    """As it is published on safety/lease."""
+    claim = told.claim
+    message = SupervisorLease(
+        name=claim.name,
+        instance=told.instance,
+        running=told.running,
+        rank=claim.rank,
+        epoch=claim.epoch,
+        leading=claim.leading,
+        empty=claim.empty,
+        links_heard=claim.links_heard,
+        leader=told.leader,
+        state=told.state,
+    )
+    message.header.stamp = stamp
+    return message
+
+
+def lease_claim_from(message: SupervisorLease) -> LeaseClaim:
+    """What somebody published on safety/lease."""
+    claim = Claim(
+        message.name,
+        message.rank,
+        message.epoch,
+        message.leading,
+        message.empty,
+        message.links_heard,
+    )
+    return LeaseClaim(claim, message.instance, message.running, message.leader, message.state)
 
 
 def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> ParachuteStatus:

@@ -1,36 +1,33 @@
-"""The safety supervisor: carries its core's decisions out into ROS and the inputs back in.
+"""The safety supervisor in ROS: a supervisor's runtime, its topics, services, files and timer.
 
-One loop does it all: every message and request becomes an input of the core; one timer, set to the
-core's next deadline, wakes it when nothing comes. Its heartbeat comes from that loop alone.
-
-What goes wrong inside: an input that the core cannot take is left out, reported, and the loop goes
-on. If the core fails without any input, or what a turn does with its outputs, the supervisor falls
-silent: a standby takes over, and the device nodes do what on_supervisor_lost says.
+One loop does it all: every message and request goes to the runtime; one timer, set to when that
+has something to do, wakes it when nothing comes. What a turn does with its outputs and fails is
+reported; the process goes on, and the next turn tries anew.
 """
 
 from __future__ import annotations
 
 import math
+import secrets
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import partial
 from itertools import count
-from operator import attrgetter
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyState
+from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyState, SupervisorLease
+from chute_msgs.srv import Arm
+from rclpy.task import Future
 
 from chute_ros import model
+from chute_ros.errors import NameTakenError
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes.afterwards import Afterwards
-from chute_ros.nodes.device_arming import DeviceArming
 from chute_ros.nodes.flight_recorder import FlightRecorder
+from chute_ros.nodes.link_log import log_notice
 from chute_ros.nodes.suite_node import SuiteNode
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.nodes.supervisor_inputs import SupervisorInputs
-from chute_ros.nodes.supervisor_lease import LeaseKeeper
 from chute_ros.nodes.supervisor_memory import Memory
 from chute_ros.nodes.supervisor_messages import MODES, decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import (
@@ -41,14 +38,17 @@ from chute_ros.nodes.supervisor_parameters import (
 )
 from chute_ros.nodes.supervisor_services import SupervisorServices
 from chute_ros.nodes.vehicle_sources import VehicleSources
+from chute_ros.protocol.events import Notice
+from chute_ros.runtime.arming import Answered
+from chute_ros.runtime.supervisor import (
+    HEARTBEAT_INTERVAL,
+    Start,
+    SupervisorRuntime,
+    Turn,
+)
+from chute_ros.runtime.topics import LeaseClaim, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
-from chute_ros.supervisor.core import next_deadline, update
-from chute_ros.supervisor.epochs import epoch_above
-from chute_ros.supervisor.lease import Event
-from chute_ros.supervisor.state import State
 
-HEARTBEAT_INTERVAL = 0.1  # s
-STATE_INTERVAL = 1.0  # s, at the latest
 #: A turn so long (s) before a deadline of the core finds the processor awake and its caches filled
 #: when the deadline has come (docs/speed.md). It is seldom reached: what comes moves it on.
 EARLY = 0.0012
@@ -57,84 +57,90 @@ SHORTEST_SLEEP = 0.0001
 
 
 class SafetySupervisorNode(SuiteNode):
-    """The node safety_supervisor."""
+    """The node safety_supervisor, which is the shell of its runtime."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("safety_supervisor", PARAMETERS, **options)
         self.config = config_from(self.values)
         lease = lease_from(self.values, self.config, self.get_name())
-        now = time.monotonic()
-        # Rises from start to start; a device node that knows a higher one makes us go on above it.
-        epoch = epoch_above(max(0, int(time.time()) & 0xFFFFFFFF), lease.rank)
-        self.state = State(
-            epoch, now, mode=inputs.Mode[self.values["mode"]], leading=not lease.standby
-        )
-        first: tuple[inputs.Input, ...] = ()
         self._memory = Memory(self, self.values, self.config)
         self.at_end.callback(self._memory.close)
-        if (before := self._memory.recall()) is not None:
-            self.state = before
-            if not lease.standby:
-                first = (inputs.TakeOver(epoch_above(max(epoch, before.epoch), lease.rank)),)
+        start = Start(
+            # Rises from start to start; a device node that knows a higher one makes us go on
+            # above it.
+            max(0, int(time.time()) & 0xFFFFFFFF),
+            secrets.token_hex(8),
+            inputs.Mode[self.values["mode"]],
+            self._memory.recall(),
+        )
         self._recorder = FlightRecorder(self, self.values)
         self.at_end.callback(self._recorder.close)
         self._health = Health()
-        self._afterwards = Afterwards()
-        self.at_end.callback(self._afterwards.look, math.inf)
-        self.services_offered = SupervisorServices(self, self.wall, self._turn)
-        self._arming = DeviceArming(self, self.config.deploy_links, self._turn)
         self._seq = count()
-        self._beat_at = now
-        self._state_at = now
-        self._published: State | None = None
+        #: Decisions that have left and are not in the black box yet.
+        self._unrecorded: list[SafetyDecision] = []
+        self.services_offered = SupervisorServices(self, self.wall, self._ask)
+        self._arm_clients = {
+            link: self.create_client(Arm, f"{link}/arm") for link in self.config.deploy_links
+        }
         self._decision_publisher = self.create_publisher(
             SafetyDecision, "safety/decision", qos.DECISION
         )
         self._state_publisher = self.create_publisher(SafetyState, "safety/state", qos.LATCHED)
-        self.lease = LeaseKeeper(
-            self,
-            lease,
-            self.wall,
-            lambda: self.state,
-            lambda now: self.state.links_heard(self.config, now),
-            self._lease_event,
-            self._follow,
+        self._lease_publisher = self.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
+        self._carriers: dict[type, Callable[[Any, Time], None]] = {
+            model.Decision: self._publish_decision,
+            SafetyTold: self._publish_state,
+            SupervisorBeat: self._publish_beat,
+            LeaseClaim: self._publish_claim,
+        }
+        self.runtime = SupervisorRuntime(self.config, lease, self, start, time.monotonic())
+        self.at_end.callback(self.runtime.afterwards.look, math.inf)
+        self.create_subscription(
+            SupervisorLease, "safety/lease", self._claim, qos.newest(qos.STATUS)
         )
-        self._inputs = SupervisorInputs(
-            self, self.config, self.wall, self._recorder, self._health, self._turn
-        )
+        SupervisorInputs(self, self.wall, self._recorder, self._health, self._run)
         self._vehicle_sources = VehicleSources(
             self,
             self.values,
-            lambda *told: self._turn(inputs.VehicleReport(*told)),
-            before=self.state.vehicle.link_state,
+            lambda report, now: self._turn(report),
+            before=self.runtime.state.vehicle.link_state,
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().warning(
                 f"rule '{rule}' can never be fulfilled: the autopilot is the only source of "
                 "measurements; add imu or odometry to vehicle_sources"
             )
-        if self.state.mode in MODES:
-            self.get_logger().warning(f"mode is {MODES[self.state.mode]} (parameter mode)")
-        if self.lease.leading:
+        mode = self.runtime.state.mode
+        if mode in MODES:
+            self.get_logger().warning(f"mode is {MODES[mode]} (parameter mode)")
+        if self.runtime.lease.leading:
             self.services_offered.open()
         self.create_timer(1.0, self._diagnose, clock=self.steady)
         self._timer = self.create_timer(HEARTBEAT_INTERVAL, self._turn, clock=self.steady)
-        self._turn(*first)
+        self._turn()
 
     # -- the loop -------------------------------------------------------------------------------
 
     def _turn(self, *new: inputs.Input) -> None:
-        """Give the core what came, do what it says, sleep until its next deadline."""
-        now = time.monotonic()
+        self._run(lambda now: self.runtime.turn(new, now))
+
+    def _run(self, step: Callable[[float], None]) -> None:
+        """Have step(now) done, and sleep until the runtime has something to do."""
         with self._guarded():
-            self._look(new, now)
+            step(time.monotonic())
+            runtime, now = self.runtime, time.monotonic()
+            due = runtime.core_due
+            if due - now > 2.0 * EARLY:
+                due -= EARLY
+            self._sleep(min(due, runtime.due))
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
-        """What fails inside is reported; the process goes on, and the next turn tries anew."""
         try:
             yield
+        except NameTakenError:
+            raise
         except Exception as error:
             if not self.context.ok():
                 raise  # nothing can be told any more
@@ -145,166 +151,108 @@ class SafetySupervisorNode(SuiteNode):
         self.get_logger().error(self._health.newest, throttle_duration_sec=1.0)
         self._sleep(time.monotonic() + HEARTBEAT_INTERVAL)
 
-    def _look(self, new: tuple[inputs.Input, ...], now: float) -> None:
-        self.lease.look(now)
-        outputs = self._update(new, now)
-        if outputs is None and new:
-            self._end_calls(new)
-            outputs = self._update((), now)
-        if outputs is None:
-            # The core cannot even look at the clock: silence tells everybody.
-            self._afterwards.look(now)
-            return
-        self._carry_out(outputs, now)
-        self._arming.give_up(now)
-        if now >= self._beat_at:
-            self._beat(now)
-        self._afterwards.look(now)
-        to_tell = self._changed() or now >= self._state_at
-        if self.lease.leading and to_tell and not self._afterwards.quiet:
-            self._publish_state(now)
-        deadline = next_deadline(self.config, self.state, now)
-        if deadline - now > 2.0 * EARLY:
-            deadline -= EARLY
-        self._sleep(min(deadline, self.lease.deadline(now), self._beat_at, self._afterwards.until))
-
-    def _end_calls(self, refused: tuple[inputs.Input, ...]) -> None:
-        """Who called must not wait for what the core could not take."""
-        text = f"refused: {self._health.newest}"
-        for token in (getattr(one, "token", 0) for one in refused):
-            self.services_offered.finished(inputs.Finish(token, False, False, text))
-
-    def _update(
-        self, new: tuple[inputs.Input, ...], now: float
-    ) -> tuple[inputs.Output, ...] | None:
-        """One turn of the core, whose decisions leave at once; None: it failed, the state is as
-        before, and it was reported."""
-        before = self.state
-        try:
-            self.state, outputs = update(self.config, before, new, now)
-        except Exception as error:  # noqa: BLE001 - the loop must go on, and say so
-            self._health.refused(error, new)
-            self._tell_mistake()
-            return None
-        decisions = [output for output in outputs if isinstance(output, inputs.Decide)]
-        if decisions and self.lease.config.standby:
-            # Whoever takes over must know of what left.
-            self.lease.tell(now)
-        # Before anything is kept or told of it: a device waits for this.
-        sent = [self._publish_decision(one.decision) for one in decisions]
-        self._recorder.turn(now, new, outputs, before, self.state, self.config)
-        for message in sent:
-            self._recorder.message("safety/decision", message)
-        if decisions:
-            self._afterwards.decided(now)
-            self._afterwards.tell(partial(self._tell_decisions, decisions))
-        return outputs
-
     def _sleep(self, wake: float) -> None:
         seconds = max(SHORTEST_SLEEP, wake - time.monotonic())
         self._timer.timer_period_ns = int(seconds * 1e9)
         self._timer.reset()
 
-    def _carry_out(self, outputs: tuple[inputs.Output, ...], now: float) -> None:
-        """All but the decisions, which have left by now. Answers first: who waits for one must get
-        it, whatever fails besides."""
-        for output in sorted(outputs, key=lambda one: not isinstance(one, inputs.Finish)):
-            if not isinstance(output, inputs.Decide):
-                self._do(output, now)
+    # -- the runtime's shell ---------------------------------------------------------------------
 
-    def _do(self, output: inputs.Output, now: float) -> None:
-        if isinstance(output, inputs.Finish):
-            self.services_offered.finished(output)
-        elif isinstance(output, inputs.ArmDevices):
-            self._arming.begin(output, now)
-        elif isinstance(output, inputs.Refused):
-            self.lease.refused(output.newest_epoch, now)
-        else:
-            self._afterwards.tell(partial(self._log, output))
+    def publish(self, message: Any) -> int:
+        """On its topic; its stamp, ns."""
+        now = self.wall.now()
+        self._carriers[type(message)](message, now.to_msg())
+        return int(now.nanoseconds)
 
-    def _log(self, output: inputs.Say) -> None:
+    def log(self, notice: Notice) -> None:
+        """At the level that it deserves."""
+        log_notice(self.get_logger(), notice)
+
+    def say(self, said: inputs.Say) -> None:
+        """What the core tells a person."""
         log = self.get_logger()
-        log.error(output.text) if output.alarm else log.info(output.text)
+        log.error(said.text) if said.alarm else log.info(said.text)
 
-    def _publish_decision(self, decision: model.Decision) -> SafetyDecision:
-        message = messages.decision(decision, self.stamp())
-        self._decision_publisher.publish(message)
-        return message
+    def record(self, turn: Turn) -> None:
+        """In the black box, with the decisions that left."""
+        self._recorder.turn(turn.now, turn.new, turn.outputs, turn.before, turn.after, self.config)
+        sent, self._unrecorded = self._unrecorded, []
+        for message in sent:
+            self._recorder.message("safety/decision", message)
 
-    def _tell_decisions(self, decided: list[inputs.Decide]) -> None:
-        self._memory.keep(self.state)
-        for output in decided:
-            if output.again:
-                continue
-            decision = output.decision
-            shadow = " (SHADOW, not sent)" if decision.shadow else ""
-            device = f" device {decision.device}" if decision.device else ""
-            self.get_logger().warning(
-                f"decision {decision.epoch}.{decision.id} {decision.action.name}{shadow} by rule "
-                f"'{decision.rule}' to {', '.join(decision.targets)}{device}: "
-                f"{'; '.join(decision.reasons)}"
-            )
+    def keep(self, state: Any) -> None:
+        """For a start anew."""
+        self._memory.keep(state)
 
-    # -- the lease ------------------------------------------------------------------------------
-
-    def _lease_event(self, event: Event) -> None:
-        with self._guarded():
-            self._follow_lease(event, time.monotonic())
-
-    def _follow_lease(self, event: Event, now: float) -> None:
-        if self.lease.leading:
-            epoch = self.lease.next_epoch()
-            self.get_logger().warning(f"leads from now on, epoch {epoch}: {event.value}")
-            outputs = self._update((inputs.TakeOver(epoch),), now)
+    def offer(self, offered: bool) -> None:
+        """The services are there only while it leads."""
+        if offered:
             self.services_offered.open()
         else:
-            self.get_logger().warning(f"only looks on from now on: {event.value}")
-            outputs = self._update((inputs.StepDown(event.value),), now)
             self.services_offered.close()
-        self._carry_out(outputs or (), now)
-        self.lease.tell(now)
 
-    def _follow(self, state: State) -> None:
-        self.state = state
+    def failed(self, error: Exception, new: tuple[inputs.Input, ...]) -> str:
+        """The core could not take this."""
+        self._health.refused(error, new)
+        self._tell_mistake()
+        return self._health.newest
 
-    # -- outputs --------------------------------------------------------------------------------
+    def arm(self, link: str, order: inputs.ArmDevices, answered: Answered) -> str:
+        """Call a device node's arm service."""
+        client = self._arm_clients[link]
+        if not client.service_is_ready():
+            return f"its service {link}/arm is not there"
 
-    def _beat(self, now: float) -> None:
-        self._health.beat_late = now - self._beat_at
-        self._beat_at = max(self._beat_at + HEARTBEAT_INTERVAL, now)
+        def done(future: Future) -> None:
+            answer = future.result()
+            self._run(lambda now: answered(answer.success, answer.message, now))
+
+        request = Arm.Request(arm=order.arm, triggers=order.triggers)
+        client.call_async(request).add_done_callback(done)
+        return ""
+
+    # -- what comes, and what is published ------------------------------------------------------
+
+    def _ask(
+        self, make: Callable[[int], inputs.Input], answered: Callable[[inputs.Finish], None]
+    ) -> None:
+        self._run(lambda now: self.runtime.ask(make, answered, now))
+
+    def _claim(self, message: SupervisorLease) -> None:
+        claim = messages.lease_claim_from(message)
+        self._run(lambda now: self.runtime.claim(claim, now))
+
+    def _publish_decision(self, decision: model.Decision, stamp: Time) -> None:
+        message = messages.decision(decision, stamp)
+        self._decision_publisher.publish(message)
+        self._unrecorded.append(message)
+
+    def _publish_beat(self, beat: SupervisorBeat, stamp: Time) -> None:
         message = LinkHeartbeat(
-            link=self.get_name(),
+            link=beat.name,
             seq=next(self._seq) % 2**32,
             link_state=LinkHeartbeat.LINK_OK,
-            device_healthy=self.lease.leading,
+            device_healthy=beat.leading,
             age=0.0,
             supervisor=True,
         )
-        message.header.stamp = self.stamp()
+        message.header.stamp = stamp
         self.heartbeat_publisher.publish(message)
-        self.lease.tell(now)
         self.services_offered.tidy()
 
-    def _changed(self) -> bool:
-        before, now = self._published, self.state
-        told = attrgetter("stage", "mode", "next_id", "alarms", "device_blocks")
-        return before is None or told(before) != told(now)
-
-    def _publish_state(self, now: float) -> None:
-        self._published, self._state_at = self.state, now + STATE_INTERVAL
-        self._memory.keep(self.state)
-        stamp = self.stamp()
-        message = state_message(self.config, self.state, now, stamp)
-        message.supervisor = self.get_name()
-        message.link_stamps = [self._inputs.stamps.get(link, Time()) for link in self.config.links]
+    def _publish_state(self, told: SafetyTold, stamp: Time) -> None:
+        message = state_message(self.config, told, stamp)
         self._state_publisher.publish(message)
         self._recorder.message("safety/state", message)
 
+    def _publish_claim(self, told: LeaseClaim, stamp: Time) -> None:
+        self._lease_publisher.publish(messages.lease_claim(told, stamp))
+
     def _diagnose(self) -> None:
-        name, now = self.diagnostic_name, time.monotonic()
+        name, now, runtime = self.diagnostic_name, time.monotonic(), self.runtime
         tasks = [
-            decisions_task(name, self.config, self.state, now),
-            self._health.task(name, self.state, self.lease, now),
+            decisions_task(name, self.config, runtime.state, now),
+            self._health.task(name, runtime, now),
             self._memory.task(name),
             *self._recorder.tasks(),
         ]

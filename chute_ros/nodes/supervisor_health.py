@@ -8,9 +8,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.event_handler import SubscriptionEventCallbacks
 
 from chute_ros.nodes import diagnostics
-from chute_ros.nodes.supervisor_lease import LeaseKeeper
+from chute_ros.runtime.supervisor import SupervisorRuntime
 from chute_ros.supervisor import inputs
-from chute_ros.supervisor.state import State
 
 #: A mistake inside, or messages that were lost, are shown as an error for so many looks (s).
 _SHOWN_FOR = 60
@@ -20,8 +19,6 @@ class Health:
     """Counts, and tells it in diagnostics."""
 
     def __init__(self) -> None:
-        #: How late the newest own heartbeat was, s.
-        self.beat_late = 0.0
         #: The newest mistake in words; empty: none.
         self.newest = ""
         self._failures = 0
@@ -49,8 +46,9 @@ class Health:
         self._failures += 1
         self.newest = f"{what}: {type(error).__name__}: {error}"
 
-    def task(self, name: str, state: State, lease: LeaseKeeper, now: float) -> DiagnosticStatus:
+    def task(self, name: str, runtime: SupervisorRuntime, now: float) -> DiagnosticStatus:
         """For diagnostics."""
+        state, lease = runtime.state, runtime.lease
         lost = sum(self._lost.values())
         seen = (self._failures, lost, state.late_count)
         self._shown = _SHOWN_FOR if seen != self._seen else max(0, self._shown - 1)
@@ -74,7 +72,7 @@ class Health:
             "leader": lease.config.name if lease.leading else lease.lease.leader,
             "rank": lease.config.rank,
             "hot standby": lease.config.standby,
-            "newest heartbeat late by (s)": self.beat_late,
+            "newest heartbeat late by (s)": runtime.beat_late,
             "updates late": state.late_count,
             "mistakes inside": self._failures,
             "newest mistake": self.newest,

@@ -6,8 +6,8 @@ from builtin_interfaces.msg import Time
 from chute_msgs.msg import RuleState, SafetyState
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from chute_ros import model
-from chute_ros.nodes import diagnostics
+from chute_ros.nodes import diagnostics, messages
+from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.flight import doubt, measured, unusable
 from chute_ros.supervisor.inputs import Mode
@@ -24,11 +24,13 @@ MODES = {
 }
 
 
-def state_message(config: SupervisorConfig, state: State, now: float, stamp: Time) -> SafetyState:
-    """safety/state at now."""
+def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> SafetyState:
+    """safety/state."""
+    state, now = told.state, told.now
     reasons = block_reasons(config, state, now)
-    blocked = _flight_blocked(state)
+    blocked = state.flight_blocked
     message = SafetyState(
+        supervisor=told.supervisor,
         epoch=state.epoch,
         state=int(state.stage),
         state_text=_text(state, reasons),
@@ -42,6 +44,7 @@ def state_message(config: SupervisorConfig, state: State, now: float, stamp: Tim
     for link in config.links:
         evidence = state.evidence(link)
         message.links.append(link)
+        message.link_stamps.append(messages.stamp_of(told.stamps.get(link, 0)))
         message.link_states.append(int(evidence.judged(config.limits(link), now)))
         message.link_ages.append(now - evidence.heard)
         message.devices_healthy.append(evidence.device_healthy)
@@ -113,12 +116,6 @@ def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float
         conditions=[f"{marks[one.holds]} {one.text}" for one in judged.findings] if alive else [],
         denied=counted.denied,
     )
-
-
-def _flight_blocked(state: State) -> bool:
-    if state.block is None or state.block.decision.shadow:
-        return False
-    return state.block.decision.action is model.Action.FLIGHT_BLOCK
 
 
 def _text(state: State, reasons: tuple[str, ...]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import date
-from itertools import count
 from typing import Any
 
 from chute_msgs.srv import Arm, Deploy, Kill, SetMode
@@ -20,16 +19,16 @@ from std_srvs.srv import Trigger
 from chute_ros.nodes import messages
 from chute_ros.supervisor import inputs
 
+#: Makes an input of a token, and gets the answer.
+Ask = Callable[[Callable[[int], inputs.Input], Callable[[inputs.Finish], None]], None]
 _EPOCH = date(1970, 1, 1).toordinal()
 
 
 class SupervisorServices:
-    """feed: gives the core an input; its answers come back through finished."""
+    """ask: asks the core, and has the answer given to who waits for it."""
 
-    def __init__(self, node: Node, wall: Clock, feed: Callable[[inputs.Input], None]) -> None:
-        self._node, self._wall, self._feed = node, wall, feed
-        self._tokens = count(1)
-        self._waiting: dict[int, Future] = {}
+    def __init__(self, node: Node, wall: Clock, ask: Ask) -> None:
+        self._node, self._wall, self._ask_core = node, wall, ask
         # A service that awaits its outcome must not keep the decision loop from running.
         self._group = ReentrantCallbackGroup()
         self._offers = (
@@ -91,16 +90,9 @@ class SupervisorServices:
 
         return served
 
-    def finished(self, output: inputs.Finish) -> None:
-        """The core has answered."""
-        future = self._waiting.pop(output.token, None)
-        if future is not None:
-            future.set_result(output)
-
     async def _ask(self, make: Callable[[int], inputs.Input]) -> inputs.Finish:
-        token = next(self._tokens)
-        self._waiting[token] = future = Future()
-        self._feed(make(token))
+        future = Future()
+        self._ask_core(make, future.set_result)
         return await future
 
     async def _arm(self, request: Any, response: Any) -> Any:

@@ -11,7 +11,6 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 from chute_msgs.msg import VehicleState
@@ -34,8 +33,9 @@ from chute_ros.protocol.vehicle_merge import (
     ODOMETRY,
     TELL_INTERVAL,
     VEHICLE_STATE,
-    VehicleMerge,
 )
+from chute_ros.runtime.vehicle_hearing import VehicleHearing
+from chute_ros.supervisor.inputs import VehicleReport
 
 SOURCES = (VEHICLE_STATE, ODOMETRY, IMU, MAVROS)
 
@@ -85,24 +85,24 @@ class VehicleSources:
     """Subscribes to what the parameters name and tells what the vehicle is by then.
 
     values: the node's parameters, VEHICLE_PARAMETERS among them, and vehicle_state_age (s): a
-    source of the autopilot that is silent for longer has lost it. tell(state, disputed, told_by),
-    as inputs.VehicleReport has them, is called by the node's executor. clock: monotonic seconds.
-    before: how the autopilot was heard before a restart (NEVER_SEEN: not, or nobody knows).
+    source of the autopilot that is silent for longer has lost it. tell(report, now) is called by
+    the node's executor. clock: monotonic seconds. before: how the autopilot was heard before a
+    restart (NEVER_SEEN: not, or nobody knows).
     """
 
     def __init__(
         self,
         node: Node,
         values: Mapping[str, Any],
-        tell: Callable[[model.VehicleState, frozenset[str], Mapping[str, str]], object],
+        tell: Callable[[VehicleReport, float], object],
         clock: Callable[[], float] = time.monotonic,
         before: model.LinkState = model.LinkState.NEVER_SEEN,
     ) -> None:
         self._node, self._values, self._tell, self._clock = node, values, tell, clock
         sources = _checked(values["vehicle_sources"])
-        self._merge = VehicleMerge(sources, values["vehicle_state_age"])
-        self._merge.recall(before, clock())
-        self._told_at = -math.inf
+        self._hearing = VehicleHearing(
+            sources, values["vehicle_state_age"], self._told, before, clock()
+        )
         self._refused: set[str] = set()
         self._disputed: frozenset[str] = frozenset()
         inputs = {source: self._inputs(source) for source in sources if source != VEHICLE_STATE}
@@ -112,8 +112,8 @@ class VehicleSources:
         )
         self._timer.cancel()
         if VEHICLE_STATE in sources:
-            callback = self._pass_on if sources == [VEHICLE_STATE] else self._vehicle_state
-            node.create_subscription(VehicleState, VEHICLE_STATE, callback, qos.newest(qos.STATUS))
+            newest = qos.newest(qos.STATUS)
+            node.create_subscription(VehicleState, VEHICLE_STATE, self._vehicle_state, newest)
         for source, kinds in inputs.items():
             for kind, parameter, read in kinds:
                 self._subscribe(kind, parameter, partial(self._heard, source, parameter, read))
@@ -148,13 +148,9 @@ class VehicleSources:
 
     # -- messages -------------------------------------------------------------------------------
 
-    def _pass_on(self, message: VehicleState) -> None:
-        self._tell(messages.vehicle_state_from(message), frozenset(), MappingProxyType({}))
-
     def _vehicle_state(self, message: VehicleState) -> None:
-        now = self._clock()
-        self._merge.hear_state(messages.vehicle_state_from(message), now)
-        self._tell_soon(now)
+        self._hearing.hear_state(messages.vehicle_state_from(message), self._clock())
+        self._wait()
 
     def _heard(self, source: str, parameter: str, read: Reader, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -163,9 +159,8 @@ class VehicleSources:
         if foreign:
             self._refuse(parameter, foreign)
             return
-        now = self._clock()
-        self._merge.hear(source, read(message), now)
-        self._tell_soon(now)
+        self._hearing.hear(source, read(message), self._clock())
+        self._wait()
 
     def _refuse(self, parameter: str, frame: str) -> None:
         if parameter not in self._refused:
@@ -177,25 +172,25 @@ class VehicleSources:
 
     # -- telling --------------------------------------------------------------------------------
 
-    def _tell_soon(self, now: float) -> None:
-        """At once, or together with what else comes until the interval is over."""
-        if now - self._told_at >= TELL_INTERVAL:
-            self._tell_now()
+    def _wait(self) -> None:
+        """Something may wait for the end of the interval."""
+        if math.isinf(self._hearing.due):
+            self._timer.cancel()
         elif self._timer.is_canceled():
             self._timer.reset()
 
     def _tell_now(self) -> None:
         self._timer.cancel()
-        self._told_at = self._clock()
-        disputed = self._merge.disputed(self._told_at)
-        if new := sorted(disputed - self._disputed):
+        self._hearing.tell_now(self._clock())
+
+    def _told(self, report: VehicleReport, now: float) -> None:
+        if new := sorted(report.disputed - self._disputed):
             self._node.get_logger().warning(
                 f"vehicle_sources: {', '.join(new)} is told otherwise by another source, or has "
                 "jumped: in doubt, and half a sign where one would decide alone (docs/rules.md)"
             )
-        self._disputed = disputed
-        told_by = self._merge.told_by(self._told_at)
-        self._tell(self._merge.state(self._told_at), disputed, told_by)
+        self._disputed = report.disputed
+        self._tell(report, now)
 
 
 def _checked(sources: list[str]) -> list[str]:

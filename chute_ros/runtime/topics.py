@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chute_ros.model import Action, LinkState
 from chute_ros.protocol.upf.vehicle_service import Ask
 from chute_ros.supervisor.inputs import ActionReport
+from chute_ros.supervisor.lease import Claim
+from chute_ros.supervisor.state import State
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,33 @@ class SupervisorBeat:
 
 
 @dataclass(frozen=True)
+class SafetyTold:
+    """A supervisor's picture, as it is published on safety/state."""
+
+    supervisor: str
+    state: State
+    #: The stamp of the newest heartbeat of each link, ns.
+    stamps: Mapping[str, int]
+    #: Monotonic s.
+    now: float
+
+
+@dataclass(frozen=True)
+class LeaseClaim:
+    """What a supervisor says of itself to the others (safety/lease)."""
+
+    claim: Claim
+    #: Tells it from another of its name; empty: it is not from a supervisor.
+    instance: str
+    #: For how long it runs, s.
+    running: float
+    #: Whom it follows; empty: nobody yet, or it leads.
+    leader: str
+    #: The leader's, for those that follow it; empty: none follows.
+    state: str
+
+
+@dataclass(frozen=True)
 class SafetyPicture:
     """Of safety/state what device nodes look at."""
 
@@ -40,7 +70,7 @@ class SafetyPicture:
     device_blocks: tuple[str, ...]
     #: Whose it is, and the stamp of the newest heartbeat of each link, ns.
     supervisor: str
-    stamps: dict[str, int]
+    stamps: Mapping[str, int]
 
 
 @dataclass(frozen=True)

@@ -225,6 +225,12 @@ class State:
     canopy_fails: bool = False
 
     @property
+    def flight_blocked(self) -> bool:
+        """Device nodes were told to keep the vehicle on the ground."""
+        block = self.block.decision if self.block is not None else None
+        return block is not None and block.action is Action.FLIGHT_BLOCK and not block.shadow
+
+    @property
     def deploy(self) -> Pending | None:
         """The newest step of the ladder."""
         return self.deploys[-1] if self.deploys else None

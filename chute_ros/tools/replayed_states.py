@@ -7,6 +7,7 @@ from typing import Any
 from builtin_interfaces.msg import Time
 
 from chute_ros.nodes.supervisor_messages import state_message
+from chute_ros.runtime.topics import SafetyTold
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording
 from chute_ros.tools.replaying import Replayer
@@ -30,6 +31,7 @@ def replayed_states(recording: Recording) -> list[tuple[float, Any]]:
             continue
         at = recording.seconds(turn.wall)
         if outputs or not pictures or not 0.0 <= at - pictures[-1][0] < apart:
-            picture = state_message(core.config, core.state, turn.turn.now, Time())
+            told = SafetyTold("", core.state, {}, turn.turn.now)
+            picture = state_message(core.config, told, Time())
             pictures.append((at, picture))
     return pictures

@@ -10,8 +10,8 @@ from chute_msgs.srv import Kill
 from supervisor_bench import Scene
 
 from chute_ros.model import Action
-from chute_ros.nodes import afterwards
-from chute_ros.nodes.afterwards import QUIET, Afterwards
+from chute_ros.runtime import afterwards
+from chute_ros.runtime.afterwards import QUIET, Afterwards
 
 #: Longer than anything here takes, s.
 LONG = 3.0
@@ -77,7 +77,9 @@ def ready(bench, monkeypatch):
     """A supervisor that stays quiet for long."""
     scene = Scene(bench)
     scene.await_stage(SafetyState.READY)
-    bench.until(lambda: not scene.supervisor._afterwards.quiet, "all is told of the release")
+    bench.until(
+        lambda: not scene.supervisor.runtime.afterwards.quiet, "all is told of the release"
+    )
     monkeypatch.setattr(afterwards, "QUIET", LONG)
     return scene
 

@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.nodes.supervisor_messages import decisions_task, state_message
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import Measured
@@ -55,4 +56,4 @@ def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() 
     assert text in task.message
     assert values(task)["sources contradict each other"] == "attitude"
     assert values(task)["tilt_deg"] == "90.00 (in doubt: another source told otherwise)"
-    assert text in state_message(CONFIG, state, NOW, Time()).state_text
+    assert text in state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text

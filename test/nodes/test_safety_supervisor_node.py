@@ -13,8 +13,9 @@ from std_srvs.srv import Trigger
 from supervisor_bench import QUICK, Scene
 
 from chute_ros.model import Action, LinkState, Outcome
-from chute_ros.nodes import qos, safety_supervisor_node
+from chute_ros.nodes import qos
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.runtime import supervisor as runtime
 
 
 @pytest.fixture
@@ -109,7 +110,7 @@ def test_whom_it_remembers_is_published_at_once_though_nothing_else_changes(read
     request(ready, SafetyRequest.FLIGHT_BLOCK)
     before = ready.await_stage(SafetyState.BLOCKED)
     # After one more, no state comes but for a change.
-    monkeypatch.setattr(safety_supervisor_node, "STATE_INTERVAL", 3600.0)
+    monkeypatch.setattr(runtime, "STATE_INTERVAL", 3600.0)
     ready.states.clear()
     ready.bench.until(lambda: ready.states, "the last regular state")
     request(ready, SafetyRequest.FLIGHT_BLOCK, link="another")
@@ -264,7 +265,7 @@ def test_after_a_restart_of_the_supervisor_its_epoch_is_higher(ready):
     again = ready.bench.add(SafetySupervisorNode, **QUICK)
     ready.bench.until(lambda: ready.states, "it speaks")
     assert ready.states[-1].epoch >= before
-    assert again.state.epoch > 0
+    assert again.runtime.state.epoch > 0
 
 
 # Reset and modes

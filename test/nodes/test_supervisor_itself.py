@@ -12,8 +12,8 @@ from node_bench import stamped
 from supervisor_bench import Scene
 
 from chute_ros.model import Action
-from chute_ros.nodes import safety_supervisor_node
 from chute_ros.nodes.supervisor_health import Health
+from chute_ros.runtime import supervisor as runtime
 from chute_ros.sim.parachute_device import ParachuteSettings
 from chute_ros.supervisor import core, inputs
 
@@ -59,7 +59,7 @@ def test_an_input_that_the_core_cannot_take_is_left_out_and_reported(bench, monk
     scene = Watched(bench)
     scene.await_itself(DiagnosticStatus.OK, "leads")
     poison = failing(lambda new: any(isinstance(one, inputs.ActionReport) for one in new))
-    monkeypatch.setattr(safety_supervisor_node, "update", poison)
+    monkeypatch.setattr(runtime, "update", poison)
     scene.link.flying = True
     scene.await_stage(SafetyState.IN_FLIGHT)  # it reports on the release meanwhile
     scene.link.report_newest(Action.FLIGHT_BLOCK_RELEASE, 3)
@@ -72,7 +72,7 @@ def test_an_input_that_the_core_cannot_take_is_left_out_and_reported(bench, monk
 def test_who_called_for_what_the_core_cannot_take_is_answered(bench, monkeypatch):
     Watched(bench)
     poison = failing(lambda new: any(isinstance(one, inputs.KillRequest) for one in new))
-    monkeypatch.setattr(safety_supervisor_node, "update", poison)
+    monkeypatch.setattr(runtime, "update", poison)
     answer = bench.call(Kill, "safety/kill", reason="a test")
     assert not answer.success
     assert "refused: left out KillRequest: ZeroDivisionError" in answer.message
@@ -80,7 +80,7 @@ def test_who_called_for_what_the_core_cannot_take_is_answered(bench, monkeypatch
 
 def test_what_fails_beside_the_core_is_reported_and_does_not_end_the_process(bench, monkeypatch):
     scene = Watched(bench)
-    monkeypatch.setattr(scene.supervisor, "_beat", lambda now: 1 / 0)
+    monkeypatch.setattr(scene.supervisor.runtime, "_beat", lambda now: 1 / 0)
     values = scene.await_itself(DiagnosticStatus.ERROR, "mistakes inside")
     told = "a turn was not done to its end: ZeroDivisionError: division by zero"
     assert values["newest mistake"] == told
@@ -93,7 +93,7 @@ def test_what_fails_beside_the_core_is_reported_and_does_not_end_the_process(ben
 
 def test_a_core_that_fails_without_any_input_falls_silent(bench, monkeypatch):
     scene = Watched(bench)
-    monkeypatch.setattr(safety_supervisor_node, "update", failing(lambda new: True))
+    monkeypatch.setattr(runtime, "update", failing(lambda new: True))
     bench.until(lambda: scene.supervisor._health.newest, "it has failed")
     scene.supervisor._health.newest = ""
     bench.until(lambda: scene.supervisor._health.newest, "it still looks at the clock")
@@ -126,12 +126,12 @@ def test_messages_that_a_queue_lost_are_counted_by_topic(bench):
     health.watch("safety/action").message_lost(Lost())
     health.watch("safety/action").message_lost(Lost())
     scene = Watched(bench)
-    task = health.task("x", scene.supervisor.state, scene.supervisor.lease, time.monotonic())
+    task = health.task("x", scene.supervisor.runtime, time.monotonic())
     assert task.level == DiagnosticStatus.WARN
     assert {p.key: p.value for p in task.values}["messages lost on safety/action"] == "6"
     health.refused(ValueError("no number"), ())
     for _ in range(60):
-        task = health.task("x", scene.supervisor.state, scene.supervisor.lease, time.monotonic())
+        task = health.task("x", scene.supervisor.runtime, time.monotonic())
         assert task.level == DiagnosticStatus.ERROR, "a mistake inside is worse"
 
 

@@ -122,7 +122,7 @@ def test_a_forged_claim_of_its_name_ends_no_supervisor_that_is_at_work(bench, fl
         scene.link.flying = True
         scene.await_stage(SafetyState.IN_FLIGHT)
     else:
-        scene.supervisor.lease._started -= 60.0
+        scene.supervisor.runtime.lease._started -= 60.0
     said = bench.follow(DiagnosticArray, "/diagnostics")
 
     def told():
@@ -136,7 +136,7 @@ def test_a_forged_claim_of_its_name_ends_no_supervisor_that_is_at_work(bench, fl
     (first, *_) = bench.until(told, "it is said")
     assert first.level == DiagnosticStatus.ERROR
     assert f"another supervisor is called {name} as well: end one" in first.message
-    assert scene.supervisor.lease.leading
+    assert scene.supervisor.runtime.lease.leading
 
 
 def test_a_name_is_free_again_when_its_lock_is_closed(tmp_path):

@@ -34,9 +34,9 @@ class Listener(Node):
         values = {**declare(self, VEHICLE_PARAMETERS), "vehicle_state_age": 2.5}
         self.sources = VehicleSources(self, values, self.hear, lambda: self.now)
 
-    def hear(self, state, disputed, told_by):
-        self.told.append(state)
-        self.disputed, self.told_by = disputed, told_by
+    def hear(self, report, now):
+        self.told.append(report.state)
+        self.disputed, self.told_by = report.disputed, report.told_by
 
 
 @pytest.fixture

@@ -160,5 +160,5 @@ def test_a_supervisor_does_not_go_on_with_what_everybody_may_write(bench, monkey
     scene.link.flying = False
     scene.states.clear()
     again = Scene(bench, profile="by_hand", black_box=False)
-    assert again.supervisor.state.stage.name == "STARTUP"
+    assert again.supervisor.runtime.state.stage.name == "STARTUP"
     assert f"{path} may be written by everybody: chmod 600 {path}" in capfd.readouterr().err

@@ -66,14 +66,14 @@ def flying(bench, **parameters):
 
 def test_a_lease_claimed_with_a_huge_epoch_takes_nothing_over(bench):
     scene = ready(bench, hot_standby=True, rank=0, lease_listen=0.3)
-    epoch = scene.supervisor.state.epoch
+    epoch = scene.supervisor.runtime.state.epoch
     for rank in (0, 1, 2, 3, 9):
         claim = SupervisorLease(name="liar", rank=rank, epoch=LARGEST_EPOCH, leading=True)
         for _ in range(3):
             say(scene, claim, "safety/lease")
     bench.turns(1.0)
-    assert scene.supervisor.lease.leading
-    assert scene.supervisor.state.epoch == epoch
+    assert scene.supervisor.runtime.lease.leading
+    assert scene.supervisor.runtime.state.epoch == epoch
 
 
 @pytest.mark.parametrize("hot_standby", [False, True])
@@ -81,7 +81,7 @@ def test_a_lease_claimed_with_a_huge_epoch_takes_nothing_over(bench):
 def test_a_state_in_a_lease_that_nobody_can_have_is_not_followed(bench, hot_standby, field):
     """The forged claim is believed while it is told, and no longer."""
     scene = ready(bench, hot_standby=hot_standby, rank=0, lease_listen=0.3)
-    supervisor = scene.supervisor
+    supervisor = scene.supervisor.runtime
     before = supervisor.state.epoch
     claim = SupervisorLease(
         name="liar",

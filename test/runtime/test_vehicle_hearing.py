@@ -9,11 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chute_ros.campaign.sensor_messages import Imu, Vector, odometry, rolled
-from chute_ros.campaign.vehicle_hearing import VehicleHearing
 from chute_ros.model import VehicleState
 from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.vehicle_merge import IMU, TELL_INTERVAL, VEHICLE_STATE
-from chute_ros.supervisor import inputs as i
+from chute_ros.runtime.vehicle_hearing import VehicleHearing
 
 
 @given(st.floats(-50.0, 500.0), st.floats(-60.0, 60.0), st.floats(-math.pi, math.pi))
@@ -38,10 +37,11 @@ def test_the_picture_is_told_at_once_and_then_as_often_as_by_the_node() -> None:
     hearing = VehicleHearing(
         (VEHICLE_STATE, IMU), 2.5, lambda report, now: told.append((now, report.state))
     )
-    hearing.hear(i.VehicleReport(VehicleState(height=12.0, height_age=0.1)), 10.0)
+    hearing.hear_state(VehicleState(height=12.0, height_age=0.1), 10.0)
     assert [now for now, _ in told] == [10.0]
     for n in range(1, 4):
-        hearing.hear(Imu(rolled(0.1 * n), Vector(z=9.8)), 10.0 + 0.004 * n)
+        told_by_imu = readings.imu(Imu(rolled(0.1 * n), Vector(z=9.8)))
+        hearing.hear(IMU, told_by_imu, 10.0 + 0.004 * n)
     assert len(told) == 1
     assert hearing.due == pytest.approx(10.004 + TELL_INTERVAL)
     hearing.tell_now(hearing.due)
