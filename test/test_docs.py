@@ -1,5 +1,6 @@
 """What is said of the parameters elsewhere is what the nodes declare."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -34,3 +35,17 @@ def test_every_executable_is_in_the_readme() -> None:
 def test_the_table_of_measurements_is_up_to_date() -> None:
     text = (ROOT / parameter_docs.RULES).read_text()
     assert text == parameter_docs.rules_text(text), "run: make docs"
+
+
+def test_each_file_on_the_way_of_a_frame_is_there() -> None:
+    text = (ROOT / "docs/design/way_of_a_frame.md").read_text()
+    # A name alone is of the folder that was named before it on its line.
+    named, missing = 0, []
+    for line in text.splitlines():
+        folder = ""
+        for found in re.findall(r"(?:[\w*]+/)*\w+\.py", line):
+            folder = found.rpartition("/")[0] or folder
+            named += 1
+            if not [*(ROOT / "chute_ros").glob(f"{folder}/{found.rpartition('/')[2]}")]:
+                missing.append(found)
+    assert (named > 25, missing) == (True, [])

@@ -17,7 +17,8 @@ from chute_ros.protocol.vehicle_merge import FRESH
 #: So many wrong flights are named, and so many causes.
 _MOST_NAMED = 50
 _INTRODUCTION = f"""\
-Each flight is a world in virtual time: the real core, the real protocols (MAVLink, UPF on
+Each flight is a world in virtual time: the real core, what the nodes do around it (`runtime/`:
+the gate, requests, reports, the lease, what is kept), the real protocols (MAVLink, UPF on
 DroneCAN, the umbilical), the simulated devices on a network, a CAN bus or a cable, one supervisor
 or two.
 Frames and messages are lost, doubled, delayed, overtaken, damaged; cables flap; processes hang,
