@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 
-from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.protocol.umbilical.modes import FlightMode
+from chute_ros.links.umbilical.protocol.layouts import Layout
+from chute_ros.links.umbilical.protocol.modes import FlightMode
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from bench.command import at_least, run, with_children
 from bench.report import load, summary, table
 from bench.wire_ends import NOMINAL_RATE, Round, RoundFailedError, WireEnds, WrongOrderError
-from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.processes import Processes
 from chute_ros.transport.data_types import load_data_types

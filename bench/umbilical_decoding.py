@@ -18,14 +18,14 @@ from bench.command import at_least, run
 from bench.decoding import Batch, Peer, Times, take_turns, times_table
 from bench.flight_lines import REAL_RATE, FlightLines
 from bench.report import load
-from chute_ros.protocol.umbilical import sayings
-from chute_ros.protocol.umbilical.config import UmbilicalConfig
-from chute_ros.protocol.umbilical.decoder import LINES_TO_RECOGNISE, TelemetryDecoder
-from chute_ros.protocol.umbilical.events import TelemetryReceived
-from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.protocol.umbilical.link import UmbilicalLink
-from chute_ros.protocol.umbilical.stream import Line, StreamReader
-from chute_ros.transport.telem_layouts import load_layouts
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol import sayings
+from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
+from chute_ros.links.umbilical.protocol.decoder import LINES_TO_RECOGNISE, TelemetryDecoder
+from chute_ros.links.umbilical.protocol.events import TelemetryReceived
+from chute_ros.links.umbilical.protocol.layouts import Layout
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
+from chute_ros.links.umbilical.protocol.stream import Line, StreamReader
 
 HEADING = "Umbilical telemetry"
 

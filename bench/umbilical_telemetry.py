@@ -17,7 +17,7 @@ from bench.command import Children, at_least, run, with_children
 from bench.flight_lines import REAL_RATE, FlightLines
 from bench.report import load, summary, table
 from bench.umbilical_ends import LATE, Ends, Step, Subscriber
-from chute_ros.transport.telem_layouts import load_layouts
+from chute_ros.links.umbilical.layout_files import load_layouts
 
 HEADING = "Umbilical telemetry"
 

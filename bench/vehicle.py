@@ -18,7 +18,7 @@ from bench.process_cost import cpu_time, resident_memory
 from bench.report import load, summary, table
 from bench.vehicle_wire import NOMINAL_RATE, VehicleWire
 from chute_ros.errors import ChuteError
-from chute_ros.protocol.mavlink.commands import CommandLimits
+from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.tools.isolation import free_udp_ports
 
 HEADING = "A vehicle"

@@ -7,11 +7,15 @@ import struct
 import time
 from collections.abc import Callable
 
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
+from chute_ros.links.upf.protocol.definitions import (
+    PARACHUTE_SERVICE,
+    TRIGGER_LAUNCH,
+    TRIGGER_SERVICE,
+)
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import Kind
-from chute_ros.protocol.upf.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
-from chute_ros.protocol.upf.definitions import PARACHUTE_SERVICE, TRIGGER_LAUNCH, TRIGGER_SERVICE
 from chute_ros.transport.can_address import CanAddress
 from chute_ros.transport.can_multicast import CanMulticastWire
 from chute_ros.transport.data_types import load_data_types

@@ -19,8 +19,8 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.substitutions import ExecutableInPackage
 
+from chute_ros.links.upf.protocol.parameters import EXCLUDES
 from chute_ros.nodes.middleware import LEADS_ELSEWHERE
-from chute_ros.protocol.upf.parameters import EXCLUDES
 from launch import LaunchContext, LaunchDescription
 
 #: As a controller is delivered it takes off, arms, disarms and lands by itself, and refuses to be

@@ -41,7 +41,9 @@ def test_the_rule_holds(copy):
         ("supervisor", "import serial", "serial"),
         ("runtime", "import threading", "threading"),
         ("runtime", "from chute_ros.transport import offender", "chute_ros.transport"),
-        ("links", "import rclpy", "rclpy"),
+        ("links.upf.protocol", "import rclpy", "rclpy"),
+        ("links.mavlink.protocol", "from time import monotonic", "time"),
+        ("links.upf.protocol", "from chute_ros.links import mavlink", "chute_ros.links.mavlink"),
         ("campaign", "from chute_ros.supervisor.core import update", "chute_ros.supervisor.core"),
         ("protocol", "from chute_ros.nodes import offender", "chute_ros.nodes"),
         ("supervisor", "from chute_ros.transport import offender", "chute_ros.transport"),
@@ -51,7 +53,7 @@ def test_the_rule_holds(copy):
 def test_the_rule_names_an_offender(copy, package, line, named):
     for layer in ("nodes", "transport"):
         (copy / "chute_ros" / layer / "offender.py").touch()
-    (copy / "chute_ros" / package / "offending.py").write_text(line + "\n")
+    (copy / "chute_ros" / package.replace(".", "/") / "offending.py").write_text(line + "\n")
     result = lint(copy)
     assert result.returncode == 1
     assert f"chute_ros.{package}.offending -> {named}" in result.stdout

@@ -7,19 +7,19 @@ from collections.abc import Callable
 from chute_ros.campaign.bus import Bus, spoil_can
 from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.ros import Process, Ros
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
+from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
+from chute_ros.links.umbilical.protocol.layouts import Layout
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.runtime import UmbilicalRuntime, UmbilicalSettings
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.links.upf.runtime import UpfRuntime, UpfSettings
 from chute_ros.protocol.dronecan.can_frame import EXTENDED_MASK
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.mavlink.config import MavlinkConfig
-from chute_ros.protocol.mavlink.link import MavlinkLink
-from chute_ros.protocol.umbilical.config import UmbilicalConfig
-from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.protocol.umbilical.link import UmbilicalLink
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf.config import UpfConfig
-from chute_ros.protocol.upf.link import UpfLink
 from chute_ros.runtime.topics import ActionTold
 from chute_ros.supervisor.inputs import VehicleReport
 

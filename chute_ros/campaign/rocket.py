@@ -13,7 +13,7 @@ from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.sensors import Sensors
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import observe_rocket
-from chute_ros.protocol.umbilical.layouts import Layout
+from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 

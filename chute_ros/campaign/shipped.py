@@ -8,13 +8,13 @@ from pathlib import Path
 
 from chute_ros.campaign.device_nodes import MAVLINK_NODE, UMBILICAL_NODE, UPF_NODE
 from chute_ros.campaign.scenario import Vehicle
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Layout
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.transport.data_types import load_data_types
-from chute_ros.transport.telem_layouts import load_layouts
 
 _UPF_LADDER = (Rung(UPF_NODE), Rung(UPF_NODE, TRIGGER))
 #: As config/*_vehicle.yaml has them: links that are required, that kill, that deploy; the ladder.

@@ -27,10 +27,11 @@ _NOT_BUILT = (
 )
 
 
-def run(name: str, class_name: str) -> None:
-    """Make the class of node name and spin it until the end; exits with 2 on a user's mistake."""
+def run(name: str, module: str, class_name: str) -> None:
+    """Make the node name of this class and spin it until the end; exits with 2 on a user's
+    mistake."""
     with at_ctrl_c(signal.SIG_DFL):
-        node_class = _imported(f"chute_ros.nodes.{name}_node", class_name)
+        node_class = _imported(module, class_name)
     set_up_middleware()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy

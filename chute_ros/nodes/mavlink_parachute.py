@@ -5,7 +5,7 @@ from chute_ros.nodes.entry import run
 
 def main() -> None:
     """Run the node."""
-    run("mavlink_parachute", "MavlinkParachuteNode")
+    run("mavlink_parachute", "chute_ros.links.mavlink.node", "MavlinkParachuteNode")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from chute_msgs.msg import (
 )
 
 from chute_ros import model
-from chute_ros.protocol.upf.vehicle_service import Ask
+from chute_ros.protocol.events import Ask
 from chute_ros.runtime.topics import (
     ActionTold,
     DeviceBeat,

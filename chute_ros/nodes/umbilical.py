@@ -5,7 +5,7 @@ from chute_ros.nodes.entry import run
 
 def main() -> None:
     """Run the node."""
-    run("umbilical", "UmbilicalNode")
+    run("umbilical", "chute_ros.links.umbilical.node", "UmbilicalNode")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from chute_ros.nodes.entry import run
 
 def main() -> None:
     """Run the node."""
-    run("upf_can", "UpfCanNode")
+    run("upf_can", "chute_ros.links.upf.node", "UpfCanNode")
 
 
 if __name__ == "__main__":

@@ -64,6 +64,23 @@ class Notice:
     text: str
 
 
+class Ask(enum.IntEnum):
+    """What a device asks of the vehicle; numbers of chute_msgs/SafetyRequest."""
+
+    KILL = 1
+    FLIGHT_BLOCK = 2
+    FLIGHT_BLOCK_RELEASE = 3
+
+
+@dataclass(frozen=True)
+class AskSupervisor:
+    """Pass this on to the supervisor on the device's behalf."""
+
+    ask: Ask
+    device: str
+    reason: str
+
+
 Event = (
     ParachuteChanged
     | VehicleChanged
@@ -71,4 +88,5 @@ Event = (
     | RequestReport
     | RequestFinished
     | Notice
+    | AskSupervisor
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from chute_ros.protocol.upf.vehicle_service import Ask
+from chute_ros.protocol.events import Ask
 from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest
 from chute_ros.supervisor import inputs
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chute_ros.model import Action, LinkState
-from chute_ros.protocol.upf.vehicle_service import Ask
+from chute_ros.protocol.events import Ask
 from chute_ros.supervisor.inputs import ActionReport
 from chute_ros.supervisor.lease import Claim
 from chute_ros.supervisor.state import State

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Hashable
 
-from chute_ros.protocol.umbilical.layouts import Layout
+from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.sim.acting import Actor, Script, one_of
 from chute_ros.sim.flight_computer_commands import NAMES, CommandReceiver
 from chute_ros.sim.flight_computer_flight import FlightProgram

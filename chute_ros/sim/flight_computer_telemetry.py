@@ -9,8 +9,8 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_DOWN, Context, Decima
 from fractions import Fraction
 from functools import lru_cache
 
-from chute_ros.protocol.umbilical.fields import FieldType
-from chute_ros.protocol.umbilical.layouts import Layout
+from chute_ros.links.umbilical.protocol.fields import FieldType
+from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.sim.flight_computer_settings import Mode
 from chute_ros.sim.rocket import GRAVITY, Rocket
 

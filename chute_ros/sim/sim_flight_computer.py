@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.umbilical.layouts import REFERENCE_LAYOUT, Layout
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import REFERENCE_LAYOUT, Layout
 from chute_ros.sim.command_line import main_of, parser_on_pty, run_on_pty, script_of
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
-from chute_ros.transport.telem_layouts import load_layouts
 
 
 def _run() -> None:

@@ -80,7 +80,7 @@ def _run() -> None:
 
 
 def _date(text: str) -> str:
-    from chute_ros.protocol.mavlink.parachute import packed_date
+    from chute_ros.links.mavlink.protocol.parachute import packed_date
 
     date, wrong = packed_date(text)
     if wrong:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.sim.command_line import main_of, number, parser, real, run_on_can, script_of
 from chute_ros.transport.address import FORMS
 
@@ -62,7 +62,7 @@ def _run() -> None:
     options.add_argument("--system-id", type=number("id", 1, 255), default=1, help="of --vehicle")
     chosen = options.parse_args()
 
-    from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, Definitions
+    from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, Definitions
     from chute_ros.sim.upf_bus import UpfBus
     from chute_ros.sim.upf_controller import ControllerSettings, UpfController
     from chute_ros.sim.upf_errors import error_places

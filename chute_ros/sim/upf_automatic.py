@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.machine import Stimulus
 from chute_ros.model import ParachuteState
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.machine import Stimulus
 from chute_ros.sim.upf_aps import Motion
 
 _S = ParachuteState

@@ -11,14 +11,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import machine
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import Definitions
+from chute_ros.links.upf.protocol.machine import Stimulus
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.calls import Call
 from chute_ros.protocol.dronecan.endpoint import Heard
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import machine
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.definitions import Definitions
-from chute_ros.protocol.upf.machine import Stimulus
 from chute_ros.sim.acting import one_of
 from chute_ros.sim.upf_aps import ApsLimits, AutomaticDeployment, Motion
 from chute_ros.sim.upf_automatic import AutomaticFunctions, AutomaticLimits

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.links.upf.protocol.definitions import Definitions
 
 _FLAGS = "error_flags"
 #: Name of an error -> (field that tells it, its value there).

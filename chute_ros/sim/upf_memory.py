@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from chute_ros.protocol.upf import errands
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import CONTROLLER_NODE_ID
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID
 
 #: The document gives no defaults but the static node id and the resistor; the others are chosen.
 CONTROLLER_PARAMETERS: dict[str, p.Value] = {

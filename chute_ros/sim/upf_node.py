@@ -13,14 +13,14 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
 from chute_ros.protocol.dronecan.calls import CallLimits, ServiceCalls
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.transfer import Kind
-from chute_ros.protocol.upf import errands
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.sim.acting import Actor
 from chute_ros.sim.upf_clock import BusClock
 from chute_ros.sim.upf_dna import NodeIdClient

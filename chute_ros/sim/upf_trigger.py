@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import TRIGGER_NODE_ID
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.protocol.dronecan.endpoint import Heard
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import TRIGGER_NODE_ID
-from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.sim.upf_errors import error_places, told_errors
 from chute_ros.sim.upf_node import NodeSettings, UpfNode
 

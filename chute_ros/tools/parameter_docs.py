@@ -11,12 +11,12 @@ import sys
 import textwrap
 from pathlib import Path
 
+from chute_ros.links.mavlink.parameters import PARAMETERS as MAVLINK_PARAMETERS
+from chute_ros.links.umbilical.parameters import PARAMETERS as UMBILICAL_PARAMETERS
+from chute_ros.links.upf.parameters import PARAMETERS as UPF_PARAMETERS
 from chute_ros.nodes.device_node import COMMON_PARAMETERS
-from chute_ros.nodes.mavlink_parameters import PARAMETERS as MAVLINK_PARAMETERS
 from chute_ros.nodes.parameters import Parameter, Value
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
-from chute_ros.nodes.umbilical_parameters import PARAMETERS as UMBILICAL_PARAMETERS
-from chute_ros.nodes.upf_parameters import PARAMETERS as UPF_PARAMETERS
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 
 NODES: dict[str, tuple[Parameter, ...]] = {

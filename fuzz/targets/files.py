@@ -8,15 +8,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
-from chute_ros.nodes.upf_allocation_file import AllocationFile
-from chute_ros.protocol.mavlink.signing import key_from_text
+from chute_ros.links.mavlink.protocol.signing import key_from_text
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.upf.allocation_file import AllocationFile
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.resume import resumed
 from chute_ros.tools.mcap_entries import McapEntries
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.can_address import parse_can_address
-from chute_ros.transport.telem_layouts import load_layouts
 from fuzz.plain_json import BOOT, NOW, SETTINGS, anything, left
 from fuzz.program import Program
 from fuzz.target import Target, WrongError

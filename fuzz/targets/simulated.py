@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
-from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings

@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 from collections import Counter
 
-from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
-from chute_ros.protocol.umbilical.layouts import Layout
-from chute_ros.protocol.umbilical.sayings import Telemetry, recognise
-from chute_ros.protocol.umbilical.stream import MOST_LINE, DumpBytes, Item, StreamReader
-from chute_ros.transport.telem_layouts import load_layouts
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
+from chute_ros.links.umbilical.protocol.layouts import Layout
+from chute_ros.links.umbilical.protocol.sayings import Telemetry, recognise
+from chute_ros.links.umbilical.protocol.stream import MOST_LINE, DumpBytes, Item, StreamReader
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from chute_ros.protocol.umbilical.commands import KINDS
-from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
-from chute_ros.protocol.umbilical.link import UmbilicalLink
-from chute_ros.protocol.umbilical.scheduler import HEARTBEAT
+from chute_ros.links.umbilical.protocol.commands import KINDS
+from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
+from chute_ros.links.umbilical.protocol.scheduler import HEARTBEAT
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 from fuzz.targets.linked import Linked

@@ -5,12 +5,12 @@ from __future__ import annotations
 import functools
 
 from chute_ros.errors import MessageError
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import errands
 from chute_ros.protocol.dronecan.can_frame import pack
 from chute_ros.protocol.dronecan.data_types import DataType, DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import MOST_SESSIONS, Kind, Transfer, frames_of
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import errands
 from chute_ros.transport.data_types import load_data_types
 from fuzz.program import Program
 from fuzz.target import Target, WrongError

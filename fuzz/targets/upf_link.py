@@ -6,6 +6,11 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import errands, parameters
+from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.can_frame import pack, unpack
@@ -16,11 +21,6 @@ from chute_ros.protocol.dronecan.transfer import (
     Transfer,
     frames_of,
 )
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import errands, parameters
-from chute_ros.protocol.upf.config import UpfConfig
-from chute_ros.protocol.upf.events import ErrandFinished
-from chute_ros.protocol.upf.link import UpfLink
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 from fuzz.targets.linked import Linked

@@ -10,6 +10,9 @@ from campaign_bench import SHIPPED
 
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.scenario import Vehicle
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
+from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.nodes import (
     mavlink_parameters,
     supervisor_parameters,
@@ -18,9 +21,6 @@ from chute_ros.nodes import (
 )
 from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.vehicle_sources import SOURCES
-from chute_ros.protocol.mavlink.config import MavlinkConfig
-from chute_ros.protocol.umbilical.config import UmbilicalConfig
-from chute_ros.protocol.upf.config import UpfConfig
 
 
 def standard(parameters: tuple[Parameter, ...]) -> dict[str, Any]:

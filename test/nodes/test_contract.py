@@ -8,11 +8,11 @@ from mavlink_bench import Module, Network, quick
 from node_bench import Bench
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.model import LinkState
 from chute_ros.nodes import qos
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.nodes.umbilical_node import UmbilicalNode
 
 VOLATILE, LATCHED = DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL
 STATUS, DECISION = (10, VOLATILE), (50, VOLATILE)

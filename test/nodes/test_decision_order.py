@@ -6,9 +6,9 @@ import pytest
 from chute_msgs.msg import SafetyDecision
 from node_bench import Bench, stamped
 
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.model import Action, Decision
 from chute_ros.nodes import qos
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 
 
 class Hung:

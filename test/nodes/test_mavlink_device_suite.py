@@ -7,7 +7,7 @@ from mavlink_bench import Module, quick
 from node_bench import LOCAL, port_of
 from simulated_device import SimulatedDevice
 
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.sim.parachute_device import ParachuteSettings
 
 

@@ -11,9 +11,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Module, Network
 
 from chute_ros.errors import SigningKeyError
+from chute_ros.links.mavlink.protocol.frames import FrameDecoder
+from chute_ros.links.mavlink.protocol.signing import Signer, SigningClock, Verifier
 from chute_ros.model import LinkState
-from chute_ros.protocol.mavlink.frames import FrameDecoder
-from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(32)
 

@@ -16,12 +16,12 @@ from mavlink_bench import Autopilot, Network, quick
 from rclpy.parameter import Parameter
 
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.umbilical.node import UmbilicalNode
+from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.nodes.parameters import MISSPELT, nearest
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.nodes.umbilical_node import UmbilicalNode
-from chute_ros.nodes.upf_can_node import UpfCanNode
-from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.tools.parameter_docs import NODES as NODE_PARAMETERS
 
 NODES = {"mavlink_parachute": MavlinkParachuteNode, "safety_supervisor": SafetySupervisorNode}
@@ -317,7 +317,7 @@ def test_a_new_message_rate_reaches_the_autopilot(bench):
 CTRL_C_IN_THE_MIDDLE = """
 import os, signal
 from chute_ros.nodes.entry import run
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
 
 begin = MavlinkParachuteNode.begin
 

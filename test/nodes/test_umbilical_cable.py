@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from umbilical_bench import PATIENT, RATE, Cable
 
 from chute_ros.errors import ParameterError
+from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.model import LinkState
-from chute_ros.nodes.umbilical_node import UmbilicalNode
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 from chute_ros.sim.pty_wire import PtyWire
 from chute_ros.transport import loop as wire_loop

@@ -10,11 +10,11 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.logging import LoggingSeverity
 from umbilical_bench import RATE, Cable
 
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Record
+from chute_ros.links.umbilical.telem_message import RENAMED, telem, without_place
 from chute_ros.model import LandedState, LinkState, ParachuteState
-from chute_ros.nodes.telem_message import RENAMED, telem, without_place
-from chute_ros.protocol.umbilical.layouts import Record
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
-from chute_ros.transport.telem_layouts import load_layouts
 
 LAYOUTS = {
     "telem57_airbrake_state",

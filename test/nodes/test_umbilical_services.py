@@ -11,10 +11,10 @@ from chute_msgs.srv import Dump, SetTarget
 from node_bench import stamped
 from umbilical_bench import PATIENT, RATE, Cable
 
+from chute_ros.links.umbilical.dump_files import PART
+from chute_ros.links.umbilical.protocol import events
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
-from chute_ros.nodes.dump_files import PART
-from chute_ros.protocol.umbilical import events
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 
 #: Name -> (token, what telemetry then says; None: it cannot show it).

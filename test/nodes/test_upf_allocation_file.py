@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.upf_allocation_file import AllocationFile
+from chute_ros.links.upf.allocation_file import AllocationFile
 
 FIRST, SECOND = bytes(range(16)), bytes(range(16, 32))
 #: Where writing can be cut short: each is a function that a save calls, in this order.
@@ -37,7 +37,7 @@ def save_and_die(path, table, step):
     script = """
 import io, os, signal, sys
 from pathlib import Path
-from chute_ros.nodes.upf_allocation_file import AllocationFile
+from chute_ros.links.upf.allocation_file import AllocationFile
 path, unique_id, node_id, step = sys.argv[1:]
 def die(*arguments):
     os.kill(os.getpid(), signal.SIGKILL)
@@ -102,7 +102,7 @@ def test_a_full_disk_is_an_error_and_leaves_the_table_before(tmp_path):
     # No file of this process may hold a byte.
     script = """
 import resource, sys
-from chute_ros.nodes.upf_allocation_file import AllocationFile
+from chute_ros.links.upf.allocation_file import AllocationFile
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 try:
     AllocationFile(sys.argv[1], "/upf_can").save({bytes(16): 7})

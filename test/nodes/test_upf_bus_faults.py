@@ -10,6 +10,8 @@ from chute_msgs.srv import Arm, Deploy, GetNodeInfo
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import Devices, Network, fly, tasks, values
 
+from chute_ros.links.upf.protocol.config import NODE_ID
+from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, TRIGGER_STATUS
 from chute_ros.model import LinkState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS
 from chute_ros.protocol.dronecan.can_frame import (
@@ -18,8 +20,6 @@ from chute_ros.protocol.dronecan.can_frame import (
     CanFrame,
     pack,
 )
-from chute_ros.protocol.upf.config import NODE_ID
-from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, TRIGGER_STATUS
 from chute_ros.sim.can_faults import CanFaultKnobs
 
 #: A bus that loses much needs limits to match.

@@ -19,9 +19,9 @@ from upf_bench import (
     vehicle_state,
 )
 
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, VEHICLE_STATUS
 from chute_ros.model import LinkState, ParachuteState
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, VEHICLE_STATUS
 from chute_ros.sim.upf_aps import Motion
 
 OK, WARN, ERROR, STALE = (

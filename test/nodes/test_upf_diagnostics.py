@@ -7,9 +7,9 @@ from chute_msgs.msg import TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import OTHER_LAYOUT, Devices, Network, tasks, values
 
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import NODE_ID
-from chute_ros.protocol.upf.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import NODE_ID
+from chute_ros.links.upf.protocol.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,

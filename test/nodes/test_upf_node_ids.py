@@ -10,10 +10,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import PATIENT, Network, tasks, values
 
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.upf_allocation_file import AllocationFile
+from chute_ros.links.upf.allocation_file import AllocationFile
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.protocol.dronecan.allocation import MESSAGE
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import NODE_ID
 
 DYNAMIC = {p.STATIC_NODE_ID: 0}
 

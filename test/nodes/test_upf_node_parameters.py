@@ -14,9 +14,9 @@ from rclpy.parameter import Parameter
 from upf_bench import OTHER_LAYOUT, Network, quick
 
 from chute_ros.errors import ParameterError
+from chute_ros.links.upf.node import UpfCanNode
+from chute_ros.links.upf.parameters import PARAMETERS
 from chute_ros.nodes.device_node import COMMON_PARAMETERS
-from chute_ros.nodes.upf_can_node import UpfCanNode
-from chute_ros.nodes.upf_parameters import PARAMETERS
 
 NAN, INF = float("nan"), float("inf")
 DSDL = Path(__file__).parents[2] / "msg_defs" / "dsdl" / "flyfire"

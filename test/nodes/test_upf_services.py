@@ -17,8 +17,8 @@ from chute_msgs.srv import (
 )
 from upf_bench import PATIENT, Devices, Network
 
+from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.model import ParachuteState
-from chute_ros.protocol.upf import parameters as p
 
 Command = UpfCommand.Request
 READY, TAKEOFF, ARMED = ParachuteState.READY, ParachuteState.TAKEOFF, ParachuteState.ARMED

@@ -7,7 +7,7 @@ from chute_msgs.msg import ParachuteStatus
 from chute_msgs.srv import Deploy, GetParam, ListParams, NodeRequest, SetParam
 from upf_bench import PATIENT, Devices, Network
 
-from chute_ros.protocol.upf import parameters as p
+from chute_ros.links.upf.protocol import parameters as p
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from node_bench import stamped
 from upf_bench import PATIENT, Devices, Network, tasks, vehicle_state
 
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import NODE_ID
 
 SCRIPT = Path(__file__).with_name("upf_third_party.py")
 DSDL = Path(__file__).parents[2] / "msg_defs" / "dsdl" / "flyfire"

@@ -11,9 +11,9 @@ from mavlink_bench import quick as quick_mavlink
 from node_bench import LOCAL, port_of
 from upf_bench import Network
 
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.model import LinkState
 from chute_ros.nodes import qos
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
 
 LINKS = ["mavlink_parachute", "upf_can"]

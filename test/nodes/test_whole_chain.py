@@ -8,9 +8,9 @@ from chute_msgs.srv import Arm, Deploy
 from mavlink_bench import Autopilot, Module, do, quick
 from node_bench import LOCAL, port_of
 
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.model import DeploymentTrigger
 from chute_ros.nodes import qos
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.sim.faults import FaultKnobs
 from chute_ros.sim.parachute_device import ParachuteSettings

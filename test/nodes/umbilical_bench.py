@@ -9,14 +9,14 @@ from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, Telem
 from chute_msgs.srv import Arm, Deploy, Dump, SetTarget, UmbilicalCommand
 from node_bench import Bench
 
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.node import UmbilicalNode
+from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.model import LinkState
-from chute_ros.nodes.umbilical_node import UmbilicalNode
-from chute_ros.protocol.umbilical.layouts import Layout
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
 from chute_ros.sim.pty_wire import PtyWire
 from chute_ros.transport.loop import WireLoop
-from chute_ros.transport.telem_layouts import load_layouts
 
 #: Lines a second.
 RATE = 20.0

@@ -10,11 +10,11 @@ from chute_msgs.msg import LinkHeartbeat, VehicleState
 from node_bench import Bench, stamped
 from upf_party import Party
 
+from chute_ros.links.upf.node import UpfCanNode
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import PARACHUTE_SERVICE, Definitions
 from chute_ros.model import LinkState
-from chute_ros.nodes.upf_can_node import UpfCanNode
 from chute_ros.protocol.dronecan.endpoint import Heard
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.definitions import PARACHUTE_SERVICE, Definitions
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
 from chute_ros.sim.upf_bus import UpfBus

@@ -6,8 +6,8 @@ import math
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
-from chute_ros.protocol.upf.definitions import Definitions
 
 
 class Party:

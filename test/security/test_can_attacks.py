@@ -5,9 +5,13 @@ from __future__ import annotations
 from chute_msgs.msg import ParachuteStatus, SafetyRequest
 from upf_bench import Devices, Network
 
+from chute_ros.links.upf.protocol.config import NODE_ID
+from chute_ros.links.upf.protocol.definitions import (
+    PARACHUTE_STATUS,
+    TRIGGER_STATUS,
+    VEHICLE_SERVICE,
+)
 from chute_ros.model import ParachuteState
-from chute_ros.protocol.upf.config import NODE_ID
-from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, TRIGGER_STATUS, VEHICLE_SERVICE
 
 KILL = "TYPE_KILLSWITCH"
 STRANGER, OURS = 60, NODE_ID

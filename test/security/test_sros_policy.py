@@ -10,10 +10,10 @@ import pytest
 import yaml
 from node_bench import LOCAL
 
-from chute_ros.nodes.mavlink_parachute_node import MavlinkParachuteNode
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.umbilical.node import UmbilicalNode
+from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
-from chute_ros.nodes.umbilical_node import UmbilicalNode
-from chute_ros.nodes.upf_can_node import UpfCanNode
 from chute_ros.tools.isolation import free_udp_ports
 
 CONFIG = Path(__file__).parents[2] / "config"

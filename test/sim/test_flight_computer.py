@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from chute_ros.protocol.umbilical.layouts import Record
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Record
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings
-from chute_ros.transport.telem_layouts import load_layouts
 
 FOLDER = Path(__file__).parents[2] / "msg_defs" / "telem"
 LAYOUTS = {layout.name: layout for layout in load_layouts(str(FOLDER), "the tests")}

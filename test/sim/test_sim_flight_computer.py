@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from chute_ros.transport.telem_layouts import load_layouts
+from chute_ros.links.umbilical.layout_files import load_layouts
 
 FOLDER = str(Path(__file__).parents[2] / "msg_defs" / "telem")
 LAYOUTS = {layout.name: layout for layout in load_layouts(FOLDER, "the tests")}

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from test_command_line import environment, start  # noqa: F401 (fixtures)
 
+from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, TRIGGER_STATUS, Definitions
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.upf.definitions import PARACHUTE_STATUS, TRIGGER_STATUS, Definitions
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.vehicle_sense import VehicleSense
 from chute_ros.tools.isolation import free_udp_ports

@@ -13,9 +13,9 @@ from upf_device_bench import (
     ready,
 )
 
+from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.can_frame import unpack
-from chute_ros.protocol.upf import definitions as names
 from chute_ros.sim.upf_bus import UpfBus
 from chute_ros.sim.upf_controller import UpfController
 from chute_ros.sim.upf_trigger import UpfTrigger

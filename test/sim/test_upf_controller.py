@@ -19,9 +19,9 @@ from upf_device_bench import (
     ready,
 )
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.model import ParachuteState as S
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import parameters as p
 from chute_ros.sim.upf_aps import Motion
 
 # Self test

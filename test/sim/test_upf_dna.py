@@ -12,10 +12,10 @@ from dronecan.driver.common import CANFrame as LibraryFrame
 from dronecan.transport import TransferError
 from upf_device_bench import Story, definitions
 
+from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.model import ParachuteState as S
 from chute_ros.protocol.dronecan.allocation import MESSAGE, Allocator
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.protocol.upf import parameters as p
 from chute_ros.sim.upf_dna import FOLLOWUP_DELAY, REQUEST_PERIOD, NodeIdClient
 from chute_ros.sim.upf_node import NodeSettings
 from chute_ros.sim.upf_trigger import TRIGGER_PARAMETERS, UpfTrigger

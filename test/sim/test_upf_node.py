@@ -14,12 +14,12 @@ from upf_device_bench import (
     ready,
 )
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.can_frame import pack
 from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import errands
-from chute_ros.protocol.upf import parameters as p
 from chute_ros.sim.upf_trigger import TRIGGER_PARAMETERS
 
 SWITCHES = [one.name for one in p.PARAMETERS if one.kind is bool]

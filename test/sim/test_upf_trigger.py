@@ -3,8 +3,8 @@
 import pytest
 from upf_device_bench import BOTH_LAYOUTS, CONTROLLER, TRIGGER, Story, ready
 
+from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.model import ParachuteState as S
-from chute_ros.protocol.upf import definitions as names
 from chute_ros.sim.flight import FlightModel
 
 LAUNCH = "TYPE_LAUNCH"

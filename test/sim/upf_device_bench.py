@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.transfer import Kind
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import errands
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.definitions import Definitions
 from chute_ros.sim.flight import FlightModel
 from chute_ros.sim.upf_aps import Motion
 from chute_ros.sim.upf_bus import UpfBus

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from chute_ros import model
-from chute_ros.protocol.mavlink.link import MavlinkLink
-from chute_ros.protocol.mavlink.parachute import ParachuteTracker
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
+from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 
 
 def health(

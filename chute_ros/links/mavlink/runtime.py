@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from chute_ros.links.mavlink.health import health
+from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.model import Action, Decision
 from chute_ros.protocol.effect import EffectFinished
 from chute_ros.protocol.events import RequestFinished
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.link import MavlinkLink
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 
 #: How a flight block is reported by a node that must leave arming alone.

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.umbilical.protocol.events import TelemetryReceived
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
+from chute_ros.links.umbilical.protocol.reasons import reasons_of
+from chute_ros.links.umbilical.protocol.sayings import LogLine
 from chute_ros.model import NAN, Action, Decision
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import RequestFinished, VehicleChanged
-from chute_ros.protocol.umbilical.events import TelemetryReceived
-from chute_ros.protocol.umbilical.link import UmbilicalLink
-from chute_ros.protocol.umbilical.reasons import reasons_of
-from chute_ros.protocol.umbilical.sayings import LogLine
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary, block_reason
 
 

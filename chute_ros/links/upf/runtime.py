@@ -7,14 +7,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.upf.protocol.errands import ErrandDone
+from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.link import UpfLink
+from chute_ros.links.upf.protocol.reasons import reasons_of
 from chute_ros.model import NAN, Action, Decision, LinkState, Outcome, VehicleState
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
-from chute_ros.protocol.events import Notice, Severity
-from chute_ros.protocol.upf.errands import ErrandDone
-from chute_ros.protocol.upf.events import ErrandFinished
-from chute_ros.protocol.upf.link import UpfLink
-from chute_ros.protocol.upf.reasons import reasons_of
-from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
+from chute_ros.protocol.events import Ask, AskSupervisor, Notice, Severity
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import ActionTold, DeviceRequest, SafetyPicture
 from chute_ros.supervisor.config import TRIGGER

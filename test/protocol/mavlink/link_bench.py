@@ -5,13 +5,13 @@ from __future__ import annotations
 import struct
 from typing import Any
 
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
+from chute_ros.links.mavlink.protocol.link import MavlinkLink
+from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
+from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
 from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished
-from chute_ros.protocol.mavlink.config import MavlinkConfig
-from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
-from chute_ros.protocol.mavlink.link import MavlinkLink
-from chute_ros.protocol.mavlink.signing import Signer, Verifier
-from chute_ros.protocol.mavlink.status_texts import StatusTexts
 
 START = 1000.0
 ASLEEP = {"autopilot_message_rate": 0.0}

@@ -6,10 +6,10 @@ from typing import Any
 
 from link_bench import heartbeat, status
 
+from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
+from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker, StatusLimits
 from chute_ros.model import ErrorFlags, ParachuteStatus
 from chute_ros.protocol.liveness import LivenessLimits
-from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
-from chute_ros.protocol.mavlink.parachute import ParachuteTracker, StatusLimits
 
 
 class Told:

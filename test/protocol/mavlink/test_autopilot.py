@@ -6,10 +6,10 @@ import pytest
 from autopilot_bench import Told, attitude, imu, position
 from link_bench import copter, heartbeat, landed
 
+from chute_ros.links.mavlink.protocol.autopilot import is_autopilot
+from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.links.mavlink.protocol.stream_watch import ASKED_FOR
 from chute_ros.model import Armed, LandedState, LinkState
-from chute_ros.protocol.mavlink.autopilot import is_autopilot
-from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.stream_watch import ASKED_FOR
 
 NAN, INF = math.nan, math.inf
 

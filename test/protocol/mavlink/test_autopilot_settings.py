@@ -8,9 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from link_bench import Bench, ardupilot, copter, heartbeat, no_setting, px4_integer, setting
 
-from chute_ros.protocol.mavlink.autopilot_settings import NAMES, READ_AGAIN, AutopilotSettings
-from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.firmware import Firmware
+from chute_ros.links.mavlink.protocol.autopilot_settings import (
+    NAMES,
+    READ_AGAIN,
+    AutopilotSettings,
+)
+from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.links.mavlink.protocol.firmware import Firmware
 
 PILOT = (1, 1)
 

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.commands import (
+from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.commands import (
     Acknowledgement,
     Command,
     CommandLimits,
     CommandTransactions,
 )
-from chute_ros.protocol.mavlink.unanswered import MOST_SENDS
+from chute_ros.links.mavlink.protocol.unanswered import MOST_SENDS
 
 RELEASE = Command(1, 161, 208, (2.0, *[0.0] * 6))
 DISABLE = Command(1, 161, 208, (0.0,) * 7)

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
+from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.commands import Command, CommandFinished
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import EffectLimits, EffectLoop, Goal
 from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase
-from chute_ros.protocol.mavlink import results
-from chute_ros.protocol.mavlink.commands import Command, CommandFinished
 from chute_ros.transitions import after
 
 ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))

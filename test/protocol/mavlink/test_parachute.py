@@ -3,6 +3,8 @@
 import pytest
 from parachute_bench import Told, picture
 
+from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.links.mavlink.protocol.parachute import packed_date
 from chute_ros.model import (
     DeploymentTrigger,
     ErrorFlags,
@@ -10,8 +12,6 @@ from chute_ros.model import (
     SafetyFlags,
     TriggerFlags,
 )
-from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.parachute import packed_date
 
 ERROR_FLAGS = {
     0: "BAROMETER_ERROR",

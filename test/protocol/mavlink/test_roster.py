@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES, Roster
 from chute_ros.protocol.liveness import Liveness, LivenessLimits
-from chute_ros.protocol.mavlink.roster import MOST_DEVICES, Roster
 
 
 @dataclass

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.protocol.mavlink.dialect import dialect as d
-from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
-from chute_ros.protocol.mavlink.status_texts import (
+from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
+from chute_ros.links.mavlink.protocol.status_texts import (
     CHUNK,
     CHUNK_SILENCE,
     MOST_CHUNKS,

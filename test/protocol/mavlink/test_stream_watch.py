@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.protocol.mavlink.stream_watch import (
+from chute_ros.links.mavlink.protocol.stream_watch import (
     ASK_AGAIN,
     ASKED_FOR,
     STORE,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chute_ros.protocol.mavlink.twins import OVER_AFTER, Twins
+from chute_ros.links.mavlink.protocol.twins import OVER_AFTER, Twins
 
 KINDS = ("ATTITUDE", "GLOBAL_POSITION_INT", "SCALED_IMU")
 

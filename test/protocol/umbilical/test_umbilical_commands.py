@@ -18,7 +18,7 @@ from umbilical_link_bench import (
 )
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.umbilical import commands
+from chute_ros.links.umbilical.protocol import commands
 
 #: Umbilical Reference, section 2: name here, token there.
 GOLDEN = {

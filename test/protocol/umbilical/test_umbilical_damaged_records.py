@@ -13,10 +13,10 @@ from umbilical_link_bench import (
 )
 from umbilical_rocket import Rocket, vehicle
 
+from chute_ros.links.umbilical.protocol.config import DeployStage
+from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.model import LandedState
 from chute_ros.protocol.boot_clock import Age
-from chute_ros.protocol.umbilical.config import DeployStage
-from chute_ros.protocol.umbilical.gate import Situation
 
 
 def damaged(bench: Bench, **fields: int) -> Bench:

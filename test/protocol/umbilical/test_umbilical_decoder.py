@@ -6,8 +6,12 @@ import pytest
 from umbilical_lines import BY_NAME, COUNTS, DEPLOYMENT, LAYOUT, LAYOUTS, STATE, body
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.umbilical.decoder import LINES_TO_RECOGNISE, NOT_YET, TelemetryDecoder
-from chute_ros.protocol.umbilical.layouts import Layout, Problem
+from chute_ros.links.umbilical.protocol.decoder import (
+    LINES_TO_RECOGNISE,
+    NOT_YET,
+    TelemetryDecoder,
+)
+from chute_ros.links.umbilical.protocol.layouts import Layout, Problem
 
 #: 57 fields that each fit every type, so that any cut of them is well-formed.
 ALIKE = ",".join(["1"] * 57)

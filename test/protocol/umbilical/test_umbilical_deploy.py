@@ -13,10 +13,10 @@ from umbilical_link_bench import (
     ready,
 )
 
+from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
+from chute_ros.links.umbilical.protocol.events import DumpStarted
+from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
 from chute_ros.protocol.events import ParachuteChanged
-from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
-from chute_ros.protocol.umbilical.events import DumpStarted
-from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
 
 TOKENS = {DeployStage.DROGUE: "<D>", DeployStage.MAIN: "<d>"}
 FLAGS = {DeployStage.DROGUE: "ssa_drogue_deployed", DeployStage.MAIN: "ssa_main_deployed"}

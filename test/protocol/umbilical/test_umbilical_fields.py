@@ -5,8 +5,8 @@ import math
 import pytest
 from umbilical_lines import BY_NAME, as_rust_prints, body
 
-from chute_ros.protocol.umbilical.fields import TYPES, convert, problem_of
-from chute_ros.protocol.umbilical.layouts import Problem
+from chute_ros.links.umbilical.protocol.fields import TYPES, convert, problem_of
+from chute_ros.links.umbilical.protocol.layouts import Problem
 
 #: 340282350000000000000000000000000000000 is how Rust prints the largest f32.
 F32_MAX = "34028235" + "0" * 31

@@ -20,6 +20,10 @@ from umbilical_rocket import (
     vehicle,
 )
 
+from chute_ros.links.umbilical.protocol.flight_computer import FlightComputer
+from chute_ros.links.umbilical.protocol.gate import Situation
+from chute_ros.links.umbilical.protocol.layouts import Layout, Record
+from chute_ros.links.umbilical.protocol.modes import FlightMode
 from chute_ros.model import (
     Armed,
     LandedState,
@@ -30,10 +34,6 @@ from chute_ros.model import (
     VehicleState,
 )
 from chute_ros.protocol.boot_clock import Age
-from chute_ros.protocol.umbilical.flight_computer import FlightComputer
-from chute_ros.protocol.umbilical.gate import Situation
-from chute_ros.protocol.umbilical.layouts import Layout, Record
-from chute_ros.protocol.umbilical.modes import FlightMode
 
 # -- by mode ------------------------------------------------------------------------------------
 

@@ -18,9 +18,9 @@ from umbilical_link_bench import (
 )
 
 from chute_ros.errors import TransitionError
-from chute_ros.protocol.umbilical import commands
-from chute_ros.protocol.umbilical.gate import TABLE, Situation, Verdict, rule
-from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
+from chute_ros.links.umbilical.protocol import commands
+from chute_ros.links.umbilical.protocol.gate import TABLE, Situation, Verdict, rule
+from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
 
 #: Columns: Startup, Standby, Ascent, Coast, DrogueDeployed, MainDeployed, Fault, lost in flight,
 #: no fresh telemetry. y: leaves; f: only if forced; n: never.

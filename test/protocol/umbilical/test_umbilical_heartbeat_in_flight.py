@@ -7,9 +7,9 @@ import pytest
 from umbilical_lines import BY_NAME, LAYOUTS, STATE
 from umbilical_link_bench import ASCENT, COAST, STANDBY, Bench
 
-from chute_ros.protocol.umbilical.config import HeartbeatInFlight, UmbilicalConfig
-from chute_ros.protocol.umbilical.layouts import layout_from
-from chute_ros.protocol.umbilical.link import UmbilicalLink
+from chute_ros.links.umbilical.protocol.config import HeartbeatInFlight, UmbilicalConfig
+from chute_ros.links.umbilical.protocol.layouts import layout_from
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.sim.flight_computer import FlightComputer
 from chute_ros.sim.flight_computer_settings import FlightComputerSettings, Mode
 

@@ -19,8 +19,8 @@ from umbilical_lines import (
 )
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.umbilical.layouts import Problem, Record, layout_from
-from chute_ros.transport.telem_layouts import load_layouts
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Problem, Record, layout_from
 
 #: In flight, main out, no fix, and every odd number that the flight computer can print.
 ODD = (

@@ -13,6 +13,9 @@ from umbilical_link_bench import (
     ready,
 )
 
+from chute_ros.links.umbilical.protocol.events import TelemetryReceived
+from chute_ros.links.umbilical.protocol.link import DOUBTED
+from chute_ros.links.umbilical.protocol.sayings import LogLine
 from chute_ros.model import LinkState, ParachuteState
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
@@ -21,9 +24,6 @@ from chute_ros.protocol.events import (
     VehicleChanged,
 )
 from chute_ros.protocol.liveness import LivenessLimits
-from chute_ros.protocol.umbilical.events import TelemetryReceived
-from chute_ros.protocol.umbilical.link import DOUBTED
-from chute_ros.protocol.umbilical.sayings import LogLine
 
 BEGIN, END = "--- BEGIN FLASH CSV DUMP ---", "--- END FLASH CSV DUMP ---"
 

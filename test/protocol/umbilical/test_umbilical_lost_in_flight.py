@@ -14,10 +14,10 @@ from umbilical_rocket import (
     vehicle,
 )
 
+from chute_ros.links.umbilical.protocol.gate import Situation
+from chute_ros.links.umbilical.protocol.modes import FlightMode
 from chute_ros.model import LandedState, ParachuteState
 from chute_ros.protocol.boot_clock import Age
-from chute_ros.protocol.umbilical.gate import Situation
-from chute_ros.protocol.umbilical.modes import FlightMode
 
 # -- restart ------------------------------------------------------------------------------------
 

@@ -4,9 +4,9 @@ import pytest
 from umbilical_link_bench import ASCENT, STANDBY, STARTUP, Bench, ready
 
 from chute_ros.errors import ParameterError, TransitionError
-from chute_ros.protocol.umbilical.config import MemoryLimits
-from chute_ros.protocol.umbilical.events import DumpData, DumpFinished, DumpStarted, Progress
-from chute_ros.protocol.umbilical.memory import STEPS, Sign, Step
+from chute_ros.links.umbilical.protocol.config import MemoryLimits
+from chute_ros.links.umbilical.protocol.events import DumpData, DumpFinished, DumpStarted, Progress
+from chute_ros.links.umbilical.protocol.memory import STEPS, Sign, Step
 from chute_ros.transitions import after
 
 CSV = b"time,mode\n1,2\n3,4\n"

@@ -8,8 +8,8 @@ from umbilical_link_bench import (
     ready,
 )
 
-from chute_ros.protocol.umbilical.config import EffectLimits
-from chute_ros.protocol.umbilical.scheduler import SchedulerLimits
+from chute_ros.links.umbilical.protocol.config import EffectLimits
+from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
 
 # -- sent, confirmed or not ---------------------------------------------------------------------
 

@@ -4,10 +4,10 @@ import pytest
 from umbilical_link_bench import ASCENT, COAST, DROGUE, FAULT, MAIN, STANDBY, STARTUP, ready
 from umbilical_rocket import Rocket, status, vehicle
 
+from chute_ros.links.umbilical.protocol.config import DeployStage
+from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.boot_clock import Age
-from chute_ros.protocol.umbilical.config import DeployStage
-from chute_ros.protocol.umbilical.gate import Situation
 
 FORGETS = {"flight_mode": STARTUP, "ssa_drogue_deployed": 0, "ssa_main_deployed": 0}
 

@@ -21,12 +21,12 @@ from umbilical_lines import (
     line,
 )
 
-from chute_ros.protocol.umbilical import layouts
-from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
-from chute_ros.protocol.umbilical.fields import convert, problem_of
-from chute_ros.protocol.umbilical.layouts import Problem
-from chute_ros.protocol.umbilical.sayings import Telemetry, recognise
-from chute_ros.protocol.umbilical.stream import (
+from chute_ros.links.umbilical.protocol import layouts
+from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
+from chute_ros.links.umbilical.protocol.fields import convert, problem_of
+from chute_ros.links.umbilical.protocol.layouts import Problem
+from chute_ros.links.umbilical.protocol.sayings import Telemetry, recognise
+from chute_ros.links.umbilical.protocol.stream import (
     MOST_LINE,
     DumpBegan,
     DumpBytes,

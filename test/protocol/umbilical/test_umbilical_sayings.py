@@ -3,8 +3,7 @@
 import pytest
 from umbilical_lines import PAD
 
-from chute_ros.protocol.events import Severity
-from chute_ros.protocol.umbilical.sayings import (
+from chute_ros.links.umbilical.protocol.sayings import (
     CUT_LINE,
     UNKNOWN_LINE,
     ArmingBlocked,
@@ -19,6 +18,7 @@ from chute_ros.protocol.umbilical.sayings import (
     printable,
     recognise,
 )
+from chute_ros.protocol.events import Severity
 
 WHOLE = PAD.removesuffix(b"\n")
 BODY = WHOLE.decode().removeprefix("$TELEM,")

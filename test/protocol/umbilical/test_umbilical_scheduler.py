@@ -6,7 +6,7 @@ import math
 import pytest
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.umbilical.scheduler import (
+from chute_ros.links.umbilical.protocol.scheduler import (
     HEARTBEAT,
     Command,
     CommandScheduler,

@@ -8,16 +8,16 @@ from hypothesis import strategies as st
 from umbilical_lines import LAYOUTS
 from umbilical_link_bench import ASCENT, ONE_TOKEN, STANDBY, zeros
 
-from chute_ros.protocol.events import RequestFinished
-from chute_ros.protocol.umbilical import commands
-from chute_ros.protocol.umbilical.config import DeployStage, UmbilicalConfig
-from chute_ros.protocol.umbilical.link import UmbilicalLink
-from chute_ros.protocol.umbilical.scheduler import (
+from chute_ros.links.umbilical.protocol import commands
+from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
+from chute_ros.links.umbilical.protocol.scheduler import (
     HEARTBEAT,
     Command,
     CommandScheduler,
     SchedulerLimits,
 )
+from chute_ros.protocol.events import RequestFinished
 
 LIMITS = st.builds(
     SchedulerLimits,

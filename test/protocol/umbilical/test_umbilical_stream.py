@@ -5,9 +5,9 @@ from collections import Counter
 import pytest
 from umbilical_lines import LAYOUTS, PAD, line
 
-from chute_ros.protocol.umbilical.decoder import TelemetryDecoder
-from chute_ros.protocol.umbilical.sayings import CUT_LINE, LogLine, Telemetry, recognise
-from chute_ros.protocol.umbilical.stream import (
+from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
+from chute_ros.links.umbilical.protocol.sayings import CUT_LINE, LogLine, Telemetry, recognise
+from chute_ros.links.umbilical.protocol.stream import (
     MOST_LINE,
     TOO_LONG,
     DumpBegan,

@@ -4,8 +4,8 @@ import struct
 from decimal import Decimal
 from pathlib import Path
 
-from chute_ros.protocol.umbilical.layouts import Record
-from chute_ros.transport.telem_layouts import load_layouts
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Record
 
 FOLDER = Path(__file__).parents[3] / "msg_defs" / "telem"
 

@@ -7,6 +7,9 @@ from typing import Any
 
 from umbilical_lines import BY_NAME, LAYOUTS, STATE, as_rust_prints
 
+from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
+from chute_ros.links.umbilical.protocol.gate import Situation
+from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.events import (
     DeviceLinkChanged,
@@ -15,9 +18,6 @@ from chute_ros.protocol.events import (
     RequestFinished,
     RequestReport,
 )
-from chute_ros.protocol.umbilical.config import UmbilicalConfig
-from chute_ros.protocol.umbilical.gate import Situation
-from chute_ros.protocol.umbilical.link import UmbilicalLink
 
 START = 1000.0
 STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)

@@ -2,8 +2,8 @@
 
 from umbilical_lines import record
 
+from chute_ros.links.umbilical.protocol.flight_computer import FlightComputer
 from chute_ros.protocol.liveness import LivenessLimits
-from chute_ros.protocol.umbilical.flight_computer import FlightComputer
 
 STARTUP, STANDBY, ASCENT, COAST, DROGUE, MAIN, FAULT = range(7)
 LIMITS = LivenessLimits(3.0, 15.0)

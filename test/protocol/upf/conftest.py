@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from upf_link_bench import LAYOUTS, Bench, Layout, layout_of
 
-from chute_ros.protocol.upf.definitions import Definitions
+from chute_ros.links.upf.protocol.definitions import Definitions
 
 
 @pytest.fixture(params=sorted(LAYOUTS))

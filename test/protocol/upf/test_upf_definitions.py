@@ -4,9 +4,9 @@ import pytest
 from upf_link_bench import LAYOUTS, Bench, Layout, layout_of, types_of
 
 from chute_ros.errors import ParameterError
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.model import ErrorFlags, ParachuteState
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf.definitions import Definitions
 
 STATES = [state for state in ParachuteState if state is not ParachuteState.UNKNOWN]
 SEVEN = {

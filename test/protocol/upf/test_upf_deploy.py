@@ -3,7 +3,7 @@
 import pytest
 from upf_link_bench import BY_REQUEST
 
-from chute_ros.protocol.upf import parameters as p
+from chute_ros.links.upf.protocol import parameters as p
 
 SERVICE, TRIGGER, LAUNCH = (
     "flyfire.ParachuteService",

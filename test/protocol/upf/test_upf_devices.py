@@ -6,12 +6,12 @@ import pytest
 from upf_link_bench import BY_REQUEST, Bench, layout_of
 
 from chute_ros.errors import ParameterError
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.events import TriggerChanged
+from chute_ros.links.upf.protocol.roster import MOST_DEVICES
 from chute_ros.model import LinkState, ParachuteState, SafetyFlags, TriggerFlags
 from chute_ros.protocol.events import DeviceLinkChanged
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import UpfConfig
-from chute_ros.protocol.upf.events import TriggerChanged
-from chute_ros.protocol.upf.roster import MOST_DEVICES
 
 S = ParachuteState
 

@@ -3,9 +3,9 @@
 import pytest
 from upf_link_bench import BY_REQUEST, flying, landed
 
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.protocol.dronecan.calls import CallFinished
-from chute_ros.protocol.upf import errands
-from chute_ros.protocol.upf import parameters as p
 
 GET_SET, OPCODE = errands.GET_SET, errands.EXECUTE_OPCODE
 

@@ -17,14 +17,14 @@ from upf_link_bench import (
     layout_of,
 )
 
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack
 from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
 from chute_ros.protocol.events import RequestFinished
-from chute_ros.protocol.upf import errands
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import UpfConfig
-from chute_ros.protocol.upf.events import ErrandFinished
-from chute_ros.protocol.upf.link import UpfLink
 
 LAYOUT = st.sampled_from(sorted(LAYOUTS))
 NAMES = [

@@ -3,9 +3,9 @@
 import pytest
 
 from chute_ros.errors import TransitionError
+from chute_ros.links.upf.protocol import machine
+from chute_ros.links.upf.protocol.machine import Stimulus as E
 from chute_ros.model import ParachuteState as S
-from chute_ros.protocol.upf import machine
-from chute_ros.protocol.upf.machine import Stimulus as E
 from chute_ros.transitions import after
 
 NAMED = [state for state in S if state is not S.UNKNOWN]

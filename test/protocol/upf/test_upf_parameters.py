@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
 from chute_ros.sim.upf_controller import CONTROLLER_PARAMETERS
 from chute_ros.sim.upf_trigger import TRIGGER_PARAMETERS
 

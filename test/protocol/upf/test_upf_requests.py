@@ -4,7 +4,7 @@ import pytest
 from upf_link_bench import BY_REQUEST, CONTROLLER_PARAMETERS, Bench
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.upf import parameters as p
+from chute_ros.links.upf.protocol import parameters as p
 
 SERVICE = "flyfire.ParachuteService"
 #: Request -> the state in which it is possible, and the states that show it.

@@ -3,8 +3,8 @@
 import pytest
 from upf_link_bench import US, Bench, flying, landed, layout_of
 
-from chute_ros.protocol.upf.config import Policy
-from chute_ros.protocol.upf.vehicle_service import KILL_MEMORY, MOST_PENDING
+from chute_ros.links.upf.protocol.config import Policy
+from chute_ros.links.upf.protocol.vehicle_service import KILL_MEMORY, MOST_PENDING
 
 KILL, BLOCK, RELEASE = "TYPE_KILLSWITCH", "TYPE_FLIGHT_BLOCK", "TYPE_FLIGHT_BLOCK_RELEASE"
 

@@ -5,8 +5,8 @@ import math
 import pytest
 from upf_link_bench import LAYOUTS, Bench, Layout, flying, landed, types_of
 
+from chute_ros.links.upf.protocol.definitions import VEHICLE_STATUS, Definitions
 from chute_ros.model import LandedState, LinkState, VehicleState
-from chute_ros.protocol.upf.definitions import VEHICLE_STATUS, Definitions
 
 KINDS = [
     (LandedState.ON_GROUND, "ON_GROUND"),

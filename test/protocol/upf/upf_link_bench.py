@@ -12,20 +12,26 @@ from typing import Any
 import dronecan
 from dronecan.dsdl import parse_namespaces
 
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import NODE_ID, UpfConfig
+from chute_ros.links.upf.protocol.definitions import Definitions
+from chute_ros.links.upf.protocol.devices import SAYINGS, SAYINGS_ORDERED
+from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.transfer import Kind
-from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished, RequestReport
-from chute_ros.protocol.upf import definitions as names
-from chute_ros.protocol.upf import parameters as p
-from chute_ros.protocol.upf.config import NODE_ID, UpfConfig
-from chute_ros.protocol.upf.definitions import Definitions
-from chute_ros.protocol.upf.devices import SAYINGS, SAYINGS_ORDERED
-from chute_ros.protocol.upf.events import ErrandFinished
-from chute_ros.protocol.upf.link import UpfLink
-from chute_ros.protocol.upf.vehicle_service import Ask, AskSupervisor
+from chute_ros.protocol.events import (
+    Ask,
+    AskSupervisor,
+    Notice,
+    ParachuteChanged,
+    RequestFinished,
+    RequestReport,
+)
 from chute_ros.sim.upf_bus import UpfBus
 from chute_ros.sim.upf_controller import CONTROLLER_PARAMETERS, ControllerSettings, UpfController
 from chute_ros.sim.upf_node import NodeSettings

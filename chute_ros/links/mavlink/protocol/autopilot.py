@@ -1,0 +1,299 @@
+"""What the autopilot on the same network says of the vehicle.
+
+Source: MAVLink common.xml: HEARTBEAT, SYSTEM_TIME, and what vehicle_readers.py reads.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.firmware import firmware_of
+from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
+from chute_ros.links.mavlink.protocol.optional_streams import OptionalStreams
+from chute_ros.links.mavlink.protocol.readings import Readings
+from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
+from chute_ros.links.mavlink.protocol.sensors import FURTHER_ACCELEROMETERS, PRESSURE
+from chute_ros.links.mavlink.protocol.stream_rate import StreamRate
+from chute_ros.links.mavlink.protocol.stream_watch import Ask, StreamWatch
+from chute_ros.links.mavlink.protocol.targets import Vehicle
+from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
+from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
+from chute_ros.model import Armed, LandedState, LinkState, Reading, VehicleState
+from chute_ros.protocol.boot_clock import Age, BootClock
+from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+
+#: What was said longer ago (s) proves nothing about now.
+STREAM_SILENCE = 2.5
+
+#: Their time_boot_ms is the autopilot's own time now. That of others (NAMED_VALUE_FLOAT, ...) a
+#: user's script may have filled in, and a target keeps the time at which it was set.
+_CLOCKS = frozenset(
+    {
+        "ATTITUDE",
+        "ATTITUDE_QUATERNION",
+        "GLOBAL_POSITION_INT",
+        "LOCAL_POSITION_NED",
+        "SCALED_IMU",
+        "SYSTEM_TIME",
+    }
+)
+
+#: What these tell is told with the next of the others: each picture is work for all who hear it.
+_TOLD_WITH_THE_NEXT = frozenset(
+    {
+        *("SCALED_PRESSURE", "SCALED_PRESSURE2", "SCALED_PRESSURE3", "SCALED_IMU2", "SCALED_IMU3"),
+        *("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT"),
+        "NAV_CONTROLLER_OUTPUT",
+    }
+)
+
+#: Types that never fly the vehicle, whatever their heartbeat says in its field autopilot.
+_NOT_FLYING = frozenset(
+    {
+        dialect.MAV_TYPE_ANTENNA_TRACKER,
+        dialect.MAV_TYPE_GCS,
+        dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+        dialect.MAV_TYPE_GIMBAL,
+        dialect.MAV_TYPE_ADSB,
+        dialect.MAV_TYPE_CAMERA,
+        dialect.MAV_TYPE_CHARGING_STATION,
+        dialect.MAV_TYPE_FLARM,
+        dialect.MAV_TYPE_SERVO,
+        dialect.MAV_TYPE_ODID,
+        dialect.MAV_TYPE_BATTERY,
+        dialect.MAV_TYPE_PARACHUTE,
+        dialect.MAV_TYPE_LOG,
+        dialect.MAV_TYPE_OSD,
+        dialect.MAV_TYPE_IMU,
+        dialect.MAV_TYPE_GPS,
+        dialect.MAV_TYPE_WINCH,
+    }
+)
+
+
+def is_autopilot(heartbeat: Any) -> bool:
+    """A flight controller sends this heartbeat: not a ground station or another component."""
+    no_autopilot = heartbeat.autopilot == dialect.MAV_AUTOPILOT_INVALID
+    return not no_autopilot and heartbeat.type not in _NOT_FLYING
+
+
+class AutopilotTracker:
+    """Follows one autopilot. needed_rate: of each message that the rules need, Hz."""
+
+    def __init__(
+        self, system_id: int, component_id: int, limits: LivenessLimits, needed_rate: float
+    ) -> None:
+        self.system_id = system_id
+        self.component_id = component_id
+        self.liveness = Liveness(limits)
+        self.reboot_count = 0
+        self.rebooted_in_flight = False
+        #: HEARTBEAT.type.
+        self.vehicle_type = 0
+        self.settings = AutopilotSettings()
+        self.motor_signs = MotorSigns()
+        self.round_trip = RoundTrip()
+        #: How often it was seen to arm.
+        self.arming_count = 0
+        self._system_status = 0
+        self._streams = StreamWatch(needed_rate)
+        self._optional = OptionalStreams()
+        #: Of each message that is read, by name.
+        self._rates: dict[str, StreamRate] = {}
+        self._clock = BootClock()
+        self._readings = Readings(self._streams.heard)
+        self._readers = VehicleReaders(self._readings, self._clock)
+        self._in_flight_before = False
+        self._twins = Twins()
+        #: A restart was seen that may be another device's clock.
+        self._restart_pending = False
+        #: When the newest restart was counted, and what was known before it.
+        self._restarted: tuple[float, int, bool] = (-math.inf, 0, False)
+
+    @property
+    def device(self) -> str:
+        """ "system/component"."""
+        return f"{self.system_id}/{self.component_id}"
+
+    @property
+    def armed(self) -> Armed:
+        """By the newest heartbeat."""
+        value = self._readings.value("armed")
+        return Armed.UNKNOWN if math.isnan(value) else Armed(int(value))
+
+    @property
+    def landed_state(self) -> LandedState:
+        """By the newest EXTENDED_SYS_STATE."""
+        value = self._readings.value("landed_state")
+        return LandedState.UNKNOWN if math.isnan(value) else LandedState(int(value))
+
+    def reading(self, name: str) -> Reading:
+        """The newest value of a part of the picture; NaN: none."""
+        return self._readings.get(name)
+
+    def on_ground(self, now: float) -> bool:
+        """The autopilot says so now: what it said before its stream fell silent proves nothing."""
+        age = self._readings.age("landed_state", now)
+        return self.landed_state is LandedState.ON_GROUND and age < STREAM_SILENCE
+
+    @property
+    def motors_off(self) -> bool:
+        """The autopilot's own state shows that the motors do not turn any more."""
+        terminated = self._system_status == dialect.MAV_STATE_FLIGHT_TERMINATION
+        return self.armed is Armed.DISARMED or terminated
+
+    def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
+        """A HEARTBEAT of the autopilot."""
+        # Of two with the same ids nobody knows whose it is: what was known ages.
+        if not self._twins.found(now):
+            armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+            self.arming_count += armed and self.armed is Armed.DISARMED
+            self.vehicle_type = message.type
+            self.motor_signs.armed(armed)
+            self._readings.set("armed", Armed.ARMED if armed else Armed.DISARMED, now)
+            self._system_status = message.system_status
+            self._readers.targets.vehicle = Vehicle(
+                message.autopilot, message.type, message.custom_mode
+            )
+        changes = self.liveness.heard(now)
+        firmware = firmware_of(message.autopilot)
+        if changes or firmware is not self.settings.firmware:
+            self._begin_streams()
+            self.settings.begin(firmware, now)
+        return changes
+
+    def ask_anew(self) -> None:
+        """It is to be asked for other intervals from now on."""
+        self._streams.fill_stores()
+        self._begin_streams()
+
+    def messages_due(self, interval: float, now: float) -> tuple[Ask, ...]:
+        """What to ask for now, so that each needed message comes each interval (s)."""
+        needed = self._streams.due(interval, now)
+        if needed:
+            return needed
+        targets = self._readers.targets.vehicle.target_messages
+        wanted = {**PRESSURE, **targets, **FURTHER_ACCELEROMETERS}
+        if self._streams.line_is_slow(now) or self.round_trip.late(now):
+            return self._optional.give_up(wanted, now)
+        return self._optional.due(wanted, self._rates, interval, now)
+
+    def message(self, message: Any, now: float) -> bool:
+        """Any other message of the autopilot; True: the vehicle's picture is to be told."""
+        kind = message.get_type()
+        if kind in _CLOCKS:
+            if not self._twins.observe(kind, message.time_boot_ms, now):
+                return False
+            self._watch_clock(message.time_boot_ms, now)
+        elif not self._twins.ours(getattr(message, "time_boot_ms", 0), now):
+            return False
+        self.motor_signs.heard(message, now)
+        if kind in ("PARAM_VALUE", "PARAM_ERROR"):
+            self.settings.heard(message)
+        elif kind == "TIMESYNC":
+            self.round_trip.heard(message, now)
+        self._streams.received(len(message.get_msgbuf()))
+        if not self._readers.read(message, now):
+            return False
+        self._rates.setdefault(kind, StreamRate()).heard(now)
+        return kind not in _TOLD_WITH_THE_NEXT
+
+    def rates(self, now: float) -> dict[str, float]:
+        """Hz of each message that is read and came at least twice, by name."""
+        rates = {name: stream.rate(now) for name, stream in self._rates.items()}
+        return {name: rate for name, rate in rates.items() if not math.isnan(rate)}
+
+    def vehicle_state(self, now: float) -> VehicleState:
+        """The picture at now, each part with its age."""
+
+        value = self._readings.value
+
+        def age(name: str) -> float:
+            return self._readings.age(name, now)
+
+        target_vertical_speed, below_target, target_age = self._readers.targets.at(now)
+        return VehicleState(
+            source=self.device,
+            link_state=self.liveness.state,
+            armed=self.armed,
+            armed_age=age("armed"),
+            landed_state=self.landed_state,
+            landed_state_age=age("landed_state"),
+            height=value("height"),
+            height_age=age("height"),
+            altitude=value("altitude"),
+            altitude_age=age("altitude"),
+            pressure=value("pressure"),
+            pressure_age=age("pressure"),
+            vertical_speed=value("vertical_speed"),
+            vertical_speed_age=age("vertical_speed"),
+            roll=value("roll"),
+            pitch=value("pitch"),
+            yaw=value("yaw"),
+            tilt=value("tilt"),
+            attitude_age=age("tilt"),
+            attitude_error=value("attitude_error"),
+            attitude_error_age=age("attitude_error"),
+            target_vertical_speed=target_vertical_speed,
+            below_target=below_target,
+            target_age=target_age,
+            acceleration=value("acceleration"),
+            acceleration_spread=value("acceleration_spread"),
+            acceleration_age=age("acceleration"),
+            latitude=value("latitude"),
+            longitude=value("longitude"),
+            position_age=age("latitude"),
+            battery_voltage=value("battery_voltage"),
+            battery_remaining=value("battery_remaining"),
+            battery_age=age("battery_voltage"),
+            system_status=self._system_status,
+            uptime=self._clock.uptime,
+            reboot_count=self.reboot_count,
+            rebooted_in_flight=self.rebooted_in_flight,
+            faults=self._faults(now),
+        )
+
+    def _faults(self, now: float) -> tuple[str, ...]:
+        # Of one that is not heard that is the reason, not its rates.
+        heard = self.liveness.state is LinkState.OK
+        return (*self._streams.faults(now), *self.round_trip.faults(now)) if heard else ()
+
+    def _begin_streams(self) -> None:
+        self.round_trip = RoundTrip()
+        self._streams.begin()
+        self._optional.begin()
+        self._rates.clear()
+
+    def doubt(self, now: float) -> str:
+        """Another device uses the same ids, in words; empty: none does."""
+        return self._twins.doubt(f"two autopilots are {self.device}", now)
+
+    def _watch_clock(self, boot_ms: int, now: float) -> None:
+        age = self._clock.observe(boot_ms)
+        if age is Age.DOUBTFUL:
+            known = self.landed_state is not LandedState.UNKNOWN
+            in_air = known and self.landed_state is not LandedState.ON_GROUND
+            # Restarts again before it said where it is: it is where it was.
+            still_there = not known and self.rebooted_in_flight
+            self._in_flight_before = in_air or still_there or self.armed is Armed.ARMED
+        self._restart_pending = self._restart_pending or age is Age.RESTARTED
+        if self._twins.found(now):
+            self._restart_pending = False
+            at, count, in_flight = self._restarted
+            if now - at <= WINDOW:
+                self.reboot_count, self.rebooted_in_flight = count, in_flight
+        elif self._restart_pending and not self._twins.by_turns(now):
+            self._restart_pending = False
+            self._restart(now)
+
+    def _restart(self, now: float) -> None:
+        self._restarted = now, self.reboot_count, self.rebooted_in_flight
+        self.reboot_count += 1
+        self.rebooted_in_flight = self._in_flight_before
+        self._begin_streams()
+        self.settings.begin(self.settings.firmware, now)
+        # What the autopilot said before its restart describes a vehicle that it no longer knows.
+        self._readings.forget("armed", "landed_state")

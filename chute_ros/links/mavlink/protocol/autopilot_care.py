@@ -1,0 +1,141 @@
+"""What is asked of our autopilot, and undone, without anybody's request.
+
+Its settings are read and told, how long it takes to answer is measured, its heartbeats are had
+sooner, its arming is undone while flight is
+blocked, and its question whether it may arm is answered.
+"""
+
+from __future__ import annotations
+
+import math
+
+from chute_ros.links.mavlink.protocol import arm_authorization, goals
+from chute_ros.links.mavlink.protocol.announcements import Announcements
+from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
+from chute_ros.links.mavlink.protocol.commands import CommandTransactions
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.devices import Devices
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.flight_block import FlightBlock
+from chute_ros.links.mavlink.protocol.heartbeat_watch import HeartbeatWatch
+from chute_ros.links.mavlink.protocol.kill import KillPlan, kill_plan
+from chute_ros.links.mavlink.protocol.setup_check import Setup, SetupNews, setup_of
+from chute_ros.links.mavlink.protocol.wire import Outbox
+from chute_ros.protocol.events import Severity
+from chute_ros.protocol.requests import Requests
+
+#: How often it is looked whether there is something new to say of its set-up, s.
+_SETUP_EVERY = 0.5
+#: An answer whether it may arm is sent again after this, s: PX4 drops one that bears the time of
+#: its question, which in its simulator, whose clock goes in steps, is every quick one.
+_ANSWER_AGAIN = 0.05
+_NO_ANSWER = (math.inf, (0, 0))
+
+
+class AutopilotCare:
+    """Looks after the autopilot that the link has chosen."""
+
+    def __init__(
+        self,
+        config: MavlinkConfig,
+        devices: Devices,
+        requests: Requests[CommandTransactions],
+        outbox: Outbox,
+        announcements: Announcements,
+    ) -> None:
+        self.block = FlightBlock(config.takeoff_height)
+        self._config, self._devices = config, devices
+        self._requests, self._outbox, self._announcements = requests, outbox, announcements
+        self._heartbeats = HeartbeatWatch()
+        self._news = SetupNews()
+        self._told_at = self._now = -math.inf
+        #: The request that disarms. Ours count down from -1: they never meet one of the owner's.
+        self._disarming = 0
+        #: When to answer once more whether an autopilot may arm, and which.
+        self._answer_again = _NO_ANSWER
+
+    def plan_of(self, autopilot: AutopilotTracker) -> KillPlan:
+        """Which ways to stop its motors are tried, and in which order."""
+        return kill_plan(self._config.kill_method, autopilot.vehicle_type, autopilot.settings)
+
+    def setup_of(self, autopilot: AutopilotTracker) -> Setup:
+        """How it is set up for a kill and a flight block."""
+        return setup_of(autopilot, self.plan_of(autopilot), self._config.system_id)
+
+    def look(self, autopilot: AutopilotTracker, faster: bool, now: float) -> None:
+        """It may have said something. faster: it may be asked for other intervals."""
+        self._now = now
+        self.block.observe(autopilot, now)
+        self._settings(autopilot, now)
+        if (question := autopilot.round_trip.question(now)) is not None:
+            self._outbox.send(question, now)
+        undone = bool(self.block.reason) and self._config.disarm_when_blocked
+        for ask in self._heartbeats.due(autopilot, faster, undone, now):
+            self._requests.commands.send_once(ask, now)
+        if self._disarming in self._requests:
+            self._still_wanted(autopilot, now)
+        elif self._config.disarm_when_blocked and self.block.disarm_due(autopilot, now):
+            self._disarm(autopilot, now)
+
+    def authorize(self, asking: tuple[int, int], now: float) -> None:
+        """The autopilot with these ids asks whether it may arm."""
+        autopilot = self._devices.autopilots.get(*asking)
+        if autopilot is None:
+            return
+        self._answer(asking, now)
+        self._answer_again = (now + _ANSWER_AGAIN, asking)
+        if reason := self.block.reason:
+            self._devices.notice(Severity.WARNING, f"arming denied, flight blocked: {reason}")
+            self._announcements.say(f"{reason}: flight blocked, arming denied")
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        at, asking = self._answer_again
+        if now >= at:
+            self._answer_again = _NO_ANSWER
+            self._answer(asking, now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return self._answer_again[0]
+
+    def _answer(self, asking: tuple[int, int], now: float) -> None:
+        autopilot = self._devices.autopilots.get(*asking)
+        assert autopilot is not None
+        reason = self.block.reason
+        self._outbox.send(arm_authorization.answer(asking, reason, autopilot.settings), now)
+
+    def _settings(self, autopilot: AutopilotTracker, now: float) -> None:
+        settings = autopilot.settings
+        if settings.complete and now >= self._told_at + _SETUP_EVERY:
+            self._told_at = now
+            for severity, text in self._news.news(autopilot.device, self.setup_of(autopilot)):
+                self._devices.notice(severity, text)
+                if severity is Severity.ERROR:
+                    self._announcements.say(text)
+        if name := settings.due(now):
+            ids, encoded = (autopilot.system_id, autopilot.component_id), name.encode()
+            self._outbox.send(dialect.MAVLink_param_request_read_message(*ids, encoded, -1), now)
+
+    def _still_wanted(self, autopilot: AutopilotTracker, now: float) -> None:
+        if not self.block.stands(autopilot, now):
+            why = "flight is not blocked any more, or the vehicle not known to be on the ground"
+        elif self._requests.under_way(goals.FORCED) and not self.block.may_force(now):
+            why = "that the vehicle has not left the ground is not known any more"
+        else:
+            return
+        self._requests.abandon(self._disarming, why, now)
+
+    def _disarm(self, autopilot: AutopilotTracker, now: float) -> None:
+        reason = self.block.reason
+        if self.block.worth_telling():
+            text = f"autopilot armed while flight is blocked ({reason}): disarming"
+            self._devices.notice(Severity.WARNING, text)
+            self._announcements.say(f"{reason}: flight blocked, disarming")
+        self._disarming -= 1
+        patience = self._config.commands.ack_timeout
+        goal = goals.disarm_on_ground(autopilot, self._may_force, patience, now)
+        self._requests.begin(self._disarming, goal, now)
+
+    def _may_force(self) -> bool:
+        return self.block.may_force(self._now)

@@ -1,0 +1,303 @@
+"""COMMAND_LONG as a transaction: sent, resent, acknowledged or given up.
+
+Source: MAVLink developer guide, "Command protocol". Sent again with a rising confirmation until an
+acknowledgement comes from the component that was addressed; IN_PROGRESS extends the wait.
+
+Which answer is to which send: see unanswered.py. A transaction that must tell its answers from
+those to N earlier sends may send N times more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+from chute_ros.errors import ParameterError
+from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.unanswered import UnansweredSends
+
+
+@dataclass(frozen=True)
+class CommandLimits:
+    """Times (s) and tries of a command."""
+
+    ack_timeout: float = 0.2
+    tries: int = 5
+    in_progress_timeout: float = 5.0
+    late_ack_window: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("ack_timeout", "in_progress_timeout", "late_ack_window"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ParameterError(f"{name} is {value}: need a time above 0 s")
+        if not 1 <= self.tries <= 255:
+            raise ParameterError(f"tries is {self.tries}: need 1 to 255 (confirmation is a byte)")
+
+
+@dataclass(frozen=True)
+class Command:
+    """A MAV_CMD for one component; params are param1 to param7."""
+
+    system_id: int
+    component_id: int
+    number: int
+    params: tuple[float, float, float, float, float, float, float] = (0.0,) * 7
+
+
+@dataclass(frozen=True)
+class Acknowledgement:
+    """A COMMAND_ACK with its sender."""
+
+    system_id: int
+    component_id: int
+    number: int
+    result: int
+    progress: int = 255
+
+
+@dataclass(frozen=True)
+class SendCommand:
+    """Put this command on the wire now."""
+
+    command: Command
+    confirmation: int
+    #: Of the transaction that it belongs to; None: of none (send_once).
+    token: int | None = None
+
+
+@dataclass(frozen=True)
+class CommandFinished:
+    """A transaction ended: result is a MAV_RESULT or NO_ACKNOWLEDGEMENT."""
+
+    token: int
+    command: Command
+    result: int
+    sends: int
+    seconds: float
+    superseded: bool = False
+
+    @property
+    def accepted(self) -> bool:
+        """The device accepted the command."""
+        return self.result == results.ACCEPTED
+
+    @property
+    def not_now(self) -> bool:
+        """No answer, or one that may be another later: worth another try."""
+        return self.result in (results.TEMPORARILY_REJECTED, results.NO_ACKNOWLEDGEMENT)
+
+    def text(self) -> str:
+        """What came of it, in words."""
+        if self.superseded:
+            return f"given up after {self.seconds:.2f} s for a newer command of the same number"
+        if self.result == results.NO_ACKNOWLEDGEMENT:
+            return f"no acknowledgement after {self.sends} sends in {self.seconds:.2f} s"
+        return f"{results.result_text(self.result)} (after {self.seconds:.2f} s)"
+
+
+_Key = tuple[int, int, int]
+
+#: Family of the sends that nobody waits for.
+_NOBODY = 0
+
+
+def _key(command: Command) -> _Key:
+    return (command.system_id, command.component_id, command.number)
+
+
+@dataclass
+class _Open:
+    tokens: list[int]
+    command: Command
+    family: int
+    started: float
+    deadline: float
+    others: int
+    tries: int
+    sends: int = 0
+    answers: Counter[int] = field(default_factory=Counter)
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    token: int
+    command: Command
+    family: int
+    since: float
+
+
+class CommandTransactions:
+    """All commands of one link that are under way. One per component and command number."""
+
+    def __init__(self, limits: CommandLimits) -> None:
+        self.limits = limits
+        self.late_count = 0
+        self.unexpected_count = 0
+        self._open: dict[_Key, _Open] = {}
+        self._sends: dict[_Key, UnansweredSends] = {}
+        self._waiting: dict[_Key, deque[_Waiting]] = {}
+        self._out: list[SendCommand] = []
+        self._finished: list[CommandFinished] = []
+
+    def start(
+        self,
+        token: int,
+        command: Command,
+        now: float,
+        urgent: bool = False,
+        family: int | None = None,
+    ) -> None:
+        """Send command; its end is reported with token. family: by default the token.
+
+        While one of the same number to the same component is open, a command waits for its turn.
+        An urgent one does not: it joins one that asks for the very same, which is sent again at
+        once, or takes the place of any other; what waits is given up, lest it undo it.
+        """
+        key = _key(command)
+        family = token if family is None else family
+        earlier = self._open.get(key)
+        if earlier is not None and not urgent:
+            waiting = self._waiting.setdefault(key, deque())
+            waiting.append(_Waiting(token, command, family, now))
+            return
+        for other in self._waiting.pop(key, ()):
+            self._report(other.token, other.command, now - other.since, superseded=True)
+        if earlier is not None and earlier.command == command:
+            earlier.tokens.append(token)
+            earlier.tries = max(earlier.tries, earlier.sends + self.limits.tries)
+            self._send(earlier, now)
+            return
+        if earlier is not None:
+            self._end(key, earlier, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
+        self._begin(key, _Waiting(token, command, family, now), now)
+
+    def send_once(self, command: Command, now: float) -> None:
+        """Send command once; nobody waits for its answer, and it confirms nothing else."""
+        key = _key(command)
+        self._out.append(SendCommand(command, 0))
+        self._sends_of(key).add(_NOBODY, now)
+        if key in self._open:
+            self._open[key].others += 1
+
+    def acknowledged(self, ack: Acknowledgement, now: float) -> None:
+        """An acknowledgement that is addressed to us came."""
+        key = (ack.system_id, ack.component_id, ack.number)
+        sends, transaction = self._sends.get(key), self._open.get(key)
+        if sends is None:
+            self.unexpected_count += 1
+            return
+        others = 0 if transaction is None else self._others_of(key, transaction, now)
+        if ack.result == results.IN_PROGRESS:
+            sends.in_progress(now, self.limits.in_progress_timeout)
+            if transaction is None or others:
+                self.late_count += 1
+            else:
+                transaction.deadline = now + self.limits.in_progress_timeout
+            return
+        if not sends.answer(now):
+            self.unexpected_count += 1
+            return
+        if transaction is None:
+            self.late_count += 1
+            return
+        transaction.answers[ack.result] += 1
+        if others and transaction.answers[ack.result] <= transaction.others:
+            self.late_count += 1
+            return
+        self._end(key, transaction, ack.result, now)
+        self._start_waiting(key, now)
+
+    def update(self, now: float) -> None:
+        """Look at the clock: send again, or give up."""
+        for key, transaction in list(self._open.items()):
+            if now < transaction.deadline:
+                continue
+            others = self._others_of(key, transaction, now)
+            if transaction.sends >= min(transaction.tries + others, 256):
+                self._end(key, transaction, results.NO_ACKNOWLEDGEMENT, now)
+                self._start_waiting(key, now)
+            else:
+                self._send(transaction, now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        return min((t.deadline for t in self._open.values()), default=math.inf)
+
+    def take_output(self) -> list[SendCommand]:
+        """The commands to put on the wire, oldest first; each is handed out once."""
+        out, self._out = self._out, []
+        return out
+
+    def take_finished(self) -> list[CommandFinished]:
+        """The transactions that ended, oldest first; each is handed out once."""
+        finished, self._finished = self._finished, []
+        return finished
+
+    def cancel(self, token: int, now: float) -> None:
+        """Whoever started this command does not want it any more: nothing is sent or reported."""
+        for key, waiting in list(self._waiting.items()):
+            left = deque(entry for entry in waiting if entry.token != token)
+            if left:
+                self._waiting[key] = left
+            else:
+                del self._waiting[key]
+        for key, transaction in list(self._open.items()):
+            if token in transaction.tokens:
+                transaction.tokens.remove(token)
+                if not transaction.tokens:
+                    del self._open[key]
+                    self._start_waiting(key, now)
+
+    def _sends_of(self, key: _Key) -> UnansweredSends:
+        return self._sends.setdefault(key, UnansweredSends(self.limits.late_ack_window))
+
+    def _others_of(self, key: _Key, transaction: _Open, now: float) -> int:
+        # Those that were answered before it began are not waited for again.
+        return min(transaction.others, self._sends_of(key).of_others(transaction.family, now))
+
+    def _begin(self, key: _Key, start: _Waiting, now: float) -> None:
+        others = self._sends_of(key).of_others(start.family, now)
+        self._open[key] = _Open(
+            [start.token], start.command, start.family, now, now, others, self.limits.tries
+        )
+        self._send(self._open[key], now)
+
+    def _send(self, transaction: _Open, now: float) -> None:
+        confirmation = min(transaction.sends, 255)
+        token = transaction.tokens[-1]
+        self._out.append(SendCommand(transaction.command, confirmation, token))
+        self._sends_of(_key(transaction.command)).add(transaction.family, now)
+        transaction.sends += 1
+        transaction.deadline = now + self.limits.ack_timeout
+
+    def _start_waiting(self, key: _Key, now: float) -> None:
+        waiting = self._waiting.get(key)
+        if not waiting:
+            return
+        start = waiting.popleft()
+        if not waiting:
+            del self._waiting[key]
+        self._begin(key, start, now)
+
+    def _end(
+        self, key: _Key, transaction: _Open, result: int, now: float, superseded: bool = False
+    ) -> None:
+        del self._open[key]
+        seconds = now - transaction.started
+        for token in transaction.tokens:
+            self._report(
+                token, transaction.command, seconds, superseded, result, transaction.sends
+            )
+
+    def _report(
+        self,
+        token: int,
+        command: Command,
+        seconds: float,
+        superseded: bool = False,
+        result: int = results.NO_ACKNOWLEDGEMENT,
+        sends: int = 0,
+    ) -> None:
+        self._finished.append(CommandFinished(token, command, result, sends, seconds, superseded))

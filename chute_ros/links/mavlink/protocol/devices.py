@@ -1,0 +1,230 @@
+"""Our parachutes and our autopilot on one MAVLink network: who they are and what they say.
+
+It only listens. What is sent to them, and when, is the business of MavlinkLink.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker, is_autopilot
+from chute_ros.links.mavlink.protocol.commands import Acknowledgement
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.kill import kill_plan
+from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
+from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES, Roster
+from chute_ros.model import Armed, LinkState, VehicleState
+from chute_ros.protocol.events import (
+    DeviceLinkChanged,
+    Event,
+    Notice,
+    ParachuteChanged,
+    Severity,
+    VehicleChanged,
+)
+from chute_ros.protocol.liveness import LinkChange, first_alive
+
+Ids = tuple[int, int]
+
+
+class Devices:
+    """Follows the devices that are ours, each known by its heartbeat's type and its ids."""
+
+    def __init__(self, config: MavlinkConfig) -> None:
+        self.parachutes: Roster[ParachuteTracker] = Roster(
+            "parachute", config.parachute_system_id, config.parachute_component_id
+        )
+        self.autopilots: Roster[AutopilotTracker] = Roster(
+            "autopilot", config.autopilot_system_id, config.autopilot_component_id
+        )
+        #: By their PARACHUTE_STATUS, and not yet by a heartbeat.
+        self._unproven: dict[Ids, ParachuteTracker] = {}
+        #: By the type in their heartbeat they are something else.
+        self._others: set[Ids] = set()
+        self._config = config
+        self._events: list[Event] = []
+
+    # -- who -------------------------------------------------------------------------------------
+
+    def chosen_parachute(self) -> ParachuteTracker | None:
+        """Where requests without a device go: the first that is not lost, or the first."""
+        return first_alive(self.parachutes.all())
+
+    def target(self, device: str) -> ParachuteTracker | None:
+        """The parachute with this name; empty: the chosen one."""
+        return self.parachutes.named(device) if device else self.chosen_parachute()
+
+    def to_release(self, device: str) -> ParachuteTracker | None:
+        """Where a release goes; device: its name, or empty. As long as no heartbeat of a parachute
+        was heard, to the one that says what only a parachute does, if all that do are of one
+        system: heartbeats come once a second, and after a restart of ours the ground may come
+        before the next that is whole."""
+        if self.parachutes.all():
+            return self.target(device)
+        if len({system_id for system_id, _ in self._unproven}) != 1:
+            return None
+        fitting = (one for one in self._unproven.values() if device in ("", one.device))
+        return next(fitting, None)
+
+    def chosen_autopilot(self) -> AutopilotTracker | None:
+        """The first autopilot of ours that is not lost, or the first."""
+        return first_alive(self.autopilots.all())
+
+    def arming_count(self) -> int:
+        """How often an autopilot of ours was seen to arm."""
+        return sum(autopilot.arming_count for autopilot in self.autopilots.all())
+
+    def accepted(self, ack: Acknowledgement, now: float) -> None:
+        """A device accepted a command of ours."""
+        autopilot = self.autopilots.get(ack.system_id, ack.component_id)
+        if autopilot is not None:
+            autopilot.motor_signs.accepted(ack.number, now)
+
+    def motors_remark(self) -> str:
+        """What whoever releases a parachute must know of the motors; empty: nothing."""
+        autopilot = self.chosen_autopilot()
+        if autopilot is None or autopilot.liveness.state is not LinkState.OK:
+            return ""
+        if autopilot.armed is not Armed.ARMED or autopilot.motors_off:
+            return ""
+        return f"WARNING: autopilot {autopilot.device} says that it is armed: the motors may turn"
+
+    def doubts(self, now: float) -> list[str]:
+        """Why it is doubtful which devices are ours."""
+        doubts = [self.parachutes.doubt(), self.autopilots.doubt()]
+        doubts += [parachute.doubt(now) for parachute in self.parachutes.all()]
+        doubts += [autopilot.doubt(now) for autopilot in self.autopilots.all()]
+        both = self.parachutes.all() and self.autopilots.all()
+        if both and self.parachutes.system_id != self.autopilots.system_id:
+            unset = [f"{self.parachutes.kind}_system_id"] if not self.parachutes.fixed else []
+            unset += [f"{self.autopilots.kind}_system_id"] if not self.autopilots.fixed else []
+            if unset:
+                doubts.append(
+                    f"the parachute is of system {self.parachutes.system_id}, the autopilot of "
+                    f"system {self.autopilots.system_id}: set {' and '.join(unset)}"
+                )
+        return [doubt for doubt in doubts if doubt]
+
+    # -- what they say ---------------------------------------------------------------------------
+
+    def heard(self, message: Any, ids: Ids, now: float) -> None:
+        """A message of anybody on the network."""
+        if message.get_type() != "HEARTBEAT":
+            self._from_parachute(message, ids, now)
+            self._from_autopilot(message, ids, now)
+        elif message.type == dialect.MAV_TYPE_PARACHUTE:
+            self._parachute_heartbeat(message, ids, now)
+        else:
+            self._unproven.pop(ids, None)
+            if len(self._others) < MOST_DEVICES:
+                self._others.add(ids)
+            if is_autopilot(message):
+                self._autopilot_heartbeat(message, ids, now)
+
+    def update(self, now: float) -> None:
+        """Look at the clock."""
+        for parachute in self.parachutes.all():
+            changes, picture_changed = parachute.update(now)
+            self._changed(f"parachute {parachute.device}", changes)
+            if picture_changed:
+                self._events.append(ParachuteChanged(parachute.status(now)))
+        for autopilot in self.autopilots.all():
+            changes = autopilot.liveness.update(now)
+            self._changed(f"autopilot {autopilot.device}", changes)
+            if changes:
+                self._vehicle_changed(now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        deadlines = [p.next_deadline() for p in self.parachutes.all()]
+        deadlines += [a.liveness.next_deadline() for a in self.autopilots.all()]
+        return min(deadlines, default=math.inf)
+
+    def vehicle_state(self, now: float) -> VehicleState:
+        """The picture of our autopilot's vehicle."""
+        autopilot = self.chosen_autopilot()
+        if autopilot is None:
+            return VehicleState()
+        state, settings = autopilot.vehicle_state(now), autopilot.settings
+        fault = kill_plan(self._config.kill_method, autopilot.vehicle_type, settings).fault()
+        return replace(state, faults=(*state.faults, fault)) if fault else state
+
+    def take_events(self) -> list[Event]:
+        """What happened, oldest first; each is handed out once."""
+        events, self._events = self._events, []
+        return events
+
+    def notice(self, severity: Severity, text: str) -> None:
+        """Put a notice among the events."""
+        self._events.append(Notice(severity, text))
+
+    def _parachute_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
+        if not self.parachutes.admits(*ids):
+            return
+        parachute = self.parachutes.get(*ids)
+        if parachute is None:
+            parachute = self._unproven.pop(ids, None) or self._tracker(ids)
+            self.parachutes.add(*ids, parachute)
+        self._changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
+        self._events.append(ParachuteChanged(parachute.status(now)))
+
+    def _tracker(self, ids: Ids) -> ParachuteTracker:
+        return ParachuteTracker(*ids, self._config.parachute_liveness, self._config.status)
+
+    def _autopilot_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
+        if not self.autopilots.admits(*ids):
+            return
+        autopilot = self.autopilots.get(*ids)
+        if autopilot is None:
+            config = self._config
+            limits, needed = config.autopilot_liveness, config.needed_message_rate
+            autopilot = AutopilotTracker(*ids, limits, needed)
+            self.autopilots.add(*ids, autopilot)
+        self._changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
+        self._vehicle_changed(now)
+
+    def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:
+        parachute, kind = self.parachutes.get(*ids), message.get_type()
+        if parachute is None:
+            if kind == "PARACHUTE_STATUS":
+                self._unproven_status(message, ids, now)
+            return
+        if kind == "PARACHUTE_STATUS":
+            reboots = parachute.reboot_count
+            parachute.parachute_status(message, now)
+            if parachute.reboot_count > reboots:
+                text = f"parachute {parachute.device} restarted"
+                self.notice(Severity.ERROR, text)
+            self._events.append(ParachuteChanged(parachute.status(now)))
+        elif kind == "COMPONENT_INFORMATION_BASIC":
+            parachute.component_information(message)
+
+    def _unproven_status(self, message: Any, ids: Ids, now: float) -> None:
+        if ids in self._others or not self.parachutes.fits(*ids):
+            return
+        if ids not in self._unproven and len(self._unproven) < MOST_DEVICES:
+            self._unproven[ids] = self._tracker(ids)
+        if ids in self._unproven:
+            self._unproven[ids].parachute_status(message, now)
+
+    def _from_autopilot(self, message: Any, ids: Ids, now: float) -> None:
+        autopilot = self.autopilots.get(*ids)
+        if autopilot is None:
+            return
+        reboots = autopilot.reboot_count
+        changed = autopilot.message(message, now)
+        if autopilot.reboot_count > reboots:
+            where = "in flight" if autopilot.rebooted_in_flight else "on the ground"
+            text = f"autopilot {autopilot.device} restarted {where}"
+            self.notice(Severity.ERROR, text)
+        if changed:
+            self._vehicle_changed(now)
+
+    def _vehicle_changed(self, now: float) -> None:
+        self._events.append(VehicleChanged(self.vehicle_state(now)))
+
+    def _changed(self, name: str, changes: list[LinkChange]) -> None:
+        self._events += [DeviceLinkChanged(name, change) for change in changes]

@@ -1,0 +1,125 @@
+"""While flight is blocked, arming on the ground is undone: when to disarm, and when not.
+
+Where the height is known, the vehicle is on the ground until it was higher than takeoff_height
+above where it was armed: some autopilots say IN_AIR as soon as a take-off is ordered, at height 0.
+Else the autopilot's own ON_GROUND is believed while it is fresh. An autopilot refuses a plain
+disarm in flight; a forced one, which it does not refuse, follows only where the vehicle was armed
+while flight was blocked already, and its height shows that it has not left the ground since.
+"""
+
+from __future__ import annotations
+
+import math
+
+from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
+from chute_ros.model import Armed, Reading
+
+#: Seconds from one disarm to the next, while the autopilot stays armed.
+DISARM_INTERVAL = 0.5
+#: It was higher once it was so for this long, s; a height older than this is not known, s.
+_FOR_A_MOMENT, _FRESH = 0.3, 1.0
+#: What a height is taken from: the first that is known as it arms. No home moves the first.
+_HEIGHTS = ("altitude", "height")
+
+
+class FlightBlock:
+    """The block, and the disarming under it."""
+
+    def __init__(self, takeoff_height: float) -> None:
+        self.reason = ""
+        self._rise = _Rise(takeoff_height)
+        self._armed_while_blocked = False
+        self._disarm_at = -math.inf
+        self._told = False
+
+    def set(self, reason: str) -> None:
+        """Block for reason, or release (empty)."""
+        news = bool(reason) != bool(self.reason)
+        self.reason = reason
+        if news:
+            self._disarm_at, self._told, self._armed_while_blocked = -math.inf, False, False
+
+    def observe(self, autopilot: AutopilotTracker, now: float) -> None:
+        """The autopilot may have said something."""
+        if self._rise.observe(autopilot, now):
+            self._armed_while_blocked = bool(self.reason)
+
+    def stands(self, autopilot: AutopilotTracker, now: float) -> bool:
+        """Flight is blocked and the vehicle is, as far as is known, on the ground."""
+        if not self.reason:
+            return False
+        if not self._rise.known(now):
+            return autopilot.on_ground(now)
+        if not self._rise.is_low:
+            return False
+        return not self._rise.left_ground or autopilot.on_ground(now)
+
+    def may_force(self, now: float) -> bool:
+        """It was armed while flight was blocked, and has not left the ground since."""
+        stands = self._rise.known(now) and self._rise.is_low and not self._rise.left_ground
+        return bool(self.reason) and self._armed_while_blocked and stands
+
+    def disarm_due(self, autopilot: AutopilotTracker, now: float) -> bool:
+        """The autopilot is to be disarmed now; if it stays armed, the next time is set."""
+        if autopilot.armed is not Armed.ARMED:
+            self._disarm_at, self._told = -math.inf, False
+            return False
+        if now < self._disarm_at or not self.stands(autopilot, now):
+            return False
+        self._disarm_at = now + DISARM_INTERVAL
+        return True
+
+    def worth_telling(self) -> bool:
+        """True the first time since the autopilot was armed."""
+        first, self._told = not self._told, True
+        return first
+
+
+class _Rise:
+    """How far the vehicle rose since it was seen to arm."""
+
+    def __init__(self, takeoff_height: float) -> None:
+        self.left_ground = False
+        self.is_low = True
+        self._limit = takeoff_height
+        self._armings: dict[str, int] = {}
+        #: What the height is taken from; empty: it was not known as the vehicle was armed.
+        self._source = ""
+        self._newest = Reading()
+        #: The lowest since it was armed: home may be set again as it arms.
+        self._lowest = math.nan
+        self._higher_since = math.inf
+
+    def observe(self, autopilot: AutopilotTracker, now: float) -> bool:
+        """The autopilot may have said something; True: it was just seen to arm."""
+        before = self._armings.setdefault(autopilot.device, autopilot.arming_count)
+        self._armings[autopilot.device] = autopilot.arming_count
+        just_armed = autopilot.arming_count > before
+        if just_armed:
+            self._begin(autopilot, now)
+        elif self._source and autopilot.armed is not Armed.ARMED:
+            self._source = ""
+        elif self._source:
+            self._follow(autopilot.reading(self._source), now)
+        return just_armed
+
+    def known(self, now: float) -> bool:
+        """The height is known, now and as it was armed."""
+        return bool(self._source) and self._newest.age(now) <= _FRESH
+
+    def _begin(self, autopilot: AutopilotTracker, now: float) -> None:
+        fresh = (name for name in _HEIGHTS if autopilot.reading(name).age(now) <= _FRESH)
+        self._source = next(fresh, "")
+        self._newest = autopilot.reading(self._source)
+        self._lowest = self._newest.value
+        self.left_ground, self.is_low, self._higher_since = False, True, math.inf
+
+    def _follow(self, height: Reading, now: float) -> None:
+        self._newest = height
+        self._lowest = min(self._lowest, height.value)
+        self.is_low = height.value - self._lowest <= self._limit
+        if self.is_low:
+            self._higher_since = math.inf
+        else:
+            self._higher_since = min(self._higher_since, now)
+        self.left_ground = self.left_ground or now - self._higher_since >= _FOR_A_MOMENT

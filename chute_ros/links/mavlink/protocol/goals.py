@@ -1,0 +1,279 @@
+"""The goals of the MAVLink parachute protocol: which commands, and what shows their effect.
+
+Sources: Parachute Protocol (MAV_CMD_SET_PARACHUTE_ARM, PARACHUTE_STATUS), MAVLink common.xml
+(MAV_CMD_DO_PARACHUTE, MAV_CMD_DO_FLIGHTTERMINATION, MAV_CMD_COMPONENT_ARM_DISARM,
+MAV_CMD_REQUEST_MESSAGE, MAV_CMD_SET_MESSAGE_INTERVAL).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
+from chute_ros.links.mavlink.protocol.commands import Command
+from chute_ros.links.mavlink.protocol.config import KillMethod
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.kill import KillPlan
+from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
+from chute_ros.model import LinkState, TriggerFlags, flag_names
+from chute_ros.protocol.effect import Goal
+
+MavlinkGoal = Goal[Command]
+
+#: param2 of MAV_CMD_COMPONENT_ARM_DISARM that makes the autopilot disarm in flight.
+FORCE_DISARM = 21196.0
+
+#: Whole numbers up to here are exact in a param, which is a 32-bit float.
+MOST_EXACT = 2**24
+
+#: Name of the goal that fires.
+RELEASE = "release"
+#: And of the one that disarms by force, on the ground.
+FORCED = "forced disarm on the ground"
+
+#: When the heartbeat is asked for after an answer, s: autopilots change state some 10 ms later.
+_LOOKS = (0.0, 0.025, 0.05, 0.1, 0.2)
+
+
+def _params(*values: float) -> tuple[float, float, float, float, float, float, float]:
+    p1, p2, p3, p4, p5, p6, p7 = (*values, *(0.0,) * (7 - len(values)))
+    return (p1, p2, p3, p4, p5, p6, p7)
+
+
+def command(device: ParachuteTracker | AutopilotTracker, number: int, *params: float) -> Command:
+    """A command for device; the params that are not given are 0."""
+    return Command(device.system_id, device.component_id, number, _params(*params))
+
+
+def set_triggers(
+    parachute: ParachuteTracker, arm: TriggerFlags, select: TriggerFlags, now: float
+) -> MavlinkGoal:
+    """Arm the selected trigger sources that are set in arm, disarm the other selected ones."""
+
+    def shown() -> bool:
+        fresh = parachute.status_received > now
+        return fresh and parachute.armed_triggers & select == arm & select
+
+    disarmed = TriggerFlags(int(select) & ~int(arm))
+    changed = ", ".join(
+        [f"{name} armed" for name in flag_names(select & arm)]
+        + [f"{name} disarmed" for name in flag_names(disarmed)]
+    )
+    return Goal(
+        "MAV_CMD_SET_PARACHUTE_ARM",
+        (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, float(arm), float(select)),),
+        f"PARACHUTE_STATUS says {changed}",
+        shown,
+        request_status(parachute),
+        hinders_release=bool(disarmed),
+    )
+
+
+def release(
+    parachute: ParachuteTracker, force: bool, now: float, remark: Callable[[], str] = str
+) -> MavlinkGoal:
+    """Release the parachute; with force its flight-controller trigger is armed on the way.
+    remark: what else whoever reads its end must know.
+
+    A status from before the order is believed only while the status stream is alive and the device
+    not lost: what a lost device said long ago must not keep us from sending.
+    """
+    alive = parachute.liveness.state is not LinkState.LOST and not parachute.status_overdue(now)
+
+    def shown() -> bool:
+        return parachute.deployed and (alive or parachute.status_received > now)
+
+    commands: tuple[Command, ...] = (
+        command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(dialect.PARACHUTE_RELEASE)),
+    )
+    if force:
+        sources = float(TriggerFlags.FC | TriggerFlags.OFFBOARD)
+        arm = command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, sources, sources)
+        commands = (arm, *commands)
+    return Goal(
+        RELEASE,
+        commands,
+        "PARACHUTE_STATUS says deployed",
+        shown,
+        request_status(parachute),
+        insist=force,
+        urgent=True,
+        hint=lambda: _why_not_released(parachute),
+        remark=remark,
+    )
+
+
+def _why_not_released(parachute: ParachuteTracker) -> str:
+    """What of the device's own status keeps a module from releasing on command."""
+    hints = []
+    if not parachute.armed_triggers & TriggerFlags.FC:
+        armed = ", ".join(flag_names(parachute.armed_triggers)) or "none"
+        # Some modules go by FC alone, wherever the command comes from.
+        offboard = parachute.armed_triggers & TriggerFlags.OFFBOARD
+        need = "this module may need FC" if offboard else "need FC or OFFBOARD"
+        hints.append(f"armed triggers: {armed}; {need}, which force arms on the way")
+    if not parachute.ground_cleared:
+        hints.append("its own status does not say GROUND_CLEARED")
+    return "; ".join(hints)
+
+
+#: The actions of MAV_CMD_DO_PARACHUTE that do not fire.
+ACTION_NAMES: dict[int, str] = {
+    dialect.PARACHUTE_DISABLE: "disable",
+    dialect.PARACHUTE_ENABLE: "enable",
+}
+
+
+def parachute_action(parachute: ParachuteTracker, action: int) -> MavlinkGoal:
+    """MAV_CMD_DO_PARACHUTE disable or enable; the status has no field that shows it."""
+    return Goal(
+        f"MAV_CMD_DO_PARACHUTE {ACTION_NAMES[action]}",
+        (command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(action)),),
+        "acknowledged",
+        hinders_release=action == dialect.PARACHUTE_DISABLE,
+    )
+
+
+def kill(
+    autopilot: AutopilotTracker,
+    plan: Callable[[], KillPlan],
+    deploy_decided: Callable[[], bool],
+    patience: float,
+    now: float,
+) -> MavlinkGoal | None:
+    """Stop the motors, by the ways that plan has as each is begun. Always sent: a heartbeat from
+    before the order proves nothing. patience: without an answer for so long the next way is tried
+    as well, s. None: no way is allowed now."""
+
+    def shown() -> bool:
+        told = autopilot.motors_off and autopilot.liveness.last_heard > now
+        return told or autopilot.motor_signs.stopped_since(now)
+
+    def next_way(tried: tuple[KillMethod, ...]) -> MavlinkGoal | None:
+        way = plan().allowed(tried, deploy_decided())
+        if way is None:
+            return None
+        return Goal(
+            f"kill ({way.method.value})",
+            (_stop_order(autopilot, way.method),),
+            "the autopilot says motors off",
+            shown,
+            _request_heartbeat(autopilot),
+            insist=True,
+            urgent=True,
+            looks=_LOOKS,
+            otherwise=lambda: next_way((*tried, way.method)),
+            patience=patience,
+        )
+
+    return next_way(())
+
+
+def _stop_order(autopilot: AutopilotTracker, method: KillMethod) -> Command:
+    if method is KillMethod.FLIGHT_TERMINATION:
+        return command(autopilot, dialect.MAV_CMD_DO_FLIGHTTERMINATION, 1.0)
+    return command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
+
+
+def _request_heartbeat(autopilot: AutopilotTracker) -> Command:
+    message_id = float(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+    return command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
+
+
+def disarm_on_ground(
+    autopilot: AutopilotTracker, may_force: Callable[[], bool], patience: float, now: float
+) -> MavlinkGoal:
+    """A plain disarm, which an autopilot refuses if it takes the vehicle to fly; where may_force
+    says that it stands, a forced one follows then."""
+
+    def disarm(forced: bool) -> MavlinkGoal:
+        param2 = (FORCE_DISARM,) if forced else ()
+        return Goal(
+            FORCED if forced else "disarm on the ground",
+            (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
+            "the autopilot's heartbeat says disarmed",
+            lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
+            _request_heartbeat(autopilot),
+            # The plain one, which may be tried on, must not keep it waiting.
+            urgent=forced,
+            looks=_LOOKS,
+            otherwise=lambda: disarm(True) if not forced and may_force() else None,
+            patience=patience,
+        )
+
+    return disarm(False)
+
+
+def request_status(parachute: ParachuteTracker) -> Command:
+    """Ask for one PARACHUTE_STATUS."""
+    message_id = float(dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS)
+    return command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
+
+
+@dataclass
+class Watch:
+    """Waits for one message of one device; field, if given, must hold value."""
+
+    system_id: int
+    component_id: int
+    message_id: int
+    field: str = ""
+    value: int = 0
+    message: Any = None
+
+    def offer(self, *said: Any) -> None:
+        """A message came (system id, component id, message): keep it if it is the one."""
+        system_id, component_id, message = said
+        if (system_id, component_id) != (self.system_id, self.component_id):
+            return
+        if message.get_msgId() != self.message_id:
+            return
+        if not self.field or getattr(message, self.field) == self.value:
+            self.message = message
+
+    def seen(self) -> bool:
+        """It came."""
+        return self.message is not None
+
+
+def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[MavlinkGoal, Watch]:
+    """Ask for one message (MAV_CMD_REQUEST_MESSAGE)."""
+    watch = Watch(parachute.system_id, parachute.component_id, message_id)
+    kind = dialect.mavlink_map.get(message_id)
+    name = kind.msgname if kind is not None else f"message {message_id}"
+    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
+    goal = Goal(
+        f"request of {name}", (ask,), f"{name} came", watch.seen, needs_acknowledgement=True
+    )
+    return goal, watch
+
+
+def set_message_interval(
+    parachute: ParachuteTracker, message_id: int, interval_us: int
+) -> MavlinkGoal:
+    """Set the interval of a message (MAV_CMD_SET_MESSAGE_INTERVAL), microseconds."""
+    order = command(
+        parachute,
+        dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+        float(message_id),
+        float(interval_us),
+    )
+    return Goal(f"interval of message {message_id}", (order,), "acknowledged")
+
+
+def read_message_interval(
+    parachute: ParachuteTracker, message_id: int
+) -> tuple[MavlinkGoal, Watch]:
+    """Ask how often a message is sent: a MAV_CMD_REQUEST_MESSAGE of MESSAGE_INTERVAL."""
+    watch = Watch(
+        parachute.system_id,
+        parachute.component_id,
+        dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL,
+        "message_id",
+        message_id,
+    )
+    wanted = float(dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL)
+    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, float(message_id))
+    return Goal("request of MESSAGE_INTERVAL", (ask,), "MESSAGE_INTERVAL came", watch.seen), watch

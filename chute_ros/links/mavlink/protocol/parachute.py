@@ -1,0 +1,284 @@
+"""What one MAVLink parachute says of itself, normalised.
+
+Source: Parachute Protocol, "Parachute Connection" (heartbeat, type, component id) and "STATUS".
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.twins import Twins
+from chute_ros.model import (
+    NAN,
+    TRIGGER_SOURCES,
+    DeploymentTrigger,
+    ErrorFlags,
+    LinkState,
+    ParachuteState,
+    ParachuteStatus,
+    SafetyFlags,
+    TriggerFlags,
+    flag_names,
+)
+from chute_ros.protocol.boot_clock import Age, BootClock
+from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+
+_UNHEALTHY_STATES = {
+    dialect.MAV_STATE_CRITICAL: "critical",
+    dialect.MAV_STATE_EMERGENCY: "emergency",
+    dialect.MAV_STATE_POWEROFF: "powering off",
+    dialect.MAV_STATE_FLIGHT_TERMINATION: "flight termination",
+}
+_STARTING_STATES = {
+    dialect.MAV_STATE_BOOT: "starting",
+    dialect.MAV_STATE_CALIBRATING: "calibrating",
+}
+#: Without a status for so long it is asked for, s: the stream nominally brings one each second.
+_STATUS_MISSED = 1.5
+#: And for the next of a doubtful one not more often than so, s.
+_ASK_AGAIN = 0.1
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}")
+
+
+@dataclass(frozen=True)
+class ComponentInformation:
+    """COMPONENT_INFORMATION_BASIC (MAVLink message 396) of one device."""
+
+    vendor_name: str
+    model_name: str
+    software_version: str
+    hardware_version: str
+    serial_number: str
+    manufacture_date: str  # YYYY-MM-DD in UTC, empty: not given
+    capabilities: int
+    uptime: float  # s
+
+
+@dataclass(frozen=True)
+class StatusLimits:
+    """PARACHUTE_STATUS is overdue after this silence (s); error flags to take no notice of."""
+
+    status_timeout: float = 3.5
+    ignored_errors: ErrorFlags = ErrorFlags(0)
+
+
+def packed_date(text: str) -> tuple[str, str]:
+    """The packed date in text and what is wrong with it: (date, "") or ("", fault).
+
+    "YYYY-MM-DD"; empty text: not given, which is no fault.
+    """
+    if not text:
+        return "", ""
+    try:
+        if not _DATE.fullmatch(text):
+            raise ValueError
+        datetime.date.fromisoformat(text)
+    except ValueError:
+        return "", f"packed date {text!r} is no date YYYY-MM-DD"
+    return text, ""
+
+
+def component_information(message: Any) -> ComponentInformation:
+    """What a COMPONENT_INFORMATION_BASIC says."""
+    manufactured = ""
+    if message.time_manufacture_s:
+        epoch = datetime.datetime(1970, 1, 1, tzinfo=datetime.timezone.utc)
+        when = epoch + datetime.timedelta(seconds=message.time_manufacture_s)
+        manufactured = when.date().isoformat()
+    return ComponentInformation(
+        message.vendor_name,
+        message.model_name,
+        message.software_version,
+        message.hardware_version,
+        message.serial_number,
+        manufactured,
+        message.capabilities,
+        message.time_boot_ms / 1000.0,
+    )
+
+
+class ParachuteTracker:
+    """Follows one parachute, told apart from others by its system and component id."""
+
+    def __init__(
+        self, system_id: int, component_id: int, liveness: LivenessLimits, status: StatusLimits
+    ) -> None:
+        self.system_id = system_id
+        self.component_id = component_id
+        self.liveness = Liveness(liveness)
+        self.information: ComponentInformation | None = None
+        self.status_received = math.nan
+        self.status_interval = math.nan  # s, between the two newest
+        self.reboot_count = 0
+        self._clock = BootClock()
+        self._twins = Twins()
+        self._limits = status
+        self._system_status = 0
+        self._message: Any = None
+        self._overdue = False
+        #: A status came that may be the first after a restart, or a delayed one from before.
+        self._doubtful = False
+        self._asked = -math.inf
+
+    @property
+    def device(self) -> str:
+        """ "system/component"."""
+        return f"{self.system_id}/{self.component_id}"
+
+    @property
+    def deployed(self) -> bool:
+        """The device's own newest status says that the parachute was released."""
+        return self._message is not None and self._message.deployment_status != 0
+
+    @property
+    def ground_cleared(self) -> bool:
+        """The newest status says that it is far enough from the ground."""
+        return self._message is not None and bool(
+            self._message.safety_status & SafetyFlags.GROUND_CLEARED
+        )
+
+    @property
+    def armed_triggers(self) -> TriggerFlags:
+        """The trigger sources that are armed by the newest status."""
+        return TriggerFlags(self._message.arm_status if self._message is not None else 0)
+
+    def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
+        """A HEARTBEAT of the device."""
+        self._system_status = message.system_status
+        return self.liveness.heard(now)
+
+    def parachute_status(self, message: Any, now: float) -> None:
+        """A PARACHUTE_STATUS of the device."""
+        if not self._twins.observe("PARACHUTE_STATUS", message.time_boot_ms, now):
+            return
+        age = self._clock.observe(message.time_boot_ms)
+        self.reboot_count += age is Age.RESTARTED and not self._twins.found(now)
+        self._doubtful = age is Age.DOUBTFUL
+        if age in (Age.OLD, Age.DOUBTFUL):
+            # Delayed: it must not undo what a newer one said.
+            return
+        self.status_interval = now - self.status_received
+        self.status_received = now
+        self._overdue = False
+        self._message = message
+
+    def component_information(self, message: Any) -> None:
+        """A COMPONENT_INFORMATION_BASIC of the device."""
+        self.information = component_information(message)
+
+    def doubt(self, now: float) -> str:
+        """Another device uses the same ids, in words; empty: none does."""
+        return self._twins.doubt(f"two parachutes are {self.device}", now)
+
+    def status_overdue(self, now: float) -> bool:
+        """The status stream stopped: the newest is too old, though the link may live."""
+        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        return now >= self.status_received + self._limits.status_timeout
+
+    def status_due(self, now: float) -> bool:
+        """It is to be asked for its status now (MAV_CMD_REQUEST_MESSAGE; the full protocol only
+        recommends the stream): none has come for too long, or a doubtful one."""
+        if self.liveness.state is not LinkState.OK:
+            return False
+        wait = _ASK_AGAIN if self._doubtful else _STATUS_MISSED
+        known = self.liveness.first_heard if self._message is None else self.status_received
+        if now < max(known, self._asked) + wait:
+            return False
+        self._asked = now
+        return True
+
+    def update(self, now: float) -> tuple[list[LinkChange], bool]:
+        """Look at the clock: (what changed of the link, whether the picture changed)."""
+        changes = self.liveness.update(now)
+        was_overdue, self._overdue = self._overdue, self.status_overdue(now)
+        return changes, bool(changes) or self._overdue != was_overdue
+
+    def next_deadline(self) -> float:
+        """When the picture changes by itself; infinity: never."""
+        overdue = self.status_received + self._limits.status_timeout
+        if self._overdue or math.isnan(overdue):
+            overdue = math.inf
+        return min(self.liveness.next_deadline(), overdue)
+
+    def status(self, now: float) -> ParachuteStatus:
+        """The normalised picture at now."""
+        faults = self._faults(now)
+        message = self._message
+        if message is None:
+            return ParachuteStatus(
+                self.device, self.liveness.state, self._state(now), faults=tuple(faults)
+            )
+        date, wrong = packed_date(message.parachute_packed_date)
+        return ParachuteStatus(
+            device=self.device,
+            link_state=self.liveness.state,
+            state=self._state(now),
+            armed=bool(self.armed_triggers & TRIGGER_SOURCES),
+            deployed=self.deployed,
+            deployment_trigger=message.deployment_status,
+            armed_triggers=self.armed_triggers,
+            error_flags=ErrorFlags(message.error_status),
+            safety_flags=SafetyFlags(message.safety_status),
+            ats_arm_altitude=float(message.ats_arm_altitude),
+            height=NAN,
+            backup_voltage=NAN,
+            uptime=message.time_boot_ms / 1000.0,
+            packed_date=date,
+            faults=tuple([*faults, wrong] if wrong else faults),
+        )
+
+    @property
+    def _errors(self) -> ErrorFlags:
+        """The error flags that matter. On whole numbers: ~ of a flag drops the unnamed bits."""
+        return ErrorFlags(self._message.error_status & ~int(self._limits.ignored_errors))
+
+    @property
+    def _unhealthy(self) -> str:
+        """What is wrong by the heartbeat; empty: nothing."""
+        if self._system_status > dialect.MAV_STATE_FLIGHT_TERMINATION:
+            return f"state {self._system_status}, which has no name"
+        return _UNHEALTHY_STATES.get(self._system_status, "")
+
+    def _faults(self, now: float) -> list[str]:
+        faults = []
+        silence = self.liveness.age(now)
+        if self.liveness.state in (LinkState.STALE, LinkState.LOST):
+            faults.append(f"heartbeat {self.liveness.state.name}: {silence:.1f} s old")
+        if self._unhealthy:
+            faults.append(f"heartbeat says {self._unhealthy}")
+        if self._message is None:
+            return [*faults, "no PARACHUTE_STATUS received"]
+        if self.status_overdue(now):
+            faults.append(f"PARACHUTE_STATUS {now - self.status_received:.1f} s old")
+        faults += flag_names(self._errors)
+        if self._message.deployment_status > max(DeploymentTrigger):
+            faults.append(f"deployment trigger {self._message.deployment_status} has no name")
+        for kind, flags in (
+            ("safety flag", flag_names(SafetyFlags(self._message.safety_status))),
+            ("trigger flag", flag_names(self.armed_triggers)),
+        ):
+            faults += [f"{kind} {name} has no name" for name in flags if name.startswith("bit ")]
+        return faults
+
+    def _state(self, now: float) -> ParachuteState:
+        """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest."""
+        message = self._message
+        if message is not None and message.deployment_status != 0:
+            on_ground = message.safety_status & SafetyFlags.ON_GROUND
+            return ParachuteState.TOUCHDOWN if on_ground else ParachuteState.LAUNCHED
+        if self._system_status in _STARTING_STATES:
+            return ParachuteState.NOT_READY
+        if self.liveness.state is LinkState.NEVER_SEEN or message is None:
+            return ParachuteState.UNKNOWN
+        if self._errors or self._unhealthy or self.status_overdue(now):
+            return ParachuteState.ABNORMAL
+        if self.armed_triggers & TRIGGER_SOURCES:
+            return ParachuteState.ARMED
+        cleared = message.safety_status & SafetyFlags.GROUND_CLEARED
+        on_ground = message.safety_status & SafetyFlags.ON_GROUND
+        return ParachuteState.TAKEOFF if cleared and not on_ground else ParachuteState.READY

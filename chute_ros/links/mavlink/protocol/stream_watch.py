@@ -1,0 +1,174 @@
+"""Which messages an autopilot is to be asked for: those that do not come, or come too seldom.
+
+A request, its answer or both may be lost, and an autopilot that starts anew sends what it likes,
+just when the supervisor needs its measurements most: then it is asked often for a while. What is
+asked for in vain again and again must not fill a slow link: such requests are spent from a store
+that fills slowly. A stream that comes, but too seldom for the rules (a ground station sets another
+rate again and again), is asked for as long as that is so, within a share of what the line carries.
+
+Source: MAVLink, MAV_CMD_SET_MESSAGE_INTERVAL.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from dataclasses import dataclass
+
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.stream_rate import StreamRate
+
+#: Parts of the vehicle's picture, and the message that is asked for to have them.
+ASKED_FOR: dict[str, int] = {
+    "landed_state": dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    "height": dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    "tilt": dialect.MAVLINK_MSG_ID_ATTITUDE,
+    "acceleration": dialect.MAVLINK_MSG_ID_SCALED_IMU,
+    "battery_voltage": dialect.MAVLINK_MSG_ID_SYS_STATUS,
+}
+#: What changes slowly is asked for at no shorter interval than this, s.
+_SHORTEST = {"battery_voltage": 1.0}
+#: What the rules of flight measure with, by name.
+_JUDGED = {"height": "GLOBAL_POSITION_INT", "tilt": "ATTITUDE", "acceleration": "SCALED_IMU"}
+#: A message is asked for again after this at least, s.
+ASK_AGAIN = 0.5
+#: So many requests for it are in the store at most, and another one is after so long, s.
+STORE, STORE_FILLS = 10, 5.0
+#: What is asked for because it comes too seldom takes this share of what is received. A request
+#: takes so many bytes, and so many requests may be saved up.
+_LINE_SHARE, _REQUEST_BYTES, _SAVED = 0.02, 45.0, 10
+#: What is not heard for so many of its intervals does not come.
+_MISSING_AFTER = 5.0
+#: Where the intervals are long nobody waits for five: after so many of them, or this long, s.
+_MISSING_SOON, _MISSING_AT_LAST = 1.5, 2.5
+#: An average so much below a rate is no shortfall.
+_TOLERANCE = 1.1
+#: A rate below what is needed for so long, s, is said.
+SAID_AFTER = 2.0
+
+
+@dataclass(frozen=True)
+class Ask:
+    """Ask for a message each interval, s; 0: at the rate that the autopilot chooses."""
+
+    message_id: int
+    interval: float
+
+
+class _Store:
+    """Requests for one message that may still be made."""
+
+    def __init__(self) -> None:
+        self._left, self._at = float(STORE), -math.inf
+
+    def take(self, now: float) -> bool:
+        """Take one, if there is one."""
+        self._left = min(float(STORE), self._left + (now - self._at) / STORE_FILLS)
+        self._at = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class StreamWatch:
+    """Follows how often the parts in ASKED_FOR come.
+
+    needed: the rate that the rules need, Hz; 0: half of what is asked for is enough, and nothing
+    is said of slow streams."""
+
+    def __init__(self, needed: float) -> None:
+        self._needed = needed
+        self._rates: defaultdict[str, StreamRate] = defaultdict(StreamRate)
+        self.fill_stores()
+        self._slow_since: dict[str, float] = {}
+        self._saved = 0.0
+
+    def fill_stores(self) -> None:
+        """As if nothing had been asked for yet: another interval is to be asked for."""
+        self._stores = {part: _Store() for part in ASKED_FOR}
+        self._asked = dict.fromkeys(ASKED_FOR, -math.inf)
+
+    def begin(self) -> None:
+        """The autopilot is heard, or heard again, or started anew: nothing has come of it yet."""
+        self._rates.clear()
+        self._slow_since.clear()
+
+    def received(self, size: int) -> None:
+        """The line carried so many bytes."""
+        self._saved = min(_SAVED * _REQUEST_BYTES, self._saved + _LINE_SHARE * size)
+
+    def heard(self, part: str, now: float) -> None:
+        """A part of the picture came, by whatever message."""
+        if part not in ASKED_FOR:
+            return
+        rate = self._rates[part]
+        rate.heard(now)
+        if rate.average < self._needed / _TOLERANCE:
+            self._slow_since.setdefault(part, now)
+        else:
+            self._slow_since.pop(part, None)
+
+    def due(self, interval: float, now: float) -> tuple[Ask, ...]:
+        """What to ask for now, so that each message comes each interval (s), or seldomer if that
+        is enough."""
+        asks = []
+        for part, message in ASKED_FOR.items():
+            each = max(interval, _SHORTEST.get(part, 0.0))
+            if self._lacks(part, each, now) and self._take(part, now):
+                asks.append(Ask(message, each))
+        return tuple(asks)
+
+    def slow(self, now: float) -> dict[str, float]:
+        """Messages that the rules need and that come too seldom for a while, with their rates."""
+        return {
+            name: rate.rate(now)
+            for part, name in _JUDGED.items()
+            if (rate := self._rates.get(part)) is not None
+            and rate.rate(now) < self._needed / _TOLERANCE
+            and now - min(self._slow_since.get(part, math.inf), rate.newest) >= SAID_AFTER
+        }
+
+    def line_is_slow(self, now: float) -> bool:
+        """All that the rules need comes too seldom, not one stream that somebody slowed down."""
+        return len(self.slow(now)) == len(_JUDGED)
+
+    def faults(self, now: float) -> list[str]:
+        """What is too slow, and what to do about it."""
+        cure = LINE_CURE if self.line_is_slow(now) else _STREAM_CURE
+        return [
+            f"{name} comes at {rate:.1f} Hz (need {self._needed:g} Hz): {cure}"
+            for name, rate in self.slow(now).items()
+        ]
+
+    def _lacks(self, part: str, interval: float, now: float) -> bool:
+        rate = self._rates[part]
+        soon = max(_MISSING_SOON * interval, _MISSING_AT_LAST)
+        if now - rate.newest >= min(_MISSING_AFTER * interval, soon):
+            return True
+        enough = 0.5 / interval
+        if part in _JUDGED and self._needed:
+            enough = min(self._needed, 1.0 / interval)
+        return rate.average < enough / _TOLERANCE
+
+    def _take(self, part: str, now: float) -> bool:
+        if now - self._asked[part] < ASK_AGAIN:
+            return False
+        comes = self._rates[part].newest > self._asked[part]
+        if not self._stores[part].take(now):
+            if not comes or self._saved < _REQUEST_BYTES:
+                return False
+            self._saved -= _REQUEST_BYTES
+        self._asked[part] = now
+        return True
+
+
+#: What a person can do about a line that is full.
+LINE_CURE = (
+    "the line to the autopilot is too slow for what it carries: raise its baud rate, or switch "
+    "off streams that others ask for on it"
+)
+_STREAM_CURE = (
+    "something else sets its rate, or the line is full: end the ground station or program that "
+    "asks for it, or its stream rates in the autopilot's settings"
+)

@@ -1,0 +1,110 @@
+"""The two ends of a link that touch bytes: what came in, and what goes out."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from collections.abc import Hashable
+from typing import Any
+
+from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.links.mavlink.protocol.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
+
+#: Most streams (serial port, TCP connections) that are read at once.
+_MOST_STREAMS = 16
+
+
+class Inbox:
+    """Bytes from datagrams and streams to frames."""
+
+    def __init__(self, verifier: Verifier | None, counts: Counter[str]) -> None:
+        self._verifier = verifier
+        self._counts = counts
+        self._datagrams = FrameDecoder(verifier, counts)
+        self._streams: dict[Hashable, FrameDecoder] = {}
+
+    def feed(self, data: bytes, now: float, stream: Hashable) -> list[Frame]:
+        """Frames in data: a datagram (stream None), or the next bytes of that stream."""
+        if stream is None:
+            return self._datagrams.feed_datagram(data, now)
+        if stream not in self._streams:
+            if len(self._streams) >= _MOST_STREAMS:
+                self._streams.clear()
+            self._streams[stream] = FrameDecoder(self._verifier, self._counts)
+        return self._streams[stream].feed(data, now)
+
+    def update(self, now: float) -> list[Frame]:
+        """Look at the clock: frames that a false start mark held back."""
+        return [frame for decoder in self._streams.values() for frame in decoder.update(now)]
+
+    def next_deadline(self) -> float:
+        """When update has something to do; infinity: never."""
+        deadlines = (decoder.next_deadline() for decoder in self._streams.values())
+        return min(deadlines, default=math.inf)
+
+    def stream_ended(self, stream: Hashable) -> None:
+        """A stream (None: every stream) was closed."""
+        if stream is None:
+            self._streams.clear()
+        else:
+            self._streams.pop(stream, None)
+
+
+class Duplicates:
+    """Knows a frame that the network delivers twice (two paths, a router that echoes).
+
+    A copy has the same bytes, sequence number included. Where a sender never counts its frames
+    up, nothing is known to be a copy.
+    """
+
+    def __init__(self, window: float) -> None:
+        self._window = window
+        self._first_sequence: dict[tuple[int, int], int] = {}
+        self._counting: set[tuple[int, int]] = set()
+        self._seen: deque[tuple[float, bytes]] = deque(maxlen=64)
+
+    def heard(self, frame: Frame) -> None:
+        """Watch whether the sender counts its frames."""
+        sender = (frame.system_id, frame.component_id)
+        first = self._first_sequence.get(sender)
+        if first is not None and frame.sequence != first:
+            self._counting.add(sender)
+        elif first is None and len(self._first_sequence) < 256:
+            self._first_sequence[sender] = frame.sequence
+
+    def is_copy(self, frame: Frame, now: float) -> bool:
+        """This very frame came within the window."""
+        while self._seen and now - self._seen[0][0] > self._window:
+            self._seen.popleft()
+        raw = bytes(frame.message.get_msgbuf())
+        counts = (frame.system_id, frame.component_id) in self._counting
+        if counts and any(raw == seen for _, seen in self._seen):
+            return True
+        self._seen.append((now, raw))
+        return False
+
+
+class Outbox:
+    """Messages of ours to frames, oldest first."""
+
+    def __init__(self, system_id: int, component_id: int, signer: Signer | None) -> None:
+        self.sent_count = 0
+        self._encoder = FrameEncoder(system_id, component_id, signer)
+        self._output: list[bytes] = []
+
+    def send(self, message: Any, now: float) -> None:
+        """Put message on the wire."""
+        self._output.append(self._encoder.encode(message, now))
+        self.sent_count += 1
+
+    def heartbeat(self, now: float) -> None:
+        """We are alive."""
+        kind, autopilot = dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID
+        state = dialect.MAV_STATE_ACTIVE
+        self.send(dialect.MAVLink_heartbeat_message(kind, autopilot, 0, 0, state, 3), now)
+
+    def take(self) -> list[bytes]:
+        """Frames to send; each is handed out once."""
+        output, self._output = self._output, []
+        return output

@@ -1,0 +1,129 @@
+"""The errands of one link: begun, refused where they would endanger a flight, ended.
+
+Source: Flyfire UPF UAVCAN protocol V1.0, "standard UAVCAN protocols" and "parameters".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.errands import Errand, ErrandDone
+from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.roster import UpfDevices
+from chute_ros.protocol.dronecan.bus_node import BusNode
+from chute_ros.protocol.events import Severity
+
+#: The parameters of a controller are read again after this, s: another tool may have changed them.
+READ_AGAIN = 10.0
+
+
+class ErrandDesk:
+    """Every errand ends in one ErrandFinished with its token."""
+
+    def __init__(self, bus: BusNode, devices: UpfDevices, in_air: Callable[[float], bool]) -> None:
+        self._bus = bus
+        self._devices = devices
+        self._in_air = in_air
+        #: Controller -> when its parameters are to be read again.
+        self._read_again: dict[int, float] = {}
+        #: Controllers whose parameters are being read.
+        self._reading: set[int] = set()
+        self._finished: list[ErrandFinished] = []
+
+    def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
+        """Ask something of a device. node_id 0: the chosen one."""
+        target = self._target(node_id)
+        if target:
+            self._bus.begin(token, make(target), now)
+        else:
+            what = f"there is no node id {node_id}" if node_id else "no UPF device was heard"
+            self._refuse(token, node_id, f"{what} on this link; name a node id from 1 to 127")
+
+    def set_parameter(
+        self, token: int, node_id: int, name: str, text: str, force: bool, now: float
+    ) -> None:
+        """Set one and read it back; what takes protection away is refused in the air."""
+        if name in p.PROTECTION and not p.switches_on(text):
+            if self._in_air(now) and not force:
+                why = (
+                    f"{name} would be off while the vehicle is in the air, and with it the "
+                    "protection; force does it all the same; nothing was sent"
+                )
+                self._refuse(token, node_id, why)
+                return
+            self._devices.notice(Severity.WARNING, f"{name} is being switched off")
+
+        def make(target: int) -> Errand:
+            return errands.set_parameter(target, name, text, lambda: self._keeps(target))
+
+        self.errand(token, node_id, make, now)
+
+    def disturb(
+        self, token: int, node_id: int, force: bool, make: Callable[[int], Errand], now: float
+    ) -> None:
+        """An errand that takes the device away for a while: refused in the air unless forced."""
+        if self._in_air(now) and not force:
+            why = "refused while the vehicle is in the air; force does it all the same"
+            self._refuse(token, node_id, why)
+        else:
+            self.errand(token, node_id, make, now)
+
+    def update(self, now: float) -> None:
+        """Read the parameters of new controllers, and end what has ended."""
+        for node_id in [n for n, due in self._read_again.items() if now >= due]:
+            del self._read_again[node_id]
+            controller = self._devices.controllers[node_id]
+            if controller.alive:
+                self._devices.to_read.append(controller)
+        for controller in self._devices.to_read:
+            if controller.node_id in self._reading:
+                # One at a time; it is read once more when this one has ended.
+                self._read_again[controller.node_id] = now + READ_AGAIN
+                continue
+            self._read_again.pop(controller.node_id, None)
+            self._reading.add(controller.node_id)
+            token = ("parameters", controller.node_id)
+            self._bus.begin(token, errands.list_parameters(controller.node_id), now)
+        self._devices.to_read.clear()
+        for ended, result in self._bus.take_ended():
+            assert isinstance(result, ErrandDone)
+            self._end(ended, result, now)
+
+    def next_deadline(self) -> float:
+        """When update has something to do by itself; infinity: never."""
+        return min(self._read_again.values(), default=math.inf)
+
+    def take_finished(self) -> list[ErrandFinished]:
+        """What has ended; each is handed out once."""
+        finished, self._finished = self._finished, []
+        return finished
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _target(self, node_id: int) -> int:
+        """The node meant; 0: there is none."""
+        device = self._devices.controller() or self._devices.trigger()
+        target = node_id or (device.node_id if device is not None else 0)
+        return target if 1 <= target <= 127 else 0
+
+    def _keeps(self, node_id: int) -> bool | None:
+        controller = self._devices.controllers.get(node_id)
+        return None if controller is None else controller.switch(p.AUTO_SAVE)
+
+    def _refuse(self, token: int, node_id: int, why: str) -> None:
+        self._finished.append(ErrandFinished(token, ErrandDone(False, why, node_id)))
+
+    def _end(self, token: object, done: ErrandDone, now: float) -> None:
+        controller = self._devices.controllers.get(done.node_id)
+        if controller is not None:
+            controller.parameters |= {one.name: one.value for one in done.parameters}
+        if isinstance(token, int):
+            self._finished.append(ErrandFinished(token, done))
+            return
+        self._reading.discard(done.node_id)
+        # A list that never ends is not begun again.
+        if done.success or len(done.parameters) < errands.MOST_PARAMETERS:
+            self._read_again[done.node_id] = now + READ_AGAIN

@@ -1,0 +1,234 @@
+"""What can be asked of a UPF device besides flying: its parameters, its memory, who it is.
+
+Source: Flyfire UPF UAVCAN protocol V1.0, "standard UAVCAN protocols" and "parameters";
+uavcan.protocol.param.GetSet, param.ExecuteOpcode, GetTransportStats, GetNodeInfo, RestartNode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from chute_ros.errors import ParameterError
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.protocol.dronecan.calls import Call, CallFinished
+
+GET_SET = "uavcan.protocol.param.GetSet"
+EXECUTE_OPCODE = "uavcan.protocol.param.ExecuteOpcode"
+TRANSPORT_STATS = "uavcan.protocol.GetTransportStats"
+GET_NODE_INFO = "uavcan.protocol.GetNodeInfo"
+RESTART_NODE = "uavcan.protocol.RestartNode"
+RESTART_MAGIC = 0xACCE551B1E
+OPCODE_SAVE, OPCODE_ERASE = 0, 1
+#: More parameters than this are not asked for: a device that never ends its list must not hold us.
+MOST_PARAMETERS = 128
+
+
+@dataclass(frozen=True)
+class DeviceParameter:
+    """One parameter as the device tells it; values in words, empty: none."""
+
+    name: str
+    value: p.Value | None = None
+    kind: str = ""
+    minimum: p.Value | None = None
+    maximum: p.Value | None = None
+    default: p.Value | None = None
+
+
+@dataclass(frozen=True)
+class ErrandDone:
+    """The end of an errand. node_id: of the device; values: of the response asked for last."""
+
+    success: bool
+    message: str
+    node_id: int
+    parameters: tuple[DeviceParameter, ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+Errand = Generator[Call, CallFinished, ErrandDone]
+
+
+def get_parameter(node_id: int, name: str) -> Errand:
+    """Read one by name."""
+    if why := _bad_name(name):
+        return ErrandDone(False, why, node_id)
+    answer = yield _get(node_id, name)
+    found = _read(answer)
+    if found is None or not found.kind or found.name != name:
+        return ErrandDone(False, _no_parameter(answer, name), node_id)
+    text = f"{name} is {p.words(found.value)}{_range(found)}"
+    return ErrandDone(True, text, node_id, (found,))
+
+
+def set_parameter(
+    node_id: int, name: str, text: str, auto_save: Callable[[], bool | None] = lambda: None
+) -> Errand:
+    """Read one for its type and range, set it, and read it back. auto_save: whether the device
+    keeps a change by itself; None: not known."""
+    if why := _bad_name(name):
+        return ErrandDone(False, why, node_id)
+    answer = yield _get(node_id, name)
+    before = _read(answer)
+    if before is None or not before.kind or before.name != name:
+        return ErrandDone(False, _no_parameter(answer, name), node_id)
+    try:
+        wanted = p.parse(text, before.kind, name)
+    except ParameterError as error:
+        return ErrandDone(False, f"{error}; nothing was sent", node_id, (before,))
+    low, high = _limits(before)
+    number = isinstance(wanted, (int, float)) and not isinstance(wanted, bool)
+    if number and (_below(wanted, low) or _below(high, wanted)):
+        why = f"{name} cannot be {text}: need {p.words(low)} to {p.words(high)}; nothing was sent"
+        return ErrandDone(False, why, node_id, (before,))
+    values = {"name": _encoded(name), "value": p.union_of(wanted)}
+    answer = yield Call(node_id, GET_SET, values)
+    unknown = replace(before, value=None)
+    if answer.values is None:
+        return ErrandDone(False, f"{name} may be set or not: {answer.text()}", node_id, (unknown,))
+    answer = yield _get(node_id, name)
+    after = _read(answer)
+    if after is None or after.name != name:
+        why = f"{name} was sent, but not read back: {answer.text()}"
+        return ErrandDone(False, why, node_id, (unknown,))
+    if not _same(after.value, wanted):
+        why = f"{name} was not taken: it still is {p.words(after.value)}"
+        return ErrandDone(False, why, node_id, (after,))
+    keeps = p.as_switch(after.value) if name == p.AUTO_SAVE else auto_save()
+    what_follows = [f"{name} is {p.words(after.value)}", *_when(after), *_kept(keeps)]
+    return ErrandDone(True, "; ".join(what_follows), node_id, (after,))
+
+
+def _when(after: DeviceParameter) -> list[str]:
+    """When a new value begins to count, if it is not at once."""
+    if after.name != p.STATIC_NODE_ID:
+        return []
+    asks = "" if after.value else " (0: asks for a node id at each start)"
+    return [f"takes effect at the next start{asks}"]
+
+
+def _kept(keeps: bool | None) -> list[str]:
+    """Whether a new value survives a restart."""
+    if keeps is None:
+        return []
+    if keeps:
+        return ["kept"]
+    return [f"not kept over a restart until ~/save_params: {p.AUTO_SAVE} is off"]
+
+
+def list_parameters(node_id: int) -> Errand:
+    """Read all, by index until the device names none."""
+    found: list[DeviceParameter] = []
+    for index in range(MOST_PARAMETERS):
+        answer = yield Call(node_id, GET_SET, {"index": index})
+        one = _read(answer)
+        if one is None:
+            why = f"stopped after {len(found)} parameters: {answer.text()}"
+            return ErrandDone(False, why, node_id, tuple(found))
+        if not one.name:
+            return ErrandDone(True, f"{len(found)} parameters", node_id, tuple(found))
+        found.append(one)
+    why = f"stopped after {MOST_PARAMETERS} parameters: the device does not end its list"
+    return ErrandDone(False, why, node_id, tuple(found))
+
+
+def execute_opcode(node_id: int, opcode: int) -> Errand:
+    """Save all parameters, or erase what was saved."""
+    name = "save" if opcode == OPCODE_SAVE else "erase"
+    answer = yield Call(node_id, EXECUTE_OPCODE, {"opcode": opcode})
+    if answer.values is None:
+        return ErrandDone(False, f"{name}: {answer.text()}", node_id)
+    done = bool(answer.values["ok"])
+    text = "done" if done else "the device answered that it did not"
+    return ErrandDone(done, f"{name}: {text}", node_id, values=answer.values)
+
+
+def restart(node_id: int) -> Errand:
+    """RestartNode with its magic number."""
+    answer = yield Call(node_id, RESTART_NODE, {"magic_number": RESTART_MAGIC})
+    if answer.values is None:
+        return ErrandDone(False, f"restart: {answer.text()}", node_id)
+    done = bool(answer.values["ok"])
+    text = "restart: the device answered that it will" + ("" if done else " not")
+    return ErrandDone(done, text, node_id, values=answer.values)
+
+
+def transport_stats(node_id: int) -> Errand:
+    """GetTransportStats."""
+    return (yield from _plain(node_id, TRANSPORT_STATS, "transport statistics"))
+
+
+def node_info(node_id: int) -> Errand:
+    """GetNodeInfo."""
+    return (yield from _plain(node_id, GET_NODE_INFO, "node information"))
+
+
+def _plain(node_id: int, service: str, what: str) -> Errand:
+    answer = yield Call(node_id, service, {})
+    if answer.values is None:
+        return ErrandDone(False, f"{what}: {answer.text()}", node_id)
+    return ErrandDone(True, what, node_id, values=answer.values)
+
+
+def _get(node_id: int, name: str) -> Call:
+    return Call(node_id, GET_SET, {"name": _encoded(name)})
+
+
+def _encoded(name: str) -> bytes:
+    return name.encode("utf-8", "replace")
+
+
+def _bad_name(name: str) -> str:
+    """What is wrong with the name of a parameter; empty: nothing."""
+    # An empty one would be a question by index, and set whatever has index 0.
+    if 1 <= len(_encoded(name)) <= p.MOST_NAME_BYTES:
+        return ""
+    return f"{name!r} is no parameter's name: need 1 to {p.MOST_NAME_BYTES} bytes"
+
+
+def _read(answer: CallFinished) -> DeviceParameter | None:
+    values = answer.values
+    if values is None:
+        return None
+    return DeviceParameter(
+        bytes(values["name"]).decode("utf-8", "replace"),
+        p.value_of(values["value"]),
+        p.kind_of(values["value"]),
+        p.value_of(values["min_value"]),
+        p.value_of(values["max_value"]),
+        p.value_of(values["default_value"]),
+    )
+
+
+def _no_parameter(answer: CallFinished, name: str) -> str:
+    if answer.values is None:
+        return f"{name}: {answer.text()}"
+    known = ", ".join(one.name for one in p.PARAMETERS)
+    return f"the device has no parameter {name!r}; the document lists {known}"
+
+
+def _limits(one: DeviceParameter) -> tuple[p.Value | None, p.Value | None]:
+    """What the device says, else what the document means."""
+    documented = p.BY_NAME.get(one.name)
+    if one.minimum is None and one.maximum is None and documented is not None:
+        return documented.minimum, documented.maximum
+    return one.minimum, one.maximum
+
+
+def _range(one: DeviceParameter) -> str:
+    if one.minimum is None or one.maximum is None:
+        return ""
+    return f" ({p.words(one.minimum)} to {p.words(one.maximum)})"
+
+
+def _below(low: p.Value | None, high: p.Value | None) -> bool:
+    return isinstance(low, (int, float)) and isinstance(high, (int, float)) and bool(low < high)
+
+
+def _same(read_back: p.Value | None, wanted: p.Value) -> bool:
+    if isinstance(wanted, float) and isinstance(read_back, float):
+        # It came back as a float of 32 bits.
+        return abs(read_back - wanted) <= 1e-6 * max(1.0, abs(wanted))
+    return read_back == wanted
