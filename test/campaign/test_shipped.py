@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import pytest
@@ -10,17 +10,20 @@ from campaign_bench import SHIPPED
 
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.scenario import Vehicle
+from chute_ros.links.mavlink import parameters as mavlink_parameters
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.runtime import MavlinkSettings
+from chute_ros.links.umbilical import parameters as umbilical_parameters
 from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
+from chute_ros.links.umbilical.runtime import UmbilicalSettings
+from chute_ros.links.upf import parameters as upf_parameters
 from chute_ros.links.upf.protocol.config import UpfConfig
-from chute_ros.nodes import (
-    mavlink_parameters,
-    supervisor_parameters,
-    umbilical_parameters,
-    upf_parameters,
-)
+from chute_ros.links.upf.runtime import UpfSettings
+from chute_ros.nodes import supervisor_parameters
+from chute_ros.nodes.device_node import BLOCK_FLIGHT, COMMON_PARAMETERS
 from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.vehicle_sources import SOURCES
+from chute_ros.runtime.device import DeviceSettings
 
 
 def standard(parameters: tuple[Parameter, ...]) -> dict[str, Any]:
@@ -35,6 +38,24 @@ def test_the_links_have_the_standard_settings_of_their_nodes() -> None:
     upf = upf_parameters.config_from(standard(upf_parameters.PARAMETERS), {}, "upf_can", 0.0)
     # Which is another on each machine.
     assert replace(upf, unique_id=UpfConfig().unique_id) == UpfConfig()
+
+
+@pytest.mark.parametrize(
+    ("settings", "parameters"),
+    [
+        (MavlinkSettings(), mavlink_parameters.PARAMETERS),
+        (UpfSettings(), upf_parameters.PARAMETERS),
+        (UmbilicalSettings(), umbilical_parameters.PARAMETERS),
+    ],
+)
+def test_so_have_their_runtimes(
+    settings: DeviceSettings, parameters: tuple[Parameter, ...]
+) -> None:
+    told = standard((*COMMON_PARAMETERS, *parameters))
+    told["block_when_lost"] = told["on_supervisor_lost"] == BLOCK_FLIGHT
+    names = [field.name for field in fields(settings)]
+    assert len(names) >= 4
+    assert {name: getattr(settings, name) for name in names} == {n: told[n] for n in names}
 
 
 def test_its_second_sources_are_ones_that_the_supervisor_takes() -> None:
