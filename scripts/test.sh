@@ -14,10 +14,15 @@ flock 9
 failed=()
 scripts/lint.sh 9>&- || failed+=("linters")
 
+# Most tests wait for something that another process, a wire or the middleware does: two at a time
+# for each core. Each worker has a ROS domain of its own (chute_ros/tools/isolation.py).
+jobs=$((2 * $(nproc)))
+
 # Results of tests that are no more would be counted.
 colcon test-result --test-result-base "build-$name" --delete-yes >/dev/null
 colcon --log-base "log-$name" test --build-base "build-$name" --install-base "install-$name" \
     --executor sequential --return-code-on-test-failure \
+    --pytest-args --numprocesses "$((jobs < 8 ? jobs : 8))" --dist worksteal \
     --event-handlers console_direct+ status- desktop_notification- 9>&- || failed+=("colcon test")
 echo
 colcon test-result --test-result-base "build-$name" --verbose | tail -n 200
