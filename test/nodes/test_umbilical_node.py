@@ -54,7 +54,7 @@ def test_each_field_of_each_layout_is_told_under_one_name(layout, field):
     assert (message.layout, message.sequence) == (layout.name, 7)
 
 
-@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
 def test_what_a_layout_lacks_reads_as_not_there(layouts, name):
     layout = layouts[name]
     message = telem(Record(layout, (1,) * layout.count, 5.0), 1, Telem().header.stamp)
@@ -67,7 +67,7 @@ def test_what_a_layout_lacks_reads_as_not_there(layouts, name):
         assert math.isnan(value) if isinstance(value, float) else value == whole, one
 
 
-@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
 def test_telem_has_a_place_for_every_field(layouts, name):
     assert without_place(layouts[name]) == []
 
@@ -92,7 +92,7 @@ def test_a_number_that_is_too_large_for_its_place_reads_as_the_largest(
     assert getattr(message, field) == told
 
 
-@pytest.mark.parametrize("name", LAYOUTS)
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
 def test_each_layout_is_recognised_and_published(bench, name):
     cable = Cable(bench, sends=name)
     # With 0 it may as well be the reference's airbrake_state.

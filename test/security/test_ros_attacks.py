@@ -47,7 +47,8 @@ def counted(bench, verdict, number):
     """The node has judged so many so."""
     (node,) = (one for one in bench.nodes if one.get_name() == NAME)
     bench.until(
-        lambda: node.runtime.decisions.counts()[f"decisions: {verdict}"] == number, f"{number} {verdict}"
+        lambda: node.runtime.decisions.counts()[f"decisions: {verdict}"] == number,
+        f"{number} {verdict}",
     )
 
 

@@ -1,4 +1,4 @@
-"""The gate at its limits: what mutants showed that no story looked at."""
+"""The gate of a device node at its limits."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every word of what is said of a profile, and every limit in it: what mutants showed."""
+"""Every word of what is said of a profile, and every limit in it."""
 
 import pytest
 from test_profile_reader import WHOLE, mistakes, read

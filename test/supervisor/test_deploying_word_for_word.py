@@ -1,4 +1,4 @@
-"""The deploy as it goes on, word for word: what mutants showed that no story looked at."""
+"""The deploy as it goes on, word for word."""
 
 from types import MappingProxyType
 from typing import Any

@@ -1,4 +1,4 @@
-"""Flight or ground at the limits: what mutants showed that no story looked at."""
+"""Flight or ground at the limits."""
 
 import math
 from dataclasses import replace

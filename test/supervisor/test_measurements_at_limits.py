@@ -1,4 +1,4 @@
-"""Measurements at their very limits, and what is said of them in full: what mutants showed."""
+"""Measurements at their very limits, and what is said of them in full."""
 
 import dataclasses
 import math

@@ -1,4 +1,4 @@
-"""Every field that is handed over or is not: what mutants showed that no story looked at."""
+"""Every field that is handed over or is not."""
 
 import json
 import math

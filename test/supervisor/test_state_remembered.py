@@ -1,4 +1,4 @@
-"""What the core remembers: what mutants showed that no story looked at."""
+"""What the core remembers."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Classes of every shape through a codec of their own: what mutants showed that no story told."""
+"""Classes of every shape through a codec of their own."""
 
 import enum
 import json

@@ -1,4 +1,4 @@
-"""The rules at work, word for word and at their limits: what mutants showed no story looked at."""
+"""The rules at work, word for word and at their limits."""
 
 import math
 from dataclasses import replace

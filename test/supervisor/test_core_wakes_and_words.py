@@ -1,5 +1,4 @@
-"""When it wakes, what it says, what a late update counts: what mutants showed that no story
-looked at."""
+"""When the core wakes, what it says, what a late update counts."""
 
 import math
 from dataclasses import replace

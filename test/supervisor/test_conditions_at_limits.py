@@ -1,4 +1,4 @@
-"""Conditions word for word and at their limits: what mutants showed that no story looked at."""
+"""Conditions word for word and at their limits."""
 
 import math
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""Pre-flight reasons word for word and at their limits: what mutants showed no story looked at."""
+"""Pre-flight reasons word for word and at their limits."""
 
 import datetime
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Settings at their very limits, and what is said past them, in full: what mutants showed."""
+"""Settings at their very limits, and what is said past them, in full."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The gate word for word and at its limits: what mutants showed that no story looked at."""
+"""The gate word for word and at its limits."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The single steps, word for word and at their limits: what mutants showed that no story saw."""
+"""The single steps, word for word and at their limits."""
 
 from dataclasses import replace
 from types import MappingProxyType

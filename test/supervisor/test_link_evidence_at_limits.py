@@ -1,4 +1,4 @@
-"""A link at its very limits, and each part of what is known of it: what mutants showed."""
+"""A link at its very limits, and each part of what is known of it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The counter to the last sample: what mutants showed that no story looked at."""
+"""The counter to the last sample."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Requests and their answers, word for word: what mutants showed that no story looked at."""
+"""Requests and their answers, word for word."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""Every word of what is said of a file that is not right: what mutants showed."""
+"""Every word of what is said of a file that is not right."""
 
 import pytest
 

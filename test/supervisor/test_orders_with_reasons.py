@@ -1,4 +1,4 @@
-"""Orders with their rule and reasons: what mutants showed that no story looked at."""
+"""Orders with their rule and reasons."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the types of rules say by themselves, written once more: mutmut changes only functions."""
+"""What the types of rules say by themselves, written once more."""
 
 import enum
 

@@ -1,4 +1,4 @@
-"""Every field of a lease after each event: what mutants showed that no story looked at."""
+"""Every field of a lease after each event."""
 
 import math
 

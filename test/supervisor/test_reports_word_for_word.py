@@ -1,4 +1,4 @@
-"""Reports in every word and at their limits: what mutants showed that no story looked at."""
+"""Reports in every word and at their limits."""
 
 import math
 from dataclasses import replace
