@@ -65,12 +65,12 @@ class McapFile:
 
     def flush(self) -> None:
         """Everything that was written is on the disk when this returns."""
-        self._writer.flush()
+        self._writer.flush()  # type: ignore[no-untyped-call]
         self._disk.sync()
 
     def finish(self) -> None:
         """Write the index, by which others find their way faster, and close."""
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
         self._disk.sync()
         self._disk.close()
 

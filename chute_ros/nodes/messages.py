@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import enum
 import math
-from typing import Any
+from typing import Any, TypeVar
 
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import (
@@ -34,7 +34,7 @@ from chute_ros.supervisor.lease import Claim
 
 def seconds(stamp: Time) -> float:
     """A stamp as Unix seconds."""
-    return float(stamp.sec) + stamp.nanosec * 1e-9
+    return float(stamp.sec) + float(stamp.nanosec) * 1e-9
 
 
 def nanoseconds(stamp: Time) -> int:
@@ -196,7 +196,7 @@ def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
     message.header.stamp = stamp
     for field in dataclasses.fields(state):
         value = getattr(state, field.name)
-        setattr(message, field.name, int(value) if isinstance(value, enum.Enum) else value)
+        setattr(message, field.name, int(value) if isinstance(value, enum.IntEnum) else value)
     return message
 
 
@@ -276,6 +276,9 @@ def answered(service: str, request: Any, response: Any) -> str:
     return f"{service}({', '.join(asked)}) answered: {response.message}"
 
 
-def _known(kind, number):  # type: ignore[no-untyped-def]
+EnumT = TypeVar("EnumT", bound=enum.IntEnum)
+
+
+def _known(kind: type[EnumT], number: int) -> EnumT:
     """The member of kind with this number, or its member 0."""
     return kind(number) if number in kind._value2member_map_ else kind(0)

@@ -28,6 +28,8 @@ class NodeExecutor(SingleThreadedExecutor):
     #: Entities came or went. On the class: rclpy's own __init__ may wake it already.
     _changed = True
     _wait_set: KeptWaitSet | None = None
+    #: rclpy's own.
+    _tasks: list[tuple[Any, Any, Any]]
 
     def __init__(self, *, context: Context | None = None) -> None:
         super().__init__(context=context)

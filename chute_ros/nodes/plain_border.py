@@ -25,7 +25,7 @@ _EXEMPT = ("rcl_interfaces", "type_description_interfaces")
 
 def with_plain_texts(message: Any) -> Any:
     """message itself, each of its texts plain. It may be a request or a response as well."""
-    for name, is_list, is_text in _texts_of(type(message)):
+    for name, is_list, is_text in _texts_of(type(message)):  # type: ignore[arg-type]
         value = getattr(message, name)
         if not is_text:
             for one in value if is_list else (value,):
@@ -98,7 +98,7 @@ def serving_plainly(callback: Callable[[Any, Any], Any]) -> Callable[[Any, Any],
     return served
 
 
-class PlainLogger(RcutilsLogger):  # type: ignore[misc]
+class PlainLogger(RcutilsLogger):
     """A logger whose lines are each one line, plain."""
 
     def log(self, message: Any, severity: Any, **options: Any) -> bool:

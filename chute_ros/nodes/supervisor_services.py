@@ -93,7 +93,8 @@ class SupervisorServices:
     async def _ask(self, make: Callable[[int], inputs.Input]) -> inputs.Finish:
         future = Future()
         self._ask_core(make, future.set_result)
-        return await future
+        end: inputs.Finish = await future
+        return end
 
     async def _arm(self, request: Any, response: Any) -> Any:
         today = date.fromtimestamp(messages.seconds(self._wall.now().to_msg()))

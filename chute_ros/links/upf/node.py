@@ -54,7 +54,8 @@ class UpfCanNode(DeviceNode):
         settings = self.settings(UpfSettings)
         self.runtime = runtime = UpfRuntime(self.get_name(), settings, self, details_of)
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
-        self.loop = WireLoop(link, make_can_wire(address), self.deliver)
+        self._wire = make_can_wire(address)
+        self.loop = WireLoop(link, self._wire, self.deliver)
         self._trigger_publisher = self.create_publisher(
             TriggerStatus, "upf/trigger_status", qos.STATUS
         )
@@ -88,7 +89,7 @@ class UpfCanNode(DeviceNode):
             "transfers received per s": self.rate(details.received),
             "transfers sent": details.sent,
             "frames that could not be sent": self.loop.send_errors,
-            **{f"bad packets: {why}": n for why, n in sorted(self.loop.wire.counts.items())},
+            **{f"bad packets: {why}": n for why, n in sorted(self._wire.counts.items())},
         }
         wire = self.wire_picture()
         return [
