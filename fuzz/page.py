@@ -7,8 +7,9 @@ from pathlib import Path
 
 from bench.report import table
 from chute_ros.tools.machine import machine
-from fuzz.run import CORPUS, Outcome
-from fuzz.targets import target_of
+from fuzz.run import Outcome
+from fuzz.stored import stored
+from fuzz.targets import NAMES, target_of
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "fuzz.md"
 _PAGE = """\
@@ -64,14 +65,14 @@ def page(outcomes: Sequence[Outcome], minutes: float) -> str:
     inputs = sum(one.inputs for one in outcomes)
     found = [f"- {line}" for one in outcomes for line in told(one)]
     text = "\n".join(["Found:", "", *found]) if found else f"Found in {inputs:,} inputs: nothing."
-    files = [one for one in CORPUS.rglob("*") if one.is_file()]
+    inputs_stored = [stored(name) for name in NAMES]
     return _PAGE.format(
         minutes=minutes,
         machine=machine(),
         table=table(head, rows),
         found=text,
-        stored=len(files),
-        size=round(sum(one.stat().st_size for one in files) / 1000),
+        stored=sum(map(len, inputs_stored)),
+        size=round(sum(len(data) for each in inputs_stored for data in each) / 1000),
     )
 
 

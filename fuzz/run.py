@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -13,10 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fuzz.child import FOUND, LARGEST, SLOWEST
+from fuzz.stored import store, unpack
 
 HERE = Path(__file__).resolve().parent
-#: In the repository: what a run begins with.
-CORPUS = HERE / "corpus"
 #: Ignored by git: what runs add to it, and what they find.
 GROWN, FOUND_FOLDER = HERE / "grown", HERE / "found"
 #: A process larger than this is a finding, MB; so is an input that takes longer than this, s, in
@@ -75,24 +73,26 @@ def why_not() -> str:
 
 def fuzz(name: str, seconds: int) -> Outcome:
     """Fuzz one target for so long."""
-    grown, stored = GROWN / name, CORPUS / name
+    grown = GROWN / name
     grown.mkdir(parents=True, exist_ok=True)
     before = {one.name for one in grown.iterdir()}
-    said, code = _child(
-        name,
-        f"-max_total_time={seconds}",
-        f"-timeout={HANGS_AFTER}",
-        # Otherwise each that takes ten seconds is written as if it were a finding.
-        f"-report_slow_units={HANGS_AFTER}",
-        f"-rss_limit_mb={MOST_MEMORY}",
-        f"-artifact_prefix={FOUND_FOLDER / name}/",
-        # Long inputs from the first: a program of few bytes gets nowhere.
-        "-len_control=0",
-        "-print_final_stats=1",
-        str(grown),
-        *([str(stored)] if stored.is_dir() else []),
-        patience=seconds + _PATIENCE,
-    )
+    with tempfile.TemporaryDirectory(prefix="fuzz_stored_") as begins_with:
+        unpack(name, Path(begins_with))
+        said, code = _child(
+            name,
+            f"-max_total_time={seconds}",
+            f"-timeout={HANGS_AFTER}",
+            # Otherwise each that takes ten seconds is written as if it were a finding.
+            f"-report_slow_units={HANGS_AFTER}",
+            f"-rss_limit_mb={MOST_MEMORY}",
+            f"-artifact_prefix={FOUND_FOLDER / name}/",
+            # Long inputs from the first: a program of few bytes gets nowhere.
+            "-len_control=0",
+            "-print_final_stats=1",
+            str(grown),
+            begins_with,
+            patience=seconds + _PATIENCE,
+        )
     outcome = outcome_of(name, seconds, said, code)
     outcome.new = len({one.name for one in grown.iterdir()} - before)
     return outcome
@@ -123,23 +123,21 @@ def outcome_of(name: str, seconds: float, said: str, code: int) -> Outcome:
 
 
 def merge(name: str) -> tuple[int, int]:
-    """Replace the stored corpus by the least that covers as much as it and what runs added; files
+    """Replace the stored corpus by the least that covers as much as it and what runs added; inputs
     and bytes of it then."""
-    stored = CORPUS / name
-    old = [one for one in (stored, GROWN / name) if one.is_dir()]
-    with tempfile.TemporaryDirectory(prefix="fuzz_merge_") as folder:
+    with (
+        tempfile.TemporaryDirectory(prefix="fuzz_merge_") as folder,
+        tempfile.TemporaryDirectory(prefix="fuzz_stored_") as before,
+    ):
+        unpack(name, Path(before))
+        old = [before, *([str(GROWN / name)] if (GROWN / name).is_dir() else [])]
         # By edges alone: how often each is taken would make it ten times as large.
-        said, code = _child(
-            name, "-merge=1", "-use_counters=0", folder, *map(str, old), patience=_PATIENCE
-        )
-        files = list(Path(folder).iterdir())
-        if code != 0 or not files:
+        said, code = _child(name, "-merge=1", "-use_counters=0", folder, *old, patience=_PATIENCE)
+        inputs = [one.read_bytes() for one in Path(folder).iterdir()]
+        if code != 0 or not inputs:
             raise RuntimeError(f"{name} cannot be merged (code {code}): {said[-500:]}")
-        shutil.rmtree(stored, ignore_errors=True)
-        stored.mkdir(parents=True)
-        for one in files:
-            shutil.copy(one, stored / one.name)
-    return len(files), sum(one.stat().st_size for one in stored.iterdir())
+    store(name, inputs)
+    return len(inputs), sum(map(len, inputs))
 
 
 def _child(name: str, *arguments: str, patience: float) -> tuple[str, int]:

@@ -9,17 +9,12 @@ from fuzz_subjects import BROKEN, Fills, Grows, Reader
 
 import fuzz.target
 from fuzz.findings import Findings
-from fuzz.run import CORPUS
+from fuzz.stored import CORPUS, archive, store, stored
 from fuzz.target import Target, WrongError, attempt, check_size, live_long
 from fuzz.targets import GROUPS, NAMES, target_of, targets_in
 
 #: Bytes of all stored inputs together, at most.
 LARGEST_CORPUS = 1_000_000
-
-
-def stored(name: str) -> list[bytes]:
-    """The stored inputs of a target."""
-    return [one.read_bytes() for one in sorted((CORPUS / name).iterdir())]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -41,9 +36,20 @@ def test_one_instance_that_reads_them_all_stays_small(name: str) -> None:
 
 
 def test_the_corpus_is_small_and_has_every_target() -> None:
-    assert sorted(one.name for one in CORPUS.iterdir()) == sorted(NAMES)
-    files = [one for one in CORPUS.rglob("*") if one.is_file()]
-    assert sum(one.stat().st_size for one in files) < LARGEST_CORPUS
+    assert {*CORPUS.iterdir()} == {archive(name) for name in NAMES}
+    assert sum(archive(name).stat().st_size for name in NAMES) < LARGEST_CORPUS
+
+
+def test_the_same_inputs_are_stored_as_the_same_bytes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("fuzz.stored.CORPUS", tmp_path)
+    assert stored("new") == [], "of a target that has none yet"
+    store("new", [b"", b"\0two", b"one"])
+    first = archive("new").read_bytes()
+    assert sorted(stored("new")) == [b"", b"\0two", b"one"]
+    store("new", [b"one", b"\0two", b"", b"one"])
+    assert archive("new").read_bytes() == first
 
 
 @pytest.mark.parametrize("group", GROUPS)
