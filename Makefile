@@ -95,7 +95,7 @@ build: ## build both packages
 lint: ## ruff, mypy and the import rule
 	@$(UNDERLAY) && exec scripts/lint.sh
 
-docs: build ## write README.md's tables, config/ and docs/states.* anew
+docs: build ## write the tables of docs/reference/, config/ and docs/states.* anew
 	@$(OVERLAY) && export PYTHONPATH="$$PWD:$$PYTHONPATH" \
 	    && python3 -m chute_ros.tools.parameter_docs && python3 -m chute_ros.tools.state_diagram
 

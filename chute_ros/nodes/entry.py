@@ -103,7 +103,7 @@ def _look_at_arguments(name: str) -> None:
     others = remove_ros_args(sys.argv)[1:]
     usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
     if "--help" in others or "-h" in others:
-        print(f"usage: {usage}\nIts parameters, topics and services: README.md")
+        print(f"usage: {usage}\nIts parameters, topics and services: docs/reference/")
         sys.exit(0)
     if others:
         text = f"unknown argument {others[0]}: what sets a node up follows --ros-args"

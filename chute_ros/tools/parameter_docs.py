@@ -1,6 +1,7 @@
 """Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
 
-The files in config/ and the tables between the marks in README.md and docs/rules.md. With
+The files in config/ and the tables between the marks in docs/reference/parameters.md and
+docs/rules.md. With
 --check it only says which of them is out of date.
 """
 
@@ -25,7 +26,7 @@ NODES: dict[str, tuple[Parameter, ...]] = {
     "umbilical": (*UMBILICAL_PARAMETERS, *COMMON_PARAMETERS),
     "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
-README = Path("README.md")
+PARAMETERS = Path("docs/reference/parameters.md")
 RULES = Path("docs/rules.md")
 _MAVLINK, _UPF, _UMBILICAL, _SUPERVISOR = NODES
 _BOTH_LINKS = [_MAVLINK, _UPF]
@@ -90,15 +91,15 @@ def config_text(path: Path) -> str:
     return "\n".join(lines)
 
 
-def readme_text(before: str) -> str:
-    """README.md with its tables made anew."""
+def parameters_text(before: str) -> str:
+    """docs/reference/parameters.md with its tables made anew."""
     for node, parameters in NODES.items():
         rows = ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
         rows += [
             f"| `{p.name}` | `{_yaml(p.default)}` | {p.description} | {_allowed(p)} |"
             for p in parameters
         ]
-        before = _between(before, README, _BEGIN.format(node), _END.format(node), rows)
+        before = _between(before, PARAMETERS, _BEGIN.format(node), _END.format(node), rows)
     return before
 
 
@@ -130,7 +131,7 @@ def main() -> None:
     options.add_argument("--check", action="store_true", help="write nothing")
     check = options.parse_args().check
     texts = {path: config_text(path) for path in CONFIGS}
-    texts[README] = readme_text(README.read_text())
+    texts[PARAMETERS] = parameters_text(PARAMETERS.read_text())
     texts[RULES] = rules_text(RULES.read_text())
     old = [str(p) for p, text in texts.items() if not p.is_file() or p.read_text() != text]
     if check and old:

@@ -175,11 +175,11 @@ PACKAGES = {
         ),
     ],
 )
-def test_it_needs_the_packages_that_the_readme_says_and_no_others(
+def test_it_needs_the_packages_that_its_page_says_and_no_others(
     simulator, connection, more, tmp_path, await_until
 ):
-    readme = (MSG_DEFS.parent / "README.md").read_text()
-    (row,) = re.findall(rf"^\| [^|]*`{simulator}`[^|]* \| ([\w -]+) \| ([^|]+) \|$", readme, re.M)
+    page = (MSG_DEFS.parent / "docs/guide/simulators.md").read_text()
+    (row,) = re.findall(rf"^\| [^|]*`{simulator}`[^|]* \| ([\w -]+) \| ([^|]+) \|$", page, re.M)
     assert not more or f"`{more[0]} msg_defs/" in row[1]
     missing = tuple(name for name, package in PACKAGES.items() if package not in row[0].split())
     assert len(PACKAGES) - len(missing) == len(row[0].split())
