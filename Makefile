@@ -53,10 +53,10 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo test bench campaign without hosts soak sitl build lint docs explore mutate fuzz lock clean distclean
+.PHONY: help demo test test-long bench campaign without hosts soak sitl build lint docs explore mutate fuzz lock clean distclean
 
 help: ## say what each target does
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
 demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both; VEHICLE=rocket)
 	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo --vehicle $(VEHICLE) \
@@ -64,6 +64,9 @@ demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both; VEHICLE
 
 test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
+
+test-long: build ## run the tests that are long by nature, write docs/long_tests.md
+	@$(OVERLAY) && $(LOCAL) && exec python3 scripts/test_long.py
 
 bench: build ## measure against bare scripts, write docs/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)

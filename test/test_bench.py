@@ -166,6 +166,7 @@ def bench(module, *arguments):
     return done
 
 
+@pytest.mark.long
 def test_all_parts_are_measured_in_one_run(tmp_path):
     output = tmp_path / "bench.md"
     done = bench("bench", *FEW, "--output", str(output))

@@ -328,7 +328,7 @@ def interrupted(self):
         pass
 
 MavlinkParachuteNode.begin = interrupted
-run("mavlink_parachute", "MavlinkParachuteNode")
+run("mavlink_parachute", "chute_ros.links.mavlink.node", "MavlinkParachuteNode")
 """
 
 
