@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.waitable import NumberOfEntities
 
+Kind = Literal["guard_condition", "subscription", "service", "client", "timer"]
 #: In the order in which they are served: what came over a wire (guard conditions) first, then
 #: messages; a timer can wait for them.
-KINDS = ("guard_condition", "subscription", "service", "client", "timer")
+KINDS: tuple[Kind, ...] = ("guard_condition", "subscription", "service", "client", "timer")
 #: Events of the middleware (a quality of service that does not match) decide nothing, stay until
 #: they are taken, and are many: they are waited for in one turn of so many. A node's timers make
 #: more turns than that in a second.
