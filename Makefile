@@ -48,7 +48,7 @@ LOCAL := export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 
 # PyPy uses the environment's packages: of those with compiled parts it takes the parts that are not.
 # Told to compile sooner and less at once, and to look for garbage every 32 MB (its own: 4), it
-# flies half as many flights again (docs/speed.md).
+# flies half as many flights again (docs/evidence/speed.md).
 FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3 -c \
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
@@ -65,30 +65,30 @@ demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both; VEHICLE
 test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
 
-test-long: build ## run the tests that are long by nature, write docs/long_tests.md
+test-long: build ## run the tests that are long by nature, write docs/evidence/long_tests.md
 	@$(OVERLAY) && $(LOCAL) && exec python3 scripts/test_long.py
 
-bench: build ## measure against bare scripts, write docs/bench.md
+bench: build ## measure against bare scripts, write docs/evidence/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
 
-campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/campaign.*
+campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/evidence/campaign.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
 	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) $(CAMPAIGN_ARGS) \
-	    $(if $(EACH),--each $(EACH) --page docs/campaign_of_each.md,--page docs/campaign.md)
+	    $(if $(EACH),--each $(EACH) --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md)
 
 without: build ## fly the campaign without a rule or heuristic, to see what needs it (WITHOUT_ARGS="--together ...")
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3) \
 	    scripts/without.py --flights $(FLIGHTS) --seed $(SEED) \
 	    $(if $(PYPY),--python "$(PYPY) $(PYPY_JIT)") $(WITHOUT_ARGS)
 
-hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write docs/hosts.md (PARTS=...)
+hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write docs/evidence/hosts.md (PARTS=...)
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults $(PARTS)
 
-soak: build ## faults on real processes, LOOPS times from SEED on, write docs/soak.* (as root)
+soak: build ## faults on real processes, LOOPS times from SEED on, write docs/evidence/soak.* (as root)
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults.soak --loops $(LOOPS) \
-	    --seed $(SEED) --page docs/soak.md
+	    --seed $(SEED) --page docs/evidence/soak.md
 
-sitl: build ## fly real autopilots' simulators (AUTOPILOT="PATH ..."), write docs/real_autopilots.md
+sitl: build ## fly real autopilots' simulators (AUTOPILOT="PATH ..."), write docs/evidence/real_autopilots.md
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m sitl --runs $(RUNS) --page \
 	    $(if $(STORIES),--stories $(STORIES) --) $(SITL_ARGS) $(AUTOPILOT)
 
@@ -98,11 +98,11 @@ build: ## build both packages
 lint: ## ruff, mypy and the import rule
 	@$(UNDERLAY) && exec scripts/lint.sh
 
-docs: build ## write the tables of docs/reference/, config/ and docs/states.* anew
+docs: build ## write the tables of docs/reference/, config/ and docs/reference/states.* anew
 	@$(OVERLAY) && export PYTHONPATH="$$PWD:$$PYTHONPATH" \
 	    && python3 -m chute_ros.tools.parameter_docs && python3 -m chute_ros.tools.state_diagram
 
-explore: build ## try every story of DEPTH steps on the supervisor's core, write docs/exploration.md
+explore: build ## try every story of DEPTH steps on the supervisor's core, write docs/evidence/exploration.md
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m chute_ros.tools.explore \
 	    --depth $(DEPTH)
 
@@ -114,7 +114,7 @@ mutate: .venv-mutate/done ## change the supervisor a little, many times; its tes
 	    && .venv-mutate/bin/pip install --quiet --disable-pip-version-check --require-hashes \
 	        -r requirements/mutate.lock && touch $@
 
-fuzz: build .venv-fuzz/done ## feed the decoders what a fuzzer thinks of for MINUTES, write docs/fuzz.md
+fuzz: build .venv-fuzz/done ## feed the decoders what a fuzzer thinks of for MINUTES, write docs/evidence/fuzz.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PWD/.venv-fuzz:$$PYTHONPATH" \
 	    exec python3 -m fuzz --minutes="$(MINUTES)"
 

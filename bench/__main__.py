@@ -1,4 +1,4 @@
-"""Measure all parts one after the other, and write docs/bench.md."""
+"""Measure all parts one after the other, and write docs/evidence/bench.md."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ from bench.command import run
 
 if __name__ == "__main__":
     parts = [kill_switch, vehicle, device_decoding, umbilical_decoding, umbilical_telemetry]
-    run("bench", __doc__ or "", parts, Path("docs/bench.md"))
+    run("bench", __doc__ or "", parts, Path("docs/evidence/bench.md"))

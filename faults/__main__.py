@@ -1,4 +1,6 @@
-"""make hosts: writes docs/hosts.md. As root: python3 -m faults [PART ...] [--only WORDS ...]
+"""make hosts: writes docs/evidence/hosts.md. As root:
+
+    python3 -m faults [PART ...] [--only WORDS ...]
 
 PART: supervisors, ground, discovery, fleet, packet; none: all. --only: the stories whose names
 contain one of these, and nothing is written.
@@ -22,7 +24,7 @@ from faults.fleet_stories import table as fleet_table
 from faults.hosts_page import PARTS, with_part
 from faults.network import Network, why_not
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "hosts.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "evidence" / "hosts.md"
 Names = tuple[str, ...]
 #: A part's table, and whether everything in it was as it must be.
 Outcome = tuple[str, bool]

@@ -1,4 +1,4 @@
-"""The discovery servers of a fleet, as docs/fleet.md has them: one on the ground, and one on each
+"""The discovery servers of a fleet, as docs/guide/fleet.md has them: on the ground, and on each
 host of vehicles, so that a vehicle's own nodes find each other without the ground."""
 
 from __future__ import annotations

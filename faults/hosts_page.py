@@ -1,4 +1,4 @@
-"""docs/hosts.md: each part is written anew by itself, and keeps its place among the others."""
+"""docs/evidence/hosts.md: each part is written by itself, and keeps its place among the others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""make soak: faults on real processes, in a loop; writes docs/soak.md. As root:
+"""make soak: faults on real processes, in a loop; writes docs/evidence/soak.md. As root:
 
 python3 -m faults.soak [--loops N] [--seed S] [--supervisors 1|2] [--kind PART ...] [--only LOOP]
 
@@ -28,7 +28,7 @@ from faults.soak_run import Loops, Result
 from faults.soak_vehicle import SoakError, Vehicle
 from faults.soak_wires import HOSTS, VEHICLE, Ports
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "soak.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "evidence" / "soak.md"
 _FIRST_PORT = 21000
 
 

@@ -1,1 +1,1 @@
-"""Coverage-guided fuzzing of what reads foreign bytes; docs/fuzz.md. By `make fuzz`."""
+"""Coverage-guided fuzzing of what reads foreign bytes; docs/evidence/fuzz.md. By `make fuzz`."""

@@ -1,4 +1,4 @@
-"""make fuzz: writes docs/fuzz.md. Or: python -m fuzz --replay TARGET FILE
+"""make fuzz: writes docs/evidence/fuzz.md. Or: python -m fuzz --replay TARGET FILE
 
 Findings are kept in fuzz/found; new inputs in fuzz/grown, from which --merge takes into the stored
 corpus what reaches more than it does.

@@ -1,4 +1,4 @@
-"""docs/fuzz.md: what was tried, for how long, and what was found."""
+"""docs/evidence/fuzz.md: what was tried, for how long, and what was found."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fuzz.run import Outcome
 from fuzz.stored import stored
 from fuzz.targets import NAMES, target_of
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "fuzz.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "evidence" / "fuzz.md"
 _PAGE = """\
 # Fuzzed
 

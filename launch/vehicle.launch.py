@@ -65,7 +65,7 @@ def _nodes(context: LaunchContext) -> list:
 
 def _range() -> str:
     """Who may hear the nodes: as the environment says; if that says nothing, this computer alone.
-    One packet of anybody else can end a node (docs/security.md)."""
+    One packet of anybody else can end a node (docs/guide/security.md)."""
     elsewhere = any(os.environ.get(name) for name in LEADS_ELSEWHERE)
     return os.environ.get(RANGE) or ("SUBNET" if elsewhere else "LOCALHOST")
 
@@ -79,7 +79,7 @@ def generate_launch_description() -> LaunchDescription:
                 default_value=_range(),
                 choices=["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF"],
                 description="who may hear the nodes: LOCALHOST, this computer alone; SUBNET, "
-                "others as well, as a ground station; docs/security.md",
+                "others as well, as a ground station; docs/guide/security.md",
             ),
             SetEnvironmentVariable(RANGE, LaunchConfiguration("range")),
             DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
@@ -113,7 +113,7 @@ def generate_launch_description() -> LaunchDescription:
                 "enclaves",
                 default_value="false",
                 choices=["true", "false"],
-                description="each node in its own SROS 2 enclave; docs/security.md",
+                description="each node in its own SROS 2 enclave; docs/guide/security.md",
             ),
             OpaqueFunction(function=_nodes),
         ]

@@ -1,8 +1,9 @@
 """Mutation testing of chute_ros/supervisor: changes it a little, many times, and runs its tests.
 
-A mutant that no test notices is a survivor. Each must be explained in docs/mutation.md, where it
-stands as "`the line` becomes `the changed line`"; the run fails on one that does not. It works in
-a copy, first with the tests of the module, then what survives with all but the random ones.
+A mutant that no test notices is a survivor. Each must be explained in docs/evidence/mutation.md,
+where it stands as "`the line` becomes `the changed line`"; the run fails on one that does not. It
+works in a copy, first with the tests of the module, then what survives with all but the random
+ones.
 
     make mutate [MODULES="gate counter"]
 """
@@ -19,7 +20,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "mutation.md"
+PAGE = ROOT / "docs" / "evidence" / "mutation.md"
 #: Module -> the tests that were written for it.
 TESTS = {
     "gate": ("gate", "wrong_heights", "gate_word_for_word"),

@@ -1,4 +1,4 @@
-"""Run the tests that are long by nature (marked long), and write docs/long_tests.md.
+"""Run the tests that are long by nature (marked long), and write docs/evidence/long_tests.md.
 
 Needs the environment sourced after a build: make test-long.
 """
@@ -14,7 +14,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "long_tests.md"
+PAGE = ROOT / "docs" / "evidence" / "long_tests.md"
 _HEAD = """\
 # Tests that are long by nature
 

@@ -1,4 +1,4 @@
-"""make sitl: flies real autopilots in their own simulators, writes docs/real_autopilots.md.
+"""make sitl: flies real autopilots in their simulators, writes docs/evidence/real_autopilots.md.
 
 python3 -m sitl [--stories NAME ...] [--runs N] [--list] AUTOPILOT ...
 """
@@ -27,7 +27,7 @@ from sitl.page import Flown, with_autopilot
 _TRIES = 3
 #: A node or a simulator that this machine kept waiting longer has flown in no real time, s.
 HELD_UP = 0.25
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "real_autopilots.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "evidence" / "real_autopilots.md"
 
 
 def main() -> None:

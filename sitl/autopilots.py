@@ -24,7 +24,8 @@ sitl: no autopilot to fly. Give the simulator binary of one, or of several:
 ArduCopter, ArduPlane (flown as a quadplane): the executable for the board SITL, as ArduPilot's
 documentation of its simulator has it (build/sitl/bin/arducopter). PX4: bin/px4 in the folder of a
 POSIX build with the SIH simulator (its etc/ folder lies beside bin/), as PX4's documentation of
-SIH has it. Nothing of them is part of this project. What comes of it: docs/real_autopilots.md."""
+SIH has it. Nothing of them is part of this project. What comes of it:
+docs/evidence/real_autopilots.md."""
 
 
 class AutopilotError(ChuteError):

@@ -1,4 +1,4 @@
-"""docs/real_autopilots.md: each autopilot is written anew by itself, and keeps its place."""
+"""docs/evidence/real_autopilots.md: each autopilot is written by itself, and keeps its place."""
 
 from __future__ import annotations
 

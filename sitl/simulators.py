@@ -39,7 +39,7 @@ _COPTER = {
     "WPNAV_SPEED_UP": 600,
 }  # fmt: skip
 _QUADPLANE = {
-    # As docs/mavlink.md has it: a device that hears its height must not hear that it stands.
+    # As docs/guide/mavlink.md has it: a device that hears its height must not hear that it stands.
     "HOME_RESET_ALT": -1,
     "Q_ENABLE": 1, "Q_FRAME_CLASS": 1, "Q_FRAME_TYPE": 1, "Q_GUIDED_MODE": 1,
     "Q_WP_SPEED_UP": 600, "RC3_TRIM": 1000,
@@ -143,7 +143,7 @@ class Simulator:
             "--instance",
             str(self.instance),
         ]
-        mode = ("-m", "onboard_low_bandwidth")  # as docs/mavlink.md has it for slow lines
+        mode = ("-m", "onboard_low_bandwidth")  # as docs/guide/mavlink.md has it for slow lines
         more = ("-r", str(self.line_rate), *mode, "-o", str(self.ports.line))
         for command in (("stop", "-u", local), ("start", "-x", "-u", local, *more)):
             subprocess.run([*mavlink, *command], check=True, timeout=10.0, capture_output=True)

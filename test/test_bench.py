@@ -182,14 +182,14 @@ def test_all_parts_are_measured_in_one_run(tmp_path):
 
 
 def test_a_part_alone_writes_nothing_but_where_it_is_told_to(tmp_path):
-    before = (ROOT / "docs" / "bench.md").read_text()
+    before = (ROOT / "docs" / "evidence" / "bench.md").read_text()
     done = bench(DECODING, "--batches", "2")
     assert check_decoding(done.stdout.rstrip()) == 2
-    assert (ROOT / "docs" / "bench.md").read_text() == before
+    assert (ROOT / "docs" / "evidence" / "bench.md").read_text() == before
 
 
 def test_what_is_in_docs_is_what_the_command_writes():
-    text = (ROOT / "docs" / "bench.md").read_text()
+    text = (ROOT / "docs" / "evidence" / "bench.md").read_text()
     kill_switch, vehicle, messages, decoding, telemetry = sections(text)
     # Of fewer the 99th percentile would be the largest.
     assert check_kill_switch(kill_switch) >= 200

@@ -1,4 +1,4 @@
-"""docs/states.* show what the tables say, and the table of the stages has no dead end."""
+"""docs/reference/states.* show what the tables say, and the table of stages has no dead end."""
 
 import xml.etree.ElementTree
 from pathlib import Path

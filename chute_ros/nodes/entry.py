@@ -130,8 +130,8 @@ def _refused(name: str, error: RuntimeError) -> NoReturn:
     text = " ".join(str(error).partition(", at /")[0].split())
     if _security():
         text += (
-            " (ROS_SECURITY_ENABLE is true: docs/security.md says what keystore, enclave and "
-            "middleware it needs)"
+            " (ROS_SECURITY_ENABLE is true: docs/guide/security.md says what keystore, enclave "
+            "and middleware it needs)"
         )
     print(f"{name}: {text}", file=sys.stderr)
     sys.exit(2)

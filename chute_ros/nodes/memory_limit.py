@@ -1,8 +1,8 @@
 """How much memory a node may take: one that is made to take more ends, not the computer.
 
 Fast DDS before 2.6.11, 2.14.6, 3.2.4, 3.3.1 and 3.4.1 takes all that there is for one packet of 68
-bytes (CVE-2025-64438, docs/security.md). Ended by its limit, the process is started again by its
-launch file, and its flight goes on.
+bytes (CVE-2025-64438, docs/guide/security.md). Ended by its limit, the process is started again by
+its launch file, and its flight goes on.
 """
 
 from __future__ import annotations

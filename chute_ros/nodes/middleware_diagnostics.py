@@ -26,7 +26,7 @@ def middleware_task(node: str) -> DiagnosticStatus:
     text = (
         f"{name} can be ended by one packet of anybody on the network (CVE-2025-64438, cured in "
         f"{cured}): set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST where nothing on another computer "
-        "must hear this node (docs/security.md)"
+        "must hear this node (docs/guide/security.md)"
     )
     return _status(node, DiagnosticStatus.WARN, text, values)
 

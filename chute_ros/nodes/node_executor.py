@@ -2,7 +2,7 @@
 
 rclpy's SingleThreadedExecutor makes its wait set anew for each callback, twice, and asks every
 event of the middleware each time: most of what a message costs a node. Here the wait set is kept
-while the entities stay the same. docs/speed.md has what that brings.
+while the entities stay the same. docs/evidence/speed.md has what that brings.
 """
 
 from __future__ import annotations

@@ -50,7 +50,8 @@ from chute_ros.runtime.topics import LeaseClaim, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
 
 #: A turn so long (s) before a deadline of the core finds the processor awake and its caches filled
-#: when the deadline has come (docs/speed.md). It is seldom reached: what comes moves it on.
+#: when the deadline has come (docs/evidence/speed.md). It is seldom reached: what comes moves it
+#: on.
 EARLY = 0.0012
 #: No turn by the clock sooner (s): a deadline that stays where it is must not take the processor.
 SHORTEST_SLEEP = 0.0001

@@ -40,7 +40,8 @@ PARAMETERS = (
     Parameter(
         "profile",
         "multirotor",
-        "rules of the vehicle: multirotor, fixed_wing, rocket, by_hand, or a file (docs/rules.md)",
+        "rules of the vehicle: multirotor, fixed_wing, rocket, by_hand, or a file "
+        "(docs/reference/rules.md)",
     ),
     Parameter(
         "deploy_ladder",

@@ -187,7 +187,8 @@ class VehicleSources:
         if new := sorted(report.disputed - self._disputed):
             self._node.get_logger().warning(
                 f"vehicle_sources: {', '.join(new)} is told otherwise by another source, or has "
-                "jumped: in doubt, and half a sign where one would decide alone (docs/rules.md)"
+                "jumped: in doubt, and half a sign where one would decide alone "
+                "(docs/reference/rules.md)"
             )
         self._disputed = report.disputed
         self._tell(report, now)

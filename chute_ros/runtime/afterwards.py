@@ -1,7 +1,7 @@
 """What follows a decision and nobody waits for: done once those who carry it out had their turn.
 
 To tell of a decision (log, safety/state, the file of what is remembered) takes the processor for
-longer than to make it, and just when the device nodes need it (docs/speed.md).
+longer than to make it, and just when the device nodes need it (docs/evidence/speed.md).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Reads a profile of rules from YAML text, and says for each mistake its line and the fix.
 
-The form of the file is described in docs/rules.md.
+The form of the file is described in docs/reference/rules.md.
 """
 
 from __future__ import annotations

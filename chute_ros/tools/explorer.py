@@ -1,7 +1,7 @@
 """Explores the supervisor's core: every story of so many steps from each beginning (make explore).
 
 Breadth first, so that the first story in which a property does not hold is a shortest one. It is
-printed, and the exit status is 1. Otherwise docs/exploration.md is written.
+printed, and the exit status is 1. Otherwise docs/evidence/exploration.md is written.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from chute_ros.tools.explore_steps import (
 )
 
 START = 1000.0
-_PAGE = Path("docs/exploration.md")
+_PAGE = Path("docs/evidence/exploration.md")
 _FLYING = ("stands disarmed", "stands armed", "flies level")
 _KILLING = (*_FLYING, f"tips over, for {HELD:g} s")
 _KILL_CONFIRMED = (*_FLYING, "kill asked for", f"kill CONFIRMED by {FIRST}", "deploy asked for")
@@ -163,7 +163,7 @@ class Explorer:
 
 
 def page(found: Found, properties: Properties, depth: int, alphabet: int) -> str:
-    """The whole of docs/exploration.md."""
+    """The whole of docs/evidence/exploration.md."""
     beginnings = [f"| {name} | {', '.join(path) or 'none'} |" for name, path in BEGINNINGS.items()]
     held = [f"| {text} | {properties.exercised[name]} |" for name, text in PROPERTIES.items()]
     return _PAGE_TEXT.format(

@@ -1,7 +1,7 @@
 """Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
 
 The files in config/ and the tables between the marks in docs/reference/parameters.md and
-docs/rules.md. With
+docs/reference/rules.md. With
 --check it only says which of them is out of date.
 """
 
@@ -27,7 +27,7 @@ NODES: dict[str, tuple[Parameter, ...]] = {
     "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
 PARAMETERS = Path("docs/reference/parameters.md")
-RULES = Path("docs/rules.md")
+RULES = Path("docs/reference/rules.md")
 _MAVLINK, _UPF, _UMBILICAL, _SUPERVISOR = NODES
 _BOTH_LINKS = [_MAVLINK, _UPF]
 #: File -> what its vehicle carries, its nodes, and what differs from the defaults.
@@ -104,7 +104,7 @@ def parameters_text(before: str) -> str:
 
 
 def rules_text(before: str) -> str:
-    """docs/rules.md with its table of measurements made anew."""
+    """docs/reference/rules.md with its table of measurements made anew."""
     rows = [
         "| name | unit | range | rate (1/s) | jump | max_age (s) | stuck_after (s) |",
         "|---|---|---|---|---|---|---|",

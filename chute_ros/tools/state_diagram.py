@@ -1,4 +1,4 @@
-"""Writes docs/states.md and docs/states.svg from the tables of the supervisor (make docs).
+"""Writes docs/reference/states.* from the tables of the supervisor (make docs).
 
 With --check it only says which of them is out of date.
 """
@@ -18,7 +18,7 @@ from chute_ros.tools.state_drawing import drawing
 
 _State = TypeVar("_State", bound=enum.Enum)
 _Stimulus = TypeVar("_Stimulus", bound=enum.Enum)
-TEXT, PICTURE = Path("docs/states.md"), Path("docs/states.svg")
+TEXT, PICTURE = Path("docs/reference/states.md"), Path("docs/reference/states.svg")
 #: Stages that are meant never to be left, or never to be reached from STARTUP: none is.
 MAY_BE_FINAL: frozenset[Stage] = frozenset()
 MAY_BE_UNREACHED: frozenset[Stage] = frozenset()
@@ -44,7 +44,7 @@ One that runs alone begins as LEADING; one of several begins as FOLLOWING and lo
 
 
 def states_text() -> str:
-    """The whole of docs/states.md."""
+    """The whole of docs/reference/states.md."""
     parts = [
         _HEAD,
         _mermaid(machine.TRANSITIONS, first=Stage.STARTUP.name),

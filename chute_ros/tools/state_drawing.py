@@ -69,7 +69,7 @@ _STYLE = """\
 
 
 def drawing() -> str:
-    """The whole of docs/states.svg."""
+    """The whole of docs/reference/states.svg."""
     common = _common()
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}">\n',

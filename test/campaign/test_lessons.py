@@ -1,4 +1,4 @@
-"""docs/lessons.md has a row for each stored flight, and names none that is not stored."""
+"""docs/evidence/lessons.md has a row for each stored flight, and names none that is not stored."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 FOLDER = Path(__file__).parent / "regressions"
-PAGE = Path(__file__).parents[2] / "docs" / "lessons.md"
+PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "lessons.md"
 
 
 def test_each_stored_flight_has_its_row_with_what_it_was_counted_as() -> None:

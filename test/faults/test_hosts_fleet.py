@@ -12,7 +12,7 @@ from faults.fleet_load import usage
 from faults.fleet_stories import SIZES, gaps
 from faults.network import Network
 
-GUIDE = Path(__file__).resolve().parents[2] / "docs" / "fleet.md"
+GUIDE = Path(__file__).resolve().parents[2] / "docs" / "guide" / "fleet.md"
 SAID = """\
 100.500000 3 ARMED
 101.250000 3 MOTOR FAILURE at 40.0 m

@@ -1,4 +1,4 @@
-"""docs/hosts.md is written part by part."""
+"""docs/evidence/hosts.md is written part by part."""
 
 import pytest
 

@@ -1,8 +1,8 @@
 """A vehicle inside its enclaves, attacked from outside and from the wrong enclave.
 
-Run by hand where the middleware supports SROS 2; docs/security.md has the command and what it
-printed. Arguments: keystores that attackers bring, each with an enclave /console that allows what
-they do. Exit code 0: nobody but the true console fired anything, and that did.
+Run by hand where the middleware supports SROS 2; docs/guide/security.md has the command and what
+it printed. Arguments: keystores that attackers bring, each with an enclave /console that allows
+what they do. Exit code 0: nobody but the true console fired anything, and that did.
 """
 
 from __future__ import annotations

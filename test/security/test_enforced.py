@@ -46,5 +46,5 @@ def test_without_keys_or_a_middleware_that_knows_them_nothing_starts(
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     (line,) = [one for one in done.stderr.splitlines() if one.startswith(f"{name}: ")]
-    assert "ROS_SECURITY_ENABLE is true: docs/security.md" in line
+    assert "ROS_SECURITY_ENABLE is true: docs/guide/security.md" in line
     assert not list(tmp_path.rglob("*.mcap")), "nothing was begun"

@@ -20,7 +20,7 @@ UNNAMED = {
 
 
 def rows():
-    text = (ROOT / "docs" / "security.md").read_text()
+    text = (ROOT / "docs" / "guide" / "security.md").read_text()
     table = text[text.index("<!-- threats") : text.index("<!-- end of threats -->")]
     lines = [line for line in table.splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[1:]]

@@ -1,4 +1,4 @@
-"""docs/real_autopilots.md is written autopilot by autopilot."""
+"""docs/evidence/real_autopilots.md is written autopilot by autopilot."""
 
 from sitl.judge import Verdict
 from sitl.page import Flown, with_autopilot
