@@ -53,7 +53,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo test test-long bench campaign without hosts soak sitl build lint docs explore mutate fuzz lock clean distclean
+.PHONY: help demo test test-long bench campaign without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -125,11 +125,19 @@ fuzz: build .venv-fuzz/done ## feed the decoders what a fuzzer thinks of for MIN
 	    || { echo 'fuzz: atheris has wheels for Linux on x86_64 and Python 3.10 to 3.13 only' >&2; \
 	        exit 1; }; } && touch $@
 
+site: .venv-docs/done ## build the site of docs/ into site/; a link that leads nowhere ends it
+	@NO_MKDOCS_2_WARNING=1 .venv-docs/bin/mkdocs build --quiet && echo "site/index.html"
+
+.venv-docs/done: requirements/docs.lock
+	@rm -rf .venv-docs && "$(PYTHON)" -m venv .venv-docs \
+	    && .venv-docs/bin/pip install --quiet --disable-pip-version-check --require-hashes \
+	        -r requirements/docs.lock && touch $@
+
 lock: ## refresh requirements/*.lock
 	@$(UNDERLAY) && exec scripts/lock.sh
 
 clean: ## remove what was built
-	rm -rf build-* install-* log-* build install log
+	rm -rf build-* install-* log-* build install log site
 
 distclean: clean ## remove the environments as well
 	rm -rf .venv-*

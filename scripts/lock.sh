@@ -23,3 +23,4 @@ pin sourced.lock runtime.in dev.in
 pin installer.lock installer.in
 pin mutate.lock mutate.in
 pin fuzz.lock fuzz.in
+pin docs.lock docs.in
