@@ -22,7 +22,7 @@ jobs=$((2 * $(nproc)))
 colcon test-result --test-result-base "build-$name" --delete-yes >/dev/null
 colcon --log-base "log-$name" test --build-base "build-$name" --install-base "install-$name" \
     --executor sequential --return-code-on-test-failure \
-    --pytest-args --numprocesses "$((jobs < 8 ? jobs : 8))" --dist worksteal \
+    --pytest-args --numprocesses "$((jobs < 8 ? jobs : 8))" --dist loadgroup \
     --event-handlers console_direct+ status- desktop_notification- 9>&- || failed+=("colcon test")
 echo
 colcon test-result --test-result-base "build-$name" --verbose | tail -n 200

@@ -53,7 +53,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "long.xml"
         command = [sys.executable, "-m", "pytest", "-m", "long", "-p", "no:cacheprovider"]
-        jobs = ["--numprocesses", str(os.cpu_count()), "--dist", "worksteal"]
+        jobs = ["--numprocesses", str(os.cpu_count()), "--dist", "loadgroup"]
         done = subprocess.run(
             [*command, *jobs, f"--junit-xml={told}", "test"], cwd=ROOT, check=False
         )

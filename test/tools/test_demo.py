@@ -22,6 +22,8 @@ def start(*arguments):
     )
 
 
+# What is flown once for all of them is flown by one worker.
+pytestmark = pytest.mark.xdist_group("demo")
 #: Name -> arguments.
 RUNS = {
     "good": (),

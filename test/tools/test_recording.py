@@ -16,6 +16,7 @@ from chute_ros.supervisor.record import Turn
 from chute_ros.tools.mcap_entries import McapEntries
 from chute_ros.tools.recording import RecordedTurn, Recording, files_of, read
 
+pytestmark = pytest.mark.xdist_group("recording")
 KINDS = {"safety/state": SafetyState}
 
 

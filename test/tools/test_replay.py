@@ -14,6 +14,7 @@ from chute_ros.tools import replay_command as replay
 from chute_ros.tools.recording import read
 from chute_ros.tools.replaying import Other, Replayer, rows
 
+pytestmark = pytest.mark.xdist_group("replay")
 YAML = """\
 /**/safety_supervisor:
   ros__parameters:

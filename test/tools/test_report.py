@@ -18,6 +18,7 @@ from chute_ros.tools.replayed_states import replayed_states
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline_rows import Band, Level
 
+pytestmark = pytest.mark.xdist_group("report")
 NASTY = '<script>alert(1)</script><img src="http://x.example/y">\'"&\x1b[2J\x00'
 
 
