@@ -16,7 +16,6 @@ from bench.command import at_least, run
 from bench.decoding import Batch, Peer, Times, take_turns, times_table
 from bench.report import load
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import FrameDecoder
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.upf.protocol.config import UpfConfig
@@ -24,6 +23,7 @@ from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.protocol.dronecan.can_frame import unpack
 from chute_ros.protocol.dronecan.endpoint import Endpoint
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.sim.upf_bus import UpfBus

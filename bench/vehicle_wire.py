@@ -14,10 +14,10 @@ import time
 from collections.abc import Callable
 
 from bench.flood import attitude
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
 from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.model import Action
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUPLANE, PX4
 from sitl.judge import NUMBERS, Expectation, Verdict, Want, events_of, held_up, judge

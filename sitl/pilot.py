@@ -6,7 +6,7 @@ import math
 import struct
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.simulators import ALTITUDE, LATITUDE, LONGITUDE
 from sitl.station import Station

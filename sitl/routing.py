@@ -12,7 +12,7 @@ import struct
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 _MAGIC_V1, _MAGIC_V2 = 0xFE, 0xFD
 _SIGNED = 0x01

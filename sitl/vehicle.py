@@ -15,13 +15,13 @@ from chute_msgs.srv import Arm, Deploy, Kill
 from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.signing import (
     EPOCH_2015,
     UNITS_PER_SECOND,
     Signer,
     SigningClock,
 )
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from faults.patience import Patient
 from faults.soak_processes import Keeper

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from chute_ros import model
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 PREFIXES = {
     "PARACHUTE_ERROR_FLAGS_": model.ErrorFlags,

@@ -16,11 +16,11 @@ from chute_ros.campaign.scenario import Failure, Fault, HomeMove, Scenario, Vehi
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import SOFT, observe
 from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.model import Action, DeploymentTrigger
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_kinds import KINDS, AutopilotKind
 from chute_ros.sim.flight import GRAVITY, FlightModel
 from chute_ros.sim.home import Home, Homing

@@ -13,7 +13,7 @@ import chute_ros
 from chute_ros.campaign.campaign import Line, Tally
 from chute_ros.campaign.judge import Count
 from chute_ros.errors import RecordError
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.transport.shared_folder import shared_folder
 
 #: Rises when what is written means something else.

@@ -11,7 +11,7 @@ from typing import Any
 from chute_ros.campaign.estimator import Estimator
 from chute_ros.campaign.manoeuvre import Manoeuvre, Motion
 from chute_ros.campaign.sensors import Sensors
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
 from chute_ros.sim.autopilot_kinds import AutopilotKind, Termination
 from chute_ros.sim.flight import GRAVITY, FlightModel

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 
 class Termination(enum.Enum):

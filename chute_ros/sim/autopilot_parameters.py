@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_kinds import AutopilotKind
 
 

@@ -12,7 +12,7 @@ import random
 from abc import abstractmethod
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.air import air_at
 from chute_ros.sim.flight import GRAVITY, FlightModel
 from chute_ros.sim.home import Home

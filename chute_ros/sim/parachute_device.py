@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import Frame
 from chute_ros.model import DeploymentTrigger, ErrorFlags, SafetyFlags, TriggerFlags
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.acting import one_of
 from chute_ros.sim.mavlink_device import MavlinkDevice, Params
 

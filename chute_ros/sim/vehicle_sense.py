@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import Frame
 from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.mavlink_device import MavlinkDevice
 from chute_ros.sim.upf_aps import Motion
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.model import Action, Outcome, TriggerFlags, flag_names
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.chart import chart
 from chute_ros.tools.demo_director import Director, StepFailedError

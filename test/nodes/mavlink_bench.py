@@ -8,10 +8,10 @@ from typing import Any
 from node_bench import LOCAL, Bench, port_of
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import Frame
 from chute_ros.links.mavlink.protocol.goals import FORCE_DISARM
 from chute_ros.model import DeploymentTrigger, SafetyFlags
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings

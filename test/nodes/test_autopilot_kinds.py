@@ -13,10 +13,10 @@ from mavlink_bench import Autopilot, Module, airborne, do, quick
 from node_bench import LOCAL, port_of, stamped
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_kinds import ARDUCOPTER, ARDUPLANE, GENERIC, PX4
 from chute_ros.sim.parachute_device import ParachuteSettings
 

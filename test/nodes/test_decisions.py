@@ -10,9 +10,9 @@ from chute_msgs.msg import ActionReport, ParachuteStatus, SafetyDecision, Vehicl
 from mavlink_bench import Autopilot, Module, Network, airborne, do
 from node_bench import stamped
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.model import Action, Outcome
 from chute_ros.nodes import qos
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_kinds import ARDUPLANE, GENERIC
 
 ARDUPLANE_WITH_AFS = replace(

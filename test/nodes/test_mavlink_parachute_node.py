@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, airborne, do
 from node_bench import LOCAL, port_of
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.model import LinkState, ParachuteState
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.parachute_device import ParachuteSettings
 
 

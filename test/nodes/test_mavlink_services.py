@@ -17,7 +17,7 @@ from chute_msgs.srv import (
 )
 from mavlink_bench import Module, Network, do
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 STATUS = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED

@@ -10,7 +10,7 @@ from chute_msgs.msg import LinkHeartbeat, VehicleState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, airborne
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.parachute_device import ParachuteSettings
 
 

@@ -17,11 +17,11 @@ from rclpy.parameter import Parameter
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.nodes.parameters import MISSPELT, nearest
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.tools.parameter_docs import NODES as NODE_PARAMETERS
 
 NODES = {"mavlink_parachute": MavlinkParachuteNode, "safety_supervisor": SafetySupervisorNode}

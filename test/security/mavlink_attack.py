@@ -12,7 +12,6 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mavlink_bench import Autopilot, Module, Network
 from node_bench import Bench
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import NOISE, FrameEncoder
 from chute_ros.links.mavlink.protocol.signing import (
     REPLAYED,
@@ -23,6 +22,7 @@ from chute_ros.links.mavlink.protocol.signing import (
     Verifier,
 )
 from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.mavlink.dialect import dialect
 
 KEY, OTHER_KEY = bytes(range(1, 33)), bytes(range(101, 133))
 #: The module's own ids and its autopilot's.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.dialect import dialect
 
 COMPUTER = (1, 191)
 

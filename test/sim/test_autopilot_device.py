@@ -5,7 +5,7 @@ import math
 import pytest
 from device_bench import Station, parachute_status
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.air import air_at
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.flight import Descent

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.links.mavlink.signing_key import signing_from_file
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.tools.isolation import free_udp_ports
 
 PARACHUTE, AUTOPILOT = "sim_mavlink_parachute", "sim_autopilot"

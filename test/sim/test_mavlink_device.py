@@ -3,8 +3,8 @@
 import pytest
 from device_bench import Station
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.frames import FrameEncoder
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 

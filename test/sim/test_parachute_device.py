@@ -7,8 +7,8 @@ emulator.
 import pytest
 from device_bench import Station, position
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.model import DeploymentTrigger, ErrorFlags, SafetyFlags, TriggerFlags
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 
 ACCEPTED = dialect.MAV_RESULT_ACCEPTED

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from device_bench import Station
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.autopilot_kinds import ARDUCOPTER, ARDUPLANE, GENERIC, KINDS, PX4
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 from sitl.judge import Expectation, Verdict, Want, events_of, held_up, judge
 from sitl.record import Seen
 from sitl.truth import Truth

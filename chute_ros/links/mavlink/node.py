@@ -25,7 +25,6 @@ from chute_ros.links.mavlink.diagnostics import (
     parachute_tasks,
 )
 from chute_ros.links.mavlink.parameters import PARAMETERS, config_from
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
@@ -33,6 +32,7 @@ from chute_ros.links.mavlink.signing_memory import SigningMemory
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.protocol.events import RequestFinished
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.runtime.device import Summary
 from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_address

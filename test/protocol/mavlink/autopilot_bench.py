@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 
 class Told:

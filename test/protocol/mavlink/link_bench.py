@@ -6,12 +6,12 @@ import struct
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
 from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
 from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 START = 1000.0
 ASLEEP = {"autopilot_message_rate": 0.0}

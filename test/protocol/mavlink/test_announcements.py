@@ -5,7 +5,7 @@ from link_bench import ASLEEP, Bench, ack, copter, heartbeat, landed, status
 
 from chute_ros.links.mavlink.protocol.announcements import REASON_INTERVAL, Announcements
 from chute_ros.links.mavlink.protocol.config import KillMethod
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PILOT, CHUTE = (1, 1), (1, 161)
 KILL, RELEASE = 400, 208

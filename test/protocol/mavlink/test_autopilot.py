@@ -7,9 +7,9 @@ from autopilot_bench import Told, attitude, imu, position
 from link_bench import copter, heartbeat, landed
 
 from chute_ros.links.mavlink.protocol.autopilot import is_autopilot
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.stream_watch import ASKED_FOR
 from chute_ros.model import Armed, LandedState, LinkState
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 NAN, INF = math.nan, math.inf
 

@@ -13,8 +13,8 @@ from chute_ros.links.mavlink.protocol.autopilot_settings import (
     READ_AGAIN,
     AutopilotSettings,
 )
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.firmware import Firmware
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PILOT = (1, 1)
 

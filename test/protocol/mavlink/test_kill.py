@@ -15,9 +15,9 @@ from link_bench import (
 )
 
 from chute_ros.links.mavlink.protocol.config import KillMethod
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.model import Armed
 from chute_ros.protocol.events import RequestReport, Severity
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 CHUTE, PILOT = (1, 161), (1, 1)
 RELEASE, REQUEST, TERMINATE, DISARM = 208, 512, 185, 400

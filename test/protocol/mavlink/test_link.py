@@ -8,9 +8,7 @@ import pytest
 from link_bench import START, Bench, ack, copter, heartbeat, landed, status
 
 from chute_ros.errors import NotBuiltError, ParameterError
-from chute_ros.links.mavlink.protocol import dialect as dialect_module
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.flight_block import DISARM_INTERVAL
 from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.links.mavlink.protocol.signing import (
@@ -23,6 +21,8 @@ from chute_ros.links.mavlink.protocol.signing import (
 )
 from chute_ros.model import Armed, LinkState, ParachuteState
 from chute_ros.protocol.events import DeviceLinkChanged, ParachuteChanged
+from chute_ros.protocol.mavlink import dialect as dialect_module
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 CHUTE, SECOND, PILOT, GROUND = (1, 161), (1, 162), (1, 1), (255, 190)
 GCS = heartbeat(d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID)

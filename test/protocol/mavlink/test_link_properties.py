@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from link_bench import START, Bench, ack, copter, heartbeat, landed, status
 
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 BYTE = st.integers(0, 255)
 INTERESTING = ["HEARTBEAT", "PARACHUTE_STATUS", "COMMAND_ACK", "COMPONENT_INFORMATION_BASIC"]

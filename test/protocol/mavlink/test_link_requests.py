@@ -4,8 +4,8 @@ import pytest
 from link_bench import Bench, ack, copter, heartbeat, status
 
 from chute_ros.links.mavlink.protocol import results
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.protocol.events import RequestReport
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 CHUTE, PILOT = (1, 161), (1, 1)
 RELEASE, TRIGGERS, REQUEST, DISARM = 208, 225, 512, 400

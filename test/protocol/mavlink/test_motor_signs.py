@@ -3,7 +3,7 @@
 import pytest
 from link_bench import Bench, ack, ardupilot, landed
 
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PILOT = (1, 1)
 DISARM = 400

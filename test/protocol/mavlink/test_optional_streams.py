@@ -8,8 +8,8 @@ import pytest
 from autopilot_bench import Told, attitude, imu, position
 from link_bench import landed
 
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.optional_streams import AFTER, TRIES
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PRESSURE, IMU2, IMU3 = 29, 116, 129
 ATTITUDE_TARGET, LOCAL_TARGET, GLOBAL_TARGET, NAVIGATION, LOCAL = 83, 85, 87, 62, 32

@@ -3,7 +3,6 @@
 import pytest
 from parachute_bench import Told, picture
 
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.parachute import packed_date
 from chute_ros.model import (
     DeploymentTrigger,
@@ -12,6 +11,7 @@ from chute_ros.model import (
     SafetyFlags,
     TriggerFlags,
 )
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 ERROR_FLAGS = {
     0: "BAROMETER_ERROR",

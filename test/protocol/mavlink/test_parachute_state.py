@@ -5,8 +5,8 @@ import math
 import pytest
 from parachute_bench import Told, picture
 
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.model import LinkState, ParachuteState, SafetyFlags
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 # -- state ------------------------------------------------------------------------------------
 

@@ -11,11 +11,11 @@ from link_bench import ack as ack_message
 from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.goals import Watch
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import Goal
 from chute_ros.protocol.events import RequestFinished, RequestReport
+from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.requests import Requests
 
 ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))

@@ -10,9 +10,9 @@ from autopilot_bench import Told
 from link_bench import copter
 
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.round_trip import LIMIT, RoundTrip
+from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.sim.autopilot_device import AutopilotDevice
 
 STEP = 0.02

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from link_bench import heartbeat
 
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 NAN = math.nan
 G = 9.80665

@@ -4,8 +4,8 @@ import pytest
 from link_bench import Bench, ack, ardupilot, heartbeat, setting, status
 
 from chute_ros.links.mavlink.protocol.config import KillMethod
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.model import LinkState, ParachuteState, TriggerFlags
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PARACHUTE = (1, 161)
 

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.links.mavlink.protocol.dialect import dialect as d
 from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.links.mavlink.protocol.status_texts import (
     CHUNK,
@@ -18,6 +17,7 @@ from chute_ros.links.mavlink.protocol.status_texts import (
     StatusTexts,
     chunked,
 )
+from chute_ros.protocol.mavlink.dialect import dialect as d
 
 LONG = "upf_can never heard: flight blocked until its node is started and heard by the supervisor"
 

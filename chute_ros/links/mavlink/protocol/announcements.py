@@ -9,10 +9,10 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.status_texts import chunked
 from chute_ros.model import Outcome
 from chute_ros.protocol.events import Event, RequestFinished, RequestReport
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: Another reason of the block is said no more often than this, s; the newest one wins.
 REASON_INTERVAL = 2.0

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.firmware import Firmware
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: An authorization holds for so long, s: short where the arming that asks is the one that arms.
 _AT_ONCE, _TWO_STEPS = 1, 5

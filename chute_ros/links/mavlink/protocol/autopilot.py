@@ -9,7 +9,6 @@ import math
 from typing import Any
 
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.firmware import firmware_of
 from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
 from chute_ros.links.mavlink.protocol.optional_streams import OptionalStreams
@@ -24,6 +23,7 @@ from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
 from chute_ros.model import Armed, LandedState, LinkState, Reading, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: What was said longer ago (s) proves nothing about now.
 STREAM_SILENCE = 2.5

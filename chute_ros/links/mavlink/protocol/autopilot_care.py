@@ -15,13 +15,13 @@ from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.commands import CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.flight_block import FlightBlock
 from chute_ros.links.mavlink.protocol.heartbeat_watch import HeartbeatWatch
 from chute_ros.links.mavlink.protocol.kill import KillPlan, kill_plan
 from chute_ros.links.mavlink.protocol.setup_check import Setup, SetupNews, setup_of
 from chute_ros.links.mavlink.protocol.wire import Outbox
 from chute_ros.protocol.events import Severity
+from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.requests import Requests
 
 #: How often it is looked whether there is something new to say of its set-up, s.

@@ -16,8 +16,8 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.firmware import Firmware
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: What is read of each.
 NAMES: Mapping[Firmware, tuple[str, ...]] = {

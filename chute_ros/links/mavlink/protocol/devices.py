@@ -12,7 +12,6 @@ from typing import Any
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker, is_autopilot
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.kill import kill_plan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES, Roster
@@ -26,6 +25,7 @@ from chute_ros.protocol.events import (
     VehicleChanged,
 )
 from chute_ros.protocol.liveness import LinkChange, first_alive
+from chute_ros.protocol.mavlink.dialect import dialect
 
 Ids = tuple[int, int]
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import enum
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 
 class Firmware(enum.Enum):

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.errors import MessageError
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
+from chute_ros.protocol.mavlink.dialect import dialect
 
 MAGIC_V1 = 0xFE
 MAGIC_V2 = 0xFD

@@ -14,11 +14,11 @@ from typing import Any
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.commands import Command
 from chute_ros.links.mavlink.protocol.config import KillMethod
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.kill import KillPlan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import LinkState, TriggerFlags, flag_names
 from chute_ros.protocol.effect import Goal
+from chute_ros.protocol.mavlink.dialect import dialect
 
 MavlinkGoal = Goal[Command]
 

@@ -11,8 +11,8 @@ import math
 
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.commands import Command
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.firmware import Firmware
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: Wanted between two heartbeats, s.
 INTERVAL = 0.2

@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: A motor's output while disarmed is its lowest; a control surface stands in the middle, us.
 _HIGHEST_IDLE = 1150

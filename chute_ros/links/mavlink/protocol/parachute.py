@@ -11,7 +11,6 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.twins import Twins
 from chute_ros.model import (
     NAN,
@@ -27,6 +26,7 @@ from chute_ros.model import (
 )
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.mavlink.dialect import dialect
 
 _UNHEALTHY_STATES = {
     dialect.MAV_STATE_CRITICAL: "critical",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.protocol.mavlink.dialect import dialect
 
 ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED
 TEMPORARILY_REJECTED: int = dialect.MAV_RESULT_TEMPORARILY_REJECTED

@@ -14,8 +14,8 @@ import math
 from collections import deque
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.stream_watch import LINE_CURE
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: It is asked so often, s.
 EACH = 1.0

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.model import Reading
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: The messages of sensors that are asked for besides SCALED_IMU: message id -> name.
 PRESSURE = {dialect.MAVLINK_MSG_ID_SCALED_PRESSURE: "SCALED_PRESSURE"}

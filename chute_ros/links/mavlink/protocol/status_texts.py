@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: Bytes in one message.
 CHUNK = 50

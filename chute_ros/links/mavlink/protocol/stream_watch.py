@@ -15,8 +15,8 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.stream_rate import StreamRate
+from chute_ros.protocol.mavlink.dialect import dialect
 
 #: Parts of the vehicle's picture, and the message that is asked for to have them.
 ASKED_FOR: dict[str, int] = {

@@ -21,8 +21,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.dialect import dialect
 from chute_ros.links.mavlink.protocol.readings import Readings
+from chute_ros.protocol.mavlink.dialect import dialect
 
 Vector = tuple[float, float, float]
 

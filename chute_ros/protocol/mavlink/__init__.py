@@ -1,0 +1,1 @@
+"""What everything shares that speaks MAVLink: the link, the simulators, the campaign."""
