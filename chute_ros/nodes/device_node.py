@@ -84,12 +84,11 @@ def _old(status: DiagnosticStatus) -> DiagnosticStatus:
 
 class DeviceNode(SuiteNode, ABC):
     """Base of the nodes that speak to a device, and the shell of its runtime. The subclass makes
-    self.runtime and self.loop, and calls begin."""
+    the runtime and calls carry with it, makes self.loop, and calls begin."""
 
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
         # Before ROS knows the node, as at_end.
         self.loop: WireLoop[Any] | None = None
-        self.runtime: DeviceRuntime[Any]
         super().__init__(name, (*COMMON_PARAMETERS, *parameters), **options)
         self.add_on_set_parameters_callback(self._parameters_set)
         self.wire_text = "not opened yet"
@@ -122,15 +121,18 @@ class DeviceNode(SuiteNode, ABC):
         blocks = self.values["on_supervisor_lost"] == BLOCK_FLIGHT
         return kind(block_when_lost=blocks, **{one: self.values[one] for one in names}, **more)
 
-    def begin(self) -> None:
-        """Start the link's thread and everything that reacts to it."""
-        assert self.loop is not None
-        runtime = self.runtime
+    def carry(self, runtime: DeviceRuntime[Any]) -> None:
+        """Be the shell of this runtime; before anything that may bring events."""
+        self.runtime = runtime
         guard = self.create_guard_condition(self._drain)
         # An autopilot tells its measurements one right after the other; each picture has all.
         self.inbox = Inbox(
             self._take, guard.trigger, runtime.PICTURES, runtime.REPLACED, runtime.UNHURRIED
         )
+
+    def begin(self) -> None:
+        """Start the link's thread and everything that reacts to it."""
+        assert self.loop is not None
         self._decisions = self.create_subscription(
             SafetyDecision, "safety/decision", self._decided, qos.newest(qos.DECISION)
         )

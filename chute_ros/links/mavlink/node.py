@@ -56,7 +56,7 @@ class MavlinkParachuteNode(DeviceNode):
         #: Why take-off is forbidden, as it was last told.
         self._doubts: set[str] = set()
         settings = self.settings(MavlinkSettings)
-        self.runtime = MavlinkRuntime(self.get_name(), settings, self, self._details)
+        self.carry(MavlinkRuntime(self.get_name(), settings, self, self._details))
         link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, frames=lambda: link.received_count

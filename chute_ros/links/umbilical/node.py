@@ -50,10 +50,10 @@ class UmbilicalNode(DeviceNode):
             if names := without_place(layout):
                 text = f"{layout.name}: umbilical/telem has no field for {', '.join(names)}"
                 self.get_logger().warning(text)
+        settings = self.settings(UmbilicalSettings)
+        self.carry(UmbilicalRuntime(self.get_name(), settings, self, details_of))
         self.files = DumpFiles(self.values["dump_folder"])
         self.at_end.callback(self._end_dump)
-        settings = self.settings(UmbilicalSettings)
-        self.runtime = UmbilicalRuntime(self.get_name(), settings, self, details_of)
         link = UmbilicalLink(config_from(self.values), layouts)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written

@@ -52,7 +52,8 @@ class UpfCanNode(DeviceNode):
         table = self._file.load() if self.values["allocator"] != "false" else {}
         utc_offset = time.time() - time.monotonic()
         settings = self.settings(UpfSettings)
-        self.runtime = runtime = UpfRuntime(self.get_name(), settings, self, details_of)
+        runtime = UpfRuntime(self.get_name(), settings, self, details_of)
+        self.carry(runtime)
         link = UpfLink(config_from(self.values, table, name, utc_offset), types)
         self._wire = make_can_wire(address)
         self.loop = WireLoop(link, self._wire, self.deliver)
