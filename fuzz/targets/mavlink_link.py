@@ -205,12 +205,21 @@ class MavlinkLinked(Linked):
             raise WrongError(f"a kill alone may release: {message}")
 
 
+#: Two devices with one id are told apart by so many of the newest messages (protocol/twins.py).
+_LARGER = dict.fromkeys(("Twins._seen", "Twins._sights", "Twins._copies"), 1000)
 TARGETS = (
-    Target("mavlink.link", "the link with its transactions", MavlinkLinked, longest=512),
+    Target(
+        "mavlink.link",
+        "the link with its transactions",
+        MavlinkLinked,
+        longest=512,
+        larger=_LARGER,
+    ),
     Target(
         "mavlink.link_signed",
         "the same with a key",
         lambda: MavlinkLinked(signed=True),
         longest=512,
+        larger=_LARGER,
     ),
 )
