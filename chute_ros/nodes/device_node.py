@@ -115,11 +115,11 @@ class DeviceNode(SuiteNode, ABC):
         self.follow(DeviceRequest, self._request)
         self.follow(ParachuteReport, self._parachute)
 
-    def settings(self, kind: Any, **more: Any) -> Any:
+    def settings(self, kind: Any) -> Any:
         """The runtime's settings of this kind, from the parameters."""
         names = [one for one in kind.__dataclass_fields__ if one in self.values]
         blocks = self.values["on_supervisor_lost"] == BLOCK_FLIGHT
-        return kind(block_when_lost=blocks, **{one: self.values[one] for one in names}, **more)
+        return kind(block_when_lost=blocks, **{one: self.values[one] for one in names})
 
     def carry(self, runtime: DeviceRuntime[Any]) -> None:
         """Be the shell of this runtime; before anything that may bring events."""
@@ -318,10 +318,6 @@ class DeviceNode(SuiteNode, ABC):
         return response
 
     # -- inside ---------------------------------------------------------------------------------
-
-    def difference(self, stamp: Time) -> float:
-        """The wall clock here less a stamp, s."""
-        return messages.seconds(self.stamp()) - messages.seconds(stamp)
 
     def _parameters_set(self, parameters: list[Any]) -> Any:
         for parameter in parameters:

@@ -100,7 +100,7 @@ class SafetySupervisorNode(SuiteNode):
         self.create_subscription(
             SupervisorLease, "safety/lease", self._claim, qos.newest(qos.STATUS)
         )
-        SupervisorInputs(self, self.wall, self._recorder, self._health, self._run)
+        SupervisorInputs(self, self._recorder, self._health, self._run)
         self._vehicle_sources = VehicleSources(
             self,
             self.values,

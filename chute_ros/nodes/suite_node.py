@@ -9,7 +9,7 @@ from chute_msgs.msg import LinkHeartbeat
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from chute_ros.nodes import diagnostics, qos
+from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.parameters import Parameter, declare
 from chute_ros.nodes.plain_border import (
     PlainLogger,
@@ -65,3 +65,7 @@ class SuiteNode(Node):
     def stamp(self) -> Any:
         """The wall clock, for headers."""
         return self.wall.now().to_msg()
+
+    def difference(self, stamp: Any) -> float:
+        """The wall clock here less a stamp, s."""
+        return messages.seconds(self.stamp()) - messages.seconds(stamp)

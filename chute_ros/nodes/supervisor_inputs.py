@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from chute_msgs.msg import ActionReport, LinkHeartbeat, ParachuteStatus, SafetyRequest
-from rclpy.clock import Clock
 
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.flight_recorder import FlightRecorder
@@ -28,13 +27,11 @@ class SupervisorInputs:
     def __init__(
         self,
         node: SafetySupervisorNode,
-        wall: Clock,
         recorder: FlightRecorder,
         health: Health,
         run: Callable[[Callable[[float], None]], None],
     ) -> None:
-        self._node, self._wall = node, wall
-        self._recorder, self._run = recorder, run
+        self._node, self._recorder, self._run = node, recorder, run
         self._misasked: set[str] = set()
         for kind, topic, read, profile in (
             (LinkHeartbeat, "safety/heartbeat", self._heartbeat, qos.newest(qos.STATUS)),
@@ -56,14 +53,10 @@ class SupervisorInputs:
     def _heartbeat(self, message: LinkHeartbeat) -> None:
         if message.supervisor:
             return
-        sent = messages.seconds(message.header.stamp)
-        difference = messages.seconds(self._wall.now().to_msg()) - sent if sent else math.nan
-        beat, stamp = messages.device_beat_from(message), message.header.stamp
-        self._run(
-            lambda now: self._node.runtime.heard_beat(
-                beat, messages.nanoseconds(stamp), difference, now
-            )
-        )
+        stamp = messages.nanoseconds(message.header.stamp)
+        difference = self._node.difference(message.header.stamp) if stamp else math.nan
+        beat = messages.device_beat_from(message)
+        self._run(lambda now: self._node.runtime.heard_beat(beat, stamp, difference, now))
 
     def _parachute(self, message: ParachuteStatus) -> None:
         self._give(inputs.ParachuteReport(message.link, messages.parachute_from(message)))

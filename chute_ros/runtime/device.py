@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any, Generic, TypeVar
 
@@ -226,11 +226,8 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
 
     def _answer(self, link: Any, now: float) -> None:
         link.owner_alive(now + OWNER_SILENCE)
-        one = self.summarise(link, now)
-        details = self._details(link, now)
-        self.shell.deliver(
-            [Summary(one.link_state, one.device_healthy, one.age, one.reasons, details)]
-        )
+        summary = replace(self.summarise(link, now), details=self._details(link, now))
+        self.shell.deliver([summary])
 
     def _publish_beat(self, one: Summary, now: float) -> None:
         self.summary = one
