@@ -5,6 +5,19 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "chute_ros"
+#: Node, which is its executable as well, and the folder of its link.
+LINKS = {
+    "mavlink_parachute": "mavlink",
+    "upf_can": "upf",
+    "umbilical": "umbilical",
+}
+
+
+def simulator(path: str) -> str:
+    """The entry of the executable in this file."""
+    *folders, name = path.removesuffix(".py").split("/")
+    return f"{name} = {'.'.join(folders)}.{name}:main"
+
 
 setup(
     name=NAME,
@@ -28,15 +41,12 @@ setup(
     # colcon looks here to know that the tests are run with pytest.
     extras_require={"test": ["pytest"]},
     entry_points={
+        # What a link is: chute_ros/links/api.py. Somebody's own package has entries of its own.
+        "chute_ros.links": [f"{node} = {NAME}.links.{link}:LINK" for node, link in LINKS.items()],
         "console_scripts": [
-            "mavlink_parachute = chute_ros.nodes.mavlink_parachute:main",
-            "upf_can = chute_ros.nodes.upf_can:main",
-            "umbilical = chute_ros.nodes.umbilical:main",
+            *(f"{node} = {NAME}.links.{link}.__main__:main" for node, link in LINKS.items()),
+            *map(simulator, sorted(glob(f"{NAME}/**/sim_*.py", recursive=True))),
             "safety_supervisor = chute_ros.nodes.safety_supervisor:main",
-            "sim_mavlink_parachute = chute_ros.sim.sim_mavlink_parachute:main",
-            "sim_upf = chute_ros.sim.sim_upf:main",
-            "sim_autopilot = chute_ros.sim.sim_autopilot:main",
-            "sim_flight_computer = chute_ros.sim.sim_flight_computer:main",
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",

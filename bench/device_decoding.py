@@ -16,19 +16,19 @@ from bench.command import at_least, run
 from bench.decoding import Batch, Peer, Times, take_turns, times_table
 from bench.report import load
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.link import UpfLink
+from chute_ros.links.upf.simulator.bus import UpfBus
+from chute_ros.links.upf.simulator.controller import UpfController
+from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.protocol.dronecan.can_frame import unpack
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder
 from chute_ros.sim.autopilot_device import AutopilotDevice
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
-from chute_ros.sim.upf_bus import UpfBus
-from chute_ros.sim.upf_controller import UpfController
-from chute_ros.sim.upf_trigger import UpfTrigger
 from chute_ros.transport.data_types import load_data_types
 from chute_ros.transport.shared_folder import shared_folder
 

@@ -6,8 +6,8 @@ import itertools
 
 from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.protocol.modes import FlightMode
-from chute_ros.sim.flight_computer import FlightComputer
-from chute_ros.sim.flight_computer_settings import FlightComputerSettings
+from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
 
 #: What the flight computer sends, lines a second.
 REAL_RATE = 13.0

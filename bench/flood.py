@@ -13,9 +13,9 @@ import subprocess
 import sys
 import time
 
-from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.transport.can_address import parse_can_address
 from chute_ros.transport.can_multicast import CanMulticastWire
 from chute_ros.transport.data_types import load_data_types

@@ -148,13 +148,13 @@ def _start_ours(namespace: str, processes: Processes, bus: int, network: int) ->
     )
     start(
         "mavlink",
-        "chute_ros.nodes.mavlink_parachute",
+        "chute_ros.links.mavlink",
         connection=f"udpin:127.0.0.1:{network}",
         expect_parachute="false",
     )
     start(
         "upf_can",
-        "chute_ros.nodes.upf_can",
+        "chute_ros.links.upf",
         connection=f"mcast:0:{bus}",
         allocator="false",
         vehicle_service_timeout=str(_SERVICE_TIMEOUT),

@@ -108,7 +108,7 @@ def start_peers(
     ours, bare = peers
     node = ("--ros-args", "-r", f"__ns:={namespace}")
     port = f"connection:=serial:{ours.ends.wire.path}"
-    children.start("umbilical", "chute_ros.nodes.umbilical", *node, "-p", port)
+    children.start("umbilical", "chute_ros.links.umbilical", *node, "-p", port)
     node = ("--ros-args", "-r", f"__ns:={namespace}/bare")
     children.start("bare", "bench.bare_telemetry", bare.ends.wire.path, *node)
     ours.ends.pid, bare.ends.pid = children.pid("umbilical"), children.pid("bare")

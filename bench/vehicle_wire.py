@@ -14,12 +14,12 @@ import time
 from collections.abc import Callable
 
 from bench.flood import attitude
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.sim.autopilot_device import AutopilotDevice
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 
 #: What the two devices send by themselves once they are asked for measurements, frames a second.
 NOMINAL_RATE = 65.0

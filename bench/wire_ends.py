@@ -12,12 +12,11 @@ from typing import Any
 
 from bench.flood import Flood
 from chute_ros.errors import ChuteError
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.protocol.goals import FORCE_DISARM
 from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, VEHICLE_SERVICE, Definitions
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import Kind
-from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.can_address import parse_can_address
 from chute_ros.transport.can_multicast import CanMulticastWire

@@ -38,3 +38,7 @@ class ProfileError(ChuteError, ValueError):
 
 class NameTakenError(ChuteError):
     """Another living supervisor has this name. The text says which, and the fix."""
+
+
+class NotRegisteredError(ChuteError):
+    """A link is not registered as it should be. The text names the entry and what it needs."""

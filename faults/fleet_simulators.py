@@ -12,9 +12,9 @@ import sys
 import time
 from typing import Any
 
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.sim.autopilot_device import AutopilotDevice
 from chute_ros.sim.bundle import WireBundle
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.loop import WireLoop

@@ -6,8 +6,7 @@ import socket
 import struct
 from collections.abc import Callable
 
-from chute_ros.links.mavlink.protocol.goals import FORCE_DISARM
-from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 from chute_ros.sim.faults import flip_a_byte
 from faults.soak_relay import DEPLOY, KILL, TIMES, VALID, Relay, Seen
 

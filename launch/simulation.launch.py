@@ -19,56 +19,46 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.substitutions import ExecutableInPackage
 
-from chute_ros.links.upf.protocol.parameters import EXCLUDES
+from chute_ros.links.api import Sockets
+from chute_ros.links.registered import links, vehicles
 from chute_ros.nodes.middleware import LEADS_ELSEWHERE
 from launch import LaunchContext, LaunchDescription
-
-#: As a controller is delivered it takes off, arms, disarms and lands by itself, and refuses to be
-#: told to: safety/arm would never succeed.
-BY_COMMAND = [part for name in EXCLUDES.values() for part in ("--parameter", f"{name}=false")]
 
 
 def _vehicle(context: LaunchContext) -> list:
     share = get_package_share_directory("chute_ros")
     namespace = LaunchConfiguration("namespace").perform(context)
     port = int(LaunchConfiguration("port").perform(context))
-    network, air = f"udpout:127.0.0.1:{port}", f"127.0.0.1:{port + 1}"
-    bus = f"mcast:0:{port + 2}"
-    terminal = f"/tmp/chute_ros_umbilical_{port}"
+    sockets = Sockets(
+        network=f"127.0.0.1:{port}",
+        air=f"127.0.0.1:{port + 1}",
+        bus=f"mcast:0:{port + 2}",
+        terminal=f"/tmp/chute_ros_terminal_{port}",
+    )
     parachute = LaunchConfiguration("parachute").perform(context)
-    simulators = []
-    if parachute == "umbilical":
-        simulators.append(_simulator("sim_flight_computer", arguments=("--link", terminal)))
-    else:
-        simulators.append(_simulator("sim_autopilot", network, f"udpin:{air}"))
-    if parachute in ("mavlink", "both"):
-        simulators.append(_simulator("sim_mavlink_parachute", network, f"udpout:{air}"))
-    if parachute in ("upf", "both"):
-        feel = ("--vehicle", f"udpout:{air}", *BY_COMMAND)
-        simulators.append(_simulator("sim_upf", bus, arguments=feel))
+    vehicle = vehicles()[parachute]
+    kinds = [links()[name] for name in vehicle.links]
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
             launch_arguments={
                 "namespace": namespace,
                 "range": "LOCALHOST",
-                "connection": f"udpin:127.0.0.1:{port}",
                 "parachute": parachute,
-                "bus": bus,
-                "cable": f"serial:{terminal}",
+                **{kind.argument.name: kind.connection(sockets) for kind in kinds},
             }.items(),
         ),
-        *simulators,
+        *(
+            _simulator(kind.package, *command)
+            for kind in kinds
+            for command in kind.simulators(vehicle, sockets)
+        ),
     ]
 
 
-def _simulator(
-    executable: str, *connections: str, arguments: tuple[str, ...] = ()
-) -> ExecuteProcess:
+def _simulator(package: str, executable: str, *arguments: str) -> ExecuteProcess:
     # Not a Node: launch_ros would add --ros-args, and a simulator knows nothing of ROS.
-    command: list = [ExecutableInPackage(executable, "chute_ros"), *arguments]
-    for connection in connections:
-        command += ["--connection", connection]
+    command = [ExecutableInPackage(executable, package), *arguments]
     return ExecuteProcess(cmd=command, name=executable, output="screen")
 
 
@@ -83,7 +73,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "parachute",
                 default_value="mavlink",
-                choices=["mavlink", "upf", "both", "umbilical"],
+                choices=list(vehicles()),
                 description="what the vehicle carries",
             ),
             DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),

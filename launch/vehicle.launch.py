@@ -12,6 +12,7 @@ from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironment
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from chute_ros.links.registered import links, vehicles
 from chute_ros.nodes.middleware import LEADS_ELSEWHERE, RANGE
 from launch import LaunchContext, LaunchDescription
 
@@ -27,30 +28,24 @@ def _nodes(context: LaunchContext) -> list:
     config = LaunchConfiguration("config").perform(context)
     config = config or share + f"/config/{parachute}_vehicle.yaml"
     namespace = LaunchConfiguration("namespace").perform(context)
-    connection = LaunchConfiguration("connection").perform(context)
-    bus = LaunchConfiguration("bus").perform(context)
-    cable = LaunchConfiguration("cable").perform(context)
     # An enclave has the name of its node, with the namespace.
     place = "/".join(["", *filter(None, namespace.split("/"))])
     secured = LaunchConfiguration("enclaves").perform(context) == "true"
-    links = {
-        "mavlink": {"mavlink_parachute": connection},
-        "upf": {"mavlink_parachute": connection, "upf_can": bus},
-        "both": {"mavlink_parachute": connection, "upf_can": bus},
-        "umbilical": {"umbilical": cable},
-    }[parachute]
-    nodes = [
-        Node(
-            package="chute_ros",
-            executable=link,
-            namespace=namespace,
-            parameters=[config, *([{"connection": wire}] if wire else [])],
-            ros_arguments=["--enclave", f"{place}/{link}"] if secured else [],
-            output="screen",
-            **LIVES_ON,
+    nodes = []
+    for link in vehicles()[parachute].links:
+        kind = links()[link]
+        wire = LaunchConfiguration(kind.argument.name).perform(context)
+        nodes.append(
+            Node(
+                package=kind.package,
+                executable=link,
+                namespace=namespace,
+                parameters=[config, *([{"connection": wire}] if wire else [])],
+                ros_arguments=["--enclave", f"{place}/{link}"] if secured else [],
+                output="screen",
+                **LIVES_ON,
+            )
         )
-        for link, wire in links.items()
-    ]
     supervisor = Node(
         package="chute_ros",
         executable="safety_supervisor",
@@ -86,7 +81,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "parachute",
                 default_value="mavlink",
-                choices=["mavlink", "upf", "both", "umbilical"],
+                choices=list(vehicles()),
                 description="what the vehicle carries",
             ),
             DeclareLaunchArgument(
@@ -94,20 +89,13 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="",
                 description="parameter file of all nodes; empty: the one of this parachute",
             ),
-            DeclareLaunchArgument(
-                "connection",
-                default_value="",
-                description="where the MAVLink network is; empty: as the parameter file says",
-            ),
-            DeclareLaunchArgument(
-                "bus",
-                default_value="",
-                description="where the CAN bus of a UPF is; empty: as the parameter file says",
-            ),
-            DeclareLaunchArgument(
-                "cable",
-                default_value="",
-                description="serial port of an umbilical; empty: as the parameter file says",
+            *(
+                DeclareLaunchArgument(
+                    kind.argument.name,
+                    default_value="",
+                    description=f"{kind.argument.description}; empty: as the parameter file says",
+                )
+                for kind in links().values()
             ),
             DeclareLaunchArgument(
                 "enclaves",

@@ -30,7 +30,7 @@ from typing import Any, NoReturn
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flight
 from chute_ros.campaign.judge import WRONG, judge
-from chute_ros.campaign.scenario import PROFILES, Scenario, Vehicle
+from chute_ros.campaign.scenario import PROFILES, Scenario
 from chute_ros.campaign.scenario_text import scenario_of
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.interrupts import at_ctrl_c
@@ -187,7 +187,7 @@ class Without(Shipped):
         # Of several conditions of a rule the last one first: their numbers stay.
         self._names = sorted(names, reverse=True)
 
-    def config(self, vehicle: Vehicle, profile: str, standby: bool, rank: int) -> SupervisorConfig:
+    def config(self, vehicle: str, profile: str, standby: bool, rank: int) -> SupervisorConfig:
         """The settings of a supervisor."""
         config = super().config(vehicle, profile, standby, rank)
         return replace(config, profile=functools.reduce(changed, self._names, config.profile))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder
+from chute_ros.protocol.mavlink.frames import FrameDecoder
 from sitl.routing import message_id
 
 #: Monotonic time s, port, length of the frame that follows.

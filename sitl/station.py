@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import Frame, FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.protocol.signing import Signer
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer
 from sitl.routing import message_id
 
 GROUND_STATION = (255, 190)

@@ -15,13 +15,13 @@ from chute_msgs.srv import Arm, Deploy, Kill
 from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
-from chute_ros.links.mavlink.protocol.signing import (
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.signing import (
     EPOCH_2015,
     UNITS_PER_SECOND,
     Signer,
     SigningClock,
 )
-from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from faults.patience import Patient
 from faults.soak_processes import Keeper
@@ -276,12 +276,14 @@ class Vehicle(Patient):
         """A parachute that is not released."""
         if self.setup.dronecan:
             ids = ("--controller-node-id", "0", "--trigger-node-id", "0")
-            self.keeper.start("parachute", "chute_ros.sim.sim_upf", "--connection", _BUS, *ids)
+            self.keeper.start(
+                "parachute", "chute_ros.links.upf.simulator.sim_upf", "--connection", _BUS, *ids
+            )
             return
         options = ["--connection", f"udpout:127.0.0.1:{self.ports.parachute}"]
         if self.setup.signed:
             options += ["--signing-key-file", str(self._key)]
-        module = "chute_ros.sim.sim_mavlink_parachute"
+        module = "chute_ros.links.mavlink.simulator.sim_mavlink_parachute"
         self.keeper.start("parachute", module, *options, *self.setup.parachute)
 
     def _see_truth(self) -> None:

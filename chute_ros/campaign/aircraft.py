@@ -6,35 +6,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
-from chute_ros.campaign.bus import CAN, MAVLINK, Bus, Plug
-from chute_ros.campaign.device_nodes import MAVLINK_NODE, UPF_NODE, MavlinkNode, UpfNode
+from chute_ros.campaign.bus import MAVLINK, Bus, Plug
 from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.rig import Rig
-from chute_ros.campaign.scenario import Failure, Fault, HomeMove, Scenario, Vehicle
+from chute_ros.campaign.scenario import Failure, Fault, HomeMove, Scenario
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import SOFT, observe
 from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
-from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.model import Action, DeploymentTrigger
-from chute_ros.protocol.dronecan import time_sync
-from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
+from chute_ros.model import Action
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_kinds import KINDS, AutopilotKind
 from chute_ros.sim.flight import GRAVITY, FlightModel
-from chute_ros.sim.home import Home, Homing
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
-from chute_ros.sim.upf_aps import Motion
-from chute_ros.sim.upf_bus import UpfBus
-from chute_ros.sim.upf_controller import ControllerSettings, UpfController
-from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
-from chute_ros.sim.upf_node import NodeSettings
-from chute_ros.sim.upf_node import UpfNode as UpfDevice
-from chute_ros.sim.upf_trigger import UpfTrigger
+from chute_ros.sim.home import Home
+from chute_ros.sim.motion import Motion
 
-#: FC and OFFBOARD.
-_ARMED_TRIGGERS = 12
 #: How long the autopilot that hangs does, s.
 _HANGS = 6.0
 #: From its arming until it leaves the ground, s: PX4 spools up for 1 s (COM_SPOOLUP_TIME) and
@@ -59,17 +45,9 @@ _HEARD = tuple(
 )
 
 
-def _is_for_devices(data: bytes) -> bool:
+def is_for_devices(data: bytes) -> bool:
     """A MAVLink 2 frame of a kind to which a simulator reacts, or a damaged one."""
     return data[7:10] in _HEARD or data[0] != 0xFD
-
-
-def _heights_are_true(scenario: Scenario) -> bool:
-    """Those above home are above the ground; elsewhere a parachute has a sensor of its own."""
-    moves = any(isinstance(one, HomeMove) for one in scenario.faults)
-    autopilot = scenario.autopilot
-    stays = autopilot.homing is Homing.STAYS and not autopilot.home_drift
-    return stays and not moves and not scenario.ground
 
 
 def _kind_of(scenario: Scenario) -> AutopilotKind:
@@ -80,53 +58,8 @@ def _kind_of(scenario: Scenario) -> AutopilotKind:
     return kind
 
 
-def _is_for(node: UpfDevice) -> Callable[[bytes], bool]:
-    """A service's frame, an anonymous one, or one of a message to which this node reacts."""
-    names = (*node.messages, ALLOCATION, time_sync.MESSAGE)
-    wanted = frozenset(node.definitions.types.message(name).id for name in names)
-
-    def hears(frame: bytes) -> bool:
-        identifier = int.from_bytes(frame[:4], "little")
-        is_service, source = identifier & 0x80, identifier & 0x7F
-        return bool(is_service) or not source or identifier >> 8 & 0xFFFF in wanted
-
-    return hears
-
-
-class ReleasedParachute(ParachuteDevice):
-    """Its release acts on the vehicle, whoever hears of it. true_height: above ground, m; feels:
-    it goes by that, and not by the height that it is told."""
-
-    def __init__(
-        self,
-        settings: ParachuteSettings,
-        out: Callable[[], None],
-        true_height: Callable[[], float],
-        feels: bool,
-    ) -> None:
-        super().__init__(settings, [])
-        self._out, self._true_height, self._feels = out, true_height, feels
-        #: When it first refused a release because the height that it is told is wrong, virtual s.
-        self.misled_at = math.nan
-
-    def _height(self) -> float:
-        return self._true_height() if self._feels else super()._height()
-
-    def _release(self) -> int:
-        result = super()._release()
-        refused = result == dialect.MAV_RESULT_TEMPORARILY_REJECTED
-        first = refused and math.isnan(self.misled_at)
-        if first and self._true_height() >= self.settings.clear_height:
-            self.misled_at = self.now
-        return result
-
-    def _deploy(self, trigger: DeploymentTrigger) -> None:
-        super()._deploy(trigger)
-        self._out()
-
-
 class Aircraft(Rig):
-    """MAVLINK, UPF or BOTH."""
+    """Its autopilot is on MAVLink, its parachutes wherever its links are."""
 
     def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
         super().__init__(scenario, shipped)
@@ -136,31 +69,17 @@ class Aircraft(Rig):
         self.model.descent, self.model.unheld = scenario.descent, scenario.unheld
         self.model.canopy_speed = scenario.canopy.speed
         self.model.canopy_opening_time = scenario.canopy.opens
-        self.controller: UpfController | None = None
-        self.only_parachute: ReleasedParachute | None = None
-        bus = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
+        #: Devices that feel how it moves.
+        self.feeling: list[Callable[[Motion], None]] = []
+        self.network = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
         traits = scenario.autopilot
         self.autopilot = CampaignAutopilot(self.model, self.sensors, _kind_of(scenario))
         self.autopilot.home = Home(drift=traits.home_drift, homing=traits.homing)
         if traits.imus > 1:
             self.autopilot.add_second_imu()
-        plug = Plug(bus, "autopilot", self.autopilot, _is_for_devices)
+        plug = Plug(self.network, "autopilot", self.autopilot, is_for_devices)
         self.add_device(plug, self.autopilot.reboot)
-        on_mavlink = scenario.vehicle is not Vehicle.UPF
-        if on_mavlink:
-            settings = ParachuteSettings(armed_triggers=0 if scenario.arms else _ARMED_TRIGGERS)
-            parachute = ReleasedParachute(
-                settings,
-                partial(self._out, MAVLINK_NODE),
-                lambda: self.model.clearance,
-                feels=not _heights_are_true(scenario),
-            )
-            self.add_device(Plug(bus, "parachute", parachute, _is_for_devices), parachute.reboot)
-            if scenario.vehicle is Vehicle.MAVLINK:
-                self.only_parachute = parachute
-        self.add_node(MavlinkNode(bus, self.process(MAVLINK_NODE), self.ros, on_mavlink))
-        if scenario.vehicle is not Vehicle.MAVLINK:
-            self._add_upf()
+        self.join_links()
         self.nature = Nature(self.model, scenario.ground, self._moved)
         self.world.add(self.nature)
         for source in scenario.second_sources:
@@ -171,18 +90,6 @@ class Aircraft(Rig):
         self._first_out = ""
         self._opened_by_kill = math.nan
         self._unclear = (math.nan, math.nan)
-
-    def _add_upf(self) -> None:
-        bus = Bus(self.world, CAN, f"{self.scenario.seed} can")
-        by_itself = dict.fromkeys((p.AUTO_TAKEOFF, p.AUTO_ARM), not self.scenario.arms)
-        values = {**CONTROLLER_PARAMETERS, p.ENABLE_APS: self.scenario.aps, **by_itself}
-        node = NodeSettings("upf.controller", values)
-        self.controller = UpfController(self.shipped.definitions, ControllerSettings(node))
-        trigger = UpfTrigger(self.shipped.definitions, on_fire=partial(self._out, UPF_NODE))
-        for name, device in (("controller", self.controller), ("trigger", trigger)):
-            plug = Plug(bus, name, UpfBus([device]), _is_for(device))
-            self.add_device(plug, device.reboot)
-        self.add_node(UpfNode(bus, self.process(UPF_NODE), self.ros, self.shipped.types))
 
     # -- the flight ------------------------------------------------------------------------------
 
@@ -197,9 +104,6 @@ class Aircraft(Rig):
 
     def is_up(self) -> bool:
         return self._left and (self._flew or self.scenario.stands) and not self.nature.lifts
-
-    def refused_at(self) -> float:
-        return math.nan if self.only_parachute is None else self.only_parachute.misled_at
 
     def light_until(self) -> float:
         return self._light_until
@@ -240,10 +144,12 @@ class Aircraft(Rig):
 
     def _moved(self, now: float) -> None:
         model = self.model
-        if self.controller is not None:
-            self.controller.motion = Motion(
+        if self.feeling:
+            motion = Motion(
                 model.height, model.vertical_speed, abs(model.roll), model.acceleration
             )
+            for feel in self.feeling:
+                feel(motion)
         glides = model.descent is not None and model.descent.sink <= SOFT
         carried = model.armed and (glides or not model.motors_failed)
         if not self._flew:
@@ -268,7 +174,8 @@ class Aircraft(Rig):
         if not self.another.falls and now >= due and -model.vertical_speed > _NOT_CARRIED:
             self.another = observe(model, now)
 
-    def _out(self, whose: str) -> None:
+    def out(self, whose: str) -> None:
+        """A parachute on this link is out."""
         now = self.world.now
         if math.isnan(self.released):
             self.released, self.release_height = now, self.model.height

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from chute_ros.campaign.estimator import EstimatorFault
-from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, Vehicle, WayFault
+from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.tellers import may_count, outlives
 from chute_ros.campaign.truth import SOFT
@@ -84,7 +84,7 @@ class _Hidden:
 
 def enough_time(scenario: Scenario) -> float:
     """How long the chain may take, s."""
-    if scenario.vehicle is Vehicle.ROCKET:
+    if scenario.is_rocket:
         return _ENOUGH_FOR_ROCKET
     # Until it is old, the last word of an autopilot without power denies the sinking, unless
     # another source that knows it is preferred.
@@ -121,7 +121,7 @@ def blinded(
     if _turns_like_one_that_flies(scenario) and failed_at < need.end:
         return f"all that was left was an {IMU}, and an aeroplane dived as it turns in flight"
     drawn = [replace(one, begin=up + one.begin, end=up + one.end) for one in _all_hidden(scenario)]
-    if scenario.vehicle is Vehicle.ROCKET:
+    if scenario.is_rocket:
         drawn += _gaps(seen.told, need)
     drawn += _as_in_flight(scenario, up, seen.light_until)
     drawn += _one_against_one(scenario, up)

@@ -98,7 +98,7 @@ def fly_here(folder: Path, scenario: Scenario) -> tuple[Flight, Flown, Judged]:
 def _line(folder: Path, seed: int) -> Line:
     scenario = draw(seed)
     faults = tuple(type(one).__name__ for one in scenario.faults)
-    who = (seed, scenario.vehicle.value, scenario.profile, scenario.failure.value)
+    who = (seed, scenario.vehicle, scenario.profile, scenario.failure.value)
     drawn = (faults, ", ".join(sorted(scenario.second_sources)))
     try:
         _, flown, judged = fly_here(folder, scenario)

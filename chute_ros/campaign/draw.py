@@ -9,11 +9,8 @@ from typing import TypeVar
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.draw_world import in_the_world
 from chute_ros.campaign.scenario import (
-    NODES,
     PROFILES,
     SECOND_SENSORS,
-    STOPPING,
-    WAYS,
     ClockJump,
     Failure,
     Fault,
@@ -21,11 +18,14 @@ from chute_ros.campaign.scenario import (
     Scenario,
     Stalls,
     Stop,
-    Vehicle,
     WayFault,
+    is_rocket,
     sensors_of,
+    stopping_of,
+    ways_of,
 )
 from chute_ros.campaign.sensors import SensorFault
+from chute_ros.links.registered import vehicles
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 
 KindT = TypeVar("KindT")
@@ -57,7 +57,6 @@ _LIKELY = {
         Failure.COMPUTER_SILENT: 1,
     },
 }
-_VEHICLES = {Vehicle.MAVLINK: 4, Vehicle.UPF: 3, Vehicle.BOTH: 2, Vehicle.ROCKET: 2}
 _ROS_WAYS = ("to the supervisor", "from the supervisor")
 _STANDBY_WAYS = ("to the standby", "from the standby")
 #: So many aircraft have one, of so many of these one goes wrong, and so many fly as high as this,
@@ -72,15 +71,15 @@ _CARRIED_UNTIL = 0.7
 def draw(seed: int) -> Scenario:
     """The same for the same seed, on any machine."""
     chance = random.Random(seed)
-    vehicle = _one_of(chance, _VEHICLES)
-    is_rocket = vehicle is Vehicle.ROCKET
-    profile = "rocket" if is_rocket else chance.choice(PROFILES[:2])
+    vehicle = _vehicle(chance, seed)
+    rocket = is_rocket(vehicle)
+    profile = "rocket" if rocket else chance.choice(PROFILES[:2])
     failure = _one_of(chance, _LIKELY[profile])
-    burn = round(chance.uniform(1.5, 3.0), 2) if is_rocket else 0.0
+    burn = round(chance.uniform(1.5, 3.0), 2) if rocket else 0.0
     apogee = Scenario(0, vehicle, "", 0.0, 0.0, 0.0, burn, failure, 0.0).apogee_at
-    failure_at = round(chance.uniform(0.5, apogee + 2.0 if is_rocket else 3.0), 3)
+    failure_at = round(chance.uniform(0.5, apogee + 2.0 if rocket else 3.0), 3)
     # Most of what goes wrong goes wrong around the failure; that is what hurts.
-    around = max(failure_at, apogee + 3.0) if is_rocket and chance.random() < 0.7 else failure_at
+    around = max(failure_at, apogee + 3.0) if rocket and chance.random() < 0.7 else failure_at
     standby = chance.random() < 0.25
     count = chance.choices((0, 1, 2, 3), (3, 4, 2, 1))[0]
     drawn = Scenario(
@@ -96,13 +95,24 @@ def draw(seed: int) -> Scenario:
         tuple(_fault(chance, vehicle, around, standby) for _ in range(count)),
         standby,
         aps=chance.random() < 0.5,
-        arms=is_rocket or chance.random() < 0.3,
+        arms=rocket or chance.random() < 0.3,
         person=_person(chance, seed, apogee + 1.0),
     )
-    if is_rocket:
+    if rocket:
         return drawn
     # Drawn last: a flight without one stays as it is.
     return _with_second_source(chance, in_the_world(chance, drawn), around)
+
+
+def _vehicle(chance: random.Random, seed: int) -> str:
+    kinds = sorted(vehicles().values(), key=lambda one: (-one.often, one.name))
+    name = _one_of(chance, {one.name: one.often for one in kinds if not one.replaces})
+    for kind in kinds:
+        # By a chance of its own: all other flights stay as they are.
+        flies = random.Random(f"{seed} {kind.name}").random() < 1.0 / kind.often
+        if kind.replaces == name and flies:
+            return kind.name
+    return name
 
 
 def _one_of(chance: random.Random, likely: dict[KindT, int]) -> KindT:
@@ -119,7 +129,7 @@ def _person(chance: random.Random, seed: int, earliest: float) -> Person | None:
     return Person(does, round(chance.uniform(0.5, 4.0) + earliest, 3))
 
 
-def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool) -> Fault:
+def _fault(chance: random.Random, vehicle: str, around: float, standby: bool) -> Fault:
     begin = round(around + chance.uniform(-2.0, 2.0), 3)
     lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
     end = round(begin + lasts, 3)
@@ -129,21 +139,21 @@ def _fault(chance: random.Random, vehicle: Vehicle, around: float, standby: bool
         sensors = sensors_of(vehicle)
         sensor = chance.choice(list(sensors))
         how = chance.choice(sensors[sensor])
-        if vehicle is not Vehicle.ROCKET and sensor in ("height", "speed"):
+        if not is_rocket(vehicle) and sensor in ("height", "speed"):
             # Being carried up, as no vehicle climbs, makes the heights tell nothing until then.
             begin = max(begin, _CARRIED_UNTIL)
             end = round(begin + lasts, 3)
         return SensorFault(sensor, how, begin, end)
     if kind == "stalls":
         return Stalls(chance.choice(supervisors), begin, end, round(chance.uniform(0.05, 0.6), 3))
-    nodes = tuple(one for one in STOPPING[vehicle] if one in NODES)
+    nodes = vehicles()[vehicle].links
     if kind == "clock":
         by = chance.choice((-1.0, 1.0)) * 10.0 ** chance.uniform(-1.0, 5.0)
         return ClockJump(chance.choice((*supervisors, *nodes)), begin, round(by, 3))
     if kind == "stop":
-        who = chance.choice((*supervisors, *supervisors, *STOPPING[vehicle]))
+        who = chance.choice((*supervisors, *supervisors, *stopping_of(vehicle)))
         return Stop(who, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
-    ways = (*WAYS[vehicle], *_ROS_WAYS, *(_STANDBY_WAYS if standby else ()))
+    ways = (*ways_of(vehicle), *_ROS_WAYS, *(_STANDBY_WAYS if standby else ()))
     return WayFault(chance.choice(ways), _spell(chance, begin, end))
 
 

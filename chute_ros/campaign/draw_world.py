@@ -16,7 +16,6 @@ from chute_ros.campaign.scenario import (
     Failure,
     HomeMove,
     Scenario,
-    Vehicle,
     sensors_of,
 )
 from chute_ros.campaign.sensors import SensorFault
@@ -189,7 +188,7 @@ def _with_manoeuvre(chance: random.Random, drawn: Scenario) -> Scenario:
         return replace(drawn, failure_at=round(begin + chance.uniform(0.2, 3.0), 3))
     if chance.random() >= _WRONG_SENSOR:
         return drawn
-    sensors = sensors_of(Vehicle.MAVLINK)
+    sensors = sensors_of(drawn.vehicle)
     sensor = chance.choice(list(sensors))
     wrong = max(_SETTLED, begin + chance.uniform(-0.5, 3.0))
     end = round(wrong + chance.uniform(0.5, 4.0), 3)

@@ -9,18 +9,17 @@ from chute_ros.campaign.aircraft import Aircraft
 from chute_ros.campaign.device_node import Acted
 from chute_ros.campaign.person import Call
 from chute_ros.campaign.rig import Rig
-from chute_ros.campaign.rocket import RocketRig
 from chute_ros.campaign.scenario import (
     ClockJump,
     Fault,
     HomeMove,
     Scenario,
     Stop,
-    Vehicle,
     WayFault,
 )
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import Truth
+from chute_ros.links.api import load
 from chute_ros.model import Action, Decision
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.gate import OPERATOR
@@ -91,7 +90,7 @@ class Flight:
 
     def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
         self.scenario = scenario
-        kind: type[Rig] = RocketRig if scenario.vehicle is Vehicle.ROCKET else Aircraft
+        kind: type[Rig] = load(scenario.carries.rig) if scenario.carries.rig else Aircraft
         self.rig: Rig = kind(scenario, shipped)
         self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
         self._person = Call(self.rig, self._wish)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from chute_ros.campaign.blind import Need, Seen, blinded, enough_time, misled
 from chute_ros.campaign.flight import Flown
-from chute_ros.campaign.scenario import Vehicle
 from chute_ros.campaign.truth import SOFT, SOFT_UNDER_DROGUE
 from chute_ros.model import Action
 from chute_ros.supervisor.gate import OPERATOR
@@ -143,7 +142,7 @@ def _followed(flown: Flown, alone: float) -> Judged | None:
 def _fallen(flown: Flown) -> Judged | None:
     """It should have been released; None: it should not, or was in time."""
     truth, scenario = flown.truth, flown.scenario
-    soft = SOFT_UNDER_DROGUE if scenario.vehicle is Vehicle.ROCKET else SOFT
+    soft = SOFT_UNDER_DROGUE if scenario.is_rocket else SOFT
     if (
         not truth.falls
         or truth.lands_softly
@@ -179,7 +178,8 @@ def _not_carried(flown: Flown) -> Judged | None:
     told = [*followed, *(at for at, _ in flown.alarmed)]
     if not any(flown.another.at <= at <= due for at in told):
         return Judged(Count.MISSED, "the canopy did not carry, and nobody was alarmed")
-    if scenario.vehicle is not Vehicle.BOTH or flown.released_another <= flown.another.latest:
+    parachutes = scenario.carries.supervised("deploy_links")
+    if len(parachutes) < 2 or flown.released_another <= flown.another.latest:
         return None
     if flown.another.leeway < _CARRIES_WITHIN:
         return Judged(Count.NO_TIME, f"{flown.another.leeway:.2f} s were left for another")

@@ -19,6 +19,7 @@ from chute_ros.campaign.scenario import (
     Stalls,
     Stop,
     WayFault,
+    part,
 )
 from chute_ros.campaign.second_source import SecondSource
 from chute_ros.campaign.sensors import SensorFault, Sensors
@@ -54,6 +55,8 @@ class Rig(ABC):
         #: When a second parachute came out, as the first one did not carry; since when and until
         #: when that would have helped.
         self.released_another, self.another = math.nan, Truth()
+        #: When the only parachute refused its release by a wrong height, virtual s; NaN: never.
+        self.refused_at: Callable[[], float] = lambda: math.nan
         for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
             config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
             process = self.process(name)
@@ -97,6 +100,11 @@ class Rig(ABC):
         leading = [one for one in self.supervisors if one.leading]
         return next((one for one in leading if one.process.runs(self.world.now)), None)
 
+    def join_links(self) -> None:
+        """The nodes of its links, and their devices."""
+        for link in self.scenario.carries.links:
+            part(link).join(self)
+
     # -- for the subclass ------------------------------------------------------------------------
 
     @abstractmethod
@@ -114,10 +122,6 @@ class Rig(ABC):
     def told(self) -> Sequence[float]:
         """When lines of a rocket's flight computer came whole, virtual s."""
         return ()
-
-    def refused_at(self) -> float:
-        """When the only parachute refused its release by a wrong height, virtual s; NaN: never."""
-        return math.nan
 
     def light_until(self) -> float:
         """When less than half of its weight last carried it in its fall, virtual s; NaN: never."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 from dataclasses import dataclass
 
 from chute_ros.campaign.channel import Spell
@@ -10,6 +11,8 @@ from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import SOFT
+from chute_ros.links.api import AUTOPILOT_LINK, SUPERVISOR, Part, VehicleKind, load
+from chute_ros.links.registered import links, vehicles
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 from chute_ros.sim.autopilot_kinds import GENERIC
 from chute_ros.sim.flight import Descent
@@ -20,15 +23,6 @@ MOST_FAULTS = 3
 _GRAVITY = 9.81  # m/s^2
 #: About what the rocket's motor pushes it with, m/s^2.
 _BURN = 51.0
-
-
-class Vehicle(enum.Enum):
-    """What flies, and how its parachute is spoken to."""
-
-    MAVLINK = "mavlink"
-    UPF = "upf"
-    BOTH = "both"
-    ROCKET = "rocket"
 
 
 class Failure(enum.Enum):
@@ -52,22 +46,34 @@ class Failure(enum.Enum):
 PROFILES = ("multirotor", "fixed_wing", "rocket")
 
 #: Over which an autopilot tells.
-AUTOPILOT_WAYS = ("autopilot", "mavlink_parachute")
-#: The ways that a spell can lie on, and the processes and devices that can stop.
-WAYS = {
-    Vehicle.MAVLINK: (*AUTOPILOT_WAYS, "parachute"),
-    Vehicle.UPF: (*AUTOPILOT_WAYS, "controller", "trigger", "upf_can"),
-    Vehicle.BOTH: (*AUTOPILOT_WAYS, "parachute", "controller", "trigger", "upf_can"),
-    Vehicle.ROCKET: ("flight_computer", "umbilical"),
-}
-STOPPING = {
-    Vehicle.MAVLINK: ("mavlink_parachute", "parachute"),
-    Vehicle.UPF: ("mavlink_parachute", "upf_can", "controller", "trigger"),
-    Vehicle.BOTH: ("mavlink_parachute", "upf_can", "parachute", "controller", "trigger"),
-    Vehicle.ROCKET: ("umbilical",),
-}
-#: Those of WAYS and STOPPING that are nodes: they hang as well as die, and have a wall clock.
-NODES = ("mavlink_parachute", "upf_can", "umbilical")
+AUTOPILOT_WAYS = ("autopilot", AUTOPILOT_LINK)
+
+
+@functools.cache
+def part(link: str) -> Part:
+    """What the campaign has of a link."""
+    made: Part = load(links()[link].part)()
+    return made
+
+
+def ways_of(vehicle: str) -> tuple[str, ...]:
+    """The ways that a spell can lie on."""
+    kind = vehicles()[vehicle]
+    return tuple(way for link in kind.links for way in part(link).ways(kind))
+
+
+def stopping_of(vehicle: str) -> tuple[str, ...]:
+    """The device nodes and devices that can stop. Nodes hang as well as die, and have a wall
+    clock."""
+    kind = vehicles()[vehicle]
+    return (*kind.links, *(one for link in kind.links for one in part(link).stopping(kind)))
+
+
+def is_rocket(vehicle: str) -> bool:
+    """Whether it flies by the profile of rockets."""
+    return vehicles()[vehicle].given(SUPERVISOR, "profile", PROFILES[0]) == PROFILES[2]
+
+
 _SENSORS = {
     "height": ("sticks", "drifts", "jumps", "noise"),
     "speed": ("sticks", "drifts", "jumps", "noise", "zero"),
@@ -90,9 +96,9 @@ SECOND_SENSORS = {
 }
 
 
-def sensors_of(vehicle: Vehicle) -> dict[str, tuple[str, ...]]:
+def sensors_of(vehicle: str) -> dict[str, tuple[str, ...]]:
     """Of its autopilot or flight computer, and in which ways each may be wrong."""
-    return _ROCKET_SENSORS if vehicle is Vehicle.ROCKET else _SENSORS
+    return _ROCKET_SENSORS if is_rocket(vehicle) else _SENSORS
 
 
 @dataclass(frozen=True)
@@ -182,10 +188,11 @@ class Scenario:
     """Times are s after an aircraft has stood at its height for 0.3 s, or a rocket was launched.
     Nothing goes wrong before that height or launch: what was drawn earlier (a negative time)
     begins there, and a stop then lasts as long from there. height (m), gusts (m/s^2), fall_speed
-    (m/s): of an aircraft; burn: of a rocket, s; ground: under the flight, m above the take-off."""
+    (m/s): of an aircraft; burn: of a rocket, s; ground: under the flight, m above the take-off;
+    vehicle: a VehicleKind's name."""
 
     seed: int
-    vehicle: Vehicle
+    vehicle: str
     profile: str
     height: float
     gusts: float
@@ -215,7 +222,17 @@ class Scenario:
     @property
     def stands(self) -> bool:
         """It never leaves the ground, armed as it is."""
-        return self.vehicle is not Vehicle.ROCKET and self.height == 0.0
+        return not self.is_rocket and self.height == 0.0
+
+    @property
+    def is_rocket(self) -> bool:
+        """It is no aircraft."""
+        return is_rocket(self.vehicle)
+
+    @property
+    def carries(self) -> VehicleKind:
+        """What flies, and how its parachute is spoken to."""
+        return vehicles()[self.vehicle]
 
     @property
     def second_sources(self) -> tuple[str, ...]:

@@ -21,16 +21,16 @@ from chute_ros.campaign.scenario import (
     Scenario,
     Stalls,
     Stop,
-    Vehicle,
     WayFault,
 )
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
+from chute_ros.links.registered import vehicles
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
 #: Rises when what is written means something else.
-FORMAT = 1
+FORMAT = 2
 _FAULTS: dict[str, type[Any]] = {
     one.__name__: one
     for one in (WayFault, Stop, Stalls, ClockJump, SensorFault, EstimatorFault, HomeMove)
@@ -49,7 +49,7 @@ _PARTS: dict[str, type[Any]] = {
 def text_of(scenario: Scenario, was: str) -> str:
     """As JSON. was: what became of it, in words."""
     values = asdict(scenario)
-    values["vehicle"], values["failure"] = scenario.vehicle.name, scenario.failure.name
+    values["failure"] = scenario.failure.name
     values["autopilot"]["homing"] = scenario.autopilot.homing.name
     values["faults"] = [{"kind": type(one).__name__, **_short(one)} for one in scenario.faults]
     return json.dumps({"format": FORMAT, "was": was, "scenario": values}, indent=2) + "\n"
@@ -62,7 +62,8 @@ def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
         if whole["format"] != FORMAT:
             raise RecordError(f"{named}: format {whole['format']}: need {FORMAT}")
         values = dict(whole["scenario"])
-        values["vehicle"] = Vehicle[values["vehicle"]]
+        if values["vehicle"] not in vehicles():
+            raise RecordError(f"{named}: no link has a vehicle {values['vehicle']!r}")
         values["failure"] = Failure[values["failure"]]
         values["faults"] = tuple(map(_fault, values["faults"]))
         if "vehicle_sources" in values:

@@ -1,1 +1,1 @@
-"""One folder a device: what its node tells the link for the supervisor, and for a person."""
+"""How devices are spoken to: one folder a kind of link; api.py says what a link is."""

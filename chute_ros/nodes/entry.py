@@ -27,11 +27,11 @@ _NOT_BUILT = (
 )
 
 
-def run(name: str, module: str, class_name: str) -> None:
-    """Make the node name of this class and spin it until the end; exits with 2 on a user's
-    mistake."""
+def run(name: str, place: str) -> None:
+    """Make the node name, whose class is at place (module:class), and spin it until the end; exit
+    with 2 on a user's mistake."""
     with at_ctrl_c(signal.SIG_DFL):
-        node_class = _imported(module, class_name)
+        node_class = _imported(*place.split(":"))
     set_up_middleware()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy

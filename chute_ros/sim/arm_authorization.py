@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import Frame
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame
 
 _TIMEOUT = 1.0
 

@@ -9,9 +9,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import Frame
-from chute_ros.links.mavlink.protocol.goals import FORCE_DISARM
-from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
+from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.sim.acting import number_of
 from chute_ros.sim.arm_authorization import ArmAuthorization
 from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind, Termination

@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from chute_ros.errors import ChuteError, ParameterError
-from chute_ros.links.mavlink.signing_key import signing_from_file
 from chute_ros.plain_text import plain
 from chute_ros.sim.acting import Argument
 from chute_ros.sim.bundle import WireBundle
@@ -23,6 +22,7 @@ from chute_ros.sim.pty_wire import PtyWire
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.loop import ProtocolLink, WireLoop
+from chute_ros.transport.signing_key import signing_from_file
 from chute_ros.transport.wire import Wire, make_wire
 from chute_ros.transport.wire_events import LoopFault, WireChange
 

@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable, Hashable
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import Frame, FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.sim.acting import Actor, Script
 
 Params = tuple[float, float, float, float, float, float, float]

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from chute_ros.links.mavlink.protocol.frames import Frame
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.sim.mavlink_device import MavlinkDevice
-from chute_ros.sim.upf_aps import Motion
+from chute_ros.sim.motion import Motion
 
 _COMPONENT_ID = 192  # MAV_COMP_ID_ONBOARD_COMPUTER2
 _AUTOPILOT = 1

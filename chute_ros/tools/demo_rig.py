@@ -78,7 +78,7 @@ class Rig:
         node, start = self._node, self.processes.start
         start(
             "mavlink",
-            "chute_ros.nodes.mavlink_parachute",
+            "chute_ros.links.mavlink",
             *node,
             *_parameter("connection", f"udpin:{_LOCAL}:{self.node_port}"),
             *_parameter("expect_parachute", str(MAVLINK in self.links).lower()),
@@ -86,7 +86,7 @@ class Rig:
         if UPF in self.links:
             start(
                 "upf_can",
-                "chute_ros.nodes.upf_can",
+                "chute_ros.links.upf",
                 *node,
                 *_parameter("connection", self._bus),
                 *_parameter("allocator", "false"),
@@ -108,14 +108,17 @@ class Rig:
         if MAVLINK in self.links:
             wires = ("--connection", self._network, "--connection", self.pilot)
             self.processes.start(
-                "parachute", "chute_ros.sim.sim_mavlink_parachute", *wires, *fault
+                "parachute",
+                "chute_ros.links.mavlink.simulator.sim_mavlink_parachute",
+                *wires,
+                *fault,
             )
         if UPF in self.links:
             off = [*_BY_COMMAND, *(() if self.automatic else ("Enable APS",))]
             parameters = [part for name in off for part in ("--parameter", f"{name}=false")]
             self.processes.start(
                 "upf",
-                "chute_ros.sim.sim_upf",
+                "chute_ros.links.upf.simulator.sim_upf",
                 *("--connection", self._bus, "--vehicle", self.pilot),
                 *parameters,
                 *fault,

@@ -12,95 +12,64 @@ import sys
 import textwrap
 from pathlib import Path
 
-from chute_ros.links.mavlink.parameters import PARAMETERS as MAVLINK_PARAMETERS
-from chute_ros.links.umbilical.parameters import PARAMETERS as UMBILICAL_PARAMETERS
-from chute_ros.links.upf.parameters import PARAMETERS as UPF_PARAMETERS
+from chute_ros.links.api import SUPERVISOR, VehicleKind, load
+from chute_ros.links.registered import links, vehicles
 from chute_ros.nodes.device_node import COMMON_PARAMETERS
-from chute_ros.nodes.parameters import Parameter, Value
+from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
-    "mavlink_parachute": (*MAVLINK_PARAMETERS, *COMMON_PARAMETERS),
-    "upf_can": (*UPF_PARAMETERS, *COMMON_PARAMETERS),
-    "umbilical": (*UMBILICAL_PARAMETERS, *COMMON_PARAMETERS),
-    "safety_supervisor": SUPERVISOR_PARAMETERS,
+    **{
+        name: (*load(kind.parameters), *COMMON_PARAMETERS)
+        for name, kind in links().items()
+        if kind.package == "chute_ros"
+    },
+    SUPERVISOR: SUPERVISOR_PARAMETERS,
 }
 PARAMETERS = Path("docs/reference/parameters.md")
 RULES = Path("docs/reference/rules.md")
-_MAVLINK, _UPF, _UMBILICAL, _SUPERVISOR = NODES
-_BOTH_LINKS = [_MAVLINK, _UPF]
-#: File -> what its vehicle carries, its nodes, and what differs from the defaults.
-CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] = {
-    Path("config/mavlink_vehicle.yaml"): (
-        "a MAVLink parachute, all as delivered",
-        (_MAVLINK, _SUPERVISOR),
-        {},
-    ),
-    Path("config/upf_vehicle.yaml"): (
-        "a UPF parachute on DroneCAN and a MAVLink autopilot",
-        (_MAVLINK, _UPF, _SUPERVISOR),
-        {
-            (_MAVLINK, "expect_parachute"): False,
-            (_SUPERVISOR, "required_links"): _BOTH_LINKS,
-            (_SUPERVISOR, "deploy_links"): [_UPF],
-            (_SUPERVISOR, "deploy_ladder"): [_UPF, f"{_UPF}:trigger"],
-        },
-    ),
-    Path("config/both_vehicle.yaml"): (
-        "a MAVLink parachute and a UPF parachute on DroneCAN",
-        (_MAVLINK, _UPF, _SUPERVISOR),
-        {
-            (_SUPERVISOR, "required_links"): _BOTH_LINKS,
-            (_SUPERVISOR, "deploy_links"): _BOTH_LINKS,
-            (_SUPERVISOR, "deploy_ladder"): [*_BOTH_LINKS, f"{_UPF}:trigger"],
-        },
-    ),
-    Path("config/umbilical_vehicle.yaml"): (
-        "a flight computer on a serial umbilical",
-        (_UMBILICAL, _SUPERVISOR),
-        {
-            (_UMBILICAL, "publish_vehicle_state"): True,
-            (_SUPERVISOR, "required_links"): [_UMBILICAL],
-            (_SUPERVISOR, "kill_links"): [_UMBILICAL],
-            (_SUPERVISOR, "deploy_links"): [_UMBILICAL],
-            (_SUPERVISOR, "profile"): "rocket",
-        },
-    ),
+#: File -> its vehicle.
+CONFIGS: dict[Path, VehicleKind] = {
+    Path(f"config/{name}_vehicle.yaml"): vehicle
+    for name, vehicle in vehicles().items()
+    if NODES.keys() >= {*vehicle.links}
 }
 _HEAD = """\
 # Parameters of one vehicle with {}. The keys
 # match the nodes in any namespace. Give this file with --params-file, or as config:= of
-# vehicle.launch.py. Written by `make docs` from the tables in chute_ros/nodes.
+# vehicle.launch.py. Written by `make docs` from the tables in chute_ros.
 """
-_BEGIN, _END = "<!-- parameters of {} -->", "<!-- end of parameters of {} -->"
 
 
 def config_text(path: Path) -> str:
     """The whole of one file of CONFIGS."""
-    what, nodes, differs = CONFIGS[path]
-    lines = [_HEAD.format(what)]
-    for node in nodes:
+    vehicle = CONFIGS[path]
+    lines = [_HEAD.format(vehicle.description)]
+    for node in (*vehicle.links, SUPERVISOR):
         lines += [f"/**/{node}:", "  ros__parameters:"]
         for parameter in NODES[node]:
             text = f"{parameter.description}; {_allowed(parameter)}"
             lines += [f"    # {line}" for line in textwrap.wrap(text, 92)]
-            value = differs.get((node, parameter.name), parameter.default)
+            value = vehicle.given(node, parameter.name, parameter.default)
             lines.append(f"    {parameter.name}: {_yaml(value)}")
         lines.append("")
     return "\n".join(lines)
 
 
 def parameters_text(before: str) -> str:
-    """docs/reference/parameters.md with its tables made anew."""
+    """docs/reference/parameters.md with the tables of all nodes made anew."""
+    rows: list[str] = []
     for node, parameters in NODES.items():
-        rows = ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
+        rows += [f"## {node}", ""]
+        rows += ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
         rows += [
             f"| `{p.name}` | `{_yaml(p.default)}` | {p.description} | {_allowed(p)} |"
             for p in parameters
         ]
-        before = _between(before, PARAMETERS, _BEGIN.format(node), _END.format(node), rows)
-    return before
+        rows.append("")
+    begin, end = "<!-- parameters -->", "<!-- end of parameters -->"
+    return _between(before, PARAMETERS, begin, end, rows[:-1])
 
 
 def rules_text(before: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.udp import UdpWire
 

@@ -36,7 +36,7 @@ class RocketRig:
         start("supervisor", "chute_ros.nodes.safety_supervisor", *node, *supervisor)
         start(
             UMBILICAL,
-            "chute_ros.nodes.umbilical",
+            "chute_ros.links.umbilical",
             *node,
             *("-p", f"connection:=serial:{self._port}"),
             *("-p", "publish_vehicle_state:=true"),
@@ -47,7 +47,7 @@ class RocketRig:
         """The rocket, whose drogue will not come out by itself."""
         self.processes.start(
             "rocket",
-            "chute_ros.sim.sim_flight_computer",
+            "chute_ros.links.umbilical.simulator.sim_flight_computer",
             *("--link", str(self._port), "--speed", f"{SPEED:g}"),
             *("--drogue-fails", "--interlock", "--debug"),
             *FAULTS.get(self.fault, ()),

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
-from chute_ros.links.mavlink.protocol.signing import key_from_text
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.upf.allocation_file import AllocationFile
+from chute_ros.protocol.mavlink.signing import key_from_text
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.resume import resumed

@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from typing import Any
 
-from chute_ros.links.mavlink.protocol import frames as f
-from chute_ros.links.mavlink.protocol.signing import SigningClock, Verifier
+from chute_ros.protocol.mavlink import frames as f
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.signing import SigningClock, Verifier
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 

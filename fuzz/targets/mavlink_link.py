@@ -6,11 +6,11 @@ from typing import Any
 
 from chute_ros.links.mavlink.protocol.config import KillMethod, MavlinkConfig
 from chute_ros.links.mavlink.protocol.firmware import Firmware
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.protocol.goals import FORCE_DISARM
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
-from chute_ros.links.mavlink.protocol.signing import Signer, SigningClock, Verifier
+from chute_ros.protocol.mavlink.dialect import FORCE_DISARM
 from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
 from fuzz.program import Program
 from fuzz.target import Target, WrongError
 from fuzz.targets.linked import Linked

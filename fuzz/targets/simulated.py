@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Protocol
 
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
+from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.sim.flight_computer import FlightComputer
-from chute_ros.sim.flight_computer_settings import FlightComputerSettings
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
-from chute_ros.sim.upf_bus import UpfBus
-from chute_ros.sim.upf_controller import ControllerSettings, UpfController
-from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
-from chute_ros.sim.upf_node import NodeSettings
-from chute_ros.sim.upf_trigger import UpfTrigger
+from chute_ros.links.upf.simulator.bus import UpfBus
+from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
+from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
+from chute_ros.links.upf.simulator.node import NodeSettings
+from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from fuzz.program import Program
 from fuzz.target import Target
 from fuzz.targets.mavlink_frames import good_frame

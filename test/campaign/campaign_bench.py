@@ -7,7 +7,7 @@ from typing import Any
 
 from chute_ros.campaign.device_node import Acted
 from chute_ros.campaign.flight import Flown, fly
-from chute_ros.campaign.scenario import Failure, Fault, Scenario, Vehicle
+from chute_ros.campaign.scenario import Failure, Fault, Scenario
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.model import Action
 
@@ -19,7 +19,7 @@ def scenario(failure: Failure, *faults: Fault, **more: Any) -> Scenario:
     """A multirotor with a MAVLink parachute; from 60 m, in still air, it fails 1 s after it is up.
     more: what is otherwise."""
     drawn: dict[str, Any] = {
-        "vehicle": Vehicle.MAVLINK,
+        "vehicle": "mavlink",
         "profile": "multirotor",
         "height": 60.0,
         "gusts": 0.0,
@@ -32,7 +32,7 @@ def scenario(failure: Failure, *faults: Fault, **more: Any) -> Scenario:
 
 def rocket(failure: Failure, *faults: Fault, **more: Any) -> Scenario:
     """A rocket that turns over about 7 s after its launch."""
-    drawn = {"vehicle": Vehicle.ROCKET, "profile": "rocket", "burn": 1.5, "arms": True}
+    drawn = {"vehicle": "umbilical", "profile": "rocket", "burn": 1.5, "arms": True}
     return scenario(failure, *faults, **{**drawn, **more})
 
 

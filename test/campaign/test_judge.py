@@ -13,7 +13,7 @@ from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, judge
-from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle, WayFault
+from chute_ros.campaign.scenario import Failure, Person, Stop, WayFault
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import Truth
 from chute_ros.sim.flight import Descent
@@ -86,7 +86,7 @@ def test_a_parachute_that_is_told_a_wrong_height_refuses_and_another_does_not() 
     alone = flown(Failure.MOTOR, wrong, height=38.0)
     assert alone.truth.at < alone.refused < alone.truth.latest
     assert judge(alone).count is Count.NOT_TOLD
-    two = flown(Failure.MOTOR, wrong, height=38.0, vehicle=Vehicle.BOTH)
+    two = flown(Failure.MOTOR, wrong, height=38.0, vehicle="both")
     assert math.isnan(two.refused)
     assert judge(two).count is Count.RIGHT
     assert math.isnan(flown(Failure.MOTOR, height=38.0).refused)
@@ -258,7 +258,7 @@ def test_a_canopy_that_does_not_carry_wants_an_alarm_and_the_next_parachute(good
     assert judge(hard).why == "the canopy did not carry, and nobody was alarmed"
     alarmed = replace(hard, alarmed=((good.released + 3.0, "it falls on"),))
     assert judge(alarmed).count is Count.RIGHT, "there is no other"
-    both = replace(alarmed, scenario=replace(good.scenario, vehicle=Vehicle.BOTH))
+    both = replace(alarmed, scenario=replace(good.scenario, vehicle="both"))
     assert judge(both).why == "the canopy did not carry, and no other followed in time"
     assert judge(replace(both, released_another=good.released + 4.0)).count is Count.RIGHT
     late = replace(both, another=replace(falls, latest=falls.at + 1.0))

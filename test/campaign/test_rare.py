@@ -8,13 +8,13 @@ import pytest
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.rare import kinds, rare
-from chute_ros.campaign.scenario import Failure, Person, Stop, Vehicle
+from chute_ros.campaign.scenario import Failure, Person, Stop
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.protocol.vehicle_merge import IMU, VEHICLE_STATE
 
 SEEDS = range(1000, 5000)
 PLAIN = replace(
-    draw(7), vehicle=Vehicle.UPF, failure=Failure.HANG, faults=(), person=None,
+    draw(7), vehicle="upf", failure=Failure.HANG, faults=(), person=None,
     vehicle_sources=(VEHICLE_STATE, IMU), ground=0.0, manoeuvre=None,
 )  # fmt: skip
 LIES = SensorFault("force", "noise", 1.0, 2.0, IMU)
@@ -54,7 +54,7 @@ def test_when_a_fault_begins_and_how_often_makes_no_other_kind():
 @pytest.mark.parametrize(
     ("other", "differ"),
     [
-        (replace(PLAIN, vehicle=Vehicle.MAVLINK), (True, True, False)),
+        (replace(PLAIN, vehicle="mavlink"), (True, True, False)),
         (replace(PLAIN, failure=Failure.POWER), (True, True, True)),
         (replace(PLAIN, vehicle_sources=(VEHICLE_STATE,)), (True, True, False)),
         (replace(PLAIN, person=Person("kill", 1.0)), (True, False, False)),

@@ -25,7 +25,7 @@ def test_a_person_can_read_it() -> None:
     cut = WayFault("autopilot", Spell(0.5, 2.0, loss=1.0))
     text = text_of(scenario(Failure.MOTOR, cut, person=Person("kill", 3.0)), "was late")
     told = json.loads(text)
-    assert told["format"] == 1
+    assert told["format"] == 2
     assert told["scenario"]["failure"] == "MOTOR"
     assert told["scenario"]["person"] == {"does": "kill", "at": 3.0}
     spell = {"begin": 0.5, "end": 2.0, "loss": 1.0}
@@ -50,7 +50,7 @@ GOOD = text_of(scenario(Failure.MOTOR), "")
     [
         ("", "old.json is no scenario of a campaign: JSONDecodeError"),
         ("{}", "KeyError: 'format'"),
-        (GOOD.replace('"format": 1', '"format": 7'), "old.json: format 7: need 1"),
+        (GOOD.replace('"format": 2', '"format": 7'), "old.json: format 7: need 2"),
         (GOOD.replace("MOTOR", "WHEEL"), "KeyError: 'WHEEL'"),
         (GOOD.replace('"height"', '"depth"'), "TypeError"),
         ("[1]", "TypeError"),

@@ -9,10 +9,10 @@ import pytest
 from campaign_bench import SHIPPED
 
 from chute_ros.campaign.draw import draw
-from chute_ros.campaign.scenario import Vehicle
 from chute_ros.links.mavlink import parameters as mavlink_parameters
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.runtime import MavlinkSettings
+from chute_ros.links.registered import vehicles
 from chute_ros.links.umbilical import parameters as umbilical_parameters
 from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
 from chute_ros.links.umbilical.runtime import UmbilicalSettings
@@ -63,9 +63,9 @@ def test_its_second_sources_are_ones_that_the_supervisor_takes() -> None:
     assert {"vehicle/state", "imu", "odometry"} == drawn <= set(SOURCES)
 
 
-@pytest.mark.parametrize("vehicle", Vehicle)
-def test_so_has_the_supervisor(vehicle: Vehicle) -> None:
-    profile = "rocket" if vehicle is Vehicle.ROCKET else "multirotor"
+@pytest.mark.parametrize("vehicle", vehicles())
+def test_so_has_the_supervisor(vehicle: str) -> None:
+    profile = "rocket" if vehicle == "umbilical" else "multirotor"
     flies = SHIPPED.config(vehicle, profile, False, 0)
     told = {
         "profile": profile,

@@ -11,7 +11,7 @@ from campaign_bench import fired, flown
 from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.judge import Count, judge
 from chute_ros.campaign.manoeuvre import Manoeuvre
-from chute_ros.campaign.scenario import Autopilot, Canopy, Failure, HomeMove, Person, Vehicle
+from chute_ros.campaign.scenario import Autopilot, Canopy, Failure, HomeMove, Person
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.sim.autopilot_kinds import KINDS
 from chute_ros.sim.flight import Descent
@@ -38,8 +38,8 @@ def test_a_spin_is_released_and_a_glide_is_not() -> None:
     assert not fired(glides)
 
 
-@pytest.mark.parametrize("vehicle", [Vehicle.MAVLINK, Vehicle.UPF])
-def test_from_a_roof_it_is_released_once_it_is_below_it(vehicle: Vehicle) -> None:
+@pytest.mark.parametrize("vehicle", ["mavlink", "upf"])
+def test_from_a_roof_it_is_released_once_it_is_below_it(vehicle: str) -> None:
     end = flown(Failure.MOTOR, vehicle=vehicle, height=8.0, ground=-80.0)
     assert judge(end).count is Count.RIGHT
     assert end.release_height < -9.0
@@ -129,7 +129,7 @@ def test_nor_does_it_hide_a_tumble() -> None:
 
 
 def test_a_canopy_that_does_not_carry_is_followed_by_the_next_parachute() -> None:
-    end = flown(Failure.MOTOR, vehicle=Vehicle.BOTH, height=120.0, canopy=Canopy(22.0))
+    end = flown(Failure.MOTOR, vehicle="both", height=120.0, canopy=Canopy(22.0))
     assert end.another.at < end.released_another < end.another.latest
     assert judge(end).count is Count.RIGHT
 
@@ -141,10 +141,10 @@ def test_a_canopy_that_does_not_carry_and_is_the_only_one_is_told_of() -> None:
     assert [text for at, text in end.alarmed if at > end.another.at]
 
 
-@pytest.mark.parametrize("vehicle", [Vehicle.MAVLINK, Vehicle.UPF])
+@pytest.mark.parametrize("vehicle", ["mavlink", "upf"])
 @pytest.mark.parametrize(("how", "strength"), [("leans", 0.33), ("diverges", 4.0)])
 def test_an_estimator_that_runs_away_on_the_ground_releases_nothing(
-    how: str, strength: float, vehicle: Vehicle
+    how: str, strength: float, vehicle: str
 ) -> None:
     runs_away = EstimatorFault(how, 1.0, 9.0, strength)
     end = flown(Failure.NOTHING, runs_away, height=0.0, vehicle=vehicle)

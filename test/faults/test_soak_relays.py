@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.protocol.dronecan.can_frame import unpack
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.transport.data_types import load_data_types
 from faults.soak_relay import DEPLOY, KILL
 from faults.soak_relay_can import nonsense, stranger

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.links.umbilical.protocol.stream import Item, StreamReader
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.supervisor.inputs import Input
 from fuzz.target import MOST_ENTRIES, Subject
 from fuzz.targets import (

@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import pytest
 
 from chute_ros.errors import ChuteError
-from chute_ros.links.mavlink.signing_key import signing_from_file
 from chute_ros.links.mavlink.signing_memory import SigningMemory
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.upf.allocation_file import AllocationFile
@@ -17,6 +16,7 @@ from chute_ros.nodes.supervisor_memory import Memory
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.transport import regular_file
 from chute_ros.transport.data_types import load_data_types
+from chute_ros.transport.signing_key import signing_from_file
 
 KINDS = {
     "fifo": lambda path: os.mkfifo(path, 0o600),

@@ -11,10 +11,10 @@ from typing import ClassVar
 import pytest
 
 from chute_ros.links.upf.protocol.parameters import EXCLUDES
+from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
+from chute_ros.links.upf.simulator.sim_upf import _parameters
 from chute_ros.nodes.middleware import LEADS_ELSEWHERE
 from chute_ros.sim.command_line import parser
-from chute_ros.sim.sim_upf import _parameters
-from chute_ros.sim.upf_memory import CONTROLLER_PARAMETERS
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "launch").glob("*.launch.py"))

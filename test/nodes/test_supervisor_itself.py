@@ -11,10 +11,10 @@ from mavlink_bench import Autopilot, Module, Network, do
 from node_bench import stamped
 from supervisor_bench import Scene
 
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import Action
 from chute_ros.nodes.supervisor_health import Health
 from chute_ros.runtime import supervisor as runtime
-from chute_ros.sim.parachute_device import ParachuteSettings
 from chute_ros.supervisor import core, inputs
 
 

@@ -9,11 +9,11 @@ from mavlink_bench import Autopilot, Module, do, quick
 from node_bench import LOCAL, port_of
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import DeploymentTrigger
 from chute_ros.nodes import qos
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.sim.faults import FaultKnobs
-from chute_ros.sim.parachute_device import ParachuteSettings
 
 NO_FAULTS = FaultKnobs()
 #: High enough to fall and open, low enough not to wait for, m.

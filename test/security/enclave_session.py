@@ -117,7 +117,7 @@ def start_vehicle(processes: Processes) -> None:
     processes.start("autopilot", "chute_ros.sim.sim_autopilot", *network, f"udpin:127.0.0.1:{air}")
     processes.start(
         "module",
-        "chute_ros.sim.sim_mavlink_parachute",
+        "chute_ros.links.mavlink.simulator.sim_mavlink_parachute",
         *network,
         f"udpout:127.0.0.1:{air}",
         "--ground-cleared",

@@ -12,8 +12,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from mavlink_bench import Autopilot, Module, Network
 from node_bench import Bench
 
-from chute_ros.links.mavlink.protocol.frames import NOISE, FrameEncoder
-from chute_ros.links.mavlink.protocol.signing import (
+from chute_ros.model import DeploymentTrigger
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import NOISE, FrameEncoder
+from chute_ros.protocol.mavlink.signing import (
     REPLAYED,
     UNSIGNED,
     WRONG_SIGNATURE,
@@ -21,8 +23,6 @@ from chute_ros.links.mavlink.protocol.signing import (
     SigningClock,
     Verifier,
 )
-from chute_ros.model import DeploymentTrigger
-from chute_ros.protocol.mavlink.dialect import dialect
 
 KEY, OTHER_KEY = bytes(range(1, 33)), bytes(range(101, 133))
 #: The module's own ids and its autopilot's.

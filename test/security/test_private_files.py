@@ -13,7 +13,6 @@ from mavlink_attack import KEY
 from supervisor_bench import Scene
 
 from chute_ros.errors import ParameterError, SigningKeyError
-from chute_ros.links.mavlink.signing_key import signing_from_file
 from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.upf.allocation_file import AllocationFile
 from chute_ros.nodes import qos
@@ -21,6 +20,7 @@ from chute_ros.nodes.box_folder import BoxFolder
 from chute_ros.nodes.kept_file import KeptFile
 from chute_ros.nodes.mcap_file import McapFile, Topic
 from chute_ros.nodes.private_files import make_folder, open_new, read_own_text, replace_text
+from chute_ros.transport.signing_key import signing_from_file
 
 
 @pytest.fixture(params=[0o000, 0o022, 0o077], ids=oct)

@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from mavlink_attack import KEY, Attacked, healthy, overheard
 from mavlink_bench import Network
 
-from chute_ros.links.mavlink.protocol.signing import REPLAYED
 from chute_ros.model import LinkState
+from chute_ros.protocol.mavlink.signing import REPLAYED
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_a_clock_that_was_set_back_by_years_makes_no_old_frame_young(attacked, b
         bench.unplug(loop)
     years_ago = time.time() - 1e8
     with monkeypatch.context() as patch:
-        patch.setattr("chute_ros.links.mavlink.signing_key.time.time", lambda: years_ago)
+        patch.setattr("chute_ros.transport.signing_key.time.time", lambda: years_ago)
         attacked.restart()
     attacked.send(*recorded)
     assert attacked.counts()[REPLAYED] == 2

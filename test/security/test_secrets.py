@@ -86,7 +86,7 @@ def test_a_node_that_cannot_use_its_key_does_not_show_it(tmp_path, text):
     key = tmp_path / "signing.key"
     key.write_bytes(text)
     key.chmod(0o644 if text == KEY else 0o600)
-    command = [sys.executable, "-m", "chute_ros.nodes.mavlink_parachute", "--ros-args"]
+    command = [sys.executable, "-m", "chute_ros.links.mavlink", "--ros-args"]
     command += ["--log-level", "debug", "-p", f"signing_key_file:={key}"]
     home = tmp_path / "home"
     environment = os.environ | {"ROS_HOME": str(home), "ROS_LOG_DIR": str(home / "log")}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import Frame, FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
 
 COMPUTER = (1, 191)
 

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.signing_key import signing_from_file
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.tools.isolation import free_udp_ports
+from chute_ros.transport.signing_key import signing_from_file
 
-PARACHUTE, AUTOPILOT = "sim_mavlink_parachute", "sim_autopilot"
+PARACHUTE = "chute_ros.links.mavlink.simulator.sim_mavlink_parachute"
+AUTOPILOT = "chute_ros.sim.sim_autopilot"
 BOTH = pytest.mark.parametrize("simulator", [PARACHUTE, AUTOPILOT])
 LOCAL = "127.0.0.1"
 MSG_DEFS = Path(__file__).parents[2] / "msg_defs"
@@ -55,7 +56,7 @@ class Simulator:
 
     def __init__(self, name, environment, *arguments):
         self.process = subprocess.Popen(
-            [sys.executable, "-m", f"chute_ros.sim.{name}", *arguments],
+            [sys.executable, "-m", name, *arguments],
             env=environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -102,7 +103,7 @@ def fail(environment):
 
     def run(name, *arguments):
         done = subprocess.run(
-            [sys.executable, "-m", f"chute_ros.sim.{name}", *arguments],
+            [sys.executable, "-m", name, *arguments],
             env=environment,
             capture_output=True,
             text=True,
@@ -276,7 +277,7 @@ def test_quiet_it_prints_nothing(start):
 @BOTH
 def test_help_names_every_action_and_form(simulator, environment):
     done = subprocess.run(
-        [sys.executable, "-m", f"chute_ros.sim.{simulator}", "--help"],
+        [sys.executable, "-m", simulator, "--help"],
         env={**environment, "COLUMNS": "500"},
         capture_output=True,
         text=True,

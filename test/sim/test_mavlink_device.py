@@ -3,10 +3,10 @@
 import pytest
 from device_bench import Station
 
-from chute_ros.links.mavlink.protocol.frames import FrameEncoder
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.sim.autopilot_device import AutopilotDevice
-from chute_ros.sim.parachute_device import ParachuteDevice, ParachuteSettings
 
 ACCEPTED, DENIED = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_DENIED
 SET, GET = dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_GET_MESSAGE_INTERVAL

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from chute_ros.links.mavlink.protocol.frames import FrameEncoder
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameEncoder
 from chute_ros.tools.isolation import free_udp_ports
 from sitl.record import read
 from sitl.routing import FrameSplitter, Routes, message_id, sender, target

@@ -17,7 +17,7 @@ from chute_ros.campaign import kept_tally
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count, Judged
 from chute_ros.campaign.kept_tally import code_that_flies
-from chute_ros.campaign.scenario import Failure, Vehicle
+from chute_ros.campaign.scenario import Failure
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
 from chute_ros.tools.machine import machine
@@ -201,7 +201,7 @@ def test_what_must_not_be_is_saved_and_told_again(all_missed, monkeypatch, tmp_p
 
 
 def test_a_replay_says_who_outlives_the_autopilot(monkeypatch, tmp_path, capsys):
-    lost = replace(draw(7), faults=(), failure=Failure.POWER, vehicle=Vehicle.MAVLINK)
+    lost = replace(draw(7), faults=(), failure=Failure.POWER, vehicle="mavlink")
     lost = replace(lost, profile="multirotor", vehicle_sources=("vehicle/state", "odometry"))
     file = tmp_path / "lost.json"
     file.write_text(text_of(lost, "made by hand"))

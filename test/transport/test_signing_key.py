@@ -7,8 +7,8 @@ import time
 import pytest
 
 from chute_ros.errors import SigningKeyError
-from chute_ros.links.mavlink.protocol.signing import EPOCH_2015, UNITS_PER_SECOND, Times
-from chute_ros.links.mavlink.signing_key import signing_from_file
+from chute_ros.protocol.mavlink.signing import EPOCH_2015, UNITS_PER_SECOND, Times
+from chute_ros.transport.signing_key import signing_from_file
 
 
 @pytest.fixture

@@ -13,12 +13,12 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
-from chute_ros.links.mavlink.protocol.signing import LAST_TIME, Signer, Times, Verifier, times_of
-from chute_ros.links.mavlink.signing_key import signing_from_file
 from chute_ros.nodes import diagnostics
 from chute_ros.nodes.kept_file import KeptFile
 from chute_ros.nodes.private_files import read_own_text
 from chute_ros.nodes.ros_home import ros_home
+from chute_ros.protocol.mavlink.signing import LAST_TIME, Signer, Times, Verifier, times_of
+from chute_ros.transport.signing_key import signing_from_file
 
 #: Between two writes, s: so old a frame may be that is replayed into a node after it crashed.
 INTERVAL = 1.0

@@ -14,4 +14,7 @@ except ImportError as error:
         f"({error})"
     ) from error
 
-__all__ = ["dialect"]
+__all__ = ["FORCE_DISARM", "dialect"]
+
+#: param2 of MAV_CMD_COMPONENT_ARM_DISARM that makes the autopilot disarm in flight.
+FORCE_DISARM = 21196.0

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chute_ros.errors import MessageError
-from chute_ros.links.mavlink.protocol import frames
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink import frames
 from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 
 #: HEARTBEAT of a parachute (type 37) from 1/161, sequence 0, by MAVLink version.
 GOLDEN = {

@@ -5,10 +5,10 @@ import hashlib
 import pytest
 
 from chute_ros.errors import SigningKeyError
-from chute_ros.links.mavlink.protocol import signing
-from chute_ros.links.mavlink.protocol.frames import FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.protocol.signing import Signer, SigningClock, Verifier, key_from_text
+from chute_ros.protocol.mavlink import signing
 from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier, key_from_text
 
 KEY, OTHER = bytes(range(32)), bytes(32)
 #: Unix time less monotonic time: the host was started on 2026-01-01.

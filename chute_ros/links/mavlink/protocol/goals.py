@@ -18,12 +18,9 @@ from chute_ros.links.mavlink.protocol.kill import KillPlan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import LinkState, TriggerFlags, flag_names
 from chute_ros.protocol.effect import Goal
-from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 
 MavlinkGoal = Goal[Command]
-
-#: param2 of MAV_CMD_COMPONENT_ARM_DISARM that makes the autopilot disarm in flight.
-FORCE_DISARM = 21196.0
 
 #: Whole numbers up to here are exact in a param, which is a 32-bit float.
 MOST_EXACT = 2**24

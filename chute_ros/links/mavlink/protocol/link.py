@@ -18,16 +18,16 @@ from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
-from chute_ros.links.mavlink.protocol.frames import Frame
 from chute_ros.links.mavlink.protocol.kill import DeployDecided
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
-from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
 from chute_ros.links.mavlink.protocol.stream_watch import Ask
 from chute_ros.links.mavlink.protocol.wire import Duplicates, Inbox, Outbox
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.protocol.mavlink.signing import Signer, Verifier
 from chute_ros.protocol.requests import Requests
 
 #: What a parameter of a command can hold; an hour.

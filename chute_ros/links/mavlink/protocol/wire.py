@@ -7,9 +7,9 @@ from collections import Counter, deque
 from collections.abc import Hashable
 from typing import Any
 
-from chute_ros.links.mavlink.protocol.frames import Frame, FrameDecoder, FrameEncoder
-from chute_ros.links.mavlink.protocol.signing import Signer, Verifier
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, Verifier
 
 #: Most streams (serial port, TCP connections) that are read at once.
 _MOST_STREAMS = 16

@@ -1,0 +1,166 @@
+"""What a link is. Read this before you write one.
+
+A link is how one kind of device is spoken to. Everything of it is in one folder:
+
+    protocol/       pure: bytes and time in, bytes and events out; its link object is a Link
+    runtime.py      pure: when the device is healthy, and what a decision becomes
+                    (a subclass of chute_ros.runtime.device.DeviceRuntime)
+    node.py         the ROS node (a subclass of chute_ros.nodes.device_node.DeviceNode)
+    parameters.py   its parameters; PARAMETERS is the table
+    __main__.py     starts the node
+    simulator/      the simulated device, where there is one
+    virtual.py      its node and its simulated device in a flight of the campaign (a Part)
+    __init__.py     LINK, a LinkKind: how launch files, parameter tables, the campaign, the device
+                    suite and the docs find all that
+
+and it is registered by one entry of the entry point group `chute_ros.links`, which any package may
+have: `NODE = PACKAGE.MODULE:LINK` (docs/design/links.md).
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+#: The node that speaks to the autopilot, also where the parachute is on another link.
+AUTOPILOT_LINK = "mavlink_parachute"
+SUPERVISOR = "safety_supervisor"
+#: A text that names an object: "package.module:attribute".
+Place = str
+Value = bool | int | float | str | list[str]
+
+
+class Link(Protocol):
+    """The pure protocol object of one device. Times are monotonic s. No method raises for what
+    came from the wire. It is fed by transport/loop.py, and by the campaign in virtual time."""
+
+    def receive(self, data: bytes, now: float, stream: Any = None) -> None:
+        """Take in bytes that came on this stream."""
+
+    def stream_ended(self, stream: Any) -> None:
+        """Forget what is half received on a stream that was closed; None: on all."""
+
+    def update(self, now: float) -> None:
+        """Do what is due."""
+
+    def next_deadline(self) -> float:
+        """Return when update has something to do; infinity: never."""
+
+    def take_output(self) -> list[bytes]:
+        """Return the frames to send, each once."""
+
+    def take_events(self) -> list[Any]:
+        """Return what happened (protocol/events.py), each once."""
+
+    def owner_alive(self, until: float) -> None:
+        """The node is alive: what says so on the wire may go on until then."""
+
+    def has_parachute(self) -> bool:
+        """Return whether there is something that a deploy could be sent to."""
+
+    def arm(self, token: int, arm: bool, triggers: int, now: float) -> None:
+        """Begin to arm or disarm; ends with a RequestFinished of this token."""
+
+    def deploy(self, token: int, force: bool, now: float) -> None:
+        """Begin to release; ends with a RequestFinished of this token."""
+
+    def flight_block(self, reason: str, now: float) -> None:
+        """Keep the vehicle on the ground where the device can; empty: let it go."""
+
+
+class Part(Protocol):
+    """What the campaign has of a link: its node and its simulated device in virtual time."""
+
+    def ways(self, vehicle: VehicleKind) -> tuple[str, ...]:
+        """Return the ways that a fault can lie on: of the devices and of the node."""
+
+    def stopping(self, vehicle: VehicleKind) -> tuple[str, ...]:
+        """Return the devices that may lose their power."""
+
+    def read(self) -> None:
+        """Read what all flights share, before processes part."""
+
+    def join(self, rig: Any) -> None:
+        """Plug devices and node into a flight (campaign/rig.py)."""
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument of vehicle.launch.py that overrides the parameter `connection` of a link."""
+
+    name: str
+    description: str
+
+
+@dataclass(frozen=True)
+class Sockets:
+    """What the simulators of one vehicle speak over, all on this host. network: where the MAVLink
+    node listens, air: where the vehicle's motion is felt, as HOST:PORT; bus: of CAN; terminal: a
+    path for a pseudo terminal."""
+
+    network: str
+    air: str
+    bus: str
+    terminal: str
+
+
+@dataclass(frozen=True)
+class VehicleKind:
+    """A vehicle that the launch files, config/ and the campaign know by its name.
+
+    links: its device nodes, in the order in which they are started. parameters: node -> what
+    differs from the defaults. rig: where the campaign has its kind of flight, if it is no
+    aircraft. often: how many of the campaign's flights it flies, beside the others' numbers; or,
+    where it replaces another, it flies one in so many of that one's.
+    """
+
+    name: str
+    description: str
+    links: tuple[str, ...]
+    parameters: Mapping[str, Mapping[str, Value]]
+    often: int
+    rig: Place = ""
+    replaces: str = ""
+
+    def given(self, node: str, name: str, default: Value) -> Value:
+        """Return the value of a node's parameter."""
+        return self.parameters.get(node, {}).get(name, default)
+
+    def supervised(
+        self, name: str, default: tuple[str, ...] = (AUTOPILOT_LINK,)
+    ) -> tuple[str, ...]:
+        """Return the texts in this parameter of its supervisor."""
+        texts = self.given(SUPERVISOR, name, list(default))
+        assert isinstance(texts, list)
+        return tuple(texts)
+
+
+@dataclass(frozen=True)
+class LinkKind:
+    """One kind of link, and where its parts are. Places are imported when they are needed: the
+    campaign runs without ROS.
+
+    name: of the node and of its executable. vehicles: those that carry its device. connection:
+    where the node finds what simulators, command lines of one vehicle, simulate. part: empty
+    where the campaign does not fly it.
+    """
+
+    name: str
+    description: str
+    node: Place
+    parameters: Place
+    argument: Argument
+    vehicles: tuple[VehicleKind, ...]
+    simulators: Callable[[VehicleKind, Sockets], tuple[tuple[str, ...], ...]]
+    connection: Callable[[Sockets], str]
+    part: Place = ""
+    #: The ROS package that its executables are in.
+    package: str = "chute_ros"
+
+
+def load(place: Place) -> Any:
+    """Return the object at a place."""
+    module, _, attribute = place.partition(":")
+    return getattr(importlib.import_module(module), attribute)

@@ -1,0 +1,1 @@
+"""A simulated flight computer of a rocket."""

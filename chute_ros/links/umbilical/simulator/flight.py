@@ -1,0 +1,207 @@
+"""The flight program of a simulated flight computer: modes, valves, canopies, commands to them.
+
+It lives in two times: commands and the arming key are looked at in real time, the flight itself
+is watched in the time of the simulated world, which may be faster.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from chute_ros.links.umbilical.simulator.commands import target_of
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.sim.rocket import Rocket
+
+#: The flight is looked at this often, simulated s.
+STEP = 0.05
+#: Below this height above ground (2000 ft) the main canopy comes, m,
+MAIN_HEIGHT = 610.0
+#: but not before the drogue has been out for so long, simulated s.
+MAIN_DELAY = 3.0
+
+
+class FlightProgram:
+    """say: a line for whoever watches; print_line: one on the wire; log: one in debug mode."""
+
+    def __init__(
+        self,
+        settings: FlightComputerSettings,
+        target_floats: int,
+        log: Callable[[str, str], None],
+        print_line: Callable[[str], None],
+    ) -> None:
+        self.rocket = Rocket()
+        #: Neither drogue nor main come out any more, whoever wants it.
+        self.is_stuck = False
+        #: The flash was wiped; needed for arming with the interlock.
+        self.may_arm = False
+        self.mode = Mode.Startup
+        self.armed_altitude = 0.0
+        self.target: tuple[float, ...] = ()
+        #: Fields that commands set, by name.
+        self.flags: dict[str, int] = {}
+        self.handlers: dict[str, Callable[[], None]] = {
+            "<L>": self._launch,
+            "<V>": self._safe,
+            "<KA>": self._arm,
+            "<KD>": lambda: setattr(self, "_key", False),
+            "<M>": lambda: self._set("mav_open", 1),
+            "<m>": lambda: self._set("mav_open", 0),
+            "<S>": lambda: self._set("sv_open", 1),
+            "<s>": lambda: self._set("sv_open", 0),
+            "<D>": self._manual_drogue,
+            "<d>": self._manual_main,
+            **{f"<{n}>": self._payload(f"cmd_n{n}") for n in range(1, 5)},
+            **{f"<A{n}>": self._payload(f"cmd_a{n}") for n in range(1, 4)},
+        }
+        self._settings = settings
+        self._target_floats = target_floats
+        self._log = log
+        self._print_line = print_line
+        self._key = False
+        self._drogue_out_for = math.inf  # simulated s
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin as after a reset. A canopy that is out stays out."""
+        self.mode = Mode.Startup
+        self.may_arm = False
+        self.target = ()
+        self._key = False
+        self.flags = dict.fromkeys(
+            (
+                *("mav_open", "sv_open", "ssa_drogue_deployed", "ssa_main_deployed"),
+                *("cmd_n1", "cmd_n2", "cmd_n3", "cmd_n4", "cmd_a1", "cmd_a2", "cmd_a3"),
+            ),
+            0,
+        )
+
+    def command(self, token: str) -> None:
+        """Do what a token says that is for the flight program."""
+        if token in self.handlers:
+            self.handlers[token]()
+        else:
+            self.target = target_of(token, self._target_floats) or self.target
+
+    def turn_key(self) -> None:
+        """Follow the arming key, once each turn of the flight loop."""
+        if self.mode is Mode.Startup and self._key:
+            self.armed_altitude = self.rocket.altitude
+            self._enter(Mode.Standby)
+        elif self.mode is Mode.Standby and not self._key:
+            self.may_arm = False
+            self._enter(Mode.Startup)
+
+    def fly(self, dt: float, is_running: bool) -> None:
+        """Move the world on by dt, simulated s, and watch it if the program runs."""
+        steps = max(1, math.ceil(dt / STEP - 1e-9))
+        for _ in range(steps):
+            self.rocket.step(dt / steps)
+            self._drogue_out_for += dt / steps
+            if is_running:
+                self._watch()
+
+    def fail(self) -> None:
+        """Go to Fault: nothing is automatic any more."""
+        self._enter(Mode.Fault)
+
+    def jump(self, mode: Mode) -> None:
+        """Put the rocket where it plausibly is in this mode."""
+        if mode is Mode.Fault:
+            self.fail()
+            return
+        places = {
+            Mode.Ascent: (300.0, 155.0, 3.8),
+            Mode.Coast: (2000.0, 50.0, math.inf),
+            Mode.DrogueDeployed: (2500.0, -28.0, math.inf),
+            Mode.MainDeployed: (400.0, -6.6, math.inf),
+        }
+        height, speed, burned = places.get(mode, (0.0, 0.0, math.nan))
+        self.rocket = Rocket(height=height, vertical_speed=speed, burned_for=burned, apogee=height)
+        self._key = mode is not Mode.Startup
+        self._set("mav_open", int(mode is Mode.Ascent))
+        drogue = mode in (Mode.DrogueDeployed, Mode.MainDeployed)
+        self._set("ssa_drogue_deployed", int(drogue))
+        self._set("ssa_main_deployed", int(mode is Mode.MainDeployed))
+        if drogue:
+            self.rocket.drogue_out_for = self._drogue_out_for = 60.0
+        if mode is Mode.MainDeployed:
+            self.rocket.main_out_for = 60.0
+        self._enter(mode)
+
+    def land(self) -> None:
+        """Put the rocket on the ground."""
+        self.rocket.land()
+
+    # -- the flight by itself -------------------------------------------------------------------
+
+    def _watch(self) -> None:
+        rocket = self.rocket
+        falls = rocket.vertical_speed < 0.0 and not self._settings.drogue_fails
+        is_low = rocket.height < MAIN_HEIGHT and self._drogue_out_for >= MAIN_DELAY
+        if self.mode is Mode.Ascent and not rocket.burning:
+            self._set("mav_open", 0)
+            self._enter(Mode.Coast)
+        elif self.mode is Mode.Coast and falls and self._fire_drogue():
+            self._enter(Mode.DrogueDeployed)
+        elif self.mode is Mode.DrogueDeployed and is_low and self._fire_main():
+            self._enter(Mode.MainDeployed)
+
+    def _fire_drogue(self) -> bool:
+        if self.is_stuck:
+            return False
+        if not self.flags["ssa_drogue_deployed"]:
+            self._drogue_out_for = 0.0
+            self._log("INFO", "Drogue deployed")
+        self._set("ssa_drogue_deployed", 1)
+        if not self.rocket.on_ground:
+            self.rocket.release_drogue()
+        return True
+
+    def _fire_main(self) -> bool:
+        if self.is_stuck:
+            return False
+        if not self.flags["ssa_main_deployed"]:
+            self._log("INFO", "Main deployed")
+        self._set("ssa_main_deployed", 1)
+        if not self.rocket.on_ground:
+            self.rocket.release_main()
+        return True
+
+    def _enter(self, mode: Mode) -> None:
+        if mode is not self.mode:
+            self._log("INFO", f"Flight mode {self.mode.name} -> {mode.name}")
+            self.mode = mode
+
+    # -- commands -------------------------------------------------------------------------------
+
+    def _set(self, name: str, value: int) -> None:
+        self.flags[name] = value
+
+    def _payload(self, name: str) -> Callable[[], None]:
+        return lambda: self._set(name, 1)
+
+    def _launch(self) -> None:
+        if self.mode is Mode.Standby:
+            self._set("mav_open", 1)
+            self.rocket.ignite()
+            self._enter(Mode.Ascent)
+
+    def _safe(self) -> None:
+        self._set("mav_open", 0)
+        self._set("sv_open", int(self._settings.safe_opens_sv))
+
+    def _arm(self) -> None:
+        if self.mode is Mode.Startup and self._settings.interlock and not self.may_arm:
+            self._print_line("Arming blocked: wipe flash first")
+            return
+        self._key = True
+
+    def _manual_drogue(self) -> None:
+        if self._fire_drogue() and self.mode is Mode.Coast:
+            self._enter(Mode.DrogueDeployed)
+
+    def _manual_main(self) -> None:
+        if self._fire_main() and self.mode is Mode.DrogueDeployed:
+            self._enter(Mode.MainDeployed)

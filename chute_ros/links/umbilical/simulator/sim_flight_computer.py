@@ -1,0 +1,84 @@
+"""Executable sim_flight_computer: a rocket's flight computer on the serial umbilical, as a pty."""
+
+from __future__ import annotations
+
+import time
+
+from chute_ros.errors import ParameterError
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import REFERENCE_LAYOUT, Layout
+from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
+from chute_ros.sim.command_line import main_of, parser_on_pty, run_on_pty, script_of
+
+
+def _run() -> None:
+    start = FlightComputerSettings()
+    options = parser_on_pty(
+        "sim_flight_computer",
+        "A rocket's flight computer on its serial umbilical: it makes a pseudo terminal, prints "
+        "its path, sends $TELEM lines there and takes the commands of the Umbilical Reference.",
+        "mute, unmute, silent, speak, stuck, fault, reboot, jump=MODE, land, wipe-fails, "
+        "wipe-hangs, lose-dump-end, dump-stalls (MODE: Startup, Standby, Ascent, Coast, "
+        "DrogueDeployed, MainDeployed, Fault)",
+    )
+    options.add_argument(
+        "--layout",
+        default=REFERENCE_LAYOUT,
+        metavar="NAME",
+        help=f"of the $TELEM line (default: {REFERENCE_LAYOUT})",
+    )
+    options.add_argument("--telem-path", default="", help="folder with other layouts (*.yaml)")
+    for name, unit, text in (
+        ("rate", "HZ", "lines of telemetry a second"),
+        ("speed", "FACTOR", "the flight is this much faster than real time"),
+        ("heartbeat-timeout", "S", "without a heartbeat for so long it is not connected"),
+        ("cut", "X", "probability that a line is cut, 0 to 1"),
+        ("garbage", "X", "probability that random bytes follow a line, 0 to 1"),
+    ):
+        default = getattr(start, name.replace("-", "_"))
+        text = f"{text} (default: {default:g})"
+        options.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=text)
+    for name, text in (
+        ("debug", "log lines on the wire"),
+        ("interlock", "arming needs a wiped flash"),
+        ("drogue-fails", "at the apogee nothing comes out; by command it still does"),
+        ("safe-opens-sv", "<V> opens SV, as newer firmware does"),
+        ("faults-on-heartbeat", "a <H> in Ascent or Coast is a fault"),
+        ("binary-dump", "<G> sends bytes in place of lines"),
+    ):
+        options.add_argument(f"--{name}", action="store_true", help=text)
+    chosen = options.parse_args()
+    settings = FlightComputerSettings(
+        rate=chosen.rate,
+        speed=chosen.speed,
+        debug=chosen.debug,
+        interlock=chosen.interlock,
+        drogue_fails=chosen.drogue_fails,
+        safe_opens_sv=chosen.safe_opens_sv,
+        heartbeat_timeout=chosen.heartbeat_timeout,
+        faults_on_heartbeat=chosen.faults_on_heartbeat,
+        time_of_day=time.time() % 86_400.0,
+        binary_dump=chosen.binary_dump,
+        cut=chosen.cut,
+        garbage=chosen.garbage,
+        seed=chosen.seed,
+    )
+    layout = _layout(chosen.layout, chosen.telem_path)
+    run_on_pty(FlightComputer(settings, layout, script_of(chosen.at)), chosen)
+
+
+def _layout(name: str, folder: str) -> Layout:
+    layouts = {layout.name: layout for layout in load_layouts(folder, "--telem-path")}
+    if name not in layouts:
+        raise ParameterError(f"--layout {name!r}: need one of {', '.join(layouts)}")
+    return layouts[name]
+
+
+def main() -> None:
+    """Run the simulator."""
+    main_of(_run)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""A simulated UPF parachute: controller and trigger."""

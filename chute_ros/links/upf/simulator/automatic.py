@@ -1,0 +1,83 @@
+"""The automatic functions of a simulated UPF controller: take-off, arm, disarm, land.
+
+Source: Flyfire UPF UAVCAN protocol V1.0, "parameters"; heights and times are chosen here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.machine import Stimulus
+from chute_ros.model import ParachuteState
+from chute_ros.sim.motion import Motion
+
+_S = ParachuteState
+#: On the ground below it, m.
+_GROUND = 0.5
+
+
+@dataclass(frozen=True)
+class AutomaticLimits:
+    """When they act."""
+
+    takeoff_height: float = 1.0  # m
+    arm_height: float = 10.0  # m
+    disarm_height: float = 8.0  # m
+    #: Whoever sinks faster is not landing: it is not disarmed, m/s.
+    calm_sink_speed: float = 4.0
+    land_time: float = 2.0  # s at rest on the ground
+
+
+class AutomaticFunctions:
+    """Fed with motion; says what should happen."""
+
+    def __init__(self, limits: AutomaticLimits) -> None:
+        self.limits = limits
+        self._rest_since = math.nan
+        #: It was off the ground since READY, and above the height to disarm since ARMED: what a
+        #: request began on the ground or lower does not end by itself before that.
+        self._flown = self._was_high = False
+
+    def entered(self, state: ParachuteState) -> None:
+        """The controller has a new state, in which rest counts anew."""
+        self._rest_since = math.nan
+        if state in (_S.NOT_READY, _S.READY):
+            self._flown = False
+        if state is not _S.ARMED:
+            self._was_high = False
+
+    def feel(self, motion: Motion, now: float) -> None:
+        """Take note of how it moves."""
+        if not motion.at_rest:
+            self._rest_since = math.nan
+        elif math.isnan(self._rest_since):
+            self._rest_since = now
+        self._flown |= motion.height >= _GROUND
+        self._was_high |= motion.height >= self.limits.disarm_height
+
+    def at_rest_for(self, now: float) -> float:
+        """How long nothing has moved, s; NaN: it moves."""
+        return now - self._rest_since
+
+    def wish(
+        self, state: ParachuteState, motion: Motion, switch: Callable[[str], bool], now: float
+    ) -> Stimulus | None:
+        """What an enabled function wants in this state; None: nothing."""
+        limits, height = self.limits, motion.height
+        if state is _S.READY and switch(p.AUTO_TAKEOFF):
+            if height >= limits.takeoff_height:
+                return Stimulus.TAKEOFF
+        elif state is _S.TAKEOFF:
+            if height >= limits.arm_height and switch(p.AUTO_ARM):
+                return Stimulus.ARM
+            rests = self._flown and self.at_rest_for(now) >= limits.land_time
+            if rests and height < _GROUND and switch(p.AUTO_LAND):
+                return Stimulus.LAND
+        elif state is _S.ARMED and switch(p.AUTO_DISARM):
+            calm = motion.vertical_speed > -limits.calm_sink_speed
+            if self._was_high and height < limits.disarm_height and calm:
+                return Stimulus.DISARM
+        return None

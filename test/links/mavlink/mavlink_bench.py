@@ -1,0 +1,148 @@
+"""What the tests of mavlink_parachute share: quick parameters, and devices that remember."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from node_bench import LOCAL, Bench, port_of
+
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
+from chute_ros.model import DeploymentTrigger, SafetyFlags
+from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
+from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.sim.autopilot_device import AutopilotDevice
+from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind
+
+#: Between two heartbeats and two statuses of the simulated devices, s.
+INTERVAL = 0.05
+
+
+def quick(**parameters: Any) -> dict[str, Any]:
+    """Parameters with short limits on a free port."""
+    return {
+        "connection": f"udpin:{LOCAL}:0",
+        "parachute_stale_after": 0.4,
+        "parachute_lost_after": 0.8,
+        "autopilot_stale_after": 0.6,
+        "autopilot_lost_after": 1.2,
+        "ack_timeout": 0.15,
+        "effect_timeout": 0.4,
+        "retry_interval": 0.1,
+        "give_up_after": 0.8,
+        "late_ack_window": 0.3,
+    } | parameters
+
+
+class Remembering:
+    """Remembers the commands that came over the wire: (time, MAV_CMD, params)."""
+
+    commands_heard: list[tuple[float, int, tuple[float, ...]]]
+
+    def _command(self, frame: Frame) -> None:
+        message = frame.message
+        params = tuple(getattr(message, f"param{number}") for number in range(1, 8))
+        mine = message.target_system in (0, self.system_id)  # type: ignore[attr-defined]
+        if mine and message.target_component in (0, self.component_id):  # type: ignore[attr-defined]
+            self.commands_heard.append((time.monotonic(), message.command, params))
+        super()._command(frame)  # type: ignore[misc]
+
+    def heard_command(self, number: int, first: float | None = None) -> list[Any]:
+        """The commands of this number (and first parameter) so far."""
+        return [
+            heard
+            for heard in self.commands_heard
+            if heard[1] == number and first in (None, heard[2][0])
+        ]
+
+
+class Module(Remembering, ParachuteDevice):
+    """A parachute module that speaks often and can be stuck."""
+
+    def __init__(self, settings: ParachuteSettings | None = None, interval: float = INTERVAL):
+        self.commands_heard = []
+        #: It says yes, but nothing comes out.
+        self.stuck = False
+        #: False: it says that it is too near the ground.
+        self.cleared = True
+        super().__init__(settings or ParachuteSettings(ground_cleared="yes"), [])
+        self.default_intervals[dialect.MAVLINK_MSG_ID_HEARTBEAT] = interval
+        self.default_intervals[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS] = interval
+
+    @property
+    def releases(self) -> list[Any]:
+        """The commands to release."""
+        return self.heard_command(dialect.MAV_CMD_DO_PARACHUTE, float(dialect.PARACHUTE_RELEASE))
+
+    def safety(self) -> SafetyFlags:
+        flags = super().safety()
+        return flags if self.cleared else flags & ~SafetyFlags.GROUND_CLEARED
+
+    def _deploy(self, trigger: DeploymentTrigger) -> None:
+        if not self.stuck:
+            super()._deploy(trigger)
+
+
+class Autopilot(Remembering, AutopilotDevice):
+    """An autopilot that speaks often."""
+
+    def __init__(
+        self, system_id: int = 1, interval: float = INTERVAL, kind: AutopilotKind = GENERIC
+    ):
+        self.commands_heard = []
+        #: Names of the parameters that were asked for.
+        self.asked_for: set[str] = set()
+        super().__init__(system_id, [], kind=kind)
+        for message_id in (
+            dialect.MAVLINK_MSG_ID_HEARTBEAT,
+            dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+            dialect.MAVLINK_MSG_ID_SYSTEM_TIME,
+        ):
+            self.default_intervals[message_id] = interval
+
+    def heard(self, frame: Frame) -> None:
+        if frame.message.get_type() == "PARAM_REQUEST_READ":
+            self.asked_for.add(frame.message.param_id)
+        super().heard(frame)
+
+    @property
+    def forced(self) -> list[Any]:
+        """The orders to disarm by force."""
+        orders = self.heard_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        return [heard for heard in orders if heard[2][1] == FORCE_DISARM]
+
+
+def airborne(height: float, kind: AutopilotKind = GENERIC) -> Autopilot:
+    """One that holds its vehicle at height, m."""
+    autopilot = Autopilot(kind=kind)
+    autopilot.update(time.monotonic())  # it has started, disarmed
+    autopilot.take_output()  # which nobody heard
+    autopilot.model.height = autopilot.model.target_height = height
+    autopilot.model.armed = True
+    return autopilot
+
+
+class Network:
+    """The node, and what is plugged into its network."""
+
+    def __init__(self, bench: Bench, **parameters: Any) -> None:
+        self.bench = bench
+        self.node = bench.add(MavlinkParachuteNode, **quick(**parameters))
+        self.wire = f"udpout:{LOCAL}:{port_of(self.node.loop)}"
+
+    def plug(self, device: Any, **options: Any) -> Any:
+        """Plug a device in; the loop it runs in."""
+        return self.bench.simulate(device, self.wire, **options)
+
+
+def do(bench: Bench, loop: Any, function: Any) -> None:
+    """Have function() called in the thread of a simulated device, and wait for it."""
+    done: list[float] = []
+
+    def call(link: Any, now: float) -> None:
+        function()
+        done.append(now)
+
+    loop.call(call)
+    bench.until(lambda: done, "the simulator has done so")

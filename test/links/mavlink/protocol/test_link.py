@@ -1,0 +1,438 @@
+"""Stories of a whole link over bytes: who is heard, who is not, and the flight block."""
+
+import importlib.util
+import math
+import sys
+
+import pytest
+from link_bench import START, Bench, ack, copter, heartbeat, landed, status
+
+from chute_ros.errors import NotBuiltError, ParameterError
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.flight_block import DISARM_INTERVAL
+from chute_ros.model import Armed, LinkState, ParachuteState
+from chute_ros.protocol.events import DeviceLinkChanged, ParachuteChanged
+from chute_ros.protocol.mavlink import dialect as dialect_module
+from chute_ros.protocol.mavlink.dialect import dialect as d
+from chute_ros.protocol.mavlink.frames import FrameEncoder
+from chute_ros.protocol.mavlink.signing import (
+    REPLAYED,
+    UNSIGNED,
+    WRONG_SIGNATURE,
+    Signer,
+    SigningClock,
+    Verifier,
+)
+
+CHUTE, SECOND, PILOT, GROUND = (1, 161), (1, 162), (1, 1), (255, 190)
+GCS = heartbeat(d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID)
+DISARM, RELEASE = 400, 208
+
+
+# -- who --------------------------------------------------------------------------------------
+
+
+def test_several_parachutes_at_once():
+    bench = Bench().hear(CHUTE, heartbeat(), status(armed=4))
+    bench.hear(SECOND, heartbeat(), status(armed=0)).at(0.1)
+    bench.link.deploy(1, False, bench.now, "1/162")
+    bench.collect()
+    (order,) = bench.commands()
+    assert (order.target_system, order.target_component) == SECOND
+    # The first one's answer and status do not end the second one's request.
+    bench.at(0.2).hear(CHUTE, ack(RELEASE), status(boot_ms=5200, deployed=4))
+    assert bench.ends(1) == []
+    bench.at(0.3).hear(SECOND, ack(RELEASE), status(boot_ms=5300, deployed=4))
+    assert bench.end(1).finished.success
+
+
+def test_without_a_name_the_first_parachute_that_is_not_lost_is_meant():
+    bench = Bench().hear(CHUTE, heartbeat()).hear(SECOND, heartbeat())
+    assert bench.link.chosen_parachute().device == "1/161"
+    bench.stream(6.0, 1.0, SECOND, heartbeat)
+    assert bench.link.chosen_parachute().device == "1/162"
+    bench.at(12.0)
+    assert bench.link.chosen_parachute().device == "1/161"  # both are lost
+
+
+def test_a_deploy_need_not_wait_once_a_parachute_was_heard():
+    bench = Bench()
+    assert not bench.link.has_parachute()
+    bench.hear(PILOT, copter())
+    assert not bench.link.has_parachute(), "an autopilot is none"
+    bench.hear(CHUTE, heartbeat()).at(60.0)
+    assert bench.link.has_parachute(), "one that is lost is told all the same"
+
+
+def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
+    """Given that our process was started anew, and that its heartbeats are damaged: a deploy that
+    waits need not wait for them, and its own status ends it."""
+    bench = Bench().hear(PILOT, copter()).hear(CHUTE, status())
+    assert bench.link.has_parachute()
+    assert bench.link.chosen_parachute() is None, "its link is its heartbeats"
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    (order,) = bench.commands(RELEASE)
+    assert (order.target_system, order.target_component) == CHUTE
+    bench.at(0.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
+    assert bench.end(1).finished.success
+    assert not [e for e in bench.events if isinstance(e, ParachuteChanged)]
+    bench.at(0.2).hear(CHUTE, heartbeat())
+    assert bench.last_status().deployed, "what it said before its heartbeat is not forgotten"
+
+
+@pytest.mark.parametrize(
+    ("device", "known"), [("1/161", True), ("1/162", True), ("1/163", False), ("2/161", False)]
+)
+def test_also_the_one_that_is_named(device, known):
+    bench = Bench().hear(CHUTE, status()).hear(SECOND, status())
+    bench.link.deploy(1, False, bench.now, device)
+    bench.collect()
+    sent = [f"{one.target_system}/{one.target_component}" for one in bench.commands(RELEASE)]
+    assert sent == ([device] if known else [])
+    assert known or f"no parachute '{device}' was heard" in bench.end(1).finished.message
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        pytest.param([(CHUTE, heartbeat(d.MAV_TYPE_GIMBAL))], id="by its heartbeat a gimbal"),
+        pytest.param([((2, 161), status())], id="another vehicle's as well"),
+        pytest.param([((1, 200), heartbeat())], id="another is known by its heartbeat"),
+    ],
+)
+@pytest.mark.parametrize("first", [True, False])
+def test_but_not_in_doubt(others, first):
+    bench = Bench() if first else Bench().hear(CHUTE, status())
+    for ids, message in others:
+        bench.hear(ids, message)
+    if first:
+        bench.hear(CHUTE, status())
+    bench.link.deploy(1, False, bench.now)
+    bench.collect()
+    assert all((o.target_system, o.target_component) == (1, 200) for o in bench.commands(RELEASE))
+
+
+@pytest.mark.parametrize(
+    "ids", [(0, 161), (2, 161), (1, 162)], ids=["everybody", "another system", "another component"]
+)
+def test_nor_another_than_the_parameters_name(ids):
+    bench = Bench(parachute_system_id=1, parachute_component_id=161).hear(ids, status())
+    assert not bench.link.has_parachute()
+
+
+def test_made_up_devices_do_not_grow_what_waits_for_a_heartbeat():
+    bench = Bench()
+    for component in range(1, 100):
+        bench.hear((1, component), status())
+        bench.hear((1, 100 + component), heartbeat(d.MAV_TYPE_GIMBAL))
+    assert len(bench.link._devices._unproven) == len(bench.link._devices._others) == 16
+
+
+def test_a_kill_need_not_wait_once_an_autopilot_was_heard():
+    bench = Bench().hear(CHUTE, heartbeat())
+    assert not bench.link.has_autopilot(), "a parachute is none"
+    bench.hear(PILOT, copter()).at(60.0)
+    assert bench.link.has_autopilot(), "one that is lost is told all the same"
+
+
+@pytest.mark.parametrize("interval", [0.0, -1.0, math.inf, math.nan])
+def test_a_heartbeat_needs_a_time_between_two(interval):
+    with pytest.raises(ParameterError) as raised:
+        MavlinkConfig(heartbeat_interval=interval)
+    assert str(raised.value) == f"heartbeat_interval is {interval}: need a time above 0 s"
+
+
+def test_without_its_dialect_it_says_what_to_build(monkeypatch):
+    monkeypatch.setitem(sys.modules, "chute_msgs.mavlink", None)
+    spec = importlib.util.spec_from_file_location("not_built", dialect_module.__file__)
+    with pytest.raises(NotBuiltError, match=r"colcon build .* then source install"):
+        spec.loader.exec_module(importlib.util.module_from_spec(spec))
+
+
+def test_other_vehicles_and_ground_stations_do_not_confuse_it():
+    bench = Bench(parachute_system_id=1, autopilot_system_id=1)
+    bench.hear((2, 161), heartbeat(), status(deployed=1)).hear((2, 1), copter(armed=True))
+    bench.hear(GROUND, GCS).hear((1, 154), heartbeat(d.MAV_TYPE_GIMBAL)).hear((0, 1), copter())
+    assert bench.link.chosen_parachute() is None
+    assert bench.link.vehicle_state(bench.now).armed is Armed.UNKNOWN
+    bench.hear(CHUTE, heartbeat(), status()).hear(PILOT, copter())
+    bench.hear((2, 161), heartbeat(), status(deployed=1)).hear((2, 1), copter(armed=True))
+    assert bench.link.chosen_parachute().device == "1/161"
+    assert bench.last_status().state is ParachuteState.READY
+    assert bench.link.vehicle_state(bench.now).source == "1/1"
+    assert bench.link.vehicle_state(bench.now).armed is Armed.DISARMED
+    assert bench.link.doubts(bench.now) == []
+    assert bench.commands() == []
+    assert {m.target_system for m in bench.reads()} == {1}, "our autopilot's settings"
+
+
+def test_our_own_frames_that_come_back_are_counted_and_nothing_else():
+    bench = Bench().hear((1, 191), heartbeat(), copter())
+    assert bench.link.parachutes.all() == []
+    assert bench.link.counts["frames with our own system and component id"] == 2
+
+
+@pytest.mark.parametrize(
+    ("config", "doubts"),
+    [
+        ({}, 1),
+        ({"parachute_system_id": 1}, 1),
+        ({"autopilot_system_id": 2}, 1),
+        ({"parachute_system_id": 1, "autopilot_system_id": 2}, 0),
+    ],
+)
+def test_parachute_and_autopilot_of_different_systems_are_doubtful_unless_named(config, doubts):
+    bench = Bench(**config).hear(CHUTE, heartbeat()).hear((2, 1), copter())
+    assert len(bench.link.doubts(bench.now)) == doubts
+
+
+def test_doubt_names_the_parameter_to_set():
+    bench = Bench().hear(CHUTE, heartbeat()).hear(PILOT, copter())
+    assert bench.link.doubts(bench.now) == []
+    bench.hear((3, 161), heartbeat()).hear((3, 1), copter())
+    assert bench.link.doubts(bench.now) == [
+        "parachutes of systems 1, 3 heard, using 1: set parachute_system_id",
+        "autopilots of systems 1, 3 heard, using 1: set autopilot_system_id",
+    ]
+
+
+def test_vehicle_is_the_chosen_autopilots_alone():
+    bench = Bench(autopilot_component_id=0).hear(PILOT, copter(True)).hear((1, 2), copter(False))
+    assert bench.events[-1].state.source == "1/1"
+    assert bench.events[-1].state.armed is Armed.ARMED
+
+
+def test_link_comes_up_falls_silent_and_comes_back():
+    bench = Bench().hear(CHUTE, heartbeat()).at(6.0).hear(CHUTE, heartbeat())
+    changes = [e for e in bench.events if isinstance(e, DeviceLinkChanged)]
+    assert {e.name for e in changes} == {"parachute 1/161"}
+    states = [e.change.after for e in changes]
+    assert states == [LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.OK]
+    assert changes[-1].change.regained
+
+
+def test_restarts_are_told():
+    bench = Bench().hear(CHUTE, heartbeat(), *[status(boot_ms=t) for t in (9000, 100, 200)])
+    times = [d.MAVLink_system_time_message(0, t) for t in (9000, 100, 200)]
+    bench.hear(PILOT, copter(armed=True), *times)
+    assert bench.notices() == ["parachute 1/161 restarted", "autopilot 1/1 restarted in flight"]
+
+
+def test_both_versions_are_understood_from_a_stream_cut_anywhere():
+    bench = Bench()
+    raw = b"noise" + FrameEncoder(*CHUTE).encode(heartbeat(), 0.0)
+    raw += FrameEncoder(*CHUTE).encode(status(), 0.0)
+    for position in range(len(raw)):
+        bench.link.receive(raw[position : position + 1], START, stream="serial")
+    bench.collect()
+    assert bench.last_status().state is ParachuteState.READY
+    bench.link.receive(raw[5:9], START, stream="serial")
+    bench.link.stream_ended("serial")
+    bench.link.receive(raw[5:], START, stream="serial")
+    bench.link.stream_ended(None)
+    assert bench.link.received_count == 4
+
+
+# -- our heartbeat ----------------------------------------------------------------------------
+
+
+def test_own_heartbeat_only_while_the_owner_is_alive():
+    bench = Bench().at(1.0)
+    assert bench.sent == []
+    bench.link.owner_alive(START + 3.5)
+    bench.at(10.0)
+    assert [t for t, _ in bench.sent] == [pytest.approx(t) for t in (1.0, 2.0, 3.0)]
+    beat = bench.sent[0][1]
+    assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 191)
+    assert beat.type == d.MAV_TYPE_ONBOARD_CONTROLLER
+    assert beat.autopilot == d.MAV_AUTOPILOT_INVALID
+    bench.link.owner_alive(START + 11.5)
+    bench.at(20.0)
+    assert [t for t, _ in bench.sent[3:]] == [pytest.approx(t) for t in (10.0, 11.0)]
+    assert bench.link.sent_count == 5
+
+
+def test_owner_that_died_between_two_heartbeats_leaves_nothing_to_wake_for():
+    bench = Bench()
+    bench.link.owner_alive(START + 1.5)
+    bench.link.update(START)
+    bench.link.update(START + 1.6)  # late: the heartbeat of 1.0 is not due any more
+    assert bench.link.next_deadline() == math.inf
+
+
+# -- flight block -----------------------------------------------------------------------------
+
+
+def grounded(armed=True, **config):
+    return Bench(**config).hear(PILOT, copter(armed), landed())
+
+
+def test_block_undoes_arming_on_the_ground():
+    bench = grounded(armed=False)
+    bench.link.flight_block("parachute lost", bench.now)
+    bench.collect()
+    assert bench.commands() == []
+    bench.at(0.5).hear(PILOT, landed(), copter(armed=True))
+    (order,) = bench.commands(DISARM)
+    assert (order.command, order.param1, order.param2) == (DISARM, 0, 0)
+    assert bench.texts() == [
+        "parachute lost: flight blocked",
+        "parachute lost: flight blocked, disarming",
+    ]
+    assert bench.notices() == [
+        "autopilot armed while flight is blocked (parachute lost): disarming"
+    ]
+    bench.at(0.6).hear(PILOT, ack(DISARM), copter(armed=False)).at(20.0)
+    assert len(bench.commands(DISARM)) == 1
+
+
+def test_block_that_comes_after_arming_undoes_it_at_once():
+    bench = grounded()
+    bench.link.flight_block("x", bench.now)
+    bench.collect()
+    assert len(bench.commands(DISARM)) == 1
+
+
+@pytest.mark.parametrize("where", [0, 2, 3, 4])
+def test_block_never_disarms_off_the_ground_or_where_that_is_not_known(where):
+    bench = Bench().hear(PILOT, copter(armed=True), landed(where))
+    bench.link.flight_block("x", bench.now)
+    bench.stream(10.0, 0.5, PILOT, lambda: copter(armed=True))
+    assert bench.commands(DISARM) == []
+
+
+def test_block_does_not_believe_an_old_word_of_standing_on_the_ground():
+    bench = grounded(armed=False).stream(3.0, 0.5, PILOT, copter)
+    bench.link.flight_block("x", bench.now)
+    bench.stream(6.0, 0.5, PILOT, lambda: copter(armed=True))
+    assert bench.commands(DISARM) == []
+
+
+def test_block_switched_off_by_parameter():
+    bench = grounded(disarm_when_blocked=False)
+    bench.link.flight_block("x", bench.now)
+    bench.at(1.0).hear(PILOT, copter(armed=True))
+    assert bench.commands() == []
+    assert bench.texts() == ["x: flight blocked"]
+
+
+@pytest.mark.parametrize(
+    "end", [pytest.param("release", id="block released"), pytest.param("air", id="took off")]
+)
+def test_disarm_that_lost_its_reason_is_not_sent_again(end):
+    bench = grounded()
+    bench.link.flight_block("x", bench.now)
+    bench.at(0.1).hear(PILOT, ack(DISARM, d.MAV_RESULT_TEMPORARILY_REJECTED))
+    if end == "release":
+        bench.link.flight_block("", bench.now)
+    else:
+        bench.hear(PILOT, landed(2))
+    bench.stream(8.0, 0.1, PILOT, lambda: copter(armed=True))
+    assert len(bench.commands(DISARM)) == 1
+    assert not bench.end(-1).finished.success
+
+
+def test_autopilot_that_refuses_for_ever_makes_no_storm():
+    bench = grounded()
+    bench.link.flight_block("x", bench.now)
+    for tenth in range(1, 101):
+        bench.at(tenth / 10).hear(PILOT, landed(), copter(armed=True))
+        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_DENIED))
+        bench.link.flight_block("x", bench.now)
+    assert 3 <= len(bench.commands(DISARM)) <= 10.0 / DISARM_INTERVAL + 1
+    assert len(bench.notices()) == 1
+    assert len(bench.texts()) == 2
+    # Disarmed and armed once more: that is news.
+    bench.at(10.1).hear(PILOT, copter(armed=False), landed(), copter(armed=True))
+    assert len(bench.notices()) == 2
+
+
+# -- signing ----------------------------------------------------------------------------------
+
+KEY, OTHER = bytes(range(32)), bytes(32)
+
+
+def clock():
+    return SigningClock(1_750_000_000.0 - START)
+
+
+def test_signed_end_to_end():
+    """Two ends with one key understand each other; nobody else has a say."""
+    shared = clock()
+    bench = Bench(Signer(KEY, shared), Verifier(KEY, shared))
+    chute = FrameEncoder(*CHUTE, Signer(KEY, clock()))
+    liar = FrameEncoder(*CHUTE, Signer(OTHER, SigningClock(4_000_000_000.0)))
+    first = chute.encode(heartbeat(), START)
+    bench.link.receive(liar.encode(heartbeat(), START), START)
+    bench.link.receive(FrameEncoder(*CHUTE).encode(heartbeat(), START), START)
+    assert bench.link.chosen_parachute() is None
+    bench.link.receive(first, START)
+    bench.link.receive(first, START)
+    bench.link.receive(chute.encode(status(), START + 0.1), START + 0.1)
+    bench.collect()
+    assert bench.last_status().healthy
+    reasons = (WRONG_SIGNATURE, UNSIGNED, REPLAYED)
+    assert [bench.link.counts[reason] for reason in reasons] == [1, 1, 1]
+    assert len([e for e in bench.events if isinstance(e, ParachuteChanged)]) == 2
+
+    bench.link.deploy(1, False, bench.now)
+    raw, *_ = bench.link.take_output()
+    far = Bench(None, Verifier(KEY, clock()))
+    far.link.receive(raw, START)
+    assert far.link.received_count == 1
+
+
+# -- a status that does not come ------------------------------------------------------------------
+
+
+def asked_for_status(bench):
+    """When a PARACHUTE_STATUS was asked for."""
+    return [
+        t
+        for t, message in bench.sent
+        if message.get_type() == "COMMAND_LONG"
+        and (message.command, message.param1) == (d.MAV_CMD_REQUEST_MESSAGE, 430.0)
+    ]
+
+
+def test_a_module_that_sends_no_status_is_asked_for_it():
+    """Given one without a stream, or whose stream a ground station has switched off."""
+    bench = Bench().hear(CHUTE, heartbeat()).stream(4.0, 0.5, CHUTE, heartbeat)
+    assert asked_for_status(bench) == pytest.approx([1.5, 3.0])
+    request = bench.commands(d.MAV_CMD_REQUEST_MESSAGE)[0]
+    assert (request.target_system, request.target_component) == CHUTE
+    bench.hear(CHUTE, status()).stream(5.0, 0.5, CHUTE, heartbeat)
+    assert len(asked_for_status(bench)) == 2
+    bench.stream(6.0, 0.5, CHUTE, heartbeat)
+    assert asked_for_status(bench)[2:] == pytest.approx([5.5])
+
+
+def test_one_that_streams_is_not_asked():
+    bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=1000))
+    for second in range(1, 10):
+        bench.at(second).hear(CHUTE, heartbeat(), status(boot_ms=1000 + 1000 * second))
+    assert asked_for_status(bench) == []
+
+
+def test_one_that_is_silent_is_not_asked():
+    bench = Bench().hear(CHUTE, heartbeat(), status()).at(1.0).hear(CHUTE, status(boot_ms=6000))
+    bench.at(60.0)
+    assert len(asked_for_status(bench)) <= 1
+
+
+def test_the_first_status_after_a_restart_is_followed_by_a_question():
+    """It may be one from before that was delayed; the next one tells, and may say "deployed"."""
+    bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=500_000))
+    bench.at(0.5).hear(CHUTE, status(boot_ms=100, deployed=2))
+    assert asked_for_status(bench) == [0.5]
+    assert not bench.last_status().deployed
+    bench.at(0.52).hear(CHUTE, status(boot_ms=120, deployed=2))
+    assert bench.last_status().deployed
+
+
+def test_a_flood_of_doubtful_statuses_is_not_answered_one_by_one():
+    bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=500_000))
+    for step in range(1, 100):
+        bench.at(0.5 + step * 0.01).hear(CHUTE, status(boot_ms=1000 - 10 * step))
+    assert len(asked_for_status(bench)) <= 11

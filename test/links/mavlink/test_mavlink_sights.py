@@ -1,0 +1,102 @@
+"""mavlink_parachute on a real network: what it sees of the vehicle, and what it does not."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import pytest
+from chute_msgs.msg import LinkHeartbeat, VehicleState
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from mavlink_bench import Autopilot, Module, Network, airborne
+
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
+from chute_ros.protocol.mavlink.dialect import dialect
+
+
+def told(diagnostics, task):
+    """The newest status of this task, or None."""
+    name = f"mavlink_parachute: {task}"
+    found = [one for array in diagnostics for one in array.status if one.name.endswith(name)]
+    return found[-1] if found else None
+
+
+def value(status, key):
+    return next(pair.value for pair in status.values if pair.key == key)
+
+
+def test_altitude_pressure_and_targets_are_asked_for_and_told(bench):
+    network = Network(bench)
+    states = bench.follow(VehicleState, "vehicle/state")
+    network.plug(airborne(40.0))
+    ages = ("altitude_age", "pressure_age", "attitude_error_age", "acceleration_age")
+    state = bench.until(
+        lambda: states and all(getattr(states[-1], age) >= 0.0 for age in ages) and states[-1],
+        "all of it is told",
+    )
+    assert state.altitude == pytest.approx(528.0, abs=2.0)
+    assert 90_000.0 < state.pressure < 102_000.0
+    assert 0.0 <= state.attitude_error < 0.2
+
+
+def test_diagnostics_tell_rates_and_what_is_not_seen(bench):
+    network = Network(bench, autopilot_message_rate=0.0)
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    network.plug(Autopilot())
+
+    def autopilot():
+        status = told(diagnostics, "autopilot")
+        return status if status and "GLOBAL_POSITION_INT" in value(status, "rates (Hz)") else None
+
+    status = bench.until(autopilot, "the rates are told")
+    assert "no SCALED_PRESSURE: a wrong estimator" in value(status, "not seen")
+    assert "a level sink that nobody commanded" in value(status, "not seen")
+    bench.until(
+        lambda: value(told(diagnostics, "autopilot"), "answers after (s, TIMESYNC)") != "nan",
+        "two answers came",
+    )
+
+
+def test_a_stream_that_is_too_slow_is_named_in_the_state_and_in_diagnostics(bench):
+    network = Network(bench, autopilot_message_rate=0.0)
+    states = bench.follow(VehicleState, "vehicle/state")
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    autopilot = Autopilot()
+    autopilot.default_intervals[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT] = 0.5
+    network.plug(autopilot)
+    state = bench.until(lambda: states and states[-1].faults and states[-1], "it is told")
+    (fault,) = state.faults
+    assert fault.startswith("GLOBAL_POSITION_INT comes at 2.")
+    assert "(need 5 Hz): something else sets its rate, or the line is full: " in fault
+    bench.until(
+        lambda: (status := told(diagnostics, "autopilot")) and status.level == b"\x02",
+        "diagnostics tell it as well",
+    )
+    assert told(diagnostics, "autopilot").level == DiagnosticStatus.ERROR
+
+
+def test_two_autopilots_with_the_same_ids_forbid_take_off(bench):
+    network = Network(bench, expect_parachute=False)
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    states = bench.follow(VehicleState, "vehicle/state")
+    network.plug(Autopilot())
+    bench.until(lambda: beats and beats[-1].device_healthy, "one alone is ours")
+    other = Autopilot()
+    other.update(time.monotonic())  # it has started
+    other.booted_at -= 500.0
+    network.plug(other)
+    bench.until(lambda: beats[-1].reasons, "two are an error")
+    assert not beats[-1].device_healthy
+    (reason,) = beats[-1].reasons
+    assert reason.startswith("two autopilots are 1/1 (their clocks are ")
+    assert states[-1].reboot_count <= 1
+    assert math.isfinite(states[-1].height)
+
+
+def test_a_parachute_that_is_not_ready_has_its_reason_in_the_heartbeat(bench):
+    network = Network(bench)
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    bench.until(lambda: beats, "they come")
+    assert beats[-1].reasons[0].startswith("no parachute was heard: check its power")
+    network.plug(Module(ParachuteSettings(deployment=4)))
+    bench.until(lambda: "1/161 is released" in beats[-1].reasons, "a released one is no parachute")

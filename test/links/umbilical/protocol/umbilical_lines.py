@@ -1,0 +1,165 @@
+"""Lines of the flight computer: some typed by hand, and others made for any layout."""
+
+import struct
+from decimal import Decimal
+from pathlib import Path
+
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Record
+
+FOLDER = Path(__file__).parents[4] / "msg_defs" / "telem"
+
+STATE = "telem57_airbrake_state"
+DEPLOYMENT = "telem57_airbrake_deployment"
+COUNTS = {"telem50": 50, "telem52": 52, "telem54": 54, STATE: 57, DEPLOYMENT: 57}
+
+#: Umbilical Reference, section 3: type and name of fields 1 to 57.
+REFERENCE = """
+u32 flight_mode, f32 pressure, f32 temp, f32 altitude, f32 latitude, f32 longitude,
+u32 num_satellites, f32 timestamp,
+f32 mag_x, f32 mag_y, f32 mag_z, f32 accel_x, f32 accel_y, f32 accel_z,
+f32 gyro_x, f32 gyro_y, f32 gyro_z, f32 pt3, f32 pt4, f32 rtd,
+bool01 sv_open, bool01 mav_open, u8 ssa_drogue_deployed, u8 ssa_main_deployed,
+u8 cmd_n1, u8 cmd_n2, u8 cmd_n3, u8 cmd_n4, u8 cmd_a1, u8 cmd_a2, u8 cmd_a3,
+u8 airbrake_state, f32 predicted_apogee, u32 h_acc, u32 v_acc,
+f64 vel_n, f64 vel_e, f64 vel_d, f64 g_speed, u32 s_acc, u32 head_acc, u8 fix_type, i32 head_mot,
+f32 blims_motor_position, i8 blims_phase_id, f32 blims_pid_p, f32 blims_pid_i, f32 blims_bearing,
+i8 blims_loiter_step, f32 blims_heading_des, f32 blims_heading_error, f32 blims_error_integral,
+f32 blims_dist_to_target_m, f32 blims_target_lat, f32 blims_target_lon,
+f32 blims_wind_from_deg, u32 ms_since_boot_cfc
+"""
+REFERENCE_FIELDS = [tuple(reversed(one.split())) for one in REFERENCE.split(",")]
+
+#: On the pad: Standby, and what a person would expect there.
+PAD = (
+    b"$TELEM,1,101325.5,21.25,12.5,42.441914,-76.4878,11,43200.25,-12.5,30,48.75,0.1,-0.2,9.80665,"
+    b"0.5,-0.25,0.125,512,1023.5,-1,0,0,0,0,0,0,0,0,0,0,0,0,12.75,1500,2500,0.01,-0.02,0.03,"
+    b"0.022360679774997897,120,500000,3,-17950000,0.5,-1,0.25,0.125,270.5,-3,90,-1.5,0.0625,"
+    b"1250.5,42.4419,-76.4879,225,123456\n"
+)
+PAD_VALUES = {
+    "flight_mode": 1,
+    "pressure": 101325.5,
+    "temp": 21.25,
+    "altitude": 12.5,
+    "latitude": 42.441914,
+    "longitude": -76.4878,
+    "num_satellites": 11,
+    "timestamp": 43200.25,
+    "mag_x": -12.5,
+    "mag_y": 30.0,
+    "mag_z": 48.75,
+    "accel_x": 0.1,
+    "accel_y": -0.2,
+    "accel_z": 9.80665,
+    "gyro_x": 0.5,
+    "gyro_y": -0.25,
+    "gyro_z": 0.125,
+    "pt3": 512.0,
+    "pt4": 1023.5,
+    "rtd": -1.0,
+    "sv_open": 0,
+    "mav_open": 0,
+    "ssa_drogue_deployed": 0,
+    "ssa_main_deployed": 0,
+    "cmd_n1": 0,
+    "cmd_n2": 0,
+    "cmd_n3": 0,
+    "cmd_n4": 0,
+    "cmd_a1": 0,
+    "cmd_a2": 0,
+    "cmd_a3": 0,
+    "airbrake_state": 0,
+    "predicted_apogee": 12.75,
+    "h_acc": 1500,
+    "v_acc": 2500,
+    "vel_n": 0.01,
+    "vel_e": -0.02,
+    "vel_d": 0.03,
+    "g_speed": 0.022360679774997897,
+    "s_acc": 120,
+    "head_acc": 500000,
+    "fix_type": 3,
+    "head_mot": -17950000,
+    "blims_motor_position": 0.5,
+    "blims_phase_id": -1,
+    "blims_pid_p": 0.25,
+    "blims_pid_i": 0.125,
+    "blims_bearing": 270.5,
+    "blims_loiter_step": -3,
+    "blims_heading_des": 90.0,
+    "blims_heading_error": -1.5,
+    "blims_error_integral": 0.0625,
+    "blims_dist_to_target_m": 1250.5,
+    "blims_target_lat": 42.4419,
+    "blims_target_lon": -76.4879,
+    "blims_wind_from_deg": 225.0,
+    "ms_since_boot_cfc": 123456,
+}
+
+_ORDINARY = {
+    "bool01": "0",
+    "u8": "1",
+    "u32": "7",
+    "i8": "-3",
+    "i32": "-40000",
+    "f32": "12.5",
+    "f64": "-0.25",
+}
+_ORDINARY_FIELDS = {"airbrake_deployment": "0.5", "airbrake_state": "2"}
+
+
+#: All that are shipped, the reference's first.
+LAYOUTS = load_layouts(str(FOLDER), "test")
+BY_NAME = {layout.name: layout for layout in LAYOUTS}
+LAYOUT = BY_NAME[STATE]
+
+
+def body(layout=LAYOUT, **texts):
+    """What stands behind "$TELEM,"; texts: fields that differ from the ordinary ones."""
+    strange = set(texts) - set(layout.index)
+    assert not strange, f"{layout.name} has no {strange}"
+    ordinary = {one.name: _ORDINARY[one.kind.name] for one in layout.fields}
+    ordinary.update({k: v for k, v in _ORDINARY_FIELDS.items() if k in ordinary})
+    return ",".join({**ordinary, **texts}.values())
+
+
+def line(layout=LAYOUT, **texts):
+    """A whole line as it comes."""
+    return f"$TELEM,{body(layout, **texts)}\n".encode()
+
+
+def record(at, **texts):
+    """A record of the reference's layout, received at this time."""
+    values = LAYOUT.decode(body(**texts))
+    assert isinstance(values, tuple), values
+    return Record(LAYOUT, values, at)
+
+
+def as_rust_prints(value, kind):
+    """Shortest text that reads back as the same f32 or f64, without an exponent; or a whole one.
+
+    kind: the name of the type.
+    """
+    if kind not in ("f32", "f64"):
+        return str(value)
+    if value != value:
+        return "NaN"
+    if value in (float("inf"), float("-inf")):
+        return str(value)
+    code = "f" if kind == "f32" else "d"
+    packed = struct.pack(code, value)
+    for digits in range(1, 18):
+        text = f"{value:.{digits}g}"
+        try:
+            if struct.pack(code, float(text)) == packed:
+                break
+        except OverflowError:
+            continue  # rounded up to more than an f32 holds
+    plain = f"{Decimal(text):f}"
+    return plain.rstrip("0").rstrip(".") if "." in plain else plain
+
+
+def as_f32(value):
+    """The 32-bit float next to a value."""
+    return struct.unpack("f", struct.pack("f", value))[0]

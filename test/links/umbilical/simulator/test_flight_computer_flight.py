@@ -1,0 +1,234 @@
+"""The flight program of the simulated flight computer: key, launch, canopies, overrides."""
+
+import pytest
+from test_flight_computer import Host, standing_by
+
+from chute_ros.links.umbilical.simulator.settings import Mode
+
+
+def in_mode(name, **settings):
+    host = Host(**settings)
+    host.act(f"jump={name}")
+    host.run(0.2)
+    return host
+
+
+def flags(host):
+    return host.newest["ssa_drogue_deployed"], host.newest["ssa_main_deployed"]
+
+
+# The key
+
+
+def test_key_arm_leads_to_standby_and_key_disarm_back():
+    host = Host()
+    host.send("<KA>")
+    assert host.newest["flight_mode"] == Mode.Standby
+    host.send("<KD>")
+    assert host.newest["flight_mode"] == Mode.Startup
+    assert "Startup -> Standby" in host.log
+    assert "Standby -> Startup" in host.log
+
+
+def test_key_disarm_in_flight_changes_nothing():
+    host = in_mode("Coast")
+    host.send("<KD>")
+    assert host.newest["flight_mode"] == Mode.Coast
+
+
+def test_with_the_interlock_arming_needs_a_wiped_flash():
+    host = Host(interlock=True, wipe_time=1.0)
+    host.send("<KA>")
+    assert host.others == ["Arming blocked: wipe flash first"]
+    assert host.newest["flight_mode"] == Mode.Startup
+    host.send("<W>", 1.5)
+    host.send("<KA>")
+    assert host.newest["flight_mode"] == Mode.Standby
+
+
+def used_up(host):
+    host.send("<KA>")
+    host.send("<KD>")
+
+
+def rebooted(host):
+    host.send("<R>", 1.0)
+
+
+@pytest.mark.parametrize("end", [used_up, rebooted])
+def test_the_permission_to_arm_ends(end):
+    host = Host(interlock=True, wipe_time=1.0)
+    host.send("<W>", 1.5)
+    end(host)
+    host.forget()
+    host.send("<KA>")
+    assert host.others == ["Arming blocked: wipe flash first"]
+    assert host.newest["flight_mode"] == Mode.Startup
+
+
+def test_a_failed_wipe_is_no_permission():
+    host = Host(interlock=True, wipe_time=1.0)
+    host.act("wipe-fails")
+    host.send("<W>", 1.5)
+    host.send("<KA>")
+    assert host.newest["flight_mode"] == Mode.Startup
+
+
+# The flight
+
+
+def test_a_whole_flight():
+    host = standing_by(speed=20.0)
+    host.send("<L>", 0.16)
+    assert host.newest["flight_mode"] == Mode.Ascent
+    assert host.newest["mav_open"] == 1
+    host.until(lambda: host.newest["flight_mode"] == Mode.Coast)
+    assert host.newest["mav_open"] == 0
+    assert flags(host) == (0, 0)
+    host.until(lambda: host.newest["flight_mode"] == Mode.DrogueDeployed)
+    assert flags(host) == (1, 0)
+    assert host.newest["altitude"] == pytest.approx(3000.0, abs=80.0)
+    host.until(lambda: host.newest["flight_mode"] == Mode.MainDeployed)
+    assert flags(host) == (1, 1)
+    assert host.newest["altitude"] == pytest.approx(590.0, abs=80.0)
+    host.until(lambda: host.newest["altitude"] == 0.0)
+    host.run(5.0)
+    assert host.newest["flight_mode"] == Mode.MainDeployed
+    assert host.newest["altitude"] == 0.0
+    modes = [line for line in host.log if " -> " in line]
+    assert modes[-1] == "DrogueDeployed -> MainDeployed"
+    assert len(modes) == 5
+
+
+def test_in_real_time_the_flight_takes_as_long_as_it_does():
+    host = standing_by()
+    host.send("<L>", 0.0)
+    assert host.until(lambda: host.device.mode is Mode.Coast) == pytest.approx(6.1, abs=0.2)
+
+
+@pytest.mark.parametrize("name", ["Startup", "Ascent", "Coast", "MainDeployed", "Fault"])
+def test_launch_is_for_standby_only(name):
+    host = in_mode(name)
+    host.send("<L>", 0.1)
+    assert host.newest["flight_mode"] == Mode[name]
+    assert host.newest["mav_open"] == (name == "Ascent")
+
+
+def test_the_main_waits_until_the_drogue_has_been_out_for_3_s():
+    host = in_mode("Coast", drogue_fails=True)
+    host.until(lambda: 0.0 < host.newest["altitude"] < 560.0)
+    host.send("<D>", 0.2)
+    assert host.newest["flight_mode"] == Mode.DrogueDeployed
+    waited = host.until(lambda: host.newest["flight_mode"] == Mode.MainDeployed)
+    assert waited + 0.2 == pytest.approx(3.0, abs=0.2)
+
+
+# What fails, and the manual override
+
+
+def test_a_drogue_that_fails_by_itself_comes_by_command():
+    host = in_mode("Coast", drogue_fails=True, speed=5.0)
+    host.until(lambda: host.newest["vel_d"] > 30.0)
+    assert host.newest["flight_mode"] == Mode.Coast
+    assert flags(host) == (0, 0)
+    host.send("<D>", 2.0)
+    assert host.newest["flight_mode"] == Mode.DrogueDeployed
+    assert flags(host) == (1, 0)
+    assert host.newest["vel_d"] < 30.0
+
+
+def test_drogue_and_main_come_by_command_in_turn():
+    host = in_mode("Coast")
+    host.send("<D>")
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.DrogueDeployed, 1, 0)
+    host.send("<d>")
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.MainDeployed, 1, 1)
+    host.run(10.0)
+    assert host.newest["vel_d"] < 8.0
+
+
+def test_the_main_by_command_in_coast_does_not_change_the_mode():
+    host = in_mode("Coast")
+    host.send("<d>")
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.Coast, 0, 1)
+
+
+@pytest.mark.parametrize("name", ["Startup", "Standby", "Fault"])
+def test_on_the_ground_the_flags_are_set_and_nothing_else(name):
+    host = in_mode(name)
+    host.send("<D>")
+    host.send("<d>")
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode[name], 1, 1)
+
+
+def test_stuck_it_takes_commands_but_nothing_comes_out():
+    host = in_mode("Coast", speed=5.0)
+    host.act("stuck")
+    host.until(lambda: host.newest["vel_d"] > 30.0)
+    host.send("<D>")
+    host.send("<d>")
+    assert [token for _, token in host.device.came] == ["<D>", "<d>"]
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.Coast, 0, 0)
+    host.until(lambda: host.newest["altitude"] == 0.0)
+    assert flags(host) == (0, 0)
+
+
+def test_in_fault_nothing_is_automatic_but_the_override_works():
+    host = in_mode("Coast", speed=5.0)
+    host.act("fault")
+    host.until(lambda: host.newest["vel_d"] > 30.0)
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.Fault, 0, 0)
+    host.send("<D>", 2.0)
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.Fault, 1, 0)
+    assert host.newest["vel_d"] < 30.0
+
+
+def test_after_a_reboot_in_the_air_a_canopy_that_is_out_stays_out():
+    host = in_mode("MainDeployed")
+    host.send("<R>", 1.0)
+    assert (host.newest["flight_mode"], *flags(host)) == (Mode.Startup, 0, 0)
+    assert 6.0 < host.newest["vel_d"] < 7.0
+
+
+# Jumps
+
+
+@pytest.mark.parametrize(
+    ("name", "lowest", "highest", "falls"),
+    [
+        ("Ascent", 250.0, 400.0, False),
+        ("Coast", 1990.0, 2020.0, False),
+        ("DrogueDeployed", 2450.0, 2510.0, True),
+        ("MainDeployed", 390.0, 401.0, True),
+    ],
+)
+def test_a_jump_puts_it_where_it_plausibly_is(name, lowest, highest, falls):
+    host = in_mode(name)
+    assert host.newest["flight_mode"] == Mode[name]
+    assert lowest < host.newest["altitude"] < highest
+    assert (host.newest["vel_d"] > 0.0) is falls
+    assert flags(host) == (falls, name == "MainDeployed")
+
+
+def test_from_a_jump_to_ascent_the_flight_goes_on():
+    host = in_mode("Ascent", speed=20.0)
+    host.until(lambda: host.newest["flight_mode"] == Mode.DrogueDeployed)
+    assert host.newest["altitude"] == pytest.approx(3000.0, abs=100.0)
+
+
+def test_it_can_be_put_on_the_ground():
+    host = in_mode("MainDeployed")
+    host.act("land")
+    host.run(1.0)
+    assert host.newest["altitude"] == 0.0
+    assert host.newest["vel_d"] == 0.0
+    assert host.newest["flight_mode"] == Mode.MainDeployed
+
+
+def test_a_jump_to_the_pad_makes_it_ready_again():
+    host = in_mode("MainDeployed", speed=20.0)
+    host.act("jump=Standby")
+    host.run(0.2)
+    assert (host.newest["altitude"], *flags(host)) == (0.0, 0, 0)
+    host.send("<L>")
+    host.until(lambda: host.newest["flight_mode"] == Mode.DrogueDeployed)

@@ -1,0 +1,285 @@
+"""The node umbilical: what it publishes of a flight computer at the other end of a real pty."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from chute_msgs.msg import LinkHeartbeat, Telem, VehicleState
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.logging import LoggingSeverity
+from umbilical_bench import RATE, Cable
+
+from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.links.umbilical.protocol.layouts import Record
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
+from chute_ros.links.umbilical.telem_message import RENAMED, telem, without_place
+from chute_ros.model import LandedState, LinkState, ParachuteState
+
+LAYOUTS = {
+    "telem57_airbrake_state",
+    "telem57_airbrake_deployment",
+    "telem54",
+    "telem52",
+    "telem50",
+}
+ERROR, WARN, OK = DiagnosticStatus.ERROR, DiagnosticStatus.WARN, DiagnosticStatus.OK
+
+
+@pytest.fixture(scope="module")
+def layouts(ros):
+    found = {one.name: one for one in load_layouts("", "test")}
+    assert set(found) == LAYOUTS
+    return found
+
+
+def each_field():
+    """(layout, field) of all layouts, by the files that were built."""
+    return [(one, field.name) for one in load_layouts("", "test") for field in one.fields]
+
+
+# -- umbilical/telem ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("layout", "field"), each_field(), ids=lambda one: getattr(one, "name", one)
+)
+def test_each_field_of_each_layout_is_told_under_one_name(layout, field):
+    values = [1 for _ in layout.fields]
+    values[layout.index[field]] = 0
+    message = telem(Record(layout, tuple(values), 5.0), 7, Telem().header.stamp)
+    assert getattr(message, RENAMED.get(field, field)) == 0
+    others = [RENAMED.get(name, name) for name in layout.index if name != field]
+    assert all(getattr(message, name) in (1, 0.001) for name in others)
+    assert (message.layout, message.sequence) == (layout.name, 7)
+
+
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
+def test_what_a_layout_lacks_reads_as_not_there(layouts, name):
+    layout = layouts[name]
+    message = telem(Record(layout, (1,) * layout.count, 5.0), 1, Telem().header.stamp)
+    told = {RENAMED.get(one, one) for one in layout.index} | {"header", "layout", "sequence"}
+    lacking = set(Telem.get_fields_and_field_types()) - told
+    assert lacking, "no layout has every field"
+    for one in lacking:
+        value = getattr(message, one)
+        whole = -32768 if one in ("blims_phase_id", "blims_loiter_step") else -1
+        assert math.isnan(value) if isinstance(value, float) else value == whole, one
+
+
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
+def test_telem_has_a_place_for_every_field(layouts, name):
+    assert without_place(layouts[name]) == []
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "told"),
+    [
+        ("flight_mode", 2**32 - 1, 255),
+        ("flight_mode", -1, 255),
+        ("num_satellites", 2**32 - 1, 32767),
+        ("cmd_n1", 70_000, 32767),
+        ("sv_open", -200, -128),
+    ],
+)
+def test_a_number_that_is_too_large_for_its_place_reads_as_the_largest(
+    layouts, field, value, told
+):
+    layout = layouts["telem57_airbrake_state"]
+    values = [0] * layout.count
+    values[layout.index[field]] = value
+    message = telem(Record(layout, tuple(values), 0.0), 1, Telem().header.stamp)
+    assert getattr(message, field) == told
+
+
+@pytest.mark.parametrize("name", sorted(LAYOUTS))
+def test_each_layout_is_recognised_and_published(bench, name):
+    cable = Cable(bench, sends=name)
+    # With 0 it may as well be the reference's airbrake_state.
+    cable.computer.overrides["airbrake_deployment"] = 0.5
+    cable.plugged()
+    one = cable.await_telemetry(lambda t: True, "telemetry is published")
+    assert one.layout == name
+    assert one.flight_mode == Telem.STARTUP
+    assert 100_000 < one.pressure < 102_000
+    sequences = [t.sequence for t in cable.telemetry]
+    assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
+    bench.until(lambda: len(cable.telemetry) > 5, "it goes on")
+    uptimes = [t.device_uptime for t in cable.telemetry]
+    assert uptimes == sorted(uptimes), "the device's own clock, in s"
+    assert uptimes[-1] - uptimes[0] == pytest.approx((len(uptimes) - 1) / RATE, abs=1.0)
+
+
+def test_with_a_layout_that_was_set_no_other_is_taken(bench):
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    cable = Cable(bench, sends="telem54", layout="telem57_airbrake_state")
+    cable.plug()
+    bench.until(
+        lambda: int(values(newest(diagnostics, "link")).get("dropped: 54 fields", 0)) > 2,
+        "lines of 54 fields are counted",
+    )
+    assert cable.telemetry == []
+    cable.await_link(LinkState.NEVER_SEEN)
+
+
+# -- parachute/status, vehicle/state, safety/heartbeat --------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mode", "state", "armed", "deployed"),
+    [
+        ("Startup", ParachuteState.READY, False, False),
+        ("Standby", ParachuteState.ARMED, True, False),
+        ("Ascent", ParachuteState.ARMED, True, False),
+        ("Coast", ParachuteState.ARMED, True, False),
+        ("DrogueDeployed", ParachuteState.LAUNCHED, True, True),
+        ("MainDeployed", ParachuteState.LAUNCHED, True, True),
+        ("Fault", ParachuteState.ABNORMAL, False, False),
+    ],
+)
+def test_each_flight_mode_as_a_parachutes_state(bench, mode, state, armed, deployed):
+    cable = Cable(bench)
+    cable.plugged()
+    cable.act(f"jump={mode}")
+    bench.until(lambda: cable.statuses[-1].state == state, f"{mode} is told")
+    one = cable.statuses[-1]
+    assert (one.armed, one.deployed) == (armed, deployed)
+    assert (one.link, one.device) == ("umbilical", "flight_computer")
+    assert ("flight mode Fault" in one.faults) == (mode == "Fault")
+
+
+def test_the_vehicles_state_is_told_when_asked_to(bench):
+    cable = Cable(bench, publish_vehicle_state=True)
+    states = bench.follow(VehicleState, "vehicle/state")
+    cable.plugged()
+    bench.until(lambda: states, "it is told")
+    assert states[-1].landed_state == LandedState.ON_GROUND
+    assert states[-1].armed == VehicleState.DISARMED
+    cable.act("jump=Standby")
+    bench.until(lambda: states[-1].armed == VehicleState.ARMED, "the key is armed")
+    cable.act("jump=Coast")
+    bench.until(lambda: states[-1].landed_state == LandedState.IN_AIR, "it flies")
+    one = states[-1]
+    assert one.source == "flight_computer"
+    assert 1900.0 < one.height < 2200.0
+    assert 0.0 < one.vertical_speed < 60.0, "up is positive"
+    assert one.latitude == pytest.approx(42.44, abs=0.1)
+    assert math.isnan(one.tilt), "a flight computer tells no attitude"
+
+
+def test_without_being_asked_it_tells_no_vehicle_state(bench):
+    cable = Cable(bench)
+    cable.plugged()
+    topics = {
+        topic
+        for topic, _ in cable.node.get_publisher_names_and_types_by_node(
+            "umbilical", bench.namespace
+        )
+    }
+    assert f"{bench.namespace}/umbilical/telem" in topics
+    assert f"{bench.namespace}/vehicle/state" not in topics
+
+
+def test_the_flight_computer_hears_our_heartbeat_and_misses_it_when_we_are_gone(bench):
+    cable = Cable(bench, FlightComputerSettings(rate=RATE, heartbeat_timeout=1.0))
+    cable.plugged()
+    bench.until(lambda: len(cable.computer.heartbeats) >= 5, "heartbeats come")
+    assert cable.computer.connected
+    assert cable.computer.receiver.lost == {}, "never glued to anything"
+    bench.remove(cable.node)
+    bench.until(lambda: not cable.computer.connected, "without us it is not connected")
+
+
+def test_a_hung_executor_is_a_silent_heartbeat(bench):
+    cable = Cable(bench, FlightComputerSettings(rate=RATE, heartbeat_timeout=1.0))
+    cable.plugged()
+    bench.until(lambda: cable.computer.connected, "it is connected")
+    # Not spun any more, the node's executor is as good as hung.
+    bench.executor.remove_node(cable.node)
+    before = len(cable.computer.heartbeats)
+    bench.until(lambda: not cable.computer.connected, "the flight computer misses us")
+    # Four a second: the link's own thread sends on for a second, and for no more.
+    assert len(cable.computer.heartbeats) - before <= 8
+    bench.executor.add_node(cable.node)
+    bench.until(lambda: cable.computer.connected, "it hears us again")
+
+
+# -- logs and diagnostics -------------------------------------------------------------------------
+
+
+def newest(diagnostics, task):
+    found = [s for a in diagnostics for s in a.status if s.name.endswith(f"umbilical: {task}")]
+    return found[-1] if found else DiagnosticStatus()
+
+
+def values(status):
+    return {one.key: one.value for one in status.values}
+
+
+def test_its_log_lines_go_to_the_log_at_their_level(bench):
+    logs = bench.follow_log()
+    cable = Cable(bench, FlightComputerSettings(rate=RATE, debug=True))
+    cable.plugged()
+    assert cable.arm().success
+
+    def told():
+        return {(m.level, m.msg) for m in logs if m.name.endswith("umbilical.flight_computer")}
+
+    bench.until(lambda: any("UMBILICAL CMD" in text for _, text in told()), "it is logged")
+    level = next(level for level, text in told() if "UMBILICAL CMD" in text)
+    assert level == LoggingSeverity.WARN
+
+
+def test_diagnostics_tell_the_truth_through_a_day_with_a_cable(bench):
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    cable = Cable(bench)
+    bench.until(lambda: newest(diagnostics, "link").level == ERROR, "no port")
+    assert "no such port" in newest(diagnostics, "link").message
+    bench.until(lambda: newest(diagnostics, "parachute").message == "never heard", "never heard")
+    bench.until(
+        lambda: "the port is closed" in newest(diagnostics, "umbilical heartbeat").message,
+        "no heartbeat without a port",
+    )
+    cable.plugged()
+    bench.until(lambda: newest(diagnostics, "parachute").level == OK, "all is well")
+    bench.until(lambda: newest(diagnostics, "link").level == OK, "the port is open")
+    link = values(newest(diagnostics, "link"))
+    assert link["layout"] == "telem57_airbrake_state"
+    bench.until(
+        lambda: (
+            float(values(newest(diagnostics, "link"))["records per s"])
+            == pytest.approx(RATE, rel=0.5)
+        ),
+        "the rate is told",
+    )
+    bench.until(lambda: newest(diagnostics, "umbilical heartbeat").level == OK, "it beats")
+    assert newest(diagnostics, "memory").message == "no dump or wipe under way"
+    cable.act("fault")
+    bench.until(
+        lambda: newest(diagnostics, "parachute").message == "flight mode Fault", "it is told"
+    )
+    assert newest(diagnostics, "parachute").level == ERROR
+    cable.pull()
+    bench.until(lambda: newest(diagnostics, "link").level == ERROR, "the cable is out")
+    bench.until(
+        lambda: "telemetry LOST" in newest(diagnostics, "parachute").message, "and it is lost"
+    )
+    assert int(values(newest(diagnostics, "parachute"))["times lost"]) == 1
+
+
+def test_a_link_heartbeat_of_a_restarted_flight_computer_stays_and_it_is_told(bench):
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    cable = Cable(bench, telemetry_stale_after=3.0, telemetry_lost_after=6.0)
+    cable.plugged()
+    bench.until(lambda: cable.telemetry[-1].device_uptime > 1.5, "it has run for a while")
+    cable.act("jump=Coast")
+    cable.await_mode(Telem.COAST)
+    cable.act("reboot")
+    bench.until(
+        lambda: "it restarted in flight" in cable.statuses[-1].faults, "the restart is told"
+    )
+    assert beats[-1].link_state == LinkState.OK
+    bench.until(
+        lambda: values(newest(diagnostics, "parachute")).get("restarts") == "1", "and counted"
+    )

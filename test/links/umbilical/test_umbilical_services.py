@@ -1,0 +1,408 @@
+"""The services of umbilical, end to end: commands by name, the target, dumps, the supervisor."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from chute_msgs.msg import ActionReport, SafetyDecision, Telem
+from chute_msgs.srv import Dump, SetTarget
+from node_bench import stamped
+from umbilical_bench import PATIENT, RATE, Cable
+
+from chute_ros.links.umbilical.dump_files import PART
+from chute_ros.links.umbilical.protocol import events
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
+from chute_ros.model import Action, Outcome
+from chute_ros.nodes import qos
+
+#: Name -> (token, what telemetry then says; None: it cannot show it).
+SIMPLE = {
+    "safe": ("<V>", {"mav_open": 0, "sv_open": 0}),
+    "key_arm": ("<KA>", {"flight_mode": Telem.STANDBY}),
+    "key_disarm": ("<KD>", {"flight_mode": Telem.STARTUP}),
+    "open_mav": ("<M>", {"mav_open": 1}),
+    "close_mav": ("<m>", {"mav_open": 0}),
+    "open_sv": ("<S>", {"sv_open": 1}),
+    "close_sv": ("<s>", {"sv_open": 0}),
+    "payload_n1": ("<1>", {"cmd_n1": 1}),
+    "payload_n2": ("<2>", {"cmd_n2": 1}),
+    "payload_n3": ("<3>", {"cmd_n3": 1}),
+    "payload_n4": ("<4>", {"cmd_n4": 1}),
+    "payload_a1": ("<A1>", {"cmd_a1": 1}),
+    "payload_a2": ("<A2>", {"cmd_a2": 1}),
+    "payload_a3": ("<A3>", {"cmd_a3": 1}),
+    "reset_fram": ("<F>", None),
+}
+
+
+@pytest.fixture
+def cable(bench):
+    one = Cable(bench, **PATIENT)
+    one.plugged()
+    return one
+
+
+# -- commands -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", SIMPLE)
+def test_each_command_by_its_name_with_the_effect_that_telemetry_shows(cable, name):
+    token, shown = SIMPLE[name]
+    answer = cable.command(name)
+    assert answer.success, answer.message
+    assert answer.sent
+    assert answer.confirmed == (shown is not None)
+    cable.bench.until(lambda: cable.tokens() == [token], "it came, alone")
+    for field, value in (shown or {}).items():
+        cable.await_telemetry(lambda t, f=field, v=value: getattr(t, f) == v, f"{field} {value}")
+    if shown is None:
+        assert "telemetry cannot show its effect" in answer.message
+    assert cable.computer.receiver.lost == {}
+
+
+def test_heartbeat_by_its_name_is_one_more(cable):
+    answer = cable.command("heartbeat")
+    assert (answer.success, answer.sent, answer.confirmed) == (True, True, False)
+
+
+def test_launch_needs_the_key_standby_and_a_confirmation(cable):
+    answer = cable.command("launch", force=True)
+    assert (answer.success, answer.sent) == (False, False)
+    assert "launch needs the key armed and Standby (flight mode Startup)" in answer.message
+    assert cable.arm().success
+    answer = cable.command("launch")
+    assert not answer.sent
+    assert "needs an explicit confirmation: set force" in answer.message
+    answer = cable.command("launch", force=True)
+    assert (answer.success, answer.sent, answer.confirmed) == (True, True, True)
+    assert cable.tokens().count("<L>") == 1
+    assert "flight mode Ascent" in answer.message
+
+
+@pytest.mark.parametrize(("name", "token"), [("drogue", "<D>"), ("main", "<d>")])
+def test_drogue_and_main_are_refused_on_the_ground_unless_forced(cable, name, token):
+    answer = cable.command(name)
+    assert (answer.success, answer.sent) == (False, False)
+    assert f"the {name} is not fired on the ground" in answer.message
+    assert "force sends it all the same; nothing was sent" in answer.message
+    assert cable.command(name, force=True).confirmed
+    assert cable.tokens() == [token]
+
+
+@pytest.mark.parametrize(
+    "name", ["reboot", "reset_fram", "wipe_flash", "wipe_fram_and_reboot", "dump_flash"]
+)
+def test_what_takes_the_flight_computer_away_is_refused_in_flight(cable, name):
+    cable.act("jump=Coast")
+    cable.await_mode(Telem.COAST)
+    answer = cable.command(name)
+    assert (answer.success, answer.sent) == (False, False)
+    assert "(flight mode Coast); force sends it all the same" in answer.message
+    assert cable.tokens() == []
+
+
+def test_reboot_is_confirmed_by_the_clock_that_starts_anew(cable):
+    cable.await_telemetry(lambda t: t.device_uptime > 1.5, "it has run for a while")
+    answer = cable.command("reboot")
+    assert (answer.success, answer.confirmed) == (True, True), answer.message
+    assert "its clock starts anew" in answer.message
+
+
+def test_flash_info_is_confirmed_by_its_answer(cable):
+    answer = cable.command("flash_info")
+    assert (answer.success, answer.confirmed) == (True, True), answer.message
+
+
+def test_a_wipe_lasts_and_its_progress_is_told(bench):
+    settings = FlightComputerSettings(rate=RATE, wipe_time=1.0, wipe_sectors=8, interlock=True)
+    cable = Cable(bench, settings, **PATIENT)
+    cable.plugged()
+    answer = cable.arm()
+    assert not answer.success
+    assert "Arming blocked: wipe flash first" in answer.message
+    answer = cable.command("wipe_flash")
+    assert (answer.success, answer.confirmed) == (True, True), answer.message
+    assert "Flash wiped successfully." in answer.message
+    assert cable.arm().success
+
+
+def test_a_wipe_that_fails_says_so(cable):
+    cable.act("wipe-fails")
+    answer = cable.command("wipe_flash")
+    assert (answer.success, answer.sent, answer.confirmed) == (False, True, False)
+    assert "ERASE FAILED!" in answer.message
+
+
+def test_wipe_fram_and_reboot_ends_with_the_restart(cable):
+    cable.await_telemetry(lambda t: t.device_uptime > 1.5, "it has run for a while")
+    answer = cable.command("wipe_fram_and_reboot")
+    assert (answer.success, answer.confirmed) == (True, True), answer.message
+
+
+def test_a_command_that_does_not_exist_is_told_with_those_that_do(cable):
+    answer = cable.command("explode")
+    assert not answer.sent
+    assert "there is no command 'explode': need one of heartbeat, launch, safe" in answer.message
+
+
+def test_a_command_whose_effect_does_not_show_is_sent_but_not_confirmed(bench):
+    cable = Cable(bench)
+    cable.plugged()
+    cable.act("mute")
+    answer = cable.command("open_mav")
+    assert (answer.success, answer.sent, answer.confirmed) == (False, True, False)
+    assert "never showed that telemetry says mav_open 1" in answer.message
+    answer = cable.command("payload_n1")
+    assert "sent once, but" in answer.message, "an event is never repeated"
+
+
+# -- target ---------------------------------------------------------------------------------------
+
+
+def test_set_target_with_two_floats(cable):
+    answer = cable.set_target(42.4419130, -76.4878000)
+    assert (answer.success, answer.sent, answer.confirmed) == (True, True, True), answer.message
+    assert cable.tokens() == ["<T,42.4419130,-76.4878000>"]
+    one = cable.await_telemetry(lambda t: t.blims_target_lat_deg > 40.0, "it is told")
+    assert one.blims_target_lon_deg == pytest.approx(-76.4878, abs=1e-5)
+
+
+def test_set_target_without_a_word_of_the_other_two(cable):
+    answer = cable.bench.call(SetTarget, "umbilical/set_target", latitude=42.5, longitude=-76.5)
+    assert answer.confirmed, answer.message
+
+
+def test_a_firmware_of_four_floats_takes_no_two(bench):
+    cable = Cable(bench, sends="telem54", **PATIENT)
+    cable.plugged()
+    answer = cable.set_target(42.5, -76.5)
+    assert not answer.sent
+    assert "takes 4 floats (two points), not 2" in answer.message
+
+
+def test_set_target_with_four_floats(bench):
+    cable = Cable(bench, sends="telem54", **PATIENT)
+    cable.plugged()
+    answer = cable.set_target(42.5, -76.5, 42.25, -76.25)
+    assert answer.confirmed, answer.message
+    one = cable.await_telemetry(lambda t: t.blims_upwind_lat_deg == 42.5, "it is told")
+    assert one.blims_downwind_lon_deg == -76.25
+
+
+@pytest.mark.parametrize(
+    ("target", "why"),
+    [
+        ((90.1, 0.0), "latitude 90.1 is out of range: need -90 to 90"),
+        ((0.0, -180.1), "longitude -180.1 is out of range: need -180 to 180"),
+        ((float("nan"), 1.0), "latitude nan is out of range"),
+        ((1.0, float("inf")), "longitude inf is out of range"),
+        ((1.0, 2.0, 3.0, 4.0), "takes 2 floats (latitude and longitude), not 4"),
+        ((1.0, 2.0, 3.0), "takes 2 floats (latitude and longitude), not 4"),
+    ],
+)
+def test_a_target_that_cannot_be_is_refused(cable, target, why):
+    answer = cable.set_target(*target)
+    assert (answer.success, answer.sent, answer.confirmed) == (False, False, False)
+    assert why in answer.message
+    assert cable.tokens() == []
+
+
+# -- dumps ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("binary", [False, True], ids=["CSV", "binary"])
+def test_a_flash_dump_becomes_a_file_of_exactly_its_bytes(bench, binary):
+    settings = FlightComputerSettings(rate=RATE, binary_dump=binary, dump_size=20_000)
+    cable = Cable(bench, settings, **PATIENT)
+    cable.plugged()
+    answer = cable.dump("flash")
+    assert answer.success, answer.message
+    written = Path(answer.path_written)
+    assert written.parent == bench.folder / "dumps"
+    assert written.suffix == (".binary" if binary else ".csv")
+    data = written.read_bytes()
+    assert len(data) == answer.size > 20_000 - 1
+    assert cable.call(lambda computer: computer.memory.content()) == data
+    beats = [b.link_state for b in cable.heartbeats[-3:]]
+    assert set(beats) == {1}, "the pause is not taken for a lost link"
+
+
+def test_a_dump_goes_where_it_is_told_to(cable):
+    path = cable.bench.folder / "flight 7.csv"
+    answer = cable.dump("flash", str(path))
+    assert (answer.success, answer.path_written) == (True, str(path)), answer.message
+    assert path.stat().st_size == answer.size > 0
+    answer = cable.dump("flash", "flight 8.csv")
+    assert answer.path_written == str(cable.bench.folder / "dumps" / "flight 8.csv"), "relative"
+    again = cable.dump("flash", str(path))
+    assert not again.success
+    assert "exists already: name another path" in again.message
+    assert cable.tokens().count("<G>") == 2
+
+
+@pytest.mark.parametrize(
+    ("memory", "path", "why"),
+    [
+        ("disk", "", "memory 'disk': need one of flash, fram"),
+        ("flash", "/nowhere/at/all.csv", "there is no folder /nowhere/at"),
+    ],
+)
+def test_a_dump_that_cannot_be_is_refused(cable, memory, path, why):
+    answer = cable.dump(memory, path)
+    assert (answer.success, answer.path_written, answer.size) == (False, "", 0)
+    assert why in answer.message
+    assert cable.tokens() == []
+
+
+def test_a_fram_dump_is_the_lines_that_came(cable):
+    cable.arm()
+    cable.await_telemetry(lambda t: t.device_uptime > 2.0, "it has stored a snapshot")
+    answer = cable.dump("fram")
+    assert answer.success, answer.message
+    assert Path(answer.path_written).read_text().startswith("SNAP seq=")
+
+
+def test_a_dump_without_its_end_mark_keeps_its_part(cable):
+    cable.act("lose-dump-end")
+    answer = cable.dump("flash")
+    assert not answer.success
+    assert "its end mark did not come before telemetry went on" in answer.message
+    assert answer.path_written.endswith(f".csv{PART}")
+    assert Path(answer.path_written).stat().st_size == answer.size > 0
+
+
+def test_a_dump_that_stalls_is_given_up(bench):
+    cable = Cable(bench, dump_silence=0.5, **PATIENT)
+    cable.plugged()
+    cable.act("dump-stalls")
+    answer = cable.dump("flash")
+    assert not answer.success
+    assert "silent for 0.5 s, its end mark did not come" in answer.message
+    assert answer.path_written.endswith(PART)
+
+
+def test_a_node_that_ends_in_a_dump_keeps_what_has_come(bench):
+    settings = FlightComputerSettings(rate=RATE, dump_size=200_000, dump_rate=200.0)
+    cable = Cable(bench, settings, **PATIENT)
+    cable.plugged()
+    bench.ask(Dump, "umbilical/dump", memory="flash")
+    (part,) = bench.until(lambda: list((bench.folder / "dumps").glob(f"*{PART}")), "it has begun")
+    # More may come behind it until the link's thread has ended.
+    waits = events.DumpData(b"what came last and waits")
+    cable.node.inbox.put([waits])
+    bench.remove(cable.node)
+    assert waits.data in part.read_bytes()
+
+
+def test_a_cable_pulled_in_a_dump_ends_it(bench):
+    settings = FlightComputerSettings(rate=RATE, dump_size=200_000, dump_rate=200.0)
+    cable = Cable(bench, settings, **PATIENT)
+    cable.plugged()
+    future = bench.ask(Dump, "umbilical/dump", memory="flash")
+    bench.until(lambda: list((bench.folder / "dumps").glob(f"*{PART}")), "it has begun")
+    cable.pull()
+    bench.until(future.done, "it is over")
+    assert not future.result().success
+    assert "the cable was pulled" in future.result().message
+
+
+def test_a_disk_that_is_full_is_told(cable):
+    if not os.path.exists("/dev/full"):
+        raise AssertionError("this machine has no /dev/full to write to")
+    answer = cable.dump("flash", "/dev/full/dump.csv")
+    assert not answer.success
+    assert "/dev/full" in answer.message
+
+
+# -- the supervisor's decisions -------------------------------------------------------------------
+
+
+@pytest.fixture
+def decide(bench):
+    """Publish a decision as the supervisor would; its last report."""
+    reports = bench.follow(ActionReport, "safety/action", qos.DECISION)
+    numbers = iter(range(1, 100))
+
+    def publish(action, *reasons):
+        number = next(numbers)
+        message = SafetyDecision(
+            epoch=1, id=number, action=int(action), rule="test", targets=["umbilical"]
+        )
+        message.reasons = list(reasons)
+        bench.publish(stamped(bench.client, message), "safety/decision", qos.DECISION)
+        ended = (Outcome.CONFIRMED, Outcome.FAILED)
+        return bench.until(
+            lambda: next((r for r in reports if r.id == number and r.outcome in ended), None),
+            "it is reported",
+        )
+
+    return publish
+
+
+def test_a_kill_is_the_vehicle_made_safe(cable, decide):
+    assert cable.command("open_mav").confirmed
+    report = decide(Action.KILL, "a test")
+    assert report.outcome == Outcome.CONFIRMED, report.detail
+    assert "mav_open 0" in report.detail
+    assert cable.tokens() == ["<M>", "<V>"]
+
+
+def test_after_a_kill_nothing_launches_until_flight_is_released(cable, decide):
+    assert cable.arm().success
+    assert decide(Action.KILL, "a test").outcome == Outcome.CONFIRMED
+    answer = cable.command("launch", force=True)
+    assert "launch refused: flight is blocked (killed: a test)" in answer.message
+    answer = cable.command("open_mav")
+    assert "open_mav refused: flight is blocked (killed: a test)" in answer.message
+    assert decide(Action.FLIGHT_BLOCK_RELEASE).outcome == Outcome.CONFIRMED
+    assert cable.command("launch", force=True).confirmed
+
+
+def test_while_flight_is_blocked_nothing_launches(cable, decide):
+    assert cable.arm().success
+    assert decide(Action.FLIGHT_BLOCK, "a link is silent").outcome == Outcome.CONFIRMED
+    answer = cable.command("launch", force=True)
+    assert not answer.sent
+    assert "launch refused: flight is blocked (a link is silent)" in answer.message
+    assert decide(Action.FLIGHT_BLOCK_RELEASE).outcome == Outcome.CONFIRMED
+    assert cable.command("launch", force=True).confirmed
+
+
+def test_a_decided_deploy_on_the_ground_is_sent_where_that_is_wished(bench, decide):
+    cable = Cable(bench, **{**PATIENT, "decided_deploy_forces": True})
+    cable.plugged()
+    assert decide(Action.DEPLOY).outcome == Outcome.CONFIRMED
+    assert cable.tokens() == ["<D>"]
+
+
+@pytest.mark.parametrize(
+    ("stage", "tokens"), [("drogue", ["<D>"]), ("main", ["<d>"]), ("next", ["<D>", "<d>"])]
+)
+def test_what_a_deploy_fires_is_a_parameter(bench, stage, tokens):
+    cable = Cable(bench, deploy_stage=stage, **PATIENT)
+    cable.plugged()
+    cable.act("jump=Coast")
+    cable.await_mode(Telem.COAST)
+    for expected in tokens:
+        answer = cable.deploy()
+        assert answer.success, answer.message
+        assert cable.tokens()[-1] == expected
+    assert "already; nothing was sent" in cable.deploy().message
+    assert cable.tokens() == tokens
+
+
+def test_a_deploy_that_is_forced_fires_again(cable):
+    cable.act("jump=Coast")
+    cable.await_mode(Telem.COAST)
+    assert cable.deploy().success
+    assert cable.deploy(force=True).success
+    assert cable.tokens() == ["<D>", "<D>"]
+
+
+@pytest.mark.parametrize("triggers", [1, 8, 255])
+def test_the_key_has_no_other_triggers(cable, triggers):
+    answer = cable.arm(triggers=triggers)
+    assert not answer.success
+    assert "the key has but one" in answer.message

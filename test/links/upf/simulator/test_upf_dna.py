@@ -1,0 +1,287 @@
+"""Dynamic node ids: a device asks, an allocator gives, ours or the one of the library."""
+
+import contextlib
+from collections import deque
+from itertools import pairwise
+
+import dronecan
+import pytest
+from dronecan.app.dynamic_node_id import CentralizedServer
+from dronecan.driver.common import AbstractDriver
+from dronecan.driver.common import CANFrame as LibraryFrame
+from dronecan.transport import TransferError
+from upf_device_bench import Story, definitions
+
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.simulator.dna import FOLLOWUP_DELAY, REQUEST_PERIOD, NodeIdClient
+from chute_ros.links.upf.simulator.node import NodeSettings
+from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
+from chute_ros.model import ParachuteState as S
+from chute_ros.protocol.dronecan.allocation import MESSAGE, Allocator
+from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
+
+DYNAMIC = {p.STATIC_NODE_ID: 0}
+UNIT = bytes(range(16))
+
+
+class Office:
+    """The vehicle of a story gives out node ids."""
+
+    def __init__(self, story, table=None):
+        self.story = story
+        self.allocator = Allocator(table or {}, {33, 34})
+        self.given = {}
+        self.requests = []
+        self._served = 0
+
+    def run(self, seconds):
+        """Let time pass, and serve."""
+        for _ in range(round(seconds / 0.01)):
+            self.story.run(0.01)
+            messages = self.story.vehicle.messages.get(MESSAGE, [])
+            for message in messages[self._served :]:
+                self.requests.append(message)
+                self.allocator.heard(message.source, message.values, {}, True, self.story.now)
+            self._served = len(messages)
+            for keep in self.allocator.take_keep():
+                self.allocator.kept(keep.number)
+            for answer in self.allocator.take_answers():
+                self.given[answer["unique_id"]] = answer["node_id"]
+                self.story.vehicle.endpoint.broadcast(MESSAGE, answer)
+            self.story.exchange()
+        return self
+
+
+class Memory(AbstractDriver):
+    """A driver of the library without a bus: frames are put in and taken out."""
+
+    def __init__(self):
+        super().__init__()
+        self.incoming, self.outgoing = deque(), []
+
+    def close(self):
+        pass
+
+    def receive(self, timeout=None):
+        return self.incoming.popleft() if self.incoming else None
+
+    def send_frame(self, frame):
+        self.outgoing.append(frame)
+
+
+class AllDiscovered:
+    """A node monitor of the library on a bus where all is known."""
+
+    def add_update_handler(self, handler):
+        return self
+
+    def remove(self):
+        pass
+
+    def find_all(self, predicate):
+        return []
+
+    def are_all_nodes_discovered(self):
+        return True
+
+
+class LibraryAllocator:
+    """dronecan's own CentralizedServer, fed with frames of ours."""
+
+    def __init__(self):
+        self._memory = Memory()
+        self._node = dronecan.node.Node(self._memory, node_id=100)
+        self._server = CentralizedServer(self._node, AllDiscovered())
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._server.close()
+        self._node.close()
+
+    def receive(self, data):
+        """Bytes of a frame. The library stamps it with the machine's time, by which it sees a
+        whole story as one moment: nothing of it is too old."""
+        frame = unpack(data)
+        self._memory.incoming.append(LibraryFrame(frame.identifier, frame.data, frame.extended))
+
+    def take_output(self):
+        """Let it work; the frames that it sends."""
+        while self._memory.incoming:
+            # It raises for what it does not know, and goes on with the next frame.
+            with contextlib.suppress(TransferError):
+                self._node.spin(0)
+        sent, self._memory.outgoing = self._memory.outgoing, []
+        return [pack(CanFrame(one.id, bytes(one.data), one.extended)) for one in sent]
+
+    def table(self):
+        """Unique id -> node id."""
+        entries = self._server.get_allocation_table()
+        return {bytes(unique): node for unique, node in entries if unique is not None}
+
+
+def test_a_device_without_an_id_asks_in_three_parts_and_works_with_what_it_gets():
+    story = Story(values=DYNAMIC)
+    office = Office(story).run(4.0)
+    parts = [len(message.values["unique_id"]) for message in office.requests]
+    assert parts == [6, 6, 4]
+    assert [message.source for message in office.requests] == [0, 0, 0]
+    first = [message.values["first_part_of_unique_id"] for message in office.requests]
+    assert first == [True, False, False]
+    unique_id = b"".join(message.values["unique_id"] for message in office.requests)
+    assert unique_id == story.controller.settings.unique_id
+    assert office.given[unique_id] == story.controller.node_id == 125
+    assert story.state is S.READY
+    assert story.ask("DEPLOY_FORCE", 125) == "SUCCESS"
+    office.run(0.5)
+    assert story.state is S.LAUNCHED
+
+
+def test_it_never_speaks_but_to_ask_while_it_has_no_id():
+    story = Story(values=DYNAMIC, trigger_values=DYNAMIC)
+    story.run(5.0)
+    story.bus.act("deploy")
+    story.run(5.0)
+    assert set(story.vehicle.messages) == {MESSAGE}
+    assert story.asked() == []
+    assert any("no node id" in event for _, event in story.log)
+
+
+def test_a_trigger_without_an_id_hears_that_all_triggers_are_to_fire():
+    story = Story(trigger_values=DYNAMIC).run(1.0)
+    story.ask("DEPLOY_FORCE")
+    story.run(1.0)
+    assert story.trigger.fired
+
+
+def test_two_that_ask_at_once_get_two_ids():
+    story = Story(values=DYNAMIC, trigger_values=DYNAMIC)
+    office = Office(story).run(20.0)
+    ids = {story.controller.node_id, story.trigger.node_id}
+    assert len(ids) == 2
+    assert 0 not in ids
+    assert office.allocator.given_count == 2
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_a_bus_full_of_them_ends_with_an_id_each(count):
+    story = Story(values=DYNAMIC, trigger_values=DYNAMIC)
+    for number in range(count):
+        settings = NodeSettings(f"upf.trigger{number}", TRIGGER_PARAMETERS | DYNAMIC)
+        story.bus.nodes.append(UpfTrigger(definitions(), settings))
+    Office(story).run(60.0)
+    ids = [node.node_id for node in story.bus.nodes]
+    assert 0 not in ids
+    assert len(set(ids)) == len(ids)
+
+
+def test_a_unit_that_is_known_gets_its_id_again_but_does_not_keep_it():
+    story = Story(values=DYNAMIC)
+    office = Office(story, {story.controller.settings.unique_id: 60}).run(4.0)
+    assert story.controller.node_id == 60
+    story.restart(60)
+    assert story.controller.node_id == 0
+    office.run(4.0)
+    assert story.controller.node_id == 60
+    assert p.value_of(story.get(p.STATIC_NODE_ID, 60)["value"]) == 0
+
+
+def test_the_allocator_of_the_library_serves_two_at_once():
+    """Given dronecan's own CentralizedServer behind a driver in memory."""
+    story = Story(values=DYNAMIC, trigger_values=DYNAMIC)
+    with LibraryAllocator() as office:
+        for _ in range(3000):
+            story.bus.update(story.now)
+            for frame in story.bus.take_output():
+                office.receive(frame)
+            for frame in office.take_output():
+                story.bus.receive(frame, story.now)
+            story.now += 0.01
+        table = office.table()
+    for node in (story.controller, story.trigger):
+        assert node.node_id
+        assert table[node.settings.unique_id] == node.node_id
+    assert story.controller.node_id != story.trigger.node_id
+
+
+# The client alone, rule by rule
+
+
+class Client:
+    """A client and what it asked, at t+ the start."""
+
+    def __init__(self):
+        self.one = NodeIdClient(UNIT)
+        self.now = 0.0
+        self.asked = []
+        self.one.start(0.0)
+
+    def until(self, limit):
+        while self.one.next_deadline() <= limit:
+            self.now = self.one.next_deadline()
+            self.one.update(self.now)
+            self.asked += [(self.now, one) for one in self.one.take_requests()]
+        self.now = limit
+
+    def hear(self, said, node_id=0, source=10):
+        self.one.heard(source, {"unique_id": said, "node_id": node_id}, self.now)
+
+
+def test_rules_a_and_b_it_asks_at_random_intervals():
+    client = Client()
+    client.until(60.0)
+    times = [0.0, *(when for when, _ in client.asked)]
+    gaps = [round(b - a, 9) for a, b in pairwise(times)]
+    assert all(REQUEST_PERIOD[0] <= gap <= REQUEST_PERIOD[1] for gap in gaps)
+    assert len(set(gaps)) > len(gaps) / 2
+    assert all(ask["unique_id"] == UNIT[:6] for _, ask in client.asked)
+
+
+@pytest.mark.parametrize("source", [0, 10])
+def test_rule_c_any_allocation_puts_off_the_next_request(source):
+    client = Client()
+    for _ in range(100):
+        client.until(client.now + 0.3)
+        client.hear(b"\xff" * 6, source=source)
+    assert client.asked == []
+
+
+@pytest.mark.parametrize("known", [6, 12, 7])
+def test_rule_d_it_sends_what_follows_what_was_heard(known):
+    client = Client()
+    client.hear(UNIT[:known])
+    client.until(FOLLOWUP_DELAY[1])
+    ((when, ask),) = client.asked
+    assert 0.0 <= when <= FOLLOWUP_DELAY[1]
+    assert ask["unique_id"] == UNIT[known : known + 6]
+    assert not ask["first_part_of_unique_id"]
+
+
+def test_rule_d_another_allocation_ends_the_wait():
+    client = Client()
+    client.hear(UNIT[:6])
+    client.hear(b"\xff" * 6, source=0)
+    client.until(0.5)
+    assert client.asked == []
+
+
+def test_rule_d_what_other_nodes_ask_is_not_an_answer():
+    client = Client()
+    client.hear(UNIT[:6], source=0)
+    client.until(0.5)
+    assert client.asked == []
+
+
+def test_rule_e_a_whole_match_with_an_id_is_its_id():
+    client = Client()
+    client.hear(UNIT, node_id=0)
+    assert client.one.node_id == 0
+    client.hear(bytes(16), node_id=55)
+    assert client.one.node_id == 0
+    client.hear(UNIT, node_id=0x35)
+    assert client.one.node_id == 0x35
+    client.until(60.0)
+    assert client.asked == []
+    client.hear(UNIT, node_id=77)
+    assert client.one.node_id == 0x35, "it has one"

@@ -1,0 +1,422 @@
+"""What controller and trigger do as nodes: parameters, memory, who they are, restarts, time."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from upf_device_bench import (
+    CONTROLLER,
+    NODE_STATUS,
+    TRIGGER,
+    Story,
+    Vehicle,
+    ready,
+)
+
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS
+from chute_ros.protocol.dronecan import time_sync
+from chute_ros.protocol.dronecan.can_frame import pack
+from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
+
+SWITCHES = [one.name for one in p.PARAMETERS if one.kind is bool]
+NUMBERS = [one.name for one in p.PARAMETERS if one.kind is int]
+STATUS = names.PARACHUTE_STATUS
+
+# GetSet
+
+
+def test_it_has_the_twelve_parameters_of_the_document():
+    story = ready()
+    listed = []
+    for index in range(20):
+        answer = story.call(errands.GET_SET, {"index": index})
+        if not answer["name"]:
+            break
+        listed.append(answer["name"].decode())
+    assert sorted(listed) == sorted(one.name for one in p.PARAMETERS)
+    assert len(listed) == 12
+    beyond = story.call(errands.GET_SET, {"index": 12})
+    assert p.kind_of(beyond["value"]) == ""
+
+
+@pytest.mark.parametrize("name", [one.name for one in p.PARAMETERS])
+def test_each_is_read_by_name_with_its_kind_range_and_default(name):
+    answer = ready().get(name)
+    documented = p.BY_NAME[name]
+    assert answer["name"].decode() == name
+    assert p.kind_of(answer["value"]) == ("boolean" if documented.kind is bool else "integer")
+    assert p.kind_of(answer["default_value"]) == p.kind_of(answer["value"])
+    if documented.kind is int:
+        assert p.value_of(answer["min_value"]) == documented.minimum
+        assert p.value_of(answer["max_value"]) == documented.maximum
+    else:
+        assert p.value_of(answer["min_value"]) is None
+
+
+@pytest.mark.parametrize("name", SWITCHES)
+def test_a_switch_is_switched_and_read_back(name):
+    story = ready()
+    before = p.value_of(story.get(name)["value"])
+    assert story.set(name, not before) is not before
+    assert p.value_of(story.get(name)["value"]) is not before
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_a_number_is_taken_up_to_its_limits_and_not_beyond(name):
+    story, documented = ready(), p.BY_NAME[name]
+    for value in (documented.minimum, documented.maximum):
+        assert story.set(name, value) == value
+    for value in (documented.minimum - 1, documented.maximum + 1, 2**40):
+        assert story.set(name, value) == documented.maximum
+
+
+@pytest.mark.parametrize("value", ["text", True, 250.5, math.nan, 1e30, -1e30])
+def test_a_number_of_the_wrong_kind_is_not_taken(value):
+    story = ready()
+    before = p.value_of(story.get(p.NODE_STATUS_INTERVAL)["value"])
+    assert story.set(p.NODE_STATUS_INTERVAL, value) == before
+
+
+@pytest.mark.parametrize("value", ["false", 2, -1, 0.5, math.nan])
+def test_a_switch_of_the_wrong_kind_is_not_taken(value):
+    story = ready()
+    assert story.set(p.ENABLE_APS, value) is True
+    assert story.controller.switch(p.ENABLE_APS)
+
+
+@pytest.mark.parametrize(("value", "taken"), [(0, False), (1, True), (0.0, False)])
+def test_a_switch_as_a_number_is_taken(value, taken):
+    assert ready().set(p.ENABLE_APS, value) is taken
+
+
+def test_a_whole_number_as_a_real_is_taken():
+    assert ready().set(p.NODE_STATUS_INTERVAL, 500.0) == 500
+
+
+@pytest.mark.parametrize("name", ["No Such Parameter", "enable aps", "\N{PARACHUTE}"])
+def test_an_unknown_name_is_answered_with_nothing(name):
+    story = ready()
+    answer = story.get(name)
+    assert answer["name"] == b""
+    assert p.kind_of(answer["value"]) == ""
+    assert story.set(name, True) is None
+
+
+def test_bytes_that_are_no_text_are_no_name():
+    answer = ready().call(errands.GET_SET, {"name": b"\xff\xfe"})
+    assert answer["name"] == b""
+
+
+def test_a_name_counts_more_than_an_index():
+    answer = ready().call(errands.GET_SET, {"index": 3, "name": p.LIGHT.encode()})
+    assert answer["name"].decode() == p.LIGHT
+
+
+def test_the_trigger_has_its_own_parameters():
+    story = ready()
+    for name, value in TRIGGER_PARAMETERS.items():
+        assert p.value_of(story.get(name, TRIGGER)["value"]) == value
+    assert story.get(p.ENABLE_APS, TRIGGER)["name"] == b""
+    story.set(p.LIGHT, False, TRIGGER)
+    assert p.value_of(story.get(p.LIGHT)["value"]) is True
+
+
+# Effects
+
+
+def test_static_node_id_counts_from_the_next_start():
+    story = ready()
+    story.set(p.STATIC_NODE_ID, 77)
+    story.run(1.0)
+    assert story.get(p.STATIC_NODE_ID), "it is still there"
+    assert not story.heard(STATUS, 77)
+    story.restart()
+    story.forget()
+    story.run(1.2)
+    assert story.heard(STATUS, 77)
+    assert story.heard(NODE_STATUS, 77)
+    assert not story.heard(STATUS, CONTROLLER)
+    assert p.value_of(story.get(p.STATIC_NODE_ID, 77)["value"]) == 77
+
+
+def test_static_node_id_0_asks_for_one_from_the_next_start():
+    story = ready()
+    story.set(p.STATIC_NODE_ID, 0)
+    assert story.run(0.5).heard(STATUS)
+    story.restart()
+    story.forget()
+    story.run(3.0)
+    assert not story.heard(STATUS)
+    assert story.heard("uavcan.protocol.dynamic_node_id.Allocation", 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "message", "interval"),
+    [
+        (p.NODE_STATUS_INTERVAL, NODE_STATUS, 0.2),
+        (p.PARACHUTE_STATUS_INTERVAL, STATUS, 0.5),
+    ],
+)
+def test_an_interval_counts_at_once(name, message, interval):
+    story = ready()
+    story.set(name, round(interval * 1000))
+    story.forget()
+    story.run(10.0)
+    assert len(story.heard(message)) == pytest.approx(10.0 / interval, abs=2)
+
+
+def test_a_shorter_interval_does_not_wait_for_the_longer_one_to_end():
+    story = ready(values={p.PARACHUTE_STATUS_INTERVAL: 60000})
+    story.set(p.PARACHUTE_STATUS_INTERVAL, 100)
+    story.forget()
+    story.run(1.0)
+    assert len(story.heard(STATUS)) >= 9
+
+
+@pytest.mark.parametrize("name", [p.CANBUS_RESISTER, p.LIGHT])
+def test_resistor_and_light_change_nothing_on_the_bus(name):
+    story = ready()
+    before = dict(story.status)
+    story.set(name, not story.controller.switch(name))
+    story.run(1.0)
+    assert story.status == before
+
+
+# Memory
+
+
+def test_with_auto_save_a_change_survives_a_restart():
+    story = ready()
+    story.set(p.ENABLE_APS, False)
+    story.restart()
+    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
+
+
+def test_without_auto_save_a_change_is_lost_at_a_restart():
+    story = ready()
+    story.set(p.AUTO_SAVE, False)
+    story.set(p.ENABLE_APS, False)
+    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
+    story.restart()
+    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is True
+    assert p.value_of(story.get(p.AUTO_SAVE)["value"]) is False, "which itself is kept"
+
+
+def test_without_auto_save_the_opcode_keeps_a_change():
+    story = ready()
+    story.set(p.AUTO_SAVE, False)
+    story.set(p.ENABLE_APS, False)
+    assert story.opcode(errands.OPCODE_SAVE)
+    story.restart()
+    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
+
+
+def test_auto_save_switched_on_keeps_what_was_changed_before():
+    story = ready(values={p.AUTO_SAVE: False})
+    story.set(p.ENABLE_APS, False)
+    story.set(p.AUTO_SAVE, True)
+    story.restart()
+    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
+
+
+def test_erase_brings_back_what_was_delivered():
+    story = ready()
+    story.set(p.ENABLE_APS, False)
+    story.set(p.PARACHUTE_STATUS_INTERVAL, 1000)
+    story.set(p.STATIC_NODE_ID, 77)
+    assert story.opcode(errands.OPCODE_ERASE)
+    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is True
+    story.forget()
+    story.run(1.0)
+    assert len(story.heard(STATUS)) >= 9
+    story.restart()
+    assert p.value_of(story.get(p.STATIC_NODE_ID)["value"]) == CONTROLLER
+
+
+def test_an_opcode_that_is_none_is_not_done():
+    assert ready().opcode(7) is False
+
+
+# Who it is, and how it is
+
+
+@pytest.mark.parametrize(
+    ("server", "name"), [(CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")]
+)
+def test_it_says_who_it_is(server, name):
+    story = ready()
+    answer = story.call(errands.GET_NODE_INFO, {}, server)
+    assert answer["name"] == name
+    assert len(answer["hardware_version"]["unique_id"]) == 16
+    assert any(answer["hardware_version"]["unique_id"])
+    assert answer["status"]["uptime_sec"] == int(story.now - story.began)
+
+
+def test_controller_and_trigger_are_two_units():
+    story = ready()
+    units = [
+        story.call(errands.GET_NODE_INFO, {}, server)["hardware_version"]["unique_id"]
+        for server in (CONTROLLER, TRIGGER)
+    ]
+    assert units[0] != units[1]
+
+
+def test_node_status_comes_at_its_interval_with_uptime_and_health():
+    story = Story()
+    story.controller.health = 0
+    story.run(5.5)
+    told = [message.values for message in story.heard(NODE_STATUS)]
+    assert [one["uptime_sec"] for one in told] == list(range(len(told)))
+    assert len(told) in (5, 6)
+    story.controller.health = 2
+    story.run(1.1)
+    assert story.heard(NODE_STATUS)[-1].values["health"] == 2
+
+
+def test_transport_stats_count_transfers_and_errors():
+    story = ready()
+    first = story.call(errands.TRANSPORT_STATS, {})
+    story.run(1.0)
+    story.bus.receive(b"\x00" * 15, story.now)
+    second = story.call(errands.TRANSPORT_STATS, {})
+    assert second["transfers_tx"] - first["transfers_tx"] >= 10
+    assert second["transfers_rx"] - first["transfers_rx"] >= 10
+    assert second["transfer_errors"] - first["transfer_errors"] == 1
+
+
+# Restarts
+
+
+@pytest.mark.parametrize("server", [CONTROLLER, TRIGGER])
+def test_a_restart_is_answered_and_then_done(server):
+    story = ready()
+    story.restart(server)
+    story.run(0.5)
+    answer = story.call(errands.GET_NODE_INFO, {}, server)
+    assert answer["status"]["uptime_sec"] == 0
+    assert answer["name"] in (b"upf.controller", b"upf.trigger")
+
+
+@pytest.mark.parametrize("magic", [0, errands.RESTART_MAGIC - 1, 2**40 - 1])
+def test_a_restart_with_another_magic_number_is_refused(magic):
+    story = ready()
+    assert story.call(errands.RESTART_NODE, {"magic_number": magic}) == {"ok": False}
+    story.run(0.5)
+    assert story.call(errands.GET_NODE_INFO, {})["status"]["uptime_sec"] == 1
+
+
+def test_services_that_it_does_not_have_are_not_answered():
+    story = ready()
+    values = story.definitions.request(names.TRIGGER_SERVICE, "TYPE_LAUNCH")
+    assert story.call(names.TRIGGER_SERVICE, values, CONTROLLER) is None
+    assert not story.trigger.fired
+
+
+# Silence
+
+
+def test_a_mute_one_speaks_but_neither_obeys_nor_answers():
+    story = ready()
+    story.bus.act("mute")
+    story.forget()
+    assert story.ask("TAKEOFF") is None
+    assert story.call(errands.GET_NODE_INFO, {}) is None
+    story.run(1.0)
+    assert len(story.heard(STATUS)) >= 9
+    assert story.states() == [story.state]
+    story.bus.act("unmute")
+    assert story.ask("TAKEOFF") == "SUCCESS"
+
+
+def test_a_silent_one_says_nothing_until_it_speaks_again():
+    story = ready()
+    story.bus.act("silent")
+    story.forget()
+    assert story.call(errands.GET_NODE_INFO, {}) is None
+    story.run(3.0)
+    assert story.vehicle.messages == {}
+    story.bus.act("speak")
+    story.run(0.2)
+    assert story.heard(STATUS)
+
+
+def test_a_reboot_ends_silence_without_saying_what_was_not_said():
+    story = ready()
+    story.bus.act("silent")
+    story.run(3.0)
+    story.forget()
+    story.bus.act("reboot")
+    story.run(0.1)
+    assert [message.values["uptime_sec"] for message in story.heard(NODE_STATUS)] == [0]
+
+
+# The time of the bus
+
+
+def test_it_follows_the_time_of_the_master_with_the_lowest_id():
+    """Given two masters at t+0, 1, 2 ...: the one with the lower id says it is 5000 s later."""
+    story = ready()
+    masters = {id_: Vehicle(story.definitions, id_, speaks=False) for id_ in (20, 10)}
+    sent = {}
+    for _ in range(4):
+        for id_, offset in ((20, 9000.0), (10, 5000.0)):
+            stamp = round((sent[id_] + offset) * 1e6) if id_ in sent else 0
+            values = {"previous_transmission_timestamp_usec": stamp}
+            masters[id_].endpoint.broadcast(time_sync.MESSAGE, values)
+            for frame in masters[id_].endpoint.take_output():
+                story.bus.receive(frame, story.now)
+            sent[id_] = story.now
+        story.run(1.0)
+    for node in (story.controller, story.trigger):
+        assert node.clock.master == 10
+        assert node.clock.offset == pytest.approx(5000.0, abs=1e-6)
+
+
+def test_without_a_master_it_does_not_know_the_time():
+    assert math.isnan(ready().controller.clock.offset)
+
+
+# Whatever comes
+
+
+KNOWN = [
+    *((Kind.MESSAGE, name) for name in (names.VEHICLE_STATUS, names.TRIGGER_STATUS)),
+    *((Kind.MESSAGE, name) for name in (names.TRIGGER_LAUNCH, time_sync.MESSAGE)),
+    *((Kind.REQUEST, name) for name in (names.PARACHUTE_SERVICE, names.TRIGGER_SERVICE)),
+    *((Kind.REQUEST, name) for name in (errands.GET_SET, errands.EXECUTE_OPCODE)),
+    *((Kind.REQUEST, name) for name in (errands.RESTART_NODE, errands.GET_NODE_INFO)),
+    (Kind.RESPONSE, names.VEHICLE_SERVICE),
+    (Kind.MESSAGE, "uavcan.protocol.dynamic_node_id.Allocation"),
+]
+TRANSFERS = st.tuples(
+    st.sampled_from(KNOWN),
+    st.integers(1, 127),
+    st.sampled_from([CONTROLLER, TRIGGER]),
+    st.integers(0, 31),
+    st.binary(max_size=120),
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(transfers=st.lists(TRANSFERS, max_size=20), dynamic=st.booleans())
+def test_whatever_comes_it_goes_on(transfers, dynamic):
+    own = {p.STATIC_NODE_ID: 0} if dynamic else {}
+    story = Story(values=own, trigger_values=own).run(0.1)
+    types = story.definitions.types
+    for (kind, name), source, server, number, payload in transfers:
+        data_type = types.find(name, kind.value)
+        to = 0 if kind is Kind.MESSAGE else server
+        transfer = Transfer(kind, data_type.id, source, to, number, payload)
+        for frame in frames_of(transfer, data_type.base_crc):
+            story.bus.receive(pack(frame), story.now)
+        story.bus.update(story.now)
+        story.now += 0.05
+    for _ in range(20):
+        story.bus.update(story.now)
+        following = story.bus.next_deadline()
+        assert story.now < following < math.inf
+        story.now = following
