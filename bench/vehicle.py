@@ -19,6 +19,7 @@ from bench.report import load, summary, table
 from bench.vehicle_wire import NOMINAL_RATE, VehicleWire
 from chute_ros.errors import ChuteError
 from chute_ros.links.mavlink.protocol.commands import CommandLimits
+from chute_ros.links.registered import module_of
 from chute_ros.tools.isolation import free_udp_ports
 
 HEADING = "A vehicle"
@@ -112,7 +113,7 @@ def _start(namespace: str, children: Children, port: int) -> None:
     }
     for name in NODES:
         parts = [p for key, value in given[name].items() for p in ("-p", f"{key}:={value}")]
-        children.start(name, f"chute_ros.nodes.{name}", *node, *parts)
+        children.start(name, module_of(name), *node, *parts)
 
 
 def _until(what: str, holds: Callable[[], bool], children: Children) -> None:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
+from chute_ros.links.registered import module_of
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.demo_director import StepFailedError
 from chute_ros.tools.processes import Processes
@@ -127,7 +128,7 @@ class Fleet:
         variables = [f"{name}={value}" for name, value in self._environment.items()]
         self.processes.start(
             f"{name}{number}",
-            f"chute_ros.nodes.{module}",
+            module_of(module),
             *("--ros-args", "-r", f"__ns:={name_of(number)}", *arguments),
             on=(*self.network.on(host_of(number)), "env", *variables),
         )

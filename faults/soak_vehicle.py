@@ -14,6 +14,7 @@ from typing import Any
 from chute_msgs.srv import Arm, Deploy
 from std_srvs.srv import Trigger
 
+from chute_ros.links.registered import module_of
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.pilot import Pilot
 from faults.network import Network
@@ -179,7 +180,7 @@ class Vehicle(Patient):
             arguments = [part for one in more[name] for part in ("-p", one)]
             self.keeper.start(
                 name,
-                f"chute_ros.nodes.{name}",
+                module_of(name),
                 *node,
                 *arguments,
                 more=self.clocks[name].environment,
@@ -215,25 +216,28 @@ class Vehicle(Patient):
         )
         what: dict[str, tuple[str, ...]] = {
             "autopilot": (
-                "sim_autopilot",
+                "chute_ros.sim.sim_autopilot",
                 *("--connection", f"udpout:127.0.0.1:{ports.autopilot}"),
                 *("--connection", f"udpin:127.0.0.1:{ports.pilot}"),
             ),
             "parachute": (
-                "sim_mavlink_parachute",
+                "chute_ros.links.mavlink.simulator.sim_mavlink_parachute",
                 *("--connection", f"udpout:127.0.0.1:{ports.parachute}"),
                 *("--connection", feel),
             ),
             "upf": (
-                "sim_upf",
+                "chute_ros.links.upf.simulator.sim_upf",
                 *("--connection", ports.device_bus, "--vehicle", feel),
                 *[part for name in manual for part in ("--parameter", f"{name}=false")],
             ),
-            "rocket": ("sim_flight_computer", "--link", str(self.wires.device)),
+            "rocket": (
+                "chute_ros.links.umbilical.simulator.sim_flight_computer",
+                *("--link", str(self.wires.device)),
+            ),
         }
         for name in names:
             module, *arguments = what[name]
-            self.keeper.start(name, f"chute_ros.sim.{module}", *arguments)
+            self.keeper.start(name, module, *arguments)
 
     # -- what the devices did -------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from chute_msgs.srv import Arm, Deploy, Kill
 from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
+from chute_ros.links.registered import module_of
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.signing import (
     EPOCH_2015,
@@ -268,9 +269,9 @@ class Vehicle(Patient):
         if setup.dronecan:
             values["expect_parachute"] = "false"
             supervisor |= _ON_THE_BUS
-            self.keeper.start(CAN_NODE, f"chute_ros.nodes.{CAN_NODE}", *_ros({"connection": _BUS}))
-        self.keeper.start(NODE, f"chute_ros.nodes.{NODE}", *_ros(values))
-        self.keeper.start(SUPERVISOR, f"chute_ros.nodes.{SUPERVISOR}", *_ros(supervisor))
+            self.keeper.start(CAN_NODE, module_of(CAN_NODE), *_ros({"connection": _BUS}))
+        self.keeper.start(NODE, module_of(NODE), *_ros(values))
+        self.keeper.start(SUPERVISOR, module_of(SUPERVISOR), *_ros(supervisor))
 
     def start_parachute(self) -> None:
         """A parachute that is not released."""

@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 
 from chute_ros.errors import NotRegisteredError
-from chute_ros.links.api import LinkKind, VehicleKind
+from chute_ros.links.api import SUPERVISOR, LinkKind, VehicleKind
 
 GROUP = "chute_ros.links"
 
@@ -31,6 +31,13 @@ def links() -> Mapping[str, LinkKind]:
 def vehicles() -> Mapping[str, VehicleKind]:
     """Return the vehicles that carry the device of any link, by their names."""
     return MappingProxyType({one.name: one for kind in links().values() for one in kind.vehicles})
+
+
+def module_of(name: str) -> str:
+    """Return the module of a node, for python -m."""
+    if name == SUPERVISOR:
+        return "chute_ros.nodes.safety_supervisor"
+    return links()[name].node.partition(":")[0].rpartition(".")[0]
 
 
 def _kind(entry: EntryPoint) -> LinkKind:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
+
 import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState
 from mavlink_bench import Module, Network, quick
@@ -165,8 +167,8 @@ def test_names_types_and_qualities_are_the_contracts_and_nothing_is_missing(benc
 
 @pytest.mark.parametrize("name", NODES)
 def test_the_executable_has_the_nodes_name(name):
-    module = __import__(f"chute_ros.nodes.{name}", fromlist=["main"])
-    assert callable(module.main)
+    (entry,) = entry_points(group="console_scripts", name=name)
+    assert callable(entry.load())
 
 
 class TestClocks:

@@ -3,18 +3,21 @@
 import ast
 import importlib.util
 import itertools
+import subprocess
 import sys
 import types
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import ClassVar
 
 import pytest
 
+from chute_ros.links.api import Sockets
+from chute_ros.links.registered import links, vehicles
 from chute_ros.links.upf.protocol.parameters import EXCLUDES
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
 from chute_ros.links.upf.simulator.sim_upf import _parameters
 from chute_ros.nodes.middleware import LEADS_ELSEWHERE
-from chute_ros.sim.command_line import parser
 
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted((ROOT / "launch").glob("*.launch.py"))
@@ -32,39 +35,14 @@ def calls(file, name):
 
 
 def executables():
-    setup = ast.parse((ROOT / "setup.py").read_text())
-    texts = [n.value for n in ast.walk(setup) if isinstance(n, ast.Constant)]
-    return {
-        text.split("=")[0].strip() for text in texts if isinstance(text, str) and ":main" in text
-    }
+    """What setup.py installs: name -> module."""
+    installed = entry_points(group="console_scripts")
+    ours = [one for one in installed if one.value.startswith("chute_ros.")]
+    return {one.name: one.module for one in ours}
 
 
 def test_there_are_launch_files_with_and_without_simulators():
     assert [file.name for file in FILES] == ["simulation.launch.py", "vehicle.launch.py"]
-
-
-def started(file):
-    """The executables of this package that it starts."""
-    named = [call["executable"] for call in calls(file, "Node")]
-    # A simulator is no ROS node; a helper of the file makes its process.
-    named += [call[0] for call in calls(file, "_simulator")]
-    texts = {name.strip("'") for name in named if name.startswith("'")}
-    # The nodes of the links stand in a table.
-    constants = [n.value for n in ast.walk(ast.parse(file.read_text())) if type(n) is ast.Constant]
-    return texts | (executables() & {one for one in constants if isinstance(one, str)})
-
-
-@EVERY
-def test_it_starts_what_setup_installs(file):
-    assert started(file)
-    assert started(file) <= executables()
-    assert all(call["package"] == "'chute_ros'" for call in calls(file, "Node"))
-
-
-def test_both_together_start_nodes_and_simulators():
-    names = set().union(*map(started, FILES))
-    assert names >= {"mavlink_parachute", "upf_can", "umbilical", "safety_supervisor"}
-    assert names >= {"sim_autopilot", "sim_mavlink_parachute", "sim_upf", "sim_flight_computer"}
 
 
 @EVERY
@@ -88,11 +66,8 @@ def test_the_files_that_they_name_are_installed():
                     assert (ROOT / text.removeprefix("{share}/")).is_file(), text
 
 
-@pytest.mark.parametrize("file", ["simulation", "vehicle"])
-def test_every_parachute_that_can_be_chosen_has_a_parameter_file(file):
-    (one,) = [path for path in FILES if path.name.startswith(file)]
-    (argument,) = [c for c in calls(one, "DeclareLaunchArgument") if c[0] == "'parachute'"]
-    for parachute in ast.literal_eval(argument["choices"]):
+def test_every_parachute_that_can_be_chosen_has_a_parameter_file():
+    for parachute in vehicles():
         assert (ROOT / "config" / f"{parachute}_vehicle.yaml").is_file()
 
 
@@ -109,19 +84,18 @@ def test_the_simulation_stays_on_this_host():
 
 
 def test_the_simulators_take_the_options_that_are_given_to_them():
-    options = parser("any", "", "udpin:127.0.0.1:0", "")
-    known = {text for action in options._actions for text in action.option_strings}
-    # Of sim_upf alone, and of sim_flight_computer.
-    known |= {"--vehicle", "--parameter", "--link"}
-    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
-    texts = [
-        node.value
-        for node in ast.walk(ast.parse(simulation.read_text()))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    ]
-    given = {text for text in texts if text.startswith("--")}
-    assert given
-    assert given <= known
+    sockets = Sockets("127.0.0.1:1", "127.0.0.1:2", "mcast:0:3", "/tmp/none")
+    given = {
+        command[0]: {word for word in command if word.startswith("--")}
+        for vehicle in vehicles().values()
+        for link in vehicle.links
+        for command in links()[link].simulators(vehicle, sockets)
+    }
+    assert len(given) >= 4
+    for name, options in given.items():
+        command = [sys.executable, "-m", executables()[name], "--help"]
+        known = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert {one for one in options if one not in known} == set(), name
 
 
 def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
@@ -195,6 +169,15 @@ def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
     if vehicle:
         started = [one for one in made if "executable" in one.options]
         assert all(one.options["respawn"] for one in started), "what dies is started again"
+
+
+@pytest.mark.parametrize("parachute", vehicles())
+@EVERY
+def test_it_starts_what_setup_installs(file, parachute, monkeypatch):
+    made = made_by(file, monkeypatch, parachute=parachute)
+    names = {one.options.get("executable") or one.options.get("name") for one in made} - {None}
+    assert names
+    assert names <= executables().keys()
 
 
 @pytest.mark.parametrize(

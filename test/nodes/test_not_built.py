@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from chute_ros.links.registered import module_of
+
 BUILD = [
     "chute_msgs cannot be imported: build both packages and source the result:",
     "  colcon build --base-paths src src/chute_ros/msg_defs   (in your workspace)",
@@ -30,7 +32,7 @@ def start_without(package, node, folder):
     (folder / "sitecustomize.py").write_text(MISSING.format(name=package))
     path = os.pathsep.join([str(folder), *filter(None, sys.path)])
     done = subprocess.run(
-        [sys.executable, "-m", f"chute_ros.nodes.{node}"],
+        [sys.executable, "-m", module_of(node)],
         env={**os.environ, "PYTHONPATH": path},
         capture_output=True,
         text=True,

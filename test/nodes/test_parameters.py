@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.registered import module_of
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.nodes.parameters import MISSPELT, nearest
@@ -114,7 +115,7 @@ def destroy_half_built(bench, kind, bad):
 def run(node, *parameters, namespace="/"):
     """A real process: its exit code and stderr."""
     done = subprocess.run(
-        [sys.executable, "-m", f"chute_ros.nodes.{node}", "--ros-args", "-r", f"__ns:={namespace}"]
+        [sys.executable, "-m", module_of(node), "--ros-args", "-r", f"__ns:={namespace}"]
         + [word for parameter in parameters for word in ("-p", parameter)],
         capture_output=True,
         text=True,
@@ -162,7 +163,7 @@ def test_a_real_start_ends_in_one_line(namespace, node, given, said):
 def test_a_real_node_ends_cleanly_when_told_to(node, number, namespace, tmp_path, await_until):
     log = tmp_path / "log"
     connection = ["-p", "connection:=udpin:127.0.0.1:0"] if node == MAVLINK else []
-    command = [sys.executable, "-m", f"chute_ros.nodes.{node}", "--ros-args"]
+    command = [sys.executable, "-m", module_of(node), "--ros-args"]
     with log.open("w") as output:
         process = subprocess.Popen(
             [*command, "-r", f"__ns:={namespace}", *connection],
@@ -178,7 +179,7 @@ def test_a_real_node_ends_cleanly_when_told_to(node, number, namespace, tmp_path
 
 @pytest.mark.parametrize("node", NODES)
 def test_ctrl_c_while_a_node_is_being_loaded_ends_it_without_a_word(node):
-    command = [sys.executable, "-X", "importtime", "-m", f"chute_ros.nodes.{node}"]
+    command = [sys.executable, "-X", "importtime", "-m", module_of(node)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         # Each module is told of once it has been imported.
@@ -328,7 +329,7 @@ def interrupted(self):
         pass
 
 MavlinkParachuteNode.begin = interrupted
-run("mavlink_parachute", "chute_ros.links.mavlink.node", "MavlinkParachuteNode")
+run("mavlink_parachute", "chute_ros.links.mavlink.node:MavlinkParachuteNode")
 """
 
 

@@ -22,6 +22,7 @@ from chute_msgs.srv import Deploy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from chute_ros.links.registered import module_of
 from chute_ros.model import Action
 from chute_ros.nodes import qos
 from chute_ros.tools.isolation import free_udp_ports
@@ -128,9 +129,7 @@ def start_vehicle(processes: Processes) -> None:
         ("safety_supervisor", ("profile:=by_hand",)),
     ):
         options = [part for one in settings for part in ("-p", one)]
-        processes.start(
-            name, f"chute_ros.nodes.{name}", "--ros-args", "--enclave", f"/{name}", *options
-        )
+        processes.start(name, module_of(name), "--ros-args", "--enclave", f"/{name}", *options)
 
 
 def attacked_by(enclave: str, keystore: str = "") -> dict[str, object]:

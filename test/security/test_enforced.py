@@ -8,12 +8,14 @@ import sys
 
 import pytest
 
+from chute_ros.links.registered import module_of
+
 NODES = ("mavlink_parachute", "safety_supervisor")
 
 
 def started(name, tmp_path, **environment):
     """The node as a process that must enforce; it ends by itself."""
-    command = [sys.executable, "-m", f"chute_ros.nodes.{name}", "--ros-args"]
+    command = [sys.executable, "-m", module_of(name), "--ros-args"]
     command += ["--enclave", f"/{name}"]
     enforced = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_STRATEGY": "Enforce"}
     environment = os.environ | enforced | {"ROS_HOME": str(tmp_path)} | environment

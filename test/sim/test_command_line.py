@@ -168,9 +168,13 @@ PACKAGES = {
     [
         (PARACHUTE, ("--connection", f"udpin:{LOCAL}:0"), ()),
         (AUTOPILOT, ("--connection", f"udpin:{LOCAL}:0"), ()),
-        ("sim_flight_computer", (), ("--telem-path", str(MSG_DEFS / "telem"))),
         (
-            "sim_upf",
+            "chute_ros.links.umbilical.simulator.sim_flight_computer",
+            (),
+            ("--telem-path", str(MSG_DEFS / "telem")),
+        ),
+        (
+            "chute_ros.links.upf.simulator.sim_upf",
             ("--connection", f"mcast:0:{free_udp_ports(1)[0]}"),
             ("--dsdl-path", str(MSG_DEFS / "dsdl" / "flyfire")),
         ),
@@ -180,7 +184,8 @@ def test_it_needs_the_packages_that_its_page_says_and_no_others(
     simulator, connection, more, tmp_path, await_until
 ):
     page = (MSG_DEFS.parent / "docs/guide/simulators.md").read_text()
-    (row,) = re.findall(rf"^\| [^|]*`{simulator}`[^|]* \| ([\w -]+) \| ([^|]+) \|$", page, re.M)
+    name = simulator.rpartition(".")[2]
+    (row,) = re.findall(rf"^\| [^|]*`{name}`[^|]* \| ([\w -]+) \| ([^|]+) \|$", page, re.M)
     assert not more or f"`{more[0]} msg_defs/" in row[1]
     missing = tuple(name for name, package in PACKAGES.items() if package not in row[0].split())
     assert len(PACKAGES) - len(missing) == len(row[0].split())
