@@ -20,6 +20,8 @@ class LinkState(enum.IntEnum):
     OK = 1
     STALE = 2
     LOST = 3
+    #: The wire is open and the device never says anything on it: what it is can only be hoped.
+    UNMONITORED = 5
 
 
 class ParachuteState(enum.IntEnum):

@@ -28,7 +28,7 @@ class Shipped:
                 told("required_links"),
                 told("kill_links"),
                 told("deploy_links"),
-                tuple(map(Rung.parse, told("deploy_ladder", ()))),
+                tuple(Rung.parse(text) for text in told("deploy_ladder", ())),
             )
             self._configs[key] = replace(plain, profile=read_profile(text, profile, plain.links))
         return replace(self._configs[key], standby=standby, rank=rank)

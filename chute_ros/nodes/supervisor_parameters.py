@@ -38,6 +38,12 @@ PARAMETERS = (
         "deploy_links", ["mavlink_parachute"], "links that release a parachute (node names)"
     ),
     Parameter(
+        "unmonitored_links",
+        [""],
+        "links whose devices never say how they are and with which flight is allowed all the same "
+        "(node names); by default they are the last steps of a deploy",
+    ),
+    Parameter(
         "profile",
         "multirotor",
         "rules of the vehicle: multirotor, fixed_wing, rocket, by_hand, or a file "
@@ -211,6 +217,7 @@ def config_from(values: Mapping[str, Any]) -> SupervisorConfig:
         required_links=tuple(values["required_links"]),
         kill_links=tuple(values["kill_links"]),
         deploy_links=tuple(values["deploy_links"]),
+        unmonitored_links=tuple(_given(values["unmonitored_links"])),
         deploy_ladder=tuple(Rung.parse(text) for text in _given(values["deploy_ladder"])),
         ladder_step_timeout=values["ladder_step_timeout"],
         kill_to_deploy_delay=values["kill_to_deploy_delay"],

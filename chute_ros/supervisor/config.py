@@ -73,7 +73,10 @@ class SupervisorConfig:
     kill_links: tuple[str, ...] = ("mavlink_parachute",)
     #: Links that release a parachute.
     deploy_links: tuple[str, ...] = ("mavlink_parachute",)
-    #: The steps of a deploy, first to last; empty: the deploy_links in their order.
+    #: Links whose devices never say how they are, and with which flight is allowed all the same.
+    unmonitored_links: tuple[str, ...] = ()
+    #: The steps of a deploy, first to last; empty: the deploy_links in their order, those that
+    #: nobody monitors last.
     deploy_ladder: tuple[Rung, ...] = ()
     #: A step that has not been confirmed after this is followed by the next.
     ladder_step_timeout: float = 2.0
@@ -132,6 +135,11 @@ class SupervisorConfig:
             links = getattr(self, name)
             if not links or not all(links):
                 raise ParameterError(f"{name} is {list(links)}: need at least one link's name")
+        for link in self.unmonitored_links:
+            if link not in self.links:
+                raise ParameterError(
+                    f"unmonitored_links names {link}: need one of {', '.join(self.links)}"
+                )
         for rung in self.deploy_ladder:
             if rung.link not in self.deploy_links:
                 raise ParameterError(
@@ -147,7 +155,9 @@ class SupervisorConfig:
     @property
     def ladder(self) -> tuple[Rung, ...]:
         """The steps of a deploy, first to last; at least one."""
-        return self.deploy_ladder or tuple(Rung(link) for link in self.deploy_links)
+        hoped_for = self.unmonitored_links
+        links = sorted(self.deploy_links, key=lambda link: link in hoped_for)
+        return self.deploy_ladder or tuple(map(Rung, links))
 
     def limits(self, link: str) -> LinkLimits:
         """The limits of this link."""

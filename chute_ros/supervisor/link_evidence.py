@@ -5,6 +5,8 @@ NEVER_SEEN --heard--> OK --stale limit--> STALE --lost limit--> LOST
    heard for          | '------------------heard-----.           | heard
    regain_after s     |                              |           v
                       '----------------------------- REGAINED <--'
+
+A device that never says anything is UNMONITORED in place of OK: its node alone is heard.
 """
 
 from __future__ import annotations
@@ -38,6 +40,12 @@ class LinkJudgement(enum.IntEnum):
     LOST = 3
     #: Heard again after LOST, not yet for long enough to be relied on.
     REGAINED = 4
+    #: Its node is OK; of its device nothing can be known.
+    UNMONITORED = 5
+
+
+#: As which what a link says counts.
+_HEARD = (LinkJudgement.OK, LinkJudgement.REGAINED, LinkJudgement.UNMONITORED)
 
 
 @dataclass(frozen=True)
@@ -123,17 +131,18 @@ class LinkEvidence:
             return LinkJudgement.NEVER_SEEN
         if self.silent(limits.lost_after, now):
             return LinkJudgement.LOST
-        if self.reported is not LinkState.OK:
+        unmonitored = self.reported is LinkState.UNMONITORED
+        if self.reported is not LinkState.OK and not unmonitored:
             return LinkJudgement(int(self.reported))
         if self.silent(limits.stale_after, now):
             return LinkJudgement.STALE
         if now < self.regained_at + limits.regain_after:
             return LinkJudgement.REGAINED
-        return LinkJudgement.OK
+        return LinkJudgement.UNMONITORED if unmonitored else LinkJudgement.OK
 
     def is_heard(self, limits: LinkLimits, now: float) -> bool:
         """What it says counts now; what a lost one said last is not what it is."""
-        return self.judged(limits, now) in (LinkJudgement.OK, LinkJudgement.REGAINED)
+        return self.judged(limits, now) in _HEARD
 
     def with_heartbeat(self, one: LinkHeartbeat, limits: LinkLimits, now: float) -> LinkEvidence:
         """After a heartbeat. One lost, or stale while it was being regained, begins anew."""

@@ -44,6 +44,10 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
     if judged is LinkJudgement.REGAINED:
         heard = now - evidence.regained_at
         return f"{link}: REGAINED, heard again for {heard:.2f} s (need {limits.regain_after:g} s)"
+    if judged is LinkJudgement.UNMONITORED:
+        allowed = link in config.unmonitored_links
+        text = "UNMONITORED, its device never says how it is (to fly with it: unmonitored_links)"
+        return "" if allowed else f"{link}: {text}"
     if judged is not LinkJudgement.OK:
         silence = now - evidence.heard
         if evidence.silent(limits.stale_after, now):
@@ -53,6 +57,10 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
     if not evidence.device_healthy:
         return f"{link}: its device is not healthy" + _faults(evidence)
     return ""
+
+
+def _unmonitored(state: State, link: str) -> bool:
+    return state.evidence(link).reported is LinkState.UNMONITORED
 
 
 def _faults(evidence: LinkEvidence) -> str:
@@ -68,7 +76,12 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     problem = {
         link: link_problem(config, link, state.evidence(link), now) for link in config.links
     }
-    against = [link for link in config.required_links if problem[link]]
+    # Whoever flies with a device that nobody monitors has said so, also where others are there.
+    against = [
+        link
+        for link in config.links
+        if problem[link] and (link in config.required_links or _unmonitored(state, link))
+    ]
     for links in (config.kill_links, config.deploy_links):
         # One that can do it is enough; none at all means that nobody would.
         if all(problem[link] for link in links):

@@ -29,6 +29,7 @@ LINK_TONES = {
     LinkState.OK: "good",
     LinkState.STALE: "warn",
     LinkState.LOST: "bad",
+    LinkState.UNMONITORED: "warn",
 }
 OUTCOME_TONES = {
     Outcome.NONE: "quiet",
