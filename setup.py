@@ -10,6 +10,7 @@ LINKS = {
     "mavlink_parachute": "mavlink",
     "upf_can": "upf",
     "umbilical": "umbilical",
+    "relay": "relay",
 }
 
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 from chute_ros.campaign.aircraft import Aircraft
-from chute_ros.campaign.device_node import Acted
 from chute_ros.campaign.person import Call
 from chute_ros.campaign.rig import Rig
 from chute_ros.campaign.scenario import (
@@ -19,6 +18,7 @@ from chute_ros.campaign.scenario import (
 )
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import Truth
+from chute_ros.campaign.virtual_node import Acted
 from chute_ros.links.api import load
 from chute_ros.model import Action, Decision
 from chute_ros.supervisor import inputs as i

@@ -10,7 +10,6 @@ from functools import partial
 
 from chute_ros.campaign.bus import Plug
 from chute_ros.campaign.channel import Way
-from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.scenario import (
     ClockJump,
@@ -26,6 +25,7 @@ from chute_ros.campaign.sensors import SensorFault, Sensors
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.truth import Truth
+from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.campaign.world import World
 from chute_ros.runtime.arming import Answered
 from chute_ros.sim.flight import FlightModel
@@ -46,7 +46,7 @@ class Rig(ABC):
         #: By the source's name in a SensorFault.
         self.sensors_of = {"": self.sensors}
         self.supervisors: list[SupervisorHost] = []
-        self.nodes: dict[str, DeviceNode] = {}
+        self.nodes: dict[str, VirtualNode] = {}
         self.plugs: dict[str, Plug] = {}
         self._processes: dict[str, Process] = {}
         self._restart: dict[str, Callable[[float], None]] = {}
@@ -75,7 +75,7 @@ class Rig(ABC):
         self._processes[name] = Process(name)
         return self._processes[name]
 
-    def add_node(self, node: DeviceNode) -> None:
+    def add_node(self, node: VirtualNode) -> None:
         """A device node."""
         self.nodes[node.name] = self.plugs[node.name] = node
         self._restart[node.name] = node.start_again

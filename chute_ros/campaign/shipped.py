@@ -25,10 +25,11 @@ class Shipped:
             told = vehicles()[vehicle].supervised
             text = (self._folder / f"{profile}.yaml").read_text(encoding="utf-8")
             plain = SupervisorConfig(
-                told("required_links"),
-                told("kill_links"),
-                told("deploy_links"),
-                tuple(Rung.parse(text) for text in told("deploy_ladder", ())),
+                required_links=told("required_links"),
+                kill_links=told("kill_links"),
+                deploy_links=told("deploy_links"),
+                unmonitored_links=told("unmonitored_links", ()),
+                deploy_ladder=tuple(Rung.parse(text) for text in told("deploy_ladder", ())),
             )
             self._configs[key] = replace(plain, profile=read_profile(text, profile, plain.links))
         return replace(self._configs[key], standby=standby, rank=rank)

@@ -192,7 +192,7 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
 def run_on_can(
     device: Acting,
     options: argparse.Namespace,
-    beside: Callable[[], contextlib.AbstractContextManager[Any]],
+    beside: contextlib.AbstractContextManager[None],
 ) -> None:
     """The same on CAN buses. beside: what else runs meanwhile."""
     # Here: the simulators on MAVLink do without the library of DroneCAN.
@@ -212,11 +212,15 @@ def run_on_can(
         make_can_wire(parse_can_address(text, options.bitrate)) for text in _connections(options)
     ]
     ended = _ended()
-    with beside():
+    with beside:
         _run_link(device, link, wires, options, ended)
 
 
-def run_on_pty(device: Acting, options: argparse.Namespace) -> None:
+def run_on_pty(
+    device: Acting,
+    options: argparse.Namespace,
+    beside: contextlib.AbstractContextManager[None] | None = None,
+) -> None:
     """The same on a pseudo terminal, whose path is the first line that is printed."""
     # First, so that a mistake in it leaves no link behind.
     _check_script(device, options)
@@ -229,7 +233,8 @@ def run_on_pty(device: Acting, options: argparse.Namespace) -> None:
         raise ParameterError(f"--link {options.link!r}: {error}") from None
     if not options.quiet:
         print(wire.path + (f" linked from {options.link}" if options.link else ""), flush=True)
-    _run_link(device, device, [wire], options, ended)
+    with beside or contextlib.nullcontext():
+        _run_link(device, device, [wire], options, ended)
 
 
 def _connections(options: argparse.Namespace) -> list[str]:

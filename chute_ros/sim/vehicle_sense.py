@@ -7,13 +7,17 @@ that only the two share, and tells it when the canopy is out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.sim.mavlink_device import MavlinkDevice
 from chute_ros.sim.motion import Motion
+from chute_ros.transport.address import parse_address
+from chute_ros.transport.loop import WireLoop
+from chute_ros.transport.wire import make_wire
 
 _COMPONENT_ID = 192  # MAV_COMP_ID_ONBOARD_COMPUTER2
 _AUTOPILOT = 1
@@ -93,3 +97,23 @@ class VehicleSense(MavlinkDevice):
         return dialect.MAVLink_parachute_status_message(
             self.boot_ms(), 0, 0, int(trigger), 0, 0, b""
         )
+
+
+@contextmanager
+def sensing(
+    address: str | None,
+    system_id: int,
+    felt: Callable[[Motion], None],
+    released: Callable[[], bool],
+) -> Iterator[None]:
+    """A VehicleSense at work over the wire of this address; empty or None: there is no vehicle."""
+    if not address:
+        yield
+        return
+    device = VehicleSense(system_id, felt, released)
+    loop = WireLoop(device, make_wire(parse_address(address)), lambda events: None)
+    loop.start()
+    try:
+        yield
+    finally:
+        loop.stop()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from chute_ros.campaign.device_node import Acted
 from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.scenario import Failure, Fault, Scenario
 from chute_ros.campaign.shipped import Shipped
+from chute_ros.campaign.virtual_node import Acted
 from chute_ros.model import Action
 
 FOLDER = Path(__file__).parents[2] / "config" / "profiles"

@@ -8,9 +8,9 @@ from functools import partial
 
 from chute_ros.campaign.aircraft import Aircraft, is_for_devices
 from chute_ros.campaign.bus import Bus, Plug
-from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.scenario import HomeMove, Scenario
+from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.links.api import AUTOPILOT_LINK, VehicleKind
 from chute_ros.links.mavlink import carries_parachute
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
@@ -54,16 +54,16 @@ class MavlinkPart:
             rig.add_device(Plug(bus, _PARACHUTE, parachute, is_for_devices), parachute.reboot)
             if len(scenario.carries.supervised("deploy_links")) == 1:
                 rig.refused_at = lambda: parachute.misled_at
-        rig.add_node(MavlinkNode(bus, rig.process(AUTOPILOT_LINK), rig.ros, carries))
+        rig.add_node(VirtualMavlink(bus, rig.process(AUTOPILOT_LINK), rig.ros, carries))
 
 
-class MavlinkNode(DeviceNode):
+class VirtualMavlink(VirtualNode):
     """mavlink_parachute. expect_parachute: false where the parachute is on another link."""
 
     def __init__(self, bus: Bus, process: Process, ros: Ros, expect_parachute: bool) -> None:
         settings = MavlinkSettings(expect_parachute=expect_parachute)
 
-        def runtime(shell: DeviceNode) -> MavlinkRuntime:
+        def runtime(shell: VirtualNode) -> MavlinkRuntime:
             return MavlinkRuntime(process.name, settings, shell)
 
         super().__init__(bus, process, ros, lambda: MavlinkLink(MavlinkConfig()), runtime)

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from chute_ros.campaign.bus import SERIAL, Bus, Plug
-from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.rig import Rig
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.sensors import Sensors
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.truth import observe_rocket
+from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.links.api import VehicleKind
 from chute_ros.links.umbilical import LINK
 from chute_ros.links.umbilical.layout_files import load_layouts
@@ -73,7 +73,7 @@ class Lines:
         self.whole += [now for line in lines if line in self._said]
 
 
-class UmbilicalNode(DeviceNode):
+class VirtualUmbilical(VirtualNode):
     """umbilical, of a rocket without an autopilot beside it."""
 
     def __init__(self, bus: Bus, process: Process, ros: Ros, layouts: list[Layout]) -> None:
@@ -82,7 +82,7 @@ class UmbilicalNode(DeviceNode):
             link.wire_opened(ros.world.now)
             return link
 
-        def runtime(shell: DeviceNode) -> UmbilicalRuntime:
+        def runtime(shell: VirtualNode) -> UmbilicalRuntime:
             return UmbilicalRuntime(
                 process.name, UmbilicalSettings(publish_vehicle_state=True), shell
             )
@@ -100,7 +100,7 @@ class UmbilicalNode(DeviceNode):
         return data in (b"<D>", b"<d>")
 
 
-class ListeningNode(UmbilicalNode):
+class ListeningNode(VirtualUmbilical):
     """Notes which lines came."""
 
     lines: Lines

@@ -8,8 +8,8 @@ from functools import partial
 
 from chute_ros.campaign.aircraft import Aircraft
 from chute_ros.campaign.bus import CAN, Bus, Plug, spoil_can
-from chute_ros.campaign.device_node import DeviceNode
 from chute_ros.campaign.ros import Process, Ros
+from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.links.api import VehicleKind
 from chute_ros.links.upf import LINK
 from chute_ros.links.upf.protocol import definitions as names
@@ -21,8 +21,7 @@ from chute_ros.links.upf.runtime import UpfRuntime, UpfSettings
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
-from chute_ros.links.upf.simulator.node import NodeSettings
-from chute_ros.links.upf.simulator.node import UpfNode as UpfDevice
+from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
 from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.protocol.dronecan import time_sync
 from chute_ros.protocol.dronecan.allocation import MESSAGE as ALLOCATION
@@ -59,7 +58,7 @@ class UpfPart:
         for name, device in ((_CONTROLLER, controller), (_TRIGGER, trigger)):
             plug = Plug(bus, name, UpfBus([device]), _is_for(device))
             rig.add_device(plug, device.reboot)
-        rig.add_node(UpfNode(bus, rig.process(LINK.name), rig.ros, definitions.types))
+        rig.add_node(VirtualUpf(bus, rig.process(LINK.name), rig.ros, definitions.types))
 
         def feel(motion: Motion) -> None:
             controller.motion = motion
@@ -67,13 +66,13 @@ class UpfPart:
         rig.feeling.append(feel)
 
 
-class UpfNode(DeviceNode):
+class VirtualUpf(VirtualNode):
     """upf_can."""
 
     runtime: UpfRuntime
 
     def __init__(self, bus: Bus, process: Process, ros: Ros, types: DataTypes) -> None:
-        def runtime(shell: DeviceNode) -> UpfRuntime:
+        def runtime(shell: VirtualNode) -> UpfRuntime:
             return UpfRuntime(process.name, UpfSettings(), shell)
 
         make_link: Callable[[], UpfLink] = lambda: UpfLink(UpfConfig(), types)  # noqa: E731
@@ -105,7 +104,7 @@ def _definitions() -> Definitions:
     return Definitions(load_data_types("", "the data types"))
 
 
-def _is_for(node: UpfDevice) -> Callable[[bytes], bool]:
+def _is_for(node: UpfNode) -> Callable[[bytes], bool]:
     """A service's frame, an anonymous one, or one of a message to which this node reacts."""
     names = (*node.messages, ALLOCATION, time_sync.MESSAGE)
     wanted = frozenset(node.definitions.types.message(name).id for name in names)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import replace
 
 from chute_ros.errors import ParameterError
@@ -69,6 +67,7 @@ def _run() -> None:
     from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
     from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
     from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
+    from chute_ros.sim.vehicle_sense import sensing
     from chute_ros.transport.data_types import load_data_types
 
     definitions = Definitions(load_data_types(chosen.dsdl_path, "--dsdl-path"))
@@ -96,29 +95,12 @@ def _run() -> None:
     if not nodes:
         raise ParameterError("--no-controller and --no-trigger: nothing is left to simulate")
 
-    @contextlib.contextmanager
-    def sense() -> Iterator[None]:
-        """The wire to the simulated vehicle, if there is one."""
-        if not chosen.vehicle:
-            yield
-            return
-        from chute_ros.sim.vehicle_sense import VehicleSense
-        from chute_ros.transport.address import parse_address
-        from chute_ros.transport.loop import WireLoop
-        from chute_ros.transport.wire import make_wire
-
-        device = VehicleSense(
-            chosen.system_id,
-            lambda motion: setattr(controller, "motion", motion),
-            lambda: trigger.fired,
-        )
-        loop = WireLoop(device, make_wire(parse_address(chosen.vehicle)), lambda events: None)
-        loop.start()
-        try:
-            yield
-        finally:
-            loop.stop()
-
+    sense = sensing(
+        chosen.vehicle,
+        chosen.system_id,
+        lambda motion: setattr(controller, "motion", motion),
+        lambda: trigger.fired,
+    )
     run_on_can(UpfBus(nodes, script_of(chosen.at)), chosen, sense)
 
 

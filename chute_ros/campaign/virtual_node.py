@@ -31,7 +31,7 @@ class Acted:
     decision: Decision
 
 
-class DeviceNode(Plug):
+class VirtualNode(Plug):
     """The shell of a runtime in virtual time, of which both turns are one. make_link: its link,
     make_runtime: what it gets with this shell, both anew with each start."""
 
@@ -43,7 +43,7 @@ class DeviceNode(Plug):
         process: Process,
         ros: Ros,
         make_link: Callable[[], Any],
-        make_runtime: Callable[[DeviceNode], DeviceRuntime[Any]],
+        make_runtime: Callable[[VirtualNode], DeviceRuntime[Any]],
         spoil: Spoil | None = None,
     ) -> None:
         super().__init__(bus, process.name, make_link(), spoil=spoil)

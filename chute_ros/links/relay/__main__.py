@@ -1,0 +1,13 @@
+"""Executable relay."""
+
+from chute_ros.links.relay import LINK
+from chute_ros.nodes.entry import run
+
+
+def main() -> None:
+    """Run the node."""
+    run(LINK.name, LINK.node)
+
+
+if __name__ == "__main__":
+    main()

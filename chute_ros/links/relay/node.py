@@ -1,0 +1,34 @@
+"""A parachute without telemetry on a relay, GPIO or PWM output."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from chute_ros.links.relay.diagnostics import details_of, output_task
+from chute_ros.links.relay.output import make_output
+from chute_ros.links.relay.parameters import PARAMETERS, config_from
+from chute_ros.links.relay.protocol.link import RelayLink
+from chute_ros.links.relay.runtime import RelayRuntime
+from chute_ros.nodes.device_node import DeviceNode
+from chute_ros.runtime.device import DeviceSettings, Summary
+from chute_ros.transport.loop import WireLoop
+
+
+class RelayNode(DeviceNode):
+    """The node relay."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("relay", PARAMETERS, **options)
+        link = RelayLink(config_from(self.values))
+        wire = make_output(self.values["connection"])
+        settings = self.settings(DeviceSettings)
+        self.carry(RelayRuntime(self.get_name(), settings, self, details_of))
+        self.loop = WireLoop(link, wire, self.deliver, link.wire_opened, link.not_written)
+        self.begin()
+
+    def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
+        assert self.loop is not None
+        wire, failed = self.wire_picture(), self.loop.send_errors
+        return [output_task(self.diagnostic_name, summary.details, wire, failed)]

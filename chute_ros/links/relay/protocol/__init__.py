@@ -1,0 +1,1 @@
+"""Protocol of an output that is written and never answers."""

@@ -1,0 +1,171 @@
+"""An output that fires a parachute and never answers.
+
+At rest the output is written again each rest_interval: that is all that can be tested of it. A
+deploy is a pulse: the firing bytes, repeated each repeat_interval, for pulse_time; then rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+from chute_ros.model import LinkState, Outcome, ParachuteStatus
+from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
+from chute_ros.protocol.events import Event, ParachuteChanged, RequestFinished, RequestReport
+
+#: The one device of an output.
+DEVICE = "output"
+#: Between two pictures of it, s.
+_PICTURES = 1.0
+_SENT = "sent; a relay output confirms nothing"
+
+
+@dataclass(frozen=True)
+class RelayConfig:
+    """fire, rest: what is written to fire, and to rest; times in s. The defaults are those of a
+    serial relay board of one channel (LCUS-1)."""
+
+    fire: bytes = bytes.fromhex("a00101a2")
+    rest: bytes = bytes.fromhex("a00100a1")
+    pulse_time: float = 2.0
+    repeat_interval: float = 0.1
+    rest_interval: float = 1.0
+    #: A deploy that could not be written fails after this.
+    give_up_after: float = 5.0
+
+
+class RelayLink:
+    """The output: UNMONITORED while it can be written; else LOST, or NEVER_SEEN at first."""
+
+    def __init__(self, config: RelayConfig) -> None:
+        self.config = config
+        self.state = LinkState.NEVER_SEEN
+        #: Bytes that came, which nobody expects; pulses; when the newest one began, monotonic s.
+        self.received = self.fired = 0
+        self.fired_at = math.nan
+        self._is_open = False
+        #: Token of each deploy that was not written yet -> when it fails.
+        self._waiting: dict[int, float] = {}
+        self._fires_until = -math.inf
+        self._write_at = math.inf
+        self._picture_at = -math.inf
+        self._now = -math.inf
+        self._output: list[bytes] = []
+        #: What the wire was given, and has not refused so far.
+        self._given: list[bytes] = []
+        self._events: list[Event] = []
+
+    # -- the wire --------------------------------------------------------------------------------
+
+    def wire_opened(self, now: float) -> None:
+        """The output can be written."""
+        self._is_open = True
+        self._write_at = now
+        self.update(now)
+
+    def stream_ended(self, stream: Hashable) -> None:
+        """The output is gone."""
+        self._is_open = False
+        self._lost()
+
+    def not_written(self, frame: bytes) -> None:
+        """The output did not take it."""
+        self._given.clear()
+        self._lost()
+
+    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+        """Some boards echo; it says nothing of a parachute."""
+        self.received += len(data)
+
+    def update(self, now: float) -> None:
+        self._now = now
+        if self._is_open and now >= self._write_at:
+            fires = bool(self._waiting) or now < self._fires_until
+            self._output.append(self.config.fire if fires else self.config.rest)
+            wait = self.config.repeat_interval if fires else self.config.rest_interval
+            self._write_at = now + wait
+        for token in [one for one, until in self._waiting.items() if now >= until]:
+            del self._waiting[token]
+            text = f"the output could not be written within {self.config.give_up_after:g} s"
+            self._end(token, Outcome.FAILED, text)
+        if now >= self._picture_at:
+            self._picture(now)
+
+    def next_deadline(self) -> float:
+        write_at = self._write_at if self._is_open else math.inf
+        return min([write_at, self._picture_at, *self._waiting.values()])
+
+    def take_output(self) -> list[bytes]:
+        output, self._output = self._output, []
+        self._given += output
+        return output
+
+    def take_events(self) -> list[Event]:
+        self._look_at_written()
+        events, self._events = self._events, []
+        return events
+
+    # -- the owner -------------------------------------------------------------------------------
+
+    def owner_alive(self, until: float) -> None:
+        """Nobody listens at the other end."""
+
+    def has_parachute(self) -> bool:
+        """It cannot be known; a deploy is tried all the same."""
+        return True
+
+    def arm(self, token: int, arm: bool, triggers: int, now: float) -> None:
+        """There is nothing to arm, and nothing that could be disarmed."""
+        if arm:
+            self._end(token, Outcome.CONFIRMED, "a relay output has no arming: it can always fire")
+        else:
+            text = "a relay output cannot be disarmed: disconnect or secure the parachute"
+            self._end(token, Outcome.FAILED, text)
+
+    def deploy(self, token: int, force: bool, now: float) -> None:
+        """Fire. Without force it is refused: an output knows neither height nor arming."""
+        if not force:
+            text = "a relay output cannot tell air from ground: nothing was sent (force fires it)"
+            self._end(token, Outcome.FAILED, text)
+            return
+        self._waiting[token] = now + self.config.give_up_after
+        self._write_at = now
+        self.update(now)
+
+    def flight_block(self, reason: str, now: float) -> None:
+        """An output keeps nothing on the ground."""
+
+    # -- inside ----------------------------------------------------------------------------------
+
+    def _look_at_written(self) -> None:
+        given, self._given = self._given, []
+        if given:
+            self._to(LinkState.UNMONITORED)
+        if self.config.fire not in given or not self._waiting:
+            return
+        self.fired += 1
+        self.fired_at = self._now
+        self._fires_until = self._now + self.config.pulse_time
+        waiting, self._waiting = self._waiting, {}
+        for token in waiting:
+            self._end(token, Outcome.SENT, _SENT)
+
+    def _lost(self) -> None:
+        if self.state is LinkState.UNMONITORED:
+            self._to(LinkState.LOST)
+
+    def _to(self, state: LinkState) -> None:
+        if state is not self.state:
+            self.state = state
+            self._picture(self._now)
+
+    def _picture(self, now: float) -> None:
+        self._picture_at = now + _PICTURES
+        self._events.append(ParachuteChanged(ParachuteStatus(DEVICE, self.state)))
+
+    def _end(self, token: int, outcome: Outcome, text: str) -> None:
+        self._events.append(RequestReport(Report(token, outcome, text)))
+        success = outcome is Outcome.CONFIRMED
+        finished = EffectFinished(token, success, False, NO_ANSWER, text)
+        self._events.append(RequestFinished(finished))

@@ -1,0 +1,38 @@
+"""What relay does with decisions, and how it says that it cannot know."""
+
+from __future__ import annotations
+
+from chute_ros.links.relay.protocol.link import RelayLink
+from chute_ros.model import NAN, Action, Decision, LinkState, Outcome
+from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
+from chute_ros.protocol.events import RequestFinished
+from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+
+_UNMONITORED = "nothing comes back from a relay output: what its parachute is can only be hoped"
+_NOT_WRITTEN = "its output cannot be written"
+
+
+class RelayRuntime(DeviceRuntime[DeviceSettings]):
+    """Its link is a RelayLink."""
+
+    BLOCKS_FLIGHT = False
+
+    def summarise(self, link: RelayLink, now: float) -> Summary:
+        unmonitored = link.state is LinkState.UNMONITORED
+        return Summary(link.state, False, NAN, (_UNMONITORED if unmonitored else _NOT_WRITTEN,))
+
+    def failed_end(self, token: int, text: str) -> RequestFinished:
+        return RequestFinished(EffectFinished(token, False, False, NO_ANSWER, text))
+
+    def carry_out(self, decision: Decision) -> None:
+        if decision.action is Action.DEPLOY and decision.device:
+            text = f"device {decision.device!r}: a relay has one output; nothing was sent"
+            self.decisions.report(decision, Outcome.FAILED, text)
+        elif decision.action is Action.DEPLOY:
+            self.deploy_for(decision, lambda link, token, now: link.deploy(token, True, now))
+        elif decision.action is Action.KILL:
+            text = "a relay output stops no motors: take relay out of kill_links"
+            self.decisions.report(decision, Outcome.FAILED, text)
+        elif decision.action is not Action.NONE:
+            text = "noted; a relay output keeps nothing on the ground"
+            self.decisions.report(decision, Outcome.CONFIRMED, text)
