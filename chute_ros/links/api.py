@@ -66,8 +66,12 @@ class Link(Protocol):
     def deploy(self, token: int, force: bool, now: float) -> None:
         """Begin to release; ends with a RequestFinished of this token."""
 
+
+class BlockingLink(Link, Protocol):
+    """One that can keep its vehicle on the ground (DeviceRuntime.BLOCKS_FLIGHT)."""
+
     def flight_block(self, reason: str, now: float) -> None:
-        """Keep the vehicle on the ground where the device can; empty: let it go."""
+        """Keep the vehicle on the ground for this reason; empty: let it go."""
 
 
 class Part(Protocol):

@@ -1,7 +1,8 @@
 """The stories that every device node must pass, whatever its link.
 
-A test module of a device node subclasses DeviceSuite and says in make_device how its simulated
-device is plugged in. The names and texts below are the contract of all links.
+A test module of a link subclasses DeviceSuite and says in make how its simulated device is plugged
+in; one whose device tells nothing subclasses NodeSuite. The names and texts below are the contract
+of all links.
 """
 
 from __future__ import annotations
@@ -30,18 +31,17 @@ from chute_ros.nodes import link_log, qos
 HEARTBEAT_RATE = 50.0
 
 
-class DeviceSuite:
-    """Inherit, name the node, and give it a device."""
+class NodeSuite:
+    """Inherit, name the node, and give it a device: what holds for any device."""
 
     #: Tasks of diagnostics that do not rest on what the link says of its device.
     OF_OURS = ("link", "supervisor", "middleware")
     #: The node's name, which is its link's name as well.
     name: str
-    #: The link's protocol has acknowledgements.
-    acknowledges = True
-    #: What a refused deploy says: not armed, and too near the ground.
-    not_armed = "failed"
-    too_near = "temporarily rejected"
+    #: The state of a link that is as it should be.
+    alive = LinkState.OK
+    #: What is reported of a deploy that was decided.
+    steps: tuple[Outcome, ...]
 
     def make(self, bench: Bench, **parameters: Any) -> SimulatedDevice:
         """Start the node with short limits (stale 0.4 s, lost 0.8 s); its device, unplugged."""
@@ -58,21 +58,9 @@ class DeviceSuite:
         self.numbers = iter(range(1, 1000))
         return self.make(bench, heartbeat_rate=HEARTBEAT_RATE)
 
-    def plugged(self, device: SimulatedDevice) -> None:
-        device.plug_in()
-        self.await_link(LinkState.OK)
-        self.bench.until(
-            lambda: self.beats[-1].device_healthy and self.statuses, "the device is healthy"
-        )
-
-    def armed(self, device: SimulatedDevice) -> None:
-        self.plugged(device)
-        answer = self.bench.call(Arm, f"{self.name}/arm", arm=True)
-        assert answer.success, answer.message
-
     def ready_to_deploy(self, device: SimulatedDevice) -> None:
-        self.armed(device)
-        device.clear_the_ground()
+        """Plug it in, and do what a deploy needs."""
+        raise NotImplementedError
 
     def await_link(self, state: LinkState) -> None:
         self.bench.until(
@@ -125,47 +113,6 @@ class DeviceSuite:
 
         return self.bench.until(found, f"{outcome.name} is reported")
 
-    # -- the wire -----------------------------------------------------------------------------
-
-    def test_a_wire_on_which_nobody_is_heard_is_told_once(
-        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(link_log, "QUIET_FOR", 1.5)
-        said = self.bench.follow_log()
-        device.plug_in_mute()
-        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
-
-        def told() -> list[str]:
-            return [line.msg for line in said if "nothing received yet" in line.msg]
-
-        self.bench.until(told, "it is told")
-        assert " is open, nothing received yet, for " in told()[0]
-        looked = len(diagnostics)
-        self.bench.until(lambda: len(diagnostics) >= looked + 3, "it was looked at again")
-        assert len(told()) == 1
-
-    # -- link states --------------------------------------------------------------------------
-
-    def test_never_seen_ok_stale_lost_and_regained(self, device: SimulatedDevice) -> None:
-        self.await_link(LinkState.NEVER_SEEN)
-        assert self.beats[-1].age != self.beats[-1].age, "not known is NaN"
-        self.plugged(device)
-        assert self.beats[-1].device_healthy
-        device.fall_silent()
-        self.await_link(LinkState.STALE)
-        assert not self.beats[-1].device_healthy
-        self.await_link(LinkState.LOST)
-        assert self.beats[-1].age >= 0.8
-        device.speak_again()
-        self.await_link(LinkState.OK)
-        told = [beat.link_state for beat in self.beats]
-        assert list(dict.fromkeys(told)) == [0, 1, 2, 3], "none is left out"
-        told = [status.link_state for status in self.statuses]
-        assert list(dict.fromkeys(told)) == [1, 2, 3], "the status tells the same"
-        assert told[-1] == LinkState.OK or self.bench.until(
-            lambda: self.statuses[-1].link_state == LinkState.OK, "the status is back, too"
-        )
-
     def test_its_heartbeat_is_numbered_and_signed(self, device: SimulatedDevice) -> None:
         self.bench.until(lambda: len(self.beats) >= 5, "it beats")
         numbers = [beat.seq for beat in self.beats]
@@ -177,7 +124,7 @@ class DeviceSuite:
     def test_a_node_whose_link_fails_inside_gives_no_sign_of_life(
         self, device: SimulatedDevice, what: str, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        self.plugged(device)
+        self.ready_to_deploy(device)
         node = next(one for one in self.bench.nodes if one.get_name() == self.name)
         diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
 
@@ -206,7 +153,213 @@ class DeviceSuite:
         assert all(text.startswith("not known now; was: ") for _, text in rest.values())
         monkeypatch.undo()
         self.bench.until(lambda: len(self.beats) > told, "it is heard again")
+        self.await_link(self.alive)
+
+    def test_a_decision_to_deploy_is_carried_out_and_each_step_reported(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.ready_to_deploy(device)
+        decision = self.decide(Action.DEPLOY)
+        self.await_report(self.steps[-1], decision)
+        self.bench.until(lambda: device.deployed, "it is out")
+        # On a machine that stands still for a moment it is sent again: the same step once more.
+        outcomes = list(dict.fromkeys(report.outcome for report in self.reports))
+        assert outcomes == list(self.steps)
+        assert {report.link for report in self.reports} == {self.name}
+        assert {report.action for report in self.reports} == {Action.DEPLOY}
+        assert all(report.detail for report in self.reports)
+
+    @pytest.mark.parametrize(
+        "fields",
+        [
+            {"targets": ["another_link"]},
+            {"targets": []},
+            {"shadow": True},
+            {"age": 30.0},
+            {"age": -30.0},
+        ],
+        ids=["for another", "for nobody", "shadow", "old", "from the future"],
+    )
+    def test_a_decision_that_is_not_for_it_now_is_not_acted_on(
+        self, device: SimulatedDevice, fields: dict[str, Any]
+    ) -> None:
+        self.ready_to_deploy(device)
+        self.decide(Action.DEPLOY, **fields)
+        # What follows comes after it on the same topic: once it is done, so is the judgement.
+        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE))
+        assert not device.deployed
+        assert device.commands_to_deploy() == 0
+
+    @pytest.mark.parametrize("step", [3600.0, -3600.0], ids=["forward", "back"])
+    def test_a_wall_clock_that_is_set_makes_no_decision_older(
+        self, device: SimulatedDevice, step: float
+    ) -> None:
+        self.ready_to_deploy(device)
+        await_told = self.told_in_diagnostics()
+        ages = [0.0]
+        self.beat(ages[0])
+        self.bench.client.create_timer(0.1, lambda: self.beat(ages[0]))
+        await_told("heartbeat age (s)", 0.0)
+        self.decide(Action.DEPLOY, age=step)
+        await_told("decisions: came too late", 1)
+        await_told("clock set by (s)", 0.0)
+        ages[0] = step
+        await_told("clock set by (s)", step)
+        self.await_report(self.steps[-1], self.decide(Action.DEPLOY, age=step))
+        self.bench.until(device.commands_to_deploy, "it comes over the wire")
+        assert device.commands_to_deploy() == 1
+
+    def test_an_answer_of_the_supervisor_shows_that_its_clock_is_behind(
+        self, device: SimulatedDevice
+    ) -> None:
+        """Given a node that was started anew on a host whose clock is an hour ahead."""
+        behind = 3600.0
+        self.ready_to_deploy(device)
+        await_told = self.told_in_diagnostics()
+        self.beat(behind)
+        self.bench.client.create_timer(0.1, lambda: self.beat(behind))
+        await_told("heartbeat age (s)", 0.0)
+        self.picture(behind, Time(sec=17, nanosec=4))
+        self.decide(Action.DEPLOY, age=behind)
+        await_told("decisions: came too late", 1)
+        assert device.commands_to_deploy() == 0, "that picture answers nothing of this node"
+        # Again and again, as the supervisor does: one that a busy machine is slow with tells less.
+        self.bench.client.create_timer(
+            0.1,
+            lambda: self.picture(
+                behind, [one for one in self.beats if not one.supervisor][-1].header.stamp
+            ),
+        )
+        await_told("clock set by (s)", behind)
+        self.decide(Action.DEPLOY, age=behind + 30.0)
+        await_told("decisions: came too late", 2)
+        self.await_report(self.steps[-1], self.decide(Action.DEPLOY, age=behind))
+        self.bench.until(device.commands_to_deploy, "it comes over the wire")
+        assert device.commands_to_deploy() == 1
+
+    def test_a_repeated_decision_is_reported_again_and_not_fired_twice(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.ready_to_deploy(device)
+        decision = self.decide(Action.DEPLOY)
+        self.await_report(self.steps[-1], decision)
+        sent = self.bench.until(device.commands_to_deploy, "it comes over the wire")
+        for _ in range(3):
+            self.reports.clear()
+            self.decide(Action.DEPLOY, id=decision.id)
+            assert self.await_report(self.steps[-1], decision).action == Action.DEPLOY
+        assert device.commands_to_deploy() == sent == 1
+
+    def test_a_decision_of_an_older_epoch_fails_and_names_the_newest(
+        self, device: SimulatedDevice
+    ) -> None:
+        self.ready_to_deploy(device)
+        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE, epoch=7))
+        old = self.decide(Action.DEPLOY, epoch=6, id=10_000)
+        assert self.await_report(Outcome.FAILED, old).newest_epoch == 7
+        assert not device.deployed
+
+    def test_a_decision_is_not_heard_by_a_node_that_starts_later(self, bench: Bench) -> None:
+        self.bench, self.numbers = bench, iter(range(1, 10))
+        self.statuses = bench.follow(ParachuteStatus, "parachute/status")
+        self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+        publisher = bench.client.create_publisher(SafetyDecision, "safety/decision", qos.DECISION)
+        message = SafetyDecision(
+            epoch=1, id=1, action=int(Action.DEPLOY), rule="test", targets=[self.name]
+        )
+        publisher.publish(stamped(bench.client, message))
+        device = self.make(bench, heartbeat_rate=HEARTBEAT_RATE, max_decision_age=10.0)
+        self.ready_to_deploy(device)
+        assert device.commands_to_deploy() == 0
+
+    def test_a_decision_whose_call_fails_inside_is_reported_as_failed_and_never_as_sent(
+        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Taken for sent, the supervisor would wait, and not try the next parachute."""
+        self.ready_to_deploy(device)
+        node = next(one for one in self.bench.nodes if one.get_name() == self.name)
+
+        def broken(*_: Any) -> None:
+            raise RuntimeError("a mistake of ours")
+
+        runtime = node.runtime
+        through = runtime.deploy_for
+        monkeypatch.setattr(runtime, "deploy_for", lambda decision, _: through(decision, broken))
+        decision = self.decide(Action.DEPLOY)
+        report = self.await_report(Outcome.FAILED, decision)
+        assert report.detail == "RuntimeError: a mistake of ours"
+        assert not device.deployed
+        order = (decision.epoch, decision.id)
+        outcomes = {one.outcome for one in self.reports if (one.epoch, one.id) == order}
+        assert outcomes == {int(Outcome.FAILED)}
+
+
+class DeviceSuite(NodeSuite):
+    """The same, and what holds for a device that tells how it is."""
+
+    #: The link's protocol has acknowledgements.
+    acknowledges = True
+    #: What a refused deploy says: not armed, and too near the ground.
+    not_armed = "failed"
+    too_near = "temporarily rejected"
+
+    @property
+    def steps(self) -> tuple[Outcome, ...]:  # type: ignore[override]
+        accepted = (Outcome.ACCEPTED,) if self.acknowledges else ()
+        return (Outcome.SENT, *accepted, Outcome.CONFIRMED)
+
+    def ready_to_deploy(self, device: SimulatedDevice) -> None:
+        self.armed(device)
+        device.clear_the_ground()
+
+    def plugged(self, device: SimulatedDevice) -> None:
+        device.plug_in()
         self.await_link(LinkState.OK)
+        self.bench.until(
+            lambda: self.beats[-1].device_healthy and self.statuses, "the device is healthy"
+        )
+
+    def armed(self, device: SimulatedDevice) -> None:
+        self.plugged(device)
+        answer = self.bench.call(Arm, f"{self.name}/arm", arm=True)
+        assert answer.success, answer.message
+
+    def test_a_wire_on_which_nobody_is_heard_is_told_once(
+        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(link_log, "QUIET_FOR", 1.5)
+        said = self.bench.follow_log()
+        device.plug_in_mute()
+        diagnostics = self.bench.follow(DiagnosticArray, "/diagnostics")
+
+        def told() -> list[str]:
+            return [line.msg for line in said if "nothing received yet" in line.msg]
+
+        self.bench.until(told, "it is told")
+        assert " is open, nothing received yet, for " in told()[0]
+        looked = len(diagnostics)
+        self.bench.until(lambda: len(diagnostics) >= looked + 3, "it was looked at again")
+        assert len(told()) == 1
+
+    def test_never_seen_ok_stale_lost_and_regained(self, device: SimulatedDevice) -> None:
+        self.await_link(LinkState.NEVER_SEEN)
+        assert self.beats[-1].age != self.beats[-1].age, "not known is NaN"
+        self.plugged(device)
+        assert self.beats[-1].device_healthy
+        device.fall_silent()
+        self.await_link(LinkState.STALE)
+        assert not self.beats[-1].device_healthy
+        self.await_link(LinkState.LOST)
+        assert self.beats[-1].age >= 0.8
+        device.speak_again()
+        self.await_link(LinkState.OK)
+        told = [beat.link_state for beat in self.beats]
+        assert list(dict.fromkeys(told)) == [0, 1, 2, 3], "none is left out"
+        told = [status.link_state for status in self.statuses]
+        assert list(dict.fromkeys(told)) == [1, 2, 3], "the status tells the same"
+        assert told[-1] == LinkState.OK or self.bench.until(
+            lambda: self.statuses[-1].link_state == LinkState.OK, "the status is back, too"
+        )
 
     def test_a_device_that_breaks_down_is_not_healthy(self, device: SimulatedDevice) -> None:
         self.plugged(device)
@@ -217,8 +370,6 @@ class DeviceSuite:
         self.bench.until(lambda: not self.beats[-1].device_healthy, "the heartbeat says so")
         assert self.beats[-1].link_state == LinkState.OK, "the wire itself is well"
         assert self.statuses[-1].state == ParachuteState.ABNORMAL
-
-    # -- arm and deploy -----------------------------------------------------------------------
 
     def test_arm_and_disarm_are_confirmed_by_the_devices_own_status(
         self, device: SimulatedDevice
@@ -303,145 +454,6 @@ class DeviceSuite:
         self.bench.until(lambda: len(self.beats) >= 5 and len(self.statuses) >= 3, "both go on")
         assert not future.done(), "all that while the service was waiting"
         self.bench.until(future.done, "the service ends")
-
-    # -- decisions ----------------------------------------------------------------------------
-
-    def test_a_decision_to_deploy_is_carried_out_and_each_step_reported(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.ready_to_deploy(device)
-        decision = self.decide(Action.DEPLOY)
-        self.await_report(Outcome.CONFIRMED, decision)
-        assert device.deployed
-        # On a machine that stands still for a moment it is sent again: the same step once more.
-        outcomes = list(dict.fromkeys(report.outcome for report in self.reports))
-        accepted = [Outcome.ACCEPTED] if self.acknowledges else []
-        assert outcomes == [Outcome.SENT, *accepted, Outcome.CONFIRMED]
-        assert {report.link for report in self.reports} == {self.name}
-        assert {report.action for report in self.reports} == {Action.DEPLOY}
-        assert all(report.detail for report in self.reports)
-
-    @pytest.mark.parametrize(
-        "fields",
-        [
-            {"targets": ["another_link"]},
-            {"targets": []},
-            {"shadow": True},
-            {"age": 30.0},
-            {"age": -30.0},
-        ],
-        ids=["for another", "for nobody", "shadow", "old", "from the future"],
-    )
-    def test_a_decision_that_is_not_for_it_now_is_not_acted_on(
-        self, device: SimulatedDevice, fields: dict[str, Any]
-    ) -> None:
-        self.ready_to_deploy(device)
-        self.decide(Action.DEPLOY, **fields)
-        # What follows comes after it on the same topic: once it is done, so is the judgement.
-        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE))
-        assert not device.deployed
-        assert device.commands_to_deploy() == 0
-
-    @pytest.mark.parametrize("step", [3600.0, -3600.0], ids=["forward", "back"])
-    def test_a_wall_clock_that_is_set_makes_no_decision_older(
-        self, device: SimulatedDevice, step: float
-    ) -> None:
-        self.ready_to_deploy(device)
-        await_told = self.told_in_diagnostics()
-        ages = [0.0]
-        self.beat(ages[0])
-        self.bench.client.create_timer(0.1, lambda: self.beat(ages[0]))
-        await_told("heartbeat age (s)", 0.0)
-        self.decide(Action.DEPLOY, age=step)
-        await_told("decisions: came too late", 1)
-        await_told("clock set by (s)", 0.0)
-        ages[0] = step
-        await_told("clock set by (s)", step)
-        self.await_report(Outcome.CONFIRMED, self.decide(Action.DEPLOY, age=step))
-        assert device.commands_to_deploy() == 1
-
-    def test_an_answer_of_the_supervisor_shows_that_its_clock_is_behind(
-        self, device: SimulatedDevice
-    ) -> None:
-        """Given a node that was started anew on a host whose clock is an hour ahead."""
-        behind = 3600.0
-        self.ready_to_deploy(device)
-        await_told = self.told_in_diagnostics()
-        self.beat(behind)
-        self.bench.client.create_timer(0.1, lambda: self.beat(behind))
-        await_told("heartbeat age (s)", 0.0)
-        self.picture(behind, Time(sec=17, nanosec=4))
-        self.decide(Action.DEPLOY, age=behind)
-        await_told("decisions: came too late", 1)
-        assert device.commands_to_deploy() == 0, "that picture answers nothing of this node"
-        # Again and again, as the supervisor does: one that a busy machine is slow with tells less.
-        self.bench.client.create_timer(
-            0.1,
-            lambda: self.picture(
-                behind, [one for one in self.beats if not one.supervisor][-1].header.stamp
-            ),
-        )
-        await_told("clock set by (s)", behind)
-        self.decide(Action.DEPLOY, age=behind + 30.0)
-        await_told("decisions: came too late", 2)
-        self.await_report(Outcome.CONFIRMED, self.decide(Action.DEPLOY, age=behind))
-        assert device.commands_to_deploy() == 1
-
-    def test_a_repeated_decision_is_reported_again_and_not_fired_twice(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.ready_to_deploy(device)
-        decision = self.decide(Action.DEPLOY)
-        self.await_report(Outcome.CONFIRMED, decision)
-        sent = device.commands_to_deploy()
-        for _ in range(3):
-            self.reports.clear()
-            self.decide(Action.DEPLOY, id=decision.id)
-            assert self.await_report(Outcome.CONFIRMED, decision).action == Action.DEPLOY
-        assert device.commands_to_deploy() == sent == 1
-
-    def test_a_decision_of_an_older_epoch_fails_and_names_the_newest(
-        self, device: SimulatedDevice
-    ) -> None:
-        self.ready_to_deploy(device)
-        self.await_report(Outcome.CONFIRMED, self.decide(Action.FLIGHT_BLOCK_RELEASE, epoch=7))
-        old = self.decide(Action.DEPLOY, epoch=6, id=10_000)
-        assert self.await_report(Outcome.FAILED, old).newest_epoch == 7
-        assert not device.deployed
-
-    def test_a_decision_is_not_heard_by_a_node_that_starts_later(self, bench: Bench) -> None:
-        self.bench, self.numbers = bench, iter(range(1, 10))
-        self.statuses = bench.follow(ParachuteStatus, "parachute/status")
-        self.beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-        publisher = bench.client.create_publisher(SafetyDecision, "safety/decision", qos.DECISION)
-        message = SafetyDecision(
-            epoch=1, id=1, action=int(Action.DEPLOY), rule="test", targets=[self.name]
-        )
-        publisher.publish(stamped(bench.client, message))
-        device = self.make(bench, heartbeat_rate=HEARTBEAT_RATE, max_decision_age=10.0)
-        self.ready_to_deploy(device)
-        assert device.commands_to_deploy() == 0
-
-    def test_a_decision_whose_call_fails_inside_is_reported_as_failed_and_never_as_sent(
-        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        """Taken for sent, the supervisor would wait, and not try the next parachute."""
-        self.ready_to_deploy(device)
-        node = next(one for one in self.bench.nodes if one.get_name() == self.name)
-
-        def broken(*_: Any) -> None:
-            raise RuntimeError("a mistake of ours")
-
-        runtime = node.runtime
-        through = runtime.deploy_for
-        monkeypatch.setattr(runtime, "deploy_for", lambda decision, _: through(decision, broken))
-        decision = self.decide(Action.DEPLOY)
-        report = self.await_report(Outcome.FAILED, decision)
-        assert report.detail == "RuntimeError: a mistake of ours"
-        assert not device.deployed
-        order = (decision.epoch, decision.id)
-        outcomes = {one.outcome for one in self.reports if (one.epoch, one.id) == order}
-        assert outcomes == {int(Outcome.FAILED)}
 
     def test_a_decision_that_the_device_refuses_is_reported_as_failed(
         self, device: SimulatedDevice

@@ -23,7 +23,7 @@ from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.loop import WireLoop
-from chute_ros.transport.wire import make_wire
+from chute_ros.transport.wire import Wire, make_wire
 
 LOCAL = "127.0.0.1"
 #: How long anything that must happen may take on a busy machine, s.
@@ -78,7 +78,11 @@ class Bench:
         """Run a simulated device on these wires."""
         link = device if knobs is None else FaultyLink(device, knobs, seed=1)
         wires = [make_wire(parse_address(text)) for text in connections]
-        loop = WireLoop(link, WireBundle(wires), lambda events: None)
+        return self.simulate_on(WireBundle(wires), link)
+
+    def simulate_on(self, wire: Wire, device: Any) -> WireLoop[Any]:
+        """The same on a wire that is made already."""
+        loop = WireLoop(device, wire, lambda events: None)
         loop.start()
         self.loops.append(loop)
         return loop

@@ -168,6 +168,7 @@ PACKAGES = {
     [
         (PARACHUTE, ("--connection", f"udpin:{LOCAL}:0"), ()),
         (AUTOPILOT, ("--connection", f"udpin:{LOCAL}:0"), ()),
+        ("chute_ros.links.relay.simulator.sim_relay", (), ()),
         (
             "chute_ros.links.umbilical.simulator.sim_flight_computer",
             (),

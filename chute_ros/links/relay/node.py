@@ -6,7 +6,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from chute_ros.links.relay.diagnostics import details_of, output_task
+from chute_ros.links.relay.diagnostics import details_of, link_task, parachute_task
 from chute_ros.links.relay.output import make_output
 from chute_ros.links.relay.parameters import PARAMETERS, config_from
 from chute_ros.links.relay.protocol.link import RelayLink
@@ -30,5 +30,9 @@ class RelayNode(DeviceNode):
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         assert self.loop is not None
-        wire, failed = self.wire_picture(), self.loop.send_errors
-        return [output_task(self.diagnostic_name, summary.details, wire, failed)]
+        name, details = self.diagnostic_name, summary.details
+        failed = self.loop.send_errors
+        return [
+            link_task(name, details, self.wire_picture(), failed),
+            parachute_task(name, details),
+        ]

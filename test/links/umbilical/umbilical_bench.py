@@ -82,10 +82,7 @@ class Cable:
 
     def plug(self) -> None:
         """The flight computer is at the end of the cable."""
-        wire = PtyWire(str(self.path))
-        self.loop = WireLoop(self.computer, wire, lambda events: None)
-        self.loop.start()
-        self.bench.loops.append(self.loop)
+        self.loop = self.bench.simulate_on(PtyWire(str(self.path)), self.computer)
 
     def plug_mute(self) -> None:
         """Something is at the end of the cable that never says a word."""

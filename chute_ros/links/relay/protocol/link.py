@@ -133,9 +133,6 @@ class RelayLink:
         self._write_at = now
         self.update(now)
 
-    def flight_block(self, reason: str, now: float) -> None:
-        """An output keeps nothing on the ground."""
-
     # -- inside ----------------------------------------------------------------------------------
 
     def _look_at_written(self) -> None:

@@ -1,0 +1,133 @@
+"""The output as a file or a serial port, and the parameters that name it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from node_bench import Bench
+from relay_bench import Board
+
+from chute_ros.errors import ParameterError
+from chute_ros.links.relay.output import FileWire, make_output, output_bytes
+from chute_ros.model import LinkState
+
+
+def test_a_file_is_written_from_its_beginning_each_time(tmp_path: Path) -> None:
+    path = tmp_path / "value"
+    path.write_text("0")
+    wire = FileWire(path)
+    assert not wire.is_open
+    wire.open()
+    assert (wire.is_open, wire.describe(), wire.files()) == (True, f"file:{path}", [])
+    for value in (b"1", b"0", b"1"):
+        wire.write(value)
+        assert path.read_bytes() == value
+    wire.close()
+    assert not wire.is_open
+    wire.close()
+
+
+def test_a_file_that_is_not_there_is_not_made(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        FileWire(tmp_path / "value").open()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_pipe_is_an_output_while_somebody_reads_it(tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    wire = FileWire(path)
+    with pytest.raises(OSError):  # and it does not hang
+        wire.open()
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    wire.open()
+    wire.write(b"1")
+    assert os.read(reader, 10) == b"1"
+    os.close(reader)
+    with pytest.raises(ConnectionError):
+        wire.write(b"1")
+    wire.close()
+
+
+def test_what_is_not_taken_whole_is_not_taken(tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    wire = FileWire(path)
+    wire.open()
+    with pytest.raises(OSError, match=r"of 1000000 bytes were taken"):
+        wire.write(bytes(1_000_000))
+    with pytest.raises(BlockingIOError):
+        wire.write(b"1")
+    wire.close()
+    os.close(reader)
+
+
+def test_a_device_that_says_it_is_gone_is_opened_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = FileWire(Path("/dev/full"))
+    wire.open()
+    with pytest.raises(OSError) as full:
+        wire.write(b"1")
+    assert not isinstance(full.value, ConnectionError), "no room is no reason to open it again"
+    wire.close()
+    with pytest.raises(ConnectionError):
+        wire.write(b"1")
+
+
+@pytest.mark.parametrize(
+    ("given", "described"),
+    [
+        ("file:/sys/class/gpio/gpio17/value", "file:/sys/class/gpio/gpio17/value"),
+        ("serial:/dev/ttyUSB0:9600", "serial:/dev/ttyUSB0:9600"),
+        ("usb:1a86:7523", "usb:1a86:7523"),
+    ],
+)
+def test_what_can_be_named(given: str, described: str) -> None:
+    assert make_output(given).describe() == described
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("", "connection '' is no output: need file:PATH, serial:PATH"),
+        ("file:", "connection 'file:' is no output: need file:PATH, serial:PATH"),
+        ("udpin:0.0.0.0:14550", "is no output: need file:PATH"),
+        ("/dev/ttyUSB0", "is no output: need file:PATH"),
+        ("serial:", "need "),
+        ("file:~nobody_at_all/x", "parameter connection is '~nobody_at_all/x'"),
+    ],
+)
+def test_what_cannot(given: str, said: str) -> None:
+    with pytest.raises(ParameterError) as error:
+        make_output(given)
+    assert said in str(error.value)
+
+
+def test_bytes_as_text_and_as_digits() -> None:
+    assert output_bytes("1", "output_fire") == b"1"
+    assert output_bytes("hex:a00101a2", "output_fire") == b"\xa0\x01\x01\xa2"
+    assert output_bytes("hex:A0 01", "output_fire") == b"\xa0\x01"
+    for wrong in ("", "hex:", "hex:a", "hex:xy"):
+        with pytest.raises(ParameterError, match="parameter output_fire is"):
+            output_bytes(wrong, "output_fire")
+
+
+def test_a_node_that_would_fire_at_rest_does_not_start(bench: Bench) -> None:
+    with pytest.raises(ParameterError, match="output_fire and output_rest are both '1'"):
+        Board(bench, output_fire="1", output_rest="1")
+
+
+def test_a_node_fires_a_gpio(bench: Bench, tmp_path: Path) -> None:
+    path = tmp_path / "value"
+    path.write_text("?")
+    board = Board(
+        bench, connection=f"file:{path}", output_fire="1", output_rest="0", pulse_time=0.3
+    )
+    link = board.node.loop.link
+    bench.until(lambda: link.state is LinkState.UNMONITORED, "it can be written")
+    assert path.read_text() == "0"
+    board.node.loop.call(lambda link, now: link.deploy(7, True, now))
+    bench.until(lambda: path.read_text() == "1", "it fires")
+    bench.until(lambda: path.read_text() == "0", "and rests")
