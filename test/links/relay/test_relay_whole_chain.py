@@ -1,0 +1,118 @@
+"""Supervisor, mavlink_parachute, relay and the simulators: from the autopilot to the channel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from chute_msgs.msg import SafetyState, VehicleState
+from chute_msgs.srv import Arm, Deploy
+from mavlink_bench import Autopilot, do
+from mavlink_bench import quick as quick_mavlink
+from node_bench import LOCAL, Bench, port_of
+from relay_bench import Board
+
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.nodes import qos
+from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+
+HEIGHT = 20.0  # m
+
+
+class Flight:
+    """A vehicle whose autopilot speaks MAVLink and whose parachute hangs on a relay."""
+
+    def __init__(self, bench: Bench, **supervisor: Any) -> None:
+        self.bench = bench
+        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+        self.vehicle = bench.follow(VehicleState, "vehicle/state")
+        settings = {
+            "startup_grace": 0.5,
+            # All nodes share an executor: on a busy machine a heartbeat may come late.
+            "max_clock_difference": 2.0,
+            "required_links": ["mavlink_parachute", "relay"],
+            "kill_links": ["mavlink_parachute"],
+            "deploy_links": ["relay"],
+            "unmonitored_links": ["relay"],
+            "deploy_timeout": 1.0,
+            **supervisor,
+        }
+        bench.add(SafetySupervisorNode, **settings)
+        mavlink = bench.add(MavlinkParachuteNode, **quick_mavlink(expect_parachute=False))
+        self.autopilot = Autopilot()
+        self.autopilot.model.climb_speed = 40.0
+        self.autopilot.loop = bench.simulate(
+            self.autopilot, f"udpin:{LOCAL}:0", f"udpout:{LOCAL}:{port_of(mavlink.loop)}"
+        )
+        self.board = Board(bench)
+
+    def act(self, action: str) -> None:
+        do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
+
+    def await_stage(self, stage: int) -> None:
+        self.bench.until(
+            lambda: self.safety and self.safety[-1].state == stage, f"the stage is {stage}"
+        )
+
+    def take_off(self) -> None:
+        self.board.plug_in()
+        self.await_stage(SafetyState.READY)
+        self.act("arm")
+        self.act(f"takeoff={HEIGHT}")
+        self.await_stage(SafetyState.IN_FLIGHT)
+        self.bench.until(lambda: self.vehicle[-1].height > HEIGHT - 5.0, "it is up")
+
+
+def test_a_deploy_stops_the_motors_fires_the_output_and_says_that_nothing_confirms_it(
+    bench: Bench,
+) -> None:
+    flight = Flight(bench)
+    flight.take_off()
+    answer = bench.call(Deploy, "safety/deploy", reason="it falls")
+    assert flight.board.deployed
+    assert not flight.autopilot.model.armed, "the motors are off"
+    assert (answer.success, answer.accepted) == (False, False)
+    assert "sent; a relay output confirms nothing" in answer.message
+    flight.await_stage(SafetyState.FAULT)
+    assert flight.board.commands_to_deploy() == 1
+
+
+def test_nobody_flies_with_it_who_has_not_said_so(bench: Bench) -> None:
+    flight = Flight(bench, unmonitored_links=[""])
+    flight.board.plug_in()
+    flight.await_stage(SafetyState.BLOCKED)
+    text = "relay: UNMONITORED, its device never says how it is"
+    bench.until(
+        lambda: any(text in reason for reason in flight.safety[-1].block_reasons),
+        "the reason is told",
+    )
+
+
+def test_arming_passes_and_disarming_says_what_a_person_must_do(bench: Bench) -> None:
+    flight = Flight(bench)
+    flight.board.plug_in()
+    flight.await_stage(SafetyState.READY)
+    answer = bench.call(Arm, "safety/arm", arm=True)
+    assert answer.success, answer.message
+    assert "has no arming" in answer.message
+    answer = bench.call(Arm, "safety/arm", arm=False)
+    assert not answer.success
+    assert "disconnect or secure the parachute" in answer.message
+    assert not flight.board.deployed
+
+
+@pytest.mark.parametrize("away", [True, False])
+def test_an_output_that_is_pulled_out_forbids_take_off(bench: Bench, away: bool) -> None:
+    flight = Flight(bench)
+    if away:
+        flight.board.plug_in()
+        flight.await_stage(SafetyState.READY)
+        flight.board.pull_out()
+    flight.await_stage(SafetyState.BLOCKED)
+    bench.until(
+        lambda: any(
+            "relay: its device is" in one or "never heard" in one
+            for one in flight.safety[-1].block_reasons
+        ),
+        "the reason is told",
+    )
