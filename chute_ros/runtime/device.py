@@ -6,6 +6,7 @@ file or the clock: the shell carries out what it says, and gives it events and t
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -31,6 +32,8 @@ from chute_ros.supervisor.inputs import ParachuteReport, VehicleReport
 
 #: Our own heartbeat on the wire stops when the owner was silent for this long, s.
 OWNER_SILENCE = 1.0
+#: Diagnostics are published each second: what they are made of need not be newer, s.
+_DETAILS_INTERVAL = 0.5
 #: Numbers of heartbeats begin anew here.
 _SEQUENCES = 2**32
 
@@ -79,7 +82,7 @@ SettingsT = TypeVar("SettingsT", bound=DeviceSettings)
 
 
 class DeviceRuntime(ABC, Generic[SettingsT]):
-    """details: in the link's turn, what diagnostics are made of, with each heartbeat."""
+    """details: in the link's turn, what diagnostics are made of, twice a second."""
 
     #: Events that may be left out where the owner does not keep up: the next one tells the same.
     PICTURES: tuple[type, ...] = (ParachuteChanged, VehicleChanged)
@@ -106,6 +109,9 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
         self.desk = RequestDesk(shell, self.decisions.report)
         #: The newest answer of the link; None: none came yet.
         self.summary: Summary | None = None
+        #: Of the link's turn: what diagnostics are made of, and when that is renewed, monotonic s.
+        self._newest_details: Any = None
+        self._details_due = -math.inf
         #: Why flight is blocked by decision; empty: it is not.
         self.decided_block = ""
         self._seq = count()
@@ -226,7 +232,10 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
 
     def _answer(self, link: Any, now: float) -> None:
         link.owner_alive(now + OWNER_SILENCE)
-        summary = replace(self.summarise(link, now), details=self._details(link, now))
+        if now >= self._details_due:
+            self._details_due = now + _DETAILS_INTERVAL
+            self._newest_details = self._details(link, now)
+        summary = replace(self.summarise(link, now), details=self._newest_details)
         self.shell.deliver([summary])
 
     def _publish_beat(self, one: Summary, now: float) -> None:
