@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bench import (
     device_decoding,
+    executors,
     kill_switch,
     umbilical_decoding,
     umbilical_telemetry,
@@ -14,5 +15,12 @@ from bench import (
 from bench.command import run
 
 if __name__ == "__main__":
-    parts = [kill_switch, vehicle, device_decoding, umbilical_decoding, umbilical_telemetry]
+    parts = [
+        kill_switch,
+        executors,
+        vehicle,
+        device_decoding,
+        umbilical_decoding,
+        umbilical_telemetry,
+    ]
     run("bench", __doc__ or "", parts, Path("docs/evidence/bench.md"))

@@ -69,13 +69,20 @@ def section(chosen: argparse.Namespace) -> str:
     return report(peers, before)
 
 
+#: Starts a peer's processes: (namespace, processes, port of the bus, port of the network).
+Start = Callable[[str, Processes, int, int], None]
+
+
 def _measure(namespace: str, processes: Processes, count: int) -> list[Peer]:
+    starts: dict[str, Start] = {OURS: start_ours, ROS: _start_ros, BARE: _start_bare}
+    return measure(namespace, processes, starts, count)
+
+
+def measure(
+    namespace: str, processes: Processes, starts: dict[str, Start], count: int
+) -> list[Peer]:
+    """Start each peer, and have them take turns for so many rounds."""
     definitions = Definitions(load_data_types("", "bench"))
-    starts: dict[str, Callable[[str, Processes, int, int], None]] = {
-        OURS: _start_ours,
-        ROS: _start_ros,
-        BARE: _start_bare,
-    }
     ports = iter(free_udp_ports(2 * len(starts)))
     peers = []
     with ExitStack() as stack:
@@ -132,12 +139,20 @@ def _round(peer: Peer, peers: list[Peer], how: str, count: int) -> None:
             peer.ends.flood.set(0.0)
 
 
-def _start_ours(namespace: str, processes: Processes, bus: int, network: int) -> None:
-    node = ("--ros-args", "-r", f"__ns:={namespace}")
+def start_ours(
+    namespace: str,
+    processes: Processes,
+    bus: int,
+    network: int,
+    starter: tuple[str, ...] = (),
+    mark: str = "",
+) -> None:
+    """starter: a module and its arguments, which starts each node; mark: behind their names."""
+    node = ("--ros-args", "-r", f"__ns:={namespace}{mark}")
 
     def start(name: str, module: str, **parameters: str) -> None:
         given = [part for key, value in parameters.items() for part in ("-p", f"{key}:={value}")]
-        processes.start(name, module, *node, *given)
+        processes.start(name + mark, *starter, module, *node, *given)
 
     start(
         "supervisor",
