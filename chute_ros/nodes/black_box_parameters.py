@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chute_ros.nodes.parameters import Parameter
+from chute_ros.settings import Parameter
 
 PARAMETERS = (
     Parameter("black_box", True, "record all inputs and all decisions in files"),

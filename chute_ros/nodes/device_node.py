@@ -30,13 +30,13 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.inbox import Inbox
 from chute_ros.nodes.link_log import UselessWire, log_notice
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.plain_border import with_plain_texts
 from chute_ros.nodes.suite_node import SuiteNode
 from chute_ros.protocol.events import Notice
 from chute_ros.runtime.device import OWNER_SILENCE, DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.requests import Begin
 from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest, SupervisorBeat
+from chute_ros.settings import Parameter
 from chute_ros.supervisor.inputs import ParachuteReport
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble

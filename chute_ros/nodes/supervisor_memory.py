@@ -16,9 +16,9 @@ from chute_ros.errors import RecordError
 from chute_ros.nodes import diagnostics
 from chute_ros.nodes.kept_file import KeptFile
 from chute_ros.nodes.one_of_a_name import NameLock
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.private_files import read_own_text
 from chute_ros.nodes.ros_home import ros_home
+from chute_ros.settings import Parameter
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written

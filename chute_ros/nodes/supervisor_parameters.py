@@ -9,11 +9,12 @@ from typing import Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.nodes.black_box_parameters import PARAMETERS as BLACK_BOX_PARAMETERS
-from chute_ros.nodes.parameters import Parameter, liveness_from
+from chute_ros.nodes.parameters import liveness_from
 from chute_ros.nodes.profile_files import load_profile
 from chute_ros.nodes.supervisor_memory import MEMORY_PARAMETERS
 from chute_ros.nodes.vehicle_sources import VEHICLE_PARAMETERS
 from chute_ros.protocol.vehicle_merge import MAVROS, VEHICLE_STATE
+from chute_ros.settings import Parameter
 from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.inputs import Mode

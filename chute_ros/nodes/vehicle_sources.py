@@ -25,7 +25,6 @@ from std_msgs.msg import Float64
 from chute_ros import model
 from chute_ros.errors import ParameterError
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.vehicle_merge import (
     IMU,
@@ -35,6 +34,7 @@ from chute_ros.protocol.vehicle_merge import (
     VEHICLE_STATE,
 )
 from chute_ros.runtime.vehicle_hearing import VehicleHearing
+from chute_ros.settings import Parameter
 from chute_ros.supervisor.inputs import VehicleReport
 
 SOURCES = (VEHICLE_STATE, ODOMETRY, IMU, MAVROS)

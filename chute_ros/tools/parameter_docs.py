@@ -1,7 +1,6 @@
-"""Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
+"""Writes the files in config/ and the tables of docs/reference/ from the settings (make docs).
 
-The files in config/ and the tables between the marks in docs/reference/parameters.md and
-docs/reference/rules.md. With
+The tables stand between marks in docs/reference/parameters.md and docs/reference/rules.md. With
 --check it only says which of them is out of date.
 """
 
@@ -16,8 +15,8 @@ from chute_ros.links.mavlink.parameters import PARAMETERS as MAVLINK_PARAMETERS
 from chute_ros.links.umbilical.parameters import PARAMETERS as UMBILICAL_PARAMETERS
 from chute_ros.links.upf.parameters import PARAMETERS as UPF_PARAMETERS
 from chute_ros.nodes.device_node import COMMON_PARAMETERS
-from chute_ros.nodes.parameters import Parameter, Value
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
+from chute_ros.settings import Parameter, Value
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
@@ -71,7 +70,7 @@ CONFIGS: dict[Path, tuple[str, tuple[str, ...], dict[tuple[str, str], Value]]] =
 _HEAD = """\
 # Parameters of one vehicle with {}. The keys
 # match the nodes in any namespace. Give this file with --params-file, or as config:= of
-# vehicle.launch.py. Written by `make docs` from the tables in chute_ros/nodes.
+# vehicle.launch.py. Written by `make docs` from the settings in chute_ros.
 """
 _BEGIN, _END = "<!-- parameters of {} -->", "<!-- end of parameters of {} -->"
 
@@ -83,7 +82,7 @@ def config_text(path: Path) -> str:
     for node in nodes:
         lines += [f"/**/{node}:", "  ros__parameters:"]
         for parameter in NODES[node]:
-            text = f"{parameter.description}; {_allowed(parameter)}"
+            text = f"{parameter.meaning}; {_allowed(parameter)}"
             lines += [f"    # {line}" for line in textwrap.wrap(text, 92)]
             value = differs.get((node, parameter.name), parameter.default)
             lines.append(f"    {parameter.name}: {_yaml(value)}")
@@ -96,7 +95,7 @@ def parameters_text(before: str) -> str:
     for node, parameters in NODES.items():
         rows = ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
         rows += [
-            f"| `{p.name}` | `{_yaml(p.default)}` | {p.description} | {_allowed(p)} |"
+            f"| `{p.name}` | `{_yaml(p.default)}` | {p.meaning} | {_allowed(p)} |"
             for p in parameters
         ]
         before = _between(before, PARAMETERS, _BEGIN.format(node), _END.format(node), rows)

@@ -21,9 +21,9 @@ from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.runtime import UpfSettings
 from chute_ros.nodes import supervisor_parameters
 from chute_ros.nodes.device_node import BLOCK_FLIGHT, COMMON_PARAMETERS
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.vehicle_sources import SOURCES
 from chute_ros.runtime.device import DeviceSettings
+from chute_ros.settings import Parameter, settings_from
 
 
 def standard(parameters: tuple[Parameter, ...]) -> dict[str, Any]:
@@ -33,8 +33,9 @@ def standard(parameters: tuple[Parameter, ...]) -> dict[str, Any]:
 def test_the_links_have_the_standard_settings_of_their_nodes() -> None:
     mavlink = mavlink_parameters.config_from(standard(mavlink_parameters.PARAMETERS))
     assert mavlink == MavlinkConfig()
-    umbilical = umbilical_parameters.config_from(standard(umbilical_parameters.PARAMETERS))
-    assert umbilical == UmbilicalConfig()
+    told = standard(umbilical_parameters.PARAMETERS)
+    umbilical = settings_from(umbilical_parameters.UmbilicalParameters, told)
+    assert umbilical.link == UmbilicalConfig()
     upf = upf_parameters.config_from(standard(upf_parameters.PARAMETERS), {}, "upf_can", 0.0)
     # Which is another on each machine.
     assert replace(upf, unique_id=UpfConfig().unique_id) == UpfConfig()

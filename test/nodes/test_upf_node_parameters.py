@@ -49,7 +49,7 @@ def test_each_has_the_default_that_its_table_says(bench, monkeypatch, tmp_path):
             assert node.get_parameter(one.name).value == one.default, one.name
             assert node.values[one.name] == one.default
         described = node.describe_parameter(one.name)
-        assert described.description == one.description
+        assert described.description == one.meaning
         assert described.additional_constraints == one.allowed()
         assert described.read_only != one.changeable
 

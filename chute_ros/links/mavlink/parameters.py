@@ -9,8 +9,9 @@ from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.links.mavlink.protocol.config import KillMethod, MavlinkConfig
 from chute_ros.links.mavlink.protocol.parachute import StatusLimits
 from chute_ros.model import ErrorFlags, TriggerFlags
-from chute_ros.nodes.parameters import Parameter, liveness_from
+from chute_ros.nodes.parameters import liveness_from
 from chute_ros.protocol.effect import EffectLimits
+from chute_ros.settings import Parameter
 from chute_ros.transport.address import FORMS
 
 PARAMETERS = (

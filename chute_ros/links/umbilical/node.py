@@ -19,7 +19,7 @@ from chute_ros.links.umbilical.diagnostics import (
 )
 from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.umbilical.layout_files import load_layouts
-from chute_ros.links.umbilical.parameters import PARAMETERS, config_from
+from chute_ros.links.umbilical.parameters import PARAMETERS, UmbilicalParameters
 from chute_ros.links.umbilical.protocol import events
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.protocol.sayings import LogLine
@@ -31,6 +31,7 @@ from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.nodes.link_log import log_notice
 from chute_ros.protocol.events import Notice
 from chute_ros.runtime.device import Summary
+from chute_ros.settings import settings_from
 from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_serial_address
 from chute_ros.transport.loop import WireLoop
@@ -54,7 +55,8 @@ class UmbilicalNode(DeviceNode):
         self.carry(UmbilicalRuntime(self.get_name(), settings, self, details_of))
         self.files = DumpFiles(self.values["dump_folder"])
         self.at_end.callback(self._end_dump)
-        link = UmbilicalLink(config_from(self.values), layouts)
+        given = settings_from(UmbilicalParameters, self.values)
+        link = UmbilicalLink(given.link, layouts)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written
         )

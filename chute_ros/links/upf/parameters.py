@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.links.upf.protocol.config import NODE_ID, Policy, UpfConfig
-from chute_ros.nodes.parameters import Parameter, liveness_from
+from chute_ros.nodes.parameters import liveness_from
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.effect import EffectLimits
+from chute_ros.settings import Parameter
 from chute_ros.transport.can_address import CAN_FORMS
 
 _POLICIES = tuple(policy.value for policy in Policy)
