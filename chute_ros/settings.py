@@ -156,7 +156,8 @@ def _changed(
         try:
             changes[field] = _changed(getattr(before, field), part, values)
         except ContradictionError as error:
-            raise ContradictionError(error.values, _names(part), error.why) from None
+            told = ContradictionError(error.values, _names(part), error.why)
+            raise ParameterError(str(told)) from None
     return replace(before, **changes)  # type: ignore[type-var]
 
 

@@ -53,6 +53,11 @@ class Whole(Settings):
     text: str = parameter("", "text")
 
 
+@dataclass(frozen=True)
+class Outermost(Settings):
+    whole: Whole = nested(Whole())
+
+
 def refusal(kind: type[Settings], values: dict[str, Any]) -> str:
     with pytest.raises(ParameterError) as caught:
         settings_from(kind, values)
@@ -116,6 +121,7 @@ def test_a_value_that_is_not_allowed_is_told_by_the_parameters_name(
     values: dict[str, Any], said: str
 ) -> None:
     assert refusal(Whole, values).startswith(said)
+    assert refusal(Outermost, values).startswith(said)
 
 
 def test_settings_are_checked_however_they_are_made() -> None:

@@ -14,15 +14,14 @@ from pathlib import Path
 from chute_ros.links.mavlink.parameters import PARAMETERS as MAVLINK_PARAMETERS
 from chute_ros.links.umbilical.parameters import PARAMETERS as UMBILICAL_PARAMETERS
 from chute_ros.links.upf.parameters import PARAMETERS as UPF_PARAMETERS
-from chute_ros.nodes.device_node import COMMON_PARAMETERS
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
 from chute_ros.settings import Parameter, Value
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
-    "mavlink_parachute": (*MAVLINK_PARAMETERS, *COMMON_PARAMETERS),
-    "upf_can": (*UPF_PARAMETERS, *COMMON_PARAMETERS),
-    "umbilical": (*UMBILICAL_PARAMETERS, *COMMON_PARAMETERS),
+    "mavlink_parachute": MAVLINK_PARAMETERS,
+    "upf_can": UPF_PARAMETERS,
+    "umbilical": UMBILICAL_PARAMETERS,
     "safety_supervisor": SUPERVISOR_PARAMETERS,
 }
 PARAMETERS = Path("docs/reference/parameters.md")

@@ -23,7 +23,7 @@ from chute_ros.links.umbilical.parameters import PARAMETERS, UmbilicalParameters
 from chute_ros.links.umbilical.protocol import events
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.protocol.sayings import LogLine
-from chute_ros.links.umbilical.runtime import UmbilicalRuntime, UmbilicalSettings
+from chute_ros.links.umbilical.runtime import UmbilicalRuntime
 from chute_ros.links.umbilical.services import UmbilicalServices
 from chute_ros.links.umbilical.telem_message import telem, unfit, without_place
 from chute_ros.nodes import messages, qos
@@ -51,12 +51,11 @@ class UmbilicalNode(DeviceNode):
             if names := without_place(layout):
                 text = f"{layout.name}: umbilical/telem has no field for {', '.join(names)}"
                 self.get_logger().warning(text)
-        settings = self.settings(UmbilicalSettings)
+        settings = settings_from(UmbilicalParameters, self.values).runtime
         self.carry(UmbilicalRuntime(self.get_name(), settings, self, details_of))
         self.files = DumpFiles(self.values["dump_folder"])
         self.at_end.callback(self._end_dump)
-        given = settings_from(UmbilicalParameters, self.values)
-        link = UmbilicalLink(given.link, layouts)
+        link = UmbilicalLink(settings.link, layouts)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written
         )
@@ -64,7 +63,7 @@ class UmbilicalNode(DeviceNode):
         # The flight computer's own log, told apart from ours by the logger's name.
         self._its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
-        if self.values["publish_vehicle_state"]:
+        if settings.publish_vehicle_state:
             vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
             self.follow(
                 VehicleReport,

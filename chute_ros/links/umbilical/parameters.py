@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
+from chute_ros.links.umbilical.runtime import UmbilicalSettings
 from chute_ros.settings import Settings, nested, parameter, parameters_of
 from chute_ros.transport.address import SERIAL_FORMS
 
 
 @dataclass(frozen=True)
 class UmbilicalParameters(Settings):
-    """All parameters of the node; those of its files first."""
+    """All parameters of the node; first those of its connection and files."""
 
     connection: str = parameter(
         "usb:c0de:cafe",
@@ -23,11 +23,7 @@ class UmbilicalParameters(Settings):
     dump_folder: str = parameter(
         "", "folder for dumps; empty: chute_ros/dumps under ROS_HOME (~/.ros)"
     )
-    link: UmbilicalConfig = nested(UmbilicalConfig())
-    publish_vehicle_state: bool = parameter(
-        False,
-        "publish vehicle/state from telemetry: for a vehicle without an autopilot on another link",
-    )
+    runtime: UmbilicalSettings = nested(UmbilicalSettings())
 
 
 PARAMETERS = parameters_of(UmbilicalParameters)
