@@ -82,7 +82,7 @@ class ContradictionError(ParameterError):
 
     def __init__(self, values: Mapping[str, object], names: Mapping[str, str], why: str) -> None:
         self.values, self.why = values, why
-        told = [f"{names.get(field, field)} is {value}" for field, value in values.items()]
+        told = [f"{names[field]} is {value}" for field, value in values.items()]
         super().__init__(f"parameter {' and '.join(told)}: {why}")
 
 
@@ -92,10 +92,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         for path, one in _places(type(self)):
-            given = functools.reduce(getattr, path, self)
-            value = _as_ros(given)
+            value = _as_ros(functools.reduce(getattr, path, self))
             # Python's whole numbers are floats as well; ROS's are not.
-            if not one.takes(float(value) if type(value) is int and _is_float(one) else value):
+            whole = type(value) is int and isinstance(one.default, float)
+            if not one.takes(float(value) if whole else value):
                 raise one.refusal(value)
 
     def contradiction(self, why: str, *fields: str) -> ContradictionError:
@@ -188,10 +188,6 @@ _places: Callable[[Any], tuple[tuple[Path, Parameter], ...]] = functools.cache(_
 
 def _names(places: Iterable[tuple[Path, Parameter]]) -> dict[str, str]:
     return {path[0]: one.name for path, one in places if len(path) == 1}
-
-
-def _is_float(one: Parameter) -> bool:
-    return isinstance(one.default, float)
 
 
 def _as_ros(value: Any) -> Any:

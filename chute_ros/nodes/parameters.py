@@ -19,7 +19,6 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.settings import Parameter
 
 
@@ -65,11 +64,9 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
             raise _not_allowed(node, parameter, _given(node, parameter)) from None
         if value is None:
             value = []  # how ROS reads an empty list on the command line
-            if not isinstance(parameter.default, list):
-                raise _not_allowed(node, parameter, value)
         if parameter.takes_switch and isinstance(value, bool):
             value = str(value).lower()
-        if parameter.choices and value not in parameter.choices:
+        if not parameter.takes(value):
             raise _not_allowed(node, parameter, value)
         values[parameter.name] = value
     _tell_unknown(node, [parameter.name for parameter in parameters])
@@ -100,17 +97,6 @@ def what_was_meant(name: str, known: Iterable[str]) -> str:
     """The end of a text that says that there is no such parameter; empty: none is like it."""
     near = nearest(name, known)
     return f": did you mean {near}?" if near else ""
-
-
-def liveness_from(values: Mapping[str, Any], name: str) -> LivenessLimits:
-    """The limits in the parameters name_stale_after and name_lost_after."""
-    stale, lost = values[f"{name}_stale_after"], values[f"{name}_lost_after"]
-    if stale >= lost:
-        raise ParameterError(
-            f"parameter {name}_stale_after is {stale} and {name}_lost_after is {lost}: "
-            "a link is stale before it is lost; need a smaller first or a larger second"
-        )
-    return LivenessLimits(stale, lost)
 
 
 def _given(node: Node, parameter: Parameter) -> object:

@@ -37,7 +37,7 @@ class EffectLimits(Settings):
         "s",
     )
     give_up_after: float = parameter(
-        5.0, "a command fails after this time, with all its repetitions", 0.1, 600.0, "s"
+        5.0, "time limit of a command with all its repetitions", 0.1, 600.0, "s"
     )
 
 

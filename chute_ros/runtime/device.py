@@ -74,9 +74,8 @@ class DeviceSettings(Settings):
     )
     on_supervisor_lost: OnSupervisorLost = parameter(
         OnSupervisorLost.BLOCK_FLIGHT,
-        "reaction to a lost supervisor: hold keeps to the last decision; block_flight also keeps "
-        "a vehicle that stands on the ground there, and does nothing to one that flies; upf_can "
-        "cannot keep it there",
+        "reaction to a lost supervisor: hold keeps to the last decision; block_flight also blocks "
+        "flight on the ground, and does nothing in flight; upf_can cannot block flight",
     )
 
 

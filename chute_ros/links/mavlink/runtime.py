@@ -25,8 +25,8 @@ class MavlinkSettings(DeviceSettings):
     link: MavlinkConfig = nested(MavlinkConfig())
     expect_parachute: bool = parameter(
         True,
-        "a parachute is on this network; false: it is on another link, and the heartbeat of this "
-        "node is that of the autopilot",
+        "a parachute is on this network; false: it is on another link, and safety/heartbeat of "
+        "this node reports the autopilot",
     )
     deploy_arms_trigger: bool = parameter(
         True, "a deploy that the supervisor decided also arms the flight-controller trigger"

@@ -88,7 +88,7 @@ class UpfConfig(Settings):
     )
     vehicle_service_timeout: float = parameter(
         0.8,
-        "a request of the device that is not fulfilled by then is answered with a failure",
+        "a request of the device fails if it is not fulfilled within this time",
         0.05,
         60.0,
         "s",
