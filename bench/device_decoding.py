@@ -18,7 +18,7 @@ from bench.report import load
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
-from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.config import AllocatorUse, UpfConfig
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.links.upf.simulator.bus import UpfBus
@@ -155,7 +155,7 @@ def section(chosen: argparse.Namespace) -> str:
     network = Network([AutopilotDevice(1, []), ParachuteDevice(ParachuteSettings(), [])])
     bus = UpfBus([UpfController(definitions), UpfTrigger(definitions)])
     mavlink = MavlinkLink(MavlinkConfig())
-    upf = UpfLink(UpfConfig(allocator=False), definitions.types)
+    upf = UpfLink(UpfConfig(allocator=AllocatorUse.NO), definitions.types)
     measured = {
         "MAVLink": take_turns(
             "MAVLink",

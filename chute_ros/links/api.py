@@ -6,7 +6,7 @@ A link is how one kind of device is spoken to. Everything of it is in one folder
     runtime.py      pure: when the device is healthy, and what a decision becomes
                     (a subclass of chute_ros.runtime.device.DeviceRuntime)
     node.py         the ROS node (a subclass of chute_ros.nodes.device_node.DeviceNode)
-    parameters.py   its parameters; PARAMETERS is the table
+    parameters.py   the settings of the node (chute_ros/settings.py), each parameter written once
     __main__.py     starts the node
     simulator/      the simulated device, where there is one
     virtual.py      its node and its simulated device in a flight of the campaign (a Part)

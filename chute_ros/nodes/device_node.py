@@ -30,50 +30,16 @@ from chute_ros import model
 from chute_ros.nodes import diagnostics, messages, qos
 from chute_ros.nodes.inbox import Inbox
 from chute_ros.nodes.link_log import UselessWire, log_notice
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.plain_border import with_plain_texts
 from chute_ros.nodes.suite_node import SuiteNode
 from chute_ros.protocol.events import Notice
-from chute_ros.runtime.device import OWNER_SILENCE, DeviceRuntime, DeviceSettings, Summary
+from chute_ros.runtime.device import OWNER_SILENCE, DeviceRuntime, Summary
 from chute_ros.runtime.requests import Begin
 from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest, SupervisorBeat
+from chute_ros.settings import Parameter
 from chute_ros.supervisor.inputs import ParachuteReport
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
-
-HOLD, BLOCK_FLIGHT = "hold", "block_flight"
-COMMON_PARAMETERS = (
-    Parameter(
-        "max_decision_age",
-        DeviceSettings.max_decision_age,
-        "a decision of the supervisor that is older is not acted on, s",
-        0.05,
-        10.0,
-    ),
-    Parameter(
-        "heartbeat_rate",
-        10.0,
-        "rate of safety/heartbeat, Hz; below 4 Hz the supervisor's heartbeat_stale_after or "
-        "link_limits must allow for it",
-        1.0,
-        100.0,
-    ),
-    Parameter(
-        "supervisor_lost_after",
-        DeviceSettings.supervisor_lost_after,
-        "a supervisor that was heard and is silent for this long is lost, s",
-        0.2,
-        60.0,
-    ),
-    Parameter(
-        "on_supervisor_lost",
-        BLOCK_FLIGHT,
-        "what then: hold goes on with what was decided last; block_flight keeps a vehicle that "
-        "stands on the ground there, and does nothing to one that flies; upf_can has nothing to "
-        "keep it with",
-        choices=(HOLD, BLOCK_FLIGHT),
-    ),
-)
 
 
 def _old(status: DiagnosticStatus) -> DiagnosticStatus:
@@ -89,7 +55,7 @@ class DeviceNode(SuiteNode, ABC):
     def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
         # Before ROS knows the node, as at_end.
         self.loop: WireLoop[Any] | None = None
-        super().__init__(name, (*COMMON_PARAMETERS, *parameters), **options)
+        super().__init__(name, parameters, **options)
         self.add_on_set_parameters_callback(self._parameters_set)
         self.wire_text = "not opened yet"
         #: What is wrong with the wire while it is open; empty: nothing is known to be.
@@ -115,12 +81,6 @@ class DeviceNode(SuiteNode, ABC):
         self.follow(DeviceRequest, self._request)
         self.follow(ParachuteReport, self._parachute)
 
-    def settings(self, kind: Any) -> Any:
-        """The runtime's settings of this kind, from the parameters."""
-        names = [one for one in kind.__dataclass_fields__ if one in self.values]
-        blocks = self.values["on_supervisor_lost"] == BLOCK_FLIGHT
-        return kind(block_when_lost=blocks, **{one: self.values[one] for one in names})
-
     def carry(self, runtime: DeviceRuntime[Any]) -> None:
         """Be the shell of this runtime; before anything that may bring events."""
         self.runtime = runtime
@@ -142,7 +102,7 @@ class DeviceNode(SuiteNode, ABC):
         self.create_subscription(SafetyState, "safety/state", self._safety_state, qos.LATCHED)
         self.serve(Arm, "~/arm", self._arm)
         self.serve(Deploy, "~/deploy", self._deploy)
-        period = 1.0 / self.values["heartbeat_rate"]
+        period = 1.0 / self.runtime.settings.heartbeat_rate
         self.create_timer(period, self._beat, clock=self.steady)
         self.create_timer(1.0, self._diagnose, clock=self.steady)
         self.loop.start()

@@ -39,7 +39,7 @@ def run(name: str, place: str) -> None:
 
     from chute_ros.nodes.node_executor import NodeExecutor
 
-    node = None
+    node = executor = None
     # Before ROS, whose own handler calls it.
     ctrl_c = CtrlC()
     ctrl_c.install()
@@ -75,6 +75,9 @@ def run(name: str, place: str) -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         if node is not None:
             node.destroy_node()
+        elif executor is not None:
+            # One that is collected after ROS has ended complains.
+            executor.shutdown()
         # The signal's own handler may be shutting down at this very moment.
         with contextlib.suppress(RuntimeError):
             rclpy.try_shutdown()

@@ -10,7 +10,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from chute_ros.nodes import diagnostics, messages, qos
-from chute_ros.nodes.parameters import Parameter, declare
+from chute_ros.nodes.parameters import declare
 from chute_ros.nodes.plain_border import (
     PlainLogger,
     PlainPublisher,
@@ -18,6 +18,7 @@ from chute_ros.nodes.plain_border import (
     is_exempt,
     serving_plainly,
 )
+from chute_ros.settings import Parameter
 
 
 class SuiteNode(Node):

@@ -16,7 +16,6 @@ from chute_ros.errors import RecordError
 from chute_ros.nodes import diagnostics
 from chute_ros.nodes.kept_file import KeptFile
 from chute_ros.nodes.one_of_a_name import NameLock
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.private_files import read_own_text
 from chute_ros.nodes.ros_home import ros_home
 from chute_ros.supervisor.config import SupervisorConfig
@@ -24,16 +23,6 @@ from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written
 from chute_ros.supervisor.state import State
 
-MEMORY_PARAMETERS = (
-    Parameter(
-        "resume_within",
-        30.0,
-        "a supervisor that starts again in flight goes on where it stopped, if that was no longer "
-        "ago, s, 0: never",
-        0.0,
-        600.0,
-    ),
-)
 #: Changes with each start of the computer, with which the monotonic clock begins anew.
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 

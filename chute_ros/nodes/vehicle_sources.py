@@ -10,6 +10,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -25,7 +26,6 @@ from std_msgs.msg import Float64
 from chute_ros import model
 from chute_ros.errors import ParameterError
 from chute_ros.nodes import messages, qos
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.vehicle_merge import (
     IMU,
@@ -35,48 +35,56 @@ from chute_ros.protocol.vehicle_merge import (
     VEHICLE_STATE,
 )
 from chute_ros.runtime.vehicle_hearing import VehicleHearing
+from chute_ros.settings import Settings, parameter, settings_from
 from chute_ros.supervisor.inputs import VehicleReport
 
 SOURCES = (VEHICLE_STATE, ODOMETRY, IMU, MAVROS)
 
-VEHICLE_PARAMETERS = (
-    Parameter(
-        "vehicle_sources",
-        [VEHICLE_STATE],
-        f"where the vehicle's picture comes from, the preferred first: {', '.join(SOURCES)}",
-    ),
-    Parameter(
-        "odometry_topic",
+
+@dataclass(frozen=True)
+class VehicleSettings(Settings):
+    """The sources of the vehicle's state, and their topics."""
+
+    vehicle_sources: tuple[str, ...] = parameter(
+        (VEHICLE_STATE,),
+        f"sources of the vehicle's state, the preferred first: {', '.join(SOURCES)}",
+    )
+    odometry_topic: str = parameter(
         "odometry",
-        "nav_msgs/Odometry of source odometry: height over its origin, vertical speed, attitude",
-    ),
-    Parameter(
-        "imu_topic", "imu", "sensor_msgs/Imu of source imu: attitude, length of the acceleration"
-    ),
-    Parameter(
-        "mavros_state_topic", "mavros/state", "mavros_msgs/State of source mavros: armed, link"
-    ),
-    Parameter(
-        "mavros_extended_state_topic",
-        "mavros/extended_state",
-        "mavros_msgs/ExtendedState of source mavros: landed state",
-    ),
-    Parameter(
-        "mavros_battery_topic",
+        "nav_msgs/Odometry of source odometry: height above its origin, vertical speed, attitude",
+    )
+    imu_topic: str = parameter(
+        "imu", "sensor_msgs/Imu of source imu: attitude, magnitude of the acceleration"
+    )
+    mavros_state_topic: str = parameter(
+        "mavros/state", "mavros_msgs/State of source mavros: armed, link"
+    )
+    mavros_extended_state_topic: str = parameter(
+        "mavros/extended_state", "mavros_msgs/ExtendedState of source mavros: landed state"
+    )
+    mavros_battery_topic: str = parameter(
         "mavros/battery",
         "sensor_msgs/BatteryState of source mavros: voltage, remaining charge",
-    ),
-    Parameter(
-        "mavros_position_topic",
-        "mavros/global_position/global",
-        "sensor_msgs/NavSatFix of source mavros: position",
-    ),
-    Parameter(
-        "mavros_height_topic",
+    )
+    mavros_position_topic: str = parameter(
+        "mavros/global_position/global", "sensor_msgs/NavSatFix of source mavros: position"
+    )
+    mavros_height_topic: str = parameter(
         "mavros/global_position/rel_alt",
         "std_msgs/Float64 of source mavros: height above home, m",
-    ),
-)
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        sources = list(self.vehicle_sources)
+        wrong = [name for name in sources if name not in SOURCES or sources.count(name) > 1]
+        if wrong or not sources:
+            raise ParameterError(
+                f"parameter vehicle_sources is {sources!r}: need one or more of "
+                f"{', '.join(SOURCES)}, each once; "
+                f"{f'{wrong[0]!r} is wrong' if wrong else 'it is empty'}"
+            )
+
 
 Reader = Callable[[Any], readings.Parts]
 
@@ -84,7 +92,7 @@ Reader = Callable[[Any], readings.Parts]
 class VehicleSources:
     """Subscribes to what the parameters name and tells what the vehicle is by then.
 
-    values: the node's parameters, VEHICLE_PARAMETERS among them, and vehicle_state_age (s): a
+    values: the node's parameters, VehicleSettings' among them, and vehicle_state_age (s): a
     source of the autopilot that is silent for longer has lost it. tell(report, now) is called by
     the node's executor. clock: monotonic seconds. before: how the autopilot was heard before a
     restart (NEVER_SEEN: not, or nobody knows).
@@ -99,7 +107,7 @@ class VehicleSources:
         before: model.LinkState = model.LinkState.NEVER_SEEN,
     ) -> None:
         self._node, self._values, self._tell, self._clock = node, values, tell, clock
-        sources = _checked(values["vehicle_sources"])
+        sources = list(settings_from(VehicleSettings, values).vehicle_sources)
         self._hearing = VehicleHearing(
             sources, values["vehicle_state_age"], self._told, before, clock()
         )
@@ -115,8 +123,8 @@ class VehicleSources:
             newest = qos.newest(qos.STATUS)
             node.create_subscription(VehicleState, VEHICLE_STATE, self._vehicle_state, newest)
         for source, kinds in inputs.items():
-            for kind, parameter, read in kinds:
-                self._subscribe(kind, parameter, partial(self._heard, source, parameter, read))
+            for kind, name, read in kinds:
+                self._subscribe(kind, name, partial(self._heard, source, name, read))
 
     def _inputs(self, source: str) -> list[tuple[Any, str, Reader]]:
         """Type, parameter with the topic, and reader of each topic of a source."""
@@ -192,17 +200,6 @@ class VehicleSources:
             )
         self._disputed = report.disputed
         self._tell(report, now)
-
-
-def _checked(sources: list[str]) -> list[str]:
-    """sources, or ParameterError where one is unknown, is there twice, or none is there."""
-    wrong = [name for name in sources if name not in SOURCES or sources.count(name) > 1]
-    if sources and not wrong:
-        return list(sources)
-    raise ParameterError(
-        f"parameter vehicle_sources is {sources!r}: need one or more of {', '.join(SOURCES)}, "
-        f"each once; {f'{wrong[0]!r} is wrong' if wrong else 'it is empty'}"
-    )
 
 
 def _mavros_messages() -> tuple[Any, Any]:

@@ -10,26 +10,35 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from chute_ros.errors import ParameterError
 from chute_ros.model import Outcome
+from chute_ros.settings import Settings, parameter
 
 #: Result of a command that nobody answered: beside the eight bits of any protocol's results.
 NO_ANSWER = 255
 
 
 @dataclass(frozen=True)
-class EffectLimits:
-    """Seconds: from acknowledgement to effect, between tries, and for all tries together."""
+class EffectLimits(Settings):
+    """How long a command may take, and when it is sent again."""
 
-    effect_timeout: float = 1.5
-    retry_interval: float = 0.25
-    give_up_after: float = 5.0
-
-    def __post_init__(self) -> None:
-        for name in ("effect_timeout", "retry_interval", "give_up_after"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} is {value}: need a time above 0 s")
+    effect_timeout: float = parameter(
+        1.5,
+        "wait for the effect of an acknowledged command before the command is sent again",
+        0.05,
+        60.0,
+        "s",
+    )
+    retry_interval: float = parameter(
+        0.25,
+        "interval before a command that was refused or not answered is sent again, and between "
+        "two requests for the status that shows its effect",
+        0.02,
+        60.0,
+        "s",
+    )
+    give_up_after: float = parameter(
+        5.0, "time limit of a command with all its repetitions", 0.1, 600.0, "s"
+    )
 
 
 #: A command of the link's protocol; the loop only compares them.

@@ -15,8 +15,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState
+from chute_ros.settings import Settings, parameter
 from chute_ros.transitions import after
 
 
@@ -39,18 +39,21 @@ TRANSITIONS: dict[tuple[LinkState, Stimulus], LinkState] = {
 
 
 @dataclass(frozen=True)
-class LivenessLimits:
-    """Seconds of silence after which a link is stale, and lost."""
+class LivenessLimits(Settings):
+    """Silence after which a link is stale, and lost."""
 
-    stale_after: float
-    lost_after: float
+    stale_after: float = parameter(
+        2.5, "silence of the device after which its link is STALE", 0.05, 600.0, "s"
+    )
+    lost_after: float = parameter(
+        5.0, "silence of the device after which its link is LOST", 0.05, 600.0, "s"
+    )
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.stale_after < self.lost_after < math.inf:
-            raise ParameterError(
-                f"stale_after {self.stale_after} s and lost_after {self.lost_after} s: "
-                "need 0 < stale_after < lost_after"
-            )
+        super().__post_init__()
+        if self.stale_after >= self.lost_after:
+            why = "a link is STALE before it is LOST; need a smaller first or a larger second"
+            raise self.contradiction(why, "stale_after", "lost_after")
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,13 @@ file or the clock: the shell carries out what it says, and gives it events and t
 
 from __future__ import annotations
 
+import enum
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.protocol.events import (
@@ -28,6 +29,7 @@ from chute_ros.runtime.requests import Begin, CallFailed, RequestDesk
 from chute_ros.runtime.shell import Shell
 from chute_ros.runtime.topics import DeviceBeat, SafetyPicture, SupervisorBeat
 from chute_ros.runtime.watch import SupervisorWatch
+from chute_ros.settings import Settings, parameter
 from chute_ros.supervisor.inputs import ParachuteReport, VehicleReport
 
 #: Our own heartbeat on the wire stops when the owner was silent for this long, s.
@@ -38,15 +40,45 @@ _DETAILS_INTERVAL = 0.5
 _SEQUENCES = 2**32
 
 
-@dataclass(frozen=True)
-class DeviceSettings:
-    """What a person can set of every device node; the parameters of the same names, s."""
+class OnSupervisorLost(enum.Enum):
+    """What a lost supervisor means for the vehicle."""
 
-    max_decision_age: float = 0.5
-    supervisor_lost_after: float = 1.0
-    #: A lost supervisor keeps a vehicle that stands where it is.
-    block_when_lost: bool = True
-    give_up_after: float = 5.0
+    HOLD = "hold"
+    BLOCK_FLIGHT = "block_flight"
+
+
+class LinkConfig(Protocol):
+    """The settings of any link."""
+
+    @property
+    def give_up_after(self) -> float:
+        """Limit for all tries of a command together, s."""
+
+
+@dataclass(frozen=True)
+class DeviceSettings(Settings):
+    """Settings of every device node; a subclass says which its link has."""
+
+    link: LinkConfig
+    max_decision_age: float = parameter(
+        0.5, "a decision of the supervisor older than this is not carried out", 0.05, 10.0, "s"
+    )
+    heartbeat_rate: float = parameter(
+        10.0,
+        "rate of safety/heartbeat; below 4 Hz the supervisor's heartbeat_stale_after or "
+        "link_limits must allow for it",
+        1.0,
+        100.0,
+        "Hz",
+    )
+    supervisor_lost_after: float = parameter(
+        1.0, "a supervisor that was received is lost after this silence", 0.2, 60.0, "s"
+    )
+    on_supervisor_lost: OnSupervisorLost = parameter(
+        OnSupervisorLost.BLOCK_FLIGHT,
+        "reaction to a lost supervisor: hold keeps to the last decision; block_flight also blocks "
+        "flight on the ground, and does nothing in flight; upf_can cannot block flight",
+    )
 
 
 @dataclass(frozen=True)
@@ -225,7 +257,7 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
 
     def deploy_for(self, decision: Decision, begin: Begin) -> None:
         """Have begin(link, token, now) called for a decision, once a parachute is heard."""
-        wait = self.settings.give_up_after
+        wait = self.settings.link.give_up_after
         self.desk.request_once(decision, begin, lambda link: link.has_parachute(), wait)
 
     # -- inside ---------------------------------------------------------------------------------
@@ -253,7 +285,8 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
 
     def _supervisor_lost(self, lost: bool) -> None:
         """Nobody would stop the motors: a vehicle that stands stays where it is."""
-        blocks = self.settings.block_when_lost and self.BLOCKS_FLIGHT
+        wanted = self.settings.on_supervisor_lost is OnSupervisorLost.BLOCK_FLIGHT
+        blocks = wanted and self.BLOCKS_FLIGHT
         if lost:
             what = "flight is blocked" if blocks else "held"
             self.shell.log(Notice(Severity.ERROR, f"the supervisor is lost: {what}"))

@@ -1,4 +1,4 @@
-"""What the supervisor can be told to do differently. Times in s."""
+"""The settings of the supervisor's core."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 from types import MappingProxyType
 
 from chute_ros.errors import ParameterError
+from chute_ros.settings import Settings, nested, parameter
 from chute_ros.supervisor.link_evidence import LinkLimits
 from chute_ros.supervisor.rules import DEVICE_RULES, Profile
 
@@ -42,108 +43,137 @@ class Rung:
 
 
 @dataclass(frozen=True)
-class PreflightLimits:
+class PreflightLimits(Settings):
     """What a device must be for arming. Where it does not say, nothing is held against it."""
 
-    #: Days since the canopy was packed; 0: not looked at.
-    max_pack_age: int = 365
-    #: Arming needs a pack date at all.
-    require_pack_date: bool = False
-    #: Arming needs the parachute's own automatic trigger system to arm itself (ATS_AUTO_ARM).
-    require_self_arm: bool = False
-    #: On the ground the parachute must not say that it is high enough to deploy (GROUND_CLEARED).
-    forbid_ground_cleared: bool = True
-    #: Remaining charge of the vehicle's battery, 0 to 1.
-    min_battery_remaining: float = 0.3
-    #: V; 0: not looked at.
-    min_battery_voltage: float = 0.0
-    #: Of the parachute's own supply, V; 0: not looked at.
-    min_backup_voltage: float = 0.0
-    #: Wall clocks of the hosts may differ by this.
-    max_clock_difference: float = 0.25
+    max_pack_age: int = parameter(
+        365, "arming needs a canopy packed at most this long ago; 0: any", 0, 36500, "days"
+    )
+    require_pack_date: bool = parameter(False, "arming needs a pack date")
+    require_self_arm: bool = parameter(
+        False, "arming needs ATS_AUTO_ARM: the parachute arms itself by height"
+    )
+    forbid_ground_cleared: bool = parameter(
+        True,
+        "arming needs GROUND_CLEARED not set: a parachute on the ground must not report that it "
+        "may deploy",
+    )
+    min_battery_remaining: float = parameter(
+        0.3, "arming needs this remaining charge of the battery", 0.0, 1.0, "of full charge"
+    )
+    min_battery_voltage: float = parameter(
+        0.0, "arming needs this voltage of the battery; 0: any", 0.0, 1000.0, "V"
+    )
+    min_backup_voltage: float = parameter(
+        0.0, "arming needs this voltage of the parachute's own supply; 0: any", 0.0, 1000.0, "V"
+    )
+    max_clock_difference: float = parameter(
+        0.25, "arming needs the hosts' wall clocks to differ by less than this", 0.001, 60.0, "s"
+    )
 
 
 @dataclass(frozen=True)
-class SupervisorConfig:
+class SupervisorConfig(Settings):
     """Settings of the supervisor's core."""
 
-    #: Links whose health flight depends on.
-    required_links: tuple[str, ...] = ("mavlink_parachute",)
-    #: Links that stop the motors.
-    kill_links: tuple[str, ...] = ("mavlink_parachute",)
-    #: Links that release a parachute.
-    deploy_links: tuple[str, ...] = ("mavlink_parachute",)
-    #: Links whose devices never say how they are, and with which flight is allowed all the same.
+    required_links: tuple[str, ...] = parameter(
+        ("mavlink_parachute",), "links whose health flight depends on (node names)"
+    )
+    kill_links: tuple[str, ...] = parameter(
+        ("mavlink_parachute",), "links that stop the motors (node names)"
+    )
+    deploy_links: tuple[str, ...] = parameter(
+        ("mavlink_parachute",), "links that release a parachute (node names)"
+    )
+    #: Links whose devices never report anything, and with which flight is allowed all the same.
     unmonitored_links: tuple[str, ...] = ()
-    #: The steps of a deploy, first to last; empty: the deploy_links in their order, those that
-    #: nobody monitors last.
+    #: The steps of a deploy, first to last; empty: the deploy_links in their order, the
+    #: unmonitored_links last.
     deploy_ladder: tuple[Rung, ...] = ()
-    #: A step that has not been confirmed after this is followed by the next.
-    ladder_step_timeout: float = 2.0
+    ladder_step_timeout: float = parameter(
+        2.0, "wait for the confirmation of a ladder step before the next step", 0.1, 60.0, "s"
+    )
     #: Limits of each link, where they are not the standard ones.
     link_limits: Mapping[str, LinkLimits] = field(default_factory=lambda: _NO_LIMITS)
-    #: The parachute is released this long after the kill, confirmed or not (as ArduPilot does).
-    kill_to_deploy_delay: float = 0.5
-    #: And not longer than this where the vehicle is low (Profile.low_height).
-    low_kill_to_deploy_delay: float = 0.2
-    #: How long the last step of a deploy may take until its confirmation.
-    deploy_timeout: float = 8.0
-    #: A kill without confirmation is given up, as seen by its caller, after this.
-    kill_timeout: float = 6.0
+    #: As ArduPilot does.
+    kill_to_deploy_delay: float = parameter(
+        0.5, "a deploy waits for the confirmation of the kill at most this long", 0.0, 60.0, "s"
+    )
+    low_kill_to_deploy_delay: float = parameter(
+        0.2,
+        "a deploy waits for the confirmation of the kill at most this long in flight below the "
+        "low_height of the profile",
+        0.0,
+        60.0,
+        "s",
+    )
+    deploy_timeout: float = parameter(
+        8.0, "a deploy fails if it is not confirmed within this time", 0.1, 60.0, "s"
+    )
+    kill_timeout: float = parameter(
+        6.0, "a kill fails if it is not confirmed within this time", 0.1, 60.0, "s"
+    )
     #: A parachute that says released is believed at once; its node's report is awaited this long,
     #: only to tell the caller how it went.
     report_wait: float = 0.5
-    #: A decision that nobody has reported on is sent again after this; a kill or a deploy sooner
-    #: at first.
-    resend_interval: float = 0.1
-    #: An alarm that does not stop is said again after this.
-    alarm_interval: float = 2.0
-    #: vehicle/state counts only while its parts are younger than this.
-    vehicle_state_age: float = 2.5
-    #: Without vehicle/state flight is blocked: nobody could tell flight from ground.
-    require_vehicle_state: bool = True
-    #: Without a landed state, armed and higher than this (m) is in the air.
-    takeoff_height: float = 2.0
-    #: Once it has landed and is disarmed, parachutes that `safety/arm` has armed are disarmed.
-    disarm_after_landing: bool = True
-    #: An update that comes later than its deadline by more was late: what was not heard meanwhile
-    #: is not held against anybody.
-    late_after: float = 0.2
-    #: Of several supervisors each has another: 0 for the first choice, up to 3.
+    resend_interval: float = parameter(
+        0.1,
+        "interval before an unacknowledged decision is resent (kill and deploy start at 20 ms)",
+        0.02,
+        60.0,
+        "s",
+    )
+    alarm_interval: float = parameter(
+        2.0, "interval before an alarm that lasts is repeated", 0.1, 60.0, "s"
+    )
+    vehicle_state_age: float = parameter(
+        2.5, "parts of vehicle/state older than this are ignored", 0.1, 60.0, "s"
+    )
+    require_vehicle_state: bool = parameter(
+        True, "block flight without vehicle/state: flight and ground cannot be told apart"
+    )
+    takeoff_height: float = parameter(
+        2.0,
+        "an armed vehicle higher than this is in flight if no landed state is known",
+        0.1,
+        100.0,
+        "m",
+    )
+    disarm_after_landing: bool = parameter(
+        True, "disarm the parachutes that safety/arm has armed after landing and disarming"
+    )
+    late_after: float = parameter(
+        0.2,
+        "an update of the supervisor is late after this delay; silence during it is not counted",
+        0.02,
+        60.0,
+        "s",
+    )
+    #: LeaseConfig's: of several supervisors each has another.
     rank: int = 0
     #: Others may run: whom a device refuses as older yields instead of going on above.
     standby: bool = False
-    preflight: PreflightLimits = field(default=PreflightLimits())
+    preflight: PreflightLimits = nested(PreflightLimits())
     profile: Profile = field(default=Profile("device requests only", DEVICE_RULES))
 
     def __post_init__(self) -> None:
-        for name in ("kill_to_deploy_delay", "low_kill_to_deploy_delay"):
-            if not 0.0 <= getattr(self, name) <= 60.0:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 60 s")
-        for name in (
-            "deploy_timeout",
-            "kill_timeout",
-            "resend_interval",
-            "vehicle_state_age",
-            "ladder_step_timeout",
-            "alarm_interval",
-            "late_after",
-        ):
-            if not 0.0 < getattr(self, name) <= 60.0:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need above 0, up to 60 s")
+        super().__post_init__()
         for name in ("required_links", "kill_links", "deploy_links"):
             links = getattr(self, name)
             if not links or not all(links):
-                raise ParameterError(f"{name} is {list(links)}: need at least one link's name")
+                raise ParameterError(
+                    f"parameter {name} is {list(links)}: need at least one link's name"
+                )
         for link in self.unmonitored_links:
             if link not in self.links:
                 raise ParameterError(
-                    f"unmonitored_links names {link}: need one of {', '.join(self.links)}"
+                    f"parameter unmonitored_links names {link}: need one of "
+                    f"{', '.join(self.links)}"
                 )
         for rung in self.deploy_ladder:
             if rung.link not in self.deploy_links:
                 raise ParameterError(
-                    f"deploy_ladder names {rung}: need a link of deploy_links "
+                    f"parameter deploy_ladder names {rung}: need a link of deploy_links "
                     f"({', '.join(self.deploy_links)})"
                 )
 

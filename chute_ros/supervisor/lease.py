@@ -10,7 +10,7 @@ import enum
 import math
 from dataclasses import dataclass
 
-from chute_ros.errors import ParameterError
+from chute_ros.settings import Settings, parameter
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.transitions import after
@@ -50,24 +50,34 @@ TRANSITIONS: dict[tuple[Role, Event], Role] = {
 
 
 @dataclass(frozen=True)
-class LeaseConfig:
-    """name: of the node; rank: 0 for the first choice; standby: others may run; timeout: a leader
-    that is silent for so long has lost the lease, s; listen: how long one that starts looks for a
-    leader before it leads, s (finding each other on the network takes its time); deaf_after: one
-    that has heard no link for so long hears nothing, s."""
+class LeaseConfig(Settings):
+    """name: of the node; deaf_after: one that has heard no link for so long hears nothing, s."""
 
-    name: str
-    rank: int = 0
-    standby: bool = False
-    timeout: float = 0.5
-    listen: float = 4.0
+    name: str = ""
+    rank: int = parameter(
+        0, "rank of this supervisor, of several each its own; 0: the first choice", 0, RANKS - 1
+    )
+    standby: bool = parameter(
+        False, "a second supervisor may run; a lease says which one leads", name="hot_standby"
+    )
+    timeout: float = parameter(
+        0.5,
+        "a leading supervisor loses the lease after this silence",
+        0.15,
+        60.0,
+        "s",
+        name="lease_timeout",
+    )
+    #: Finding each other on the network takes its time.
+    listen: float = parameter(
+        4.0,
+        "a supervisor that starts looks for a leader this long before it leads, with hot_standby",
+        0.0,
+        60.0,
+        "s",
+        name="lease_listen",
+    )
     deaf_after: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.rank < RANKS:
-            raise ParameterError(f"rank is {self.rank}: need 0 to {RANKS - 1}, each its own")
-        if not 0.15 <= self.timeout <= 60.0:
-            raise ParameterError(f"lease_timeout is {self.timeout}: need 0.15 to 60 s")
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, ParachuteStatus
+from chute_ros.settings import Settings, parameter
 from chute_ros.supervisor.inputs import LinkHeartbeat
 from chute_ros.supervisor.quick_replace import replace
 
@@ -49,24 +49,31 @@ _HEARD = (LinkJudgement.OK, LinkJudgement.REGAINED, LinkJudgement.UNMONITORED)
 
 
 @dataclass(frozen=True)
-class LinkLimits:
-    """Limits of one link, s: silence of its node until stale and lost, how long it must be heard
-    without a break after it was lost, and how long it may take to come up after the start."""
+class LinkLimits(Settings):
+    """Limits of one link."""
 
-    stale_after: float = 0.5
-    lost_after: float = 1.0
-    regain_after: float = 1.0
-    startup_grace: float = 10.0
+    stale_after: float = parameter(
+        0.5, "silence of a node after which its link is STALE", 0.05, 600.0, "s"
+    )
+    lost_after: float = parameter(
+        1.0, "silence of a node after which its link is LOST", 0.05, 600.0, "s"
+    )
+    regain_after: float = parameter(
+        1.0,
+        "a node whose link was LOST counts again once it was received for this long",
+        0.0,
+        60.0,
+        "s",
+    )
+    startup_grace: float = parameter(
+        10.0, "links may take this long to come up after the start", 0.0, 60.0, "s"
+    )
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.stale_after < self.lost_after <= 600.0:
-            raise ParameterError(
-                f"stale_after {self.stale_after} s and lost_after {self.lost_after} s: "
-                "need 0 < stale_after < lost_after, up to 600 s"
-            )
-        for name in ("regain_after", "startup_grace"):
-            if not 0.0 <= getattr(self, name) <= 60.0:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 60 s")
+        super().__post_init__()
+        if self.stale_after >= self.lost_after:
+            why = "a link is STALE before it is LOST; need a smaller first or a larger second"
+            raise self.contradiction(why, "stale_after", "lost_after")
 
 
 @dataclass(frozen=True)

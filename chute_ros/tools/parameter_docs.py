@@ -1,7 +1,6 @@
-"""Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
+"""Writes the files in config/ and the tables of docs/reference/ from the settings (make docs).
 
-The files in config/ and the tables between the marks in docs/reference/parameters.md and
-docs/reference/rules.md. With
+The tables stand between marks in docs/reference/parameters.md and docs/reference/rules.md. With
 --check it only says which of them is out of date.
 """
 
@@ -14,14 +13,13 @@ from pathlib import Path
 
 from chute_ros.links.api import SUPERVISOR, VehicleKind, load
 from chute_ros.links.registered import links, vehicles
-from chute_ros.nodes.device_node import COMMON_PARAMETERS
-from chute_ros.nodes.parameters import Parameter
 from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
+from chute_ros.settings import Parameter, parameters_of
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
     **{
-        name: (*load(kind.parameters), *COMMON_PARAMETERS)
+        name: parameters_of(load(kind.parameters))
         for name, kind in links().items()
         if kind.package == "chute_ros"
     },
@@ -38,7 +36,7 @@ CONFIGS: dict[Path, VehicleKind] = {
 _HEAD = """\
 # Parameters of one vehicle with {}. The keys
 # match the nodes in any namespace. Give this file with --params-file, or as config:= of
-# vehicle.launch.py. Written by `make docs` from the tables in chute_ros.
+# vehicle.launch.py. Written by `make docs` from the settings in chute_ros.
 """
 
 
@@ -49,7 +47,7 @@ def config_text(path: Path) -> str:
     for node in (*vehicle.links, SUPERVISOR):
         lines += [f"/**/{node}:", "  ros__parameters:"]
         for parameter in NODES[node]:
-            text = f"{parameter.description}; {_allowed(parameter)}"
+            text = f"{parameter.meaning}; {_allowed(parameter)}"
             lines += [f"    # {line}" for line in textwrap.wrap(text, 92)]
             value = vehicle.given(node, parameter.name, parameter.default)
             lines.append(f"    {parameter.name}: {_yaml(value)}")
@@ -64,7 +62,7 @@ def parameters_text(before: str) -> str:
         rows += [f"## {node}", ""]
         rows += ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
         rows += [
-            f"| `{p.name}` | `{_yaml(p.default)}` | {p.description} | {_allowed(p)} |"
+            f"| `{p.name}` | `{_yaml(p.default)}` | {p.meaning} | {_allowed(p)} |"
             for p in parameters
         ]
         rows.append("")

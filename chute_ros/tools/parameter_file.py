@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -12,7 +11,7 @@ import yaml
 
 from chute_ros import plain_yaml
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.parameters import Parameter, what_was_meant
+from chute_ros.nodes.parameters import what_was_meant
 from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.replaying import Other
@@ -34,8 +33,8 @@ def other_from(path: Path, node: str) -> Other:
             hint = what_was_meant(name, known)
             raise ParameterError(f"{path}: {NODE} has no parameter {name}{hint}")
     for name, parameter in known.items():
-        if name in given:
-            _check(path, parameter, given[name])
+        if name in given and not parameter.takes(given[name]):
+            raise ParameterError(f"{path}: {parameter.refusal(given[name], f' of {NODE}')}")
     values = {name: given.get(name, one.default) for name, one in known.items()}
     try:
         config = config_from(values)
@@ -92,20 +91,3 @@ def _matches(pattern: str, node: str) -> bool:
         names = names[len(names) - len(tail) :]
         parts = tail
     return len(parts) == len(names) and all(map(fnmatchcase, names, parts))
-
-
-def _check(path: Path, parameter: Parameter, value: Any) -> None:
-    """As the node's declaration does."""
-    kind = type(parameter.default)
-    good = type(value) is kind
-    if good and kind is list:
-        good = all(isinstance(one, str) for one in value)
-    if good and parameter.choices:
-        good = value in parameter.choices
-    if good and parameter.minimum is not None and parameter.maximum is not None:
-        good = parameter.minimum <= value <= parameter.maximum
-    if not good:
-        raise ParameterError(
-            f"{path}: parameter {parameter.name} of {NODE} is {reprlib.repr(value)}: "
-            f"need {parameter.allowed()} ({parameter.description})"
-        )

@@ -6,9 +6,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 from chute_ros.nodes import black_box
-from chute_ros.nodes.black_box_parameters import PARAMETERS
+from chute_ros.nodes.black_box_parameters import BlackBoxSettings
 from chute_ros.nodes.flight_recorder import FlightRecorder
 from chute_ros.nodes.parameters import declare
+from chute_ros.settings import parameters_of
 from chute_ros.tools.mcap_entries import McapEntries
 
 
@@ -17,7 +18,7 @@ class Recording(Node):
 
     def __init__(self, **options):
         super().__init__("safety_supervisor", **options)
-        self.recorder = FlightRecorder(self, declare(self, PARAMETERS))
+        self.recorder = FlightRecorder(self, declare(self, parameters_of(BlackBoxSettings)))
 
     def destroy_node(self):
         self.recorder.close()

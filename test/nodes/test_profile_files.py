@@ -63,7 +63,10 @@ def test_a_rule_that_can_never_be_fulfilled_is_named() -> None:
         ({"link_limits": ["gps stale_after=1"]}, "link_limits names 'gps': need one of mavlink"),
         ({"link_limits": ["mavlink_parachute stale=1"]}, "has 'stale=1' for mavlink_parachute"),
         ({"link_limits": ["mavlink_parachute stale_after=x"]}, "need NAME=SECONDS"),
-        ({"link_limits": ["mavlink_parachute stale_after=9"]}, "need 0 < stale_after < lost"),
+        (
+            {"link_limits": ["mavlink_parachute stale_after=9"]},
+            "for mavlink_parachute: stale_after is 9.0 and lost_after is 1.0: a link",
+        ),
     ],
 )
 def test_a_wrong_parameter_names_itself_and_the_fix(given: dict[str, object], words: str) -> None:

@@ -16,7 +16,8 @@ from chute_ros import model
 from chute_ros.errors import ParameterError
 from chute_ros.nodes import messages, qos, vehicle_sources
 from chute_ros.nodes.parameters import declare
-from chute_ros.nodes.vehicle_sources import TELL_INTERVAL, VEHICLE_PARAMETERS, VehicleSources
+from chute_ros.nodes.vehicle_sources import TELL_INTERVAL, VehicleSettings, VehicleSources
+from chute_ros.settings import parameters_of
 
 ON_LEFT_SIDE = Quaternion(w=math.sqrt(0.5), x=-math.sqrt(0.5), y=0.0, z=0.0)
 RELIABLE_AND_BEST_EFFORT = pytest.mark.parametrize(
@@ -31,7 +32,7 @@ class Listener(Node):
         super().__init__("listener", **options)
         self.now = 100.0
         self.told, self.disputed, self.told_by = [], frozenset(), None
-        values = {**declare(self, VEHICLE_PARAMETERS), "vehicle_state_age": 2.5}
+        values = {**declare(self, parameters_of(VehicleSettings)), "vehicle_state_age": 2.5}
         self.sources = VehicleSources(self, values, self.hear, lambda: self.now)
 
     def hear(self, report, now):
@@ -192,7 +193,9 @@ def test_odometry_with_axes_that_point_down_is_not_used(bench, listen):
 )
 def test_a_wrong_source_is_named_with_what_is_allowed(namespace, sources, fix):
     node = Node("wrong", namespace=namespace)
-    values = {p.name: p.default for p in VEHICLE_PARAMETERS} | {"vehicle_state_age": 2.5}
+    values = {p.name: p.default for p in parameters_of(VehicleSettings)} | {
+        "vehicle_state_age": 2.5
+    }
     with pytest.raises(ParameterError) as error:
         VehicleSources(node, {**values, "vehicle_sources": sources}, print)
     node.destroy_node()

@@ -82,7 +82,8 @@ def test_heard_after_a_long_silence_tells_of_the_loss_in_between():
     ("stale", "lost"), [(0.0, 1.0), (2.0, 2.0), (3.0, 2.0), (1.0, math.inf), (math.nan, 1.0)]
 )
 def test_limits_that_contradict_each_other_are_refused(stale, lost):
-    with pytest.raises(ParameterError, match="stale_after"):
+    wrong = "lost_after is inf" if math.isinf(lost) else f"stale_after is {stale}"
+    with pytest.raises(ParameterError, match=wrong):
         LivenessLimits(stale, lost)
 
 

@@ -154,7 +154,10 @@ def test_every_output_comes_back() -> None:
         ('{"is":"Rung","link":', "cannot be read"),
         ("", "cannot be read"),
         ("Rung(link='a')", "Rung"),
-        ('{"is":"LinkLimits","stale_after":9.0}', "need 0 < stale_after < lost_after"),
+        (
+            '{"is":"LinkLimits","stale_after":9.0}',
+            "stale_after is 9.0 and lost_after is 1.0: a link is STALE before",
+        ),
         ('{"is":"VehicleState","height":1%s}' % ("0" * 400), "int too large"),
         ('{"is":"VehicleState","height":"1.5"}', "'1.5' is no float"),
         ('{"is":"State","epoch":"1","started_at":0}', "'1' is no int"),

@@ -17,7 +17,10 @@ from chute_ros.supervisor.steps import Steps
     ("settings", "words"),
     [
         ({"kill_to_deploy_delay": 61.0}, "kill_to_deploy_delay is 61.0"),
-        ({"deploy_timeout": 0.0}, "deploy_timeout is 0.0: need above 0"),
+        (
+            {"deploy_timeout": 0.0},
+            "^parameter deploy_timeout is 0.0: need a number .* from 0.1 to 60 s",
+        ),
         ({"resend_interval": float("nan")}, "resend_interval is nan"),
         ({"required_links": ()}, "required_links is \\[\\]: need at least one"),
         ({"deploy_links": ("",)}, "deploy_links is \\[''\\]"),

@@ -8,17 +8,16 @@ from chute_ros.errors import ParameterError
 from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkLimits
 
-TIMES = (
-    "deploy_timeout",
-    "kill_timeout",
-    "resend_interval",
-    "vehicle_state_age",
-    "ladder_step_timeout",
-    "alarm_interval",
-    "late_after",
-)
-
-
+#: With the smallest that is allowed.
+TIMES = {
+    "deploy_timeout": 0.1,
+    "kill_timeout": 0.1,
+    "resend_interval": 0.02,
+    "vehicle_state_age": 0.1,
+    "ladder_step_timeout": 0.1,
+    "alarm_interval": 0.1,
+    "late_after": 0.02,
+}
 DELAYS = ("kill_to_deploy_delay", "low_kill_to_deploy_delay")
 
 
@@ -39,26 +38,28 @@ def test_the_delay_from_the_kill_to_the_deploy_may_reach_its_limits(
 @pytest.mark.parametrize("name", DELAYS)
 @pytest.mark.parametrize("delay", [-0.1, 60.1, float("nan")])
 def test_a_delay_past_its_limits_is_told_in_full(name: str, delay: float) -> None:
-    assert refusal(**{name: delay}) == f"{name} is {delay}: need 0 to 60 s"
+    said = f"parameter {name} is {delay}: need a number (1.0, not 1) from 0 to 60 s ("
+    assert refusal(**{name: delay}).startswith(said)
 
 
-@pytest.mark.parametrize("name", TIMES)
-def test_every_time_is_above_0_and_up_to_a_minute(name: str) -> None:
-    for good in (0.001, 60.0):
+@pytest.mark.parametrize(("name", "smallest"), TIMES.items())
+def test_every_time_is_above_0_and_up_to_a_minute(name: str, smallest: float) -> None:
+    for good in (smallest, 60.0):
         assert getattr(SupervisorConfig(**{name: good}), name) == good
-    for wrong in (0.0, 60.1):
-        said = f"{name} is {wrong}: need above 0, up to 60 s"
-        assert refusal(**{name: wrong}) == said
+    for wrong in (0.0, smallest - 0.001, 60.1):
+        need = f"need a number (1.0, not 1) from {smallest} to 60 s ("
+        assert refusal(**{name: wrong}).startswith(f"parameter {name} is {wrong}: {need}")
 
 
 @pytest.mark.parametrize("name", ["required_links", "kill_links", "deploy_links"])
 def test_no_list_of_links_is_empty_or_has_an_empty_name(name: str) -> None:
-    assert refusal(**{name: ()}) == f"{name} is []: need at least one link's name"
-    assert refusal(**{name: ("a", "")}) == f"{name} is ['a', '']: need at least one link's name"
+    assert refusal(**{name: ()}) == f"parameter {name} is []: need at least one link's name"
+    said = f"parameter {name} is ['a', '']: need at least one link's name"
+    assert refusal(**{name: ("a", "")}) == said
 
 
 def test_a_step_of_the_ladder_on_another_link_is_told_with_those_that_may_be() -> None:
-    said = "deploy_ladder names c:1/162: need a link of deploy_links (a, b)"
+    said = "parameter deploy_ladder names c:1/162: need a link of deploy_links (a, b)"
     assert refusal(deploy_links=("a", "b"), deploy_ladder=(Rung("a"), Rung("c", "1/162"))) == said
 
 

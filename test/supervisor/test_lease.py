@@ -355,9 +355,9 @@ def test_each_rank_has_its_own_epochs_each_above_the_last(seen: int, rank: int) 
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"rank": 4}, "rank is 4: need 0 to 3"),
+        ({"rank": 4}, "rank is 4: need a whole number from 0 to 3"),
         ({"rank": -1}, "rank is -1"),
-        ({"timeout": 0.1}, "lease_timeout is 0.1: need 0.15 to 60 s"),
+        ({"timeout": 0.1}, "lease_timeout is 0.1: need a number .* from 0.15 to 60 s"),
     ],
 )
 def test_a_wrong_setting_says_what_is_allowed(settings: dict[str, float], words: str) -> None:

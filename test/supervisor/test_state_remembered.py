@@ -88,7 +88,7 @@ def test_a_kill_and_a_deploy_are_sent_again_soon_at_first(
 ) -> None:
     one = replace(pending(action), sent_at=sent_at)
     assert one.resend_at(TWO) == pytest.approx(then)
-    assert one.resend_at(replace(TWO, resend_interval=0.01)) == pytest.approx(sent_at + 0.01)
+    assert one.resend_at(replace(TWO, resend_interval=0.02)) == pytest.approx(sent_at + 0.02)
 
 
 def test_a_flight_block_is_sent_again_ever_more_rarely() -> None:

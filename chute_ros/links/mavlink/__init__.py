@@ -24,7 +24,7 @@ LINK = LinkKind(
     name=AUTOPILOT_LINK,
     description="a parachute on a MAVLink network, and the autopilot there",
     node=f"{_FOLDER}.node:MavlinkParachuteNode",
-    parameters=f"{_FOLDER}.parameters:PARAMETERS",
+    parameters=f"{_FOLDER}.parameters:MavlinkParameters",
     argument=Argument("connection", "where the MAVLink network is"),
     vehicles=(
         VehicleKind(

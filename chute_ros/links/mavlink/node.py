@@ -24,16 +24,17 @@ from chute_ros.links.mavlink.diagnostics import (
     link_task,
     parachute_tasks,
 )
-from chute_ros.links.mavlink.parameters import PARAMETERS, config_from
+from chute_ros.links.mavlink.parameters import PARAMETERS, MavlinkParameters
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import component_information
-from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
+from chute_ros.links.mavlink.runtime import MavlinkRuntime
 from chute_ros.links.mavlink.signing_memory import SigningMemory
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.runtime.device import Summary
+from chute_ros.settings import settings_from
 from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.loop import WireLoop
@@ -49,15 +50,14 @@ class MavlinkParachuteNode(DeviceNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("mavlink_parachute", PARAMETERS, **options)
         address = parse_address(self.values["connection"])
-        config = config_from(self.values)
+        settings = settings_from(MavlinkParameters, self.values).runtime
         self._signing = SigningMemory(self, self.values)
         # Once the newest times are known.
         self.at_end.callback(self._signing.finish)
         #: Why take-off is forbidden, as it was last told.
         self._doubts: set[str] = set()
-        settings = self.settings(MavlinkSettings)
         self.carry(MavlinkRuntime(self.get_name(), settings, self, self._details))
-        link = MavlinkLink(config, self._signing.signer, self._signing.verifier)
+        link = MavlinkLink(settings.link, self._signing.signer, self._signing.verifier)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, frames=lambda: link.received_count
         )

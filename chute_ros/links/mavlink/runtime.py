@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 from chute_ros.links.mavlink.health import health
 from chute_ros.links.mavlink.protocol import results
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.model import Action, Decision
 from chute_ros.protocol.effect import EffectFinished
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+from chute_ros.settings import nested, parameter
 
 #: How a flight block is reported by a node that must leave arming alone.
 _NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
@@ -18,11 +20,17 @@ _NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
 
 @dataclass(frozen=True)
 class MavlinkSettings(DeviceSettings):
-    """The parameters of the same names."""
+    """Settings of a MavlinkRuntime."""
 
-    expect_parachute: bool = True
-    deploy_arms_trigger: bool = True
-    disarm_when_blocked: bool = True
+    link: MavlinkConfig = nested(MavlinkConfig())
+    expect_parachute: bool = parameter(
+        True,
+        "a parachute is on this network; false: it is on another link, and safety/heartbeat of "
+        "this node reports the autopilot",
+    )
+    deploy_arms_trigger: bool = parameter(
+        True, "a deploy that the supervisor decided also arms the flight-controller trigger"
+    )
 
 
 class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
@@ -43,7 +51,7 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
                 decision,
                 lambda link, token, now: link.kill(token, now),
                 MavlinkLink.has_autopilot,
-                self.settings.give_up_after,
+                self.settings.link.give_up_after,
             )
         elif decision.action is Action.DEPLOY:
             force, device = self.settings.deploy_arms_trigger, decision.device
@@ -51,6 +59,6 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
                 decision, lambda link, token, now: link.deploy(token, force, now, device)
             )
         elif decision.action is not Action.NONE:
-            undone = self.settings.disarm_when_blocked
+            undone = self.settings.link.disarm_when_blocked
             blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
             self.carry_out_flight_block(decision, blocked, "arming is left alone")

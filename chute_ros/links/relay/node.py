@@ -8,11 +8,12 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.links.relay.diagnostics import details_of, link_task, parachute_task
 from chute_ros.links.relay.output import make_output
-from chute_ros.links.relay.parameters import PARAMETERS, config_from
+from chute_ros.links.relay.parameters import PARAMETERS, RelayParameters
 from chute_ros.links.relay.protocol.link import RelayLink
 from chute_ros.links.relay.runtime import RelayRuntime
 from chute_ros.nodes.device_node import DeviceNode
-from chute_ros.runtime.device import DeviceSettings, Summary
+from chute_ros.runtime.device import Summary
+from chute_ros.settings import settings_from
 from chute_ros.transport.loop import WireLoop
 
 
@@ -21,9 +22,9 @@ class RelayNode(DeviceNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("relay", PARAMETERS, **options)
-        link = RelayLink(config_from(self.values))
+        settings = settings_from(RelayParameters, self.values).runtime
+        link = RelayLink(settings.link)
         wire = make_output(self.values["connection"])
-        settings = self.settings(DeviceSettings)
         self.carry(RelayRuntime(self.get_name(), settings, self, details_of))
         self.loop = WireLoop(link, wire, self.deliver, link.wire_opened, link.not_written)
         self.begin()

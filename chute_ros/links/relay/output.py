@@ -74,21 +74,3 @@ def make_output(text: str) -> Wire:
     if kind not in ("serial", "usb"):
         raise ParameterError(f"connection {text!r} is no output: need {FORMS}")
     return make_wire(parse_serial_address(text))
-
-
-def output_bytes(text: str, name: str) -> bytes:
-    """The bytes of a parameter: "hex:" and pairs of digits, or the text itself."""
-    if not text.startswith("hex:"):
-        if not text:
-            raise ParameterError(f"parameter {name} is empty: need a text, or hex: and digits")
-        return text.encode()
-    try:
-        data = bytes.fromhex(text.removeprefix("hex:"))
-    except ValueError:
-        data = b""
-    if not data:
-        raise ParameterError(
-            f"parameter {name} is {text!r}: need pairs of hexadecimal digits after hex:, as "
-            "hex:a00101a2"
-        )
-    return data

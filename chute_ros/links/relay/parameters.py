@@ -1,58 +1,23 @@
-"""The parameters of relay and what they become."""
+"""The parameters of relay."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass
 
-from chute_ros.errors import ParameterError
-from chute_ros.links.relay.output import FORMS, output_bytes
-from chute_ros.links.relay.protocol.link import RelayConfig
-from chute_ros.nodes.parameters import Parameter
+from chute_ros.links.relay.output import FORMS
+from chute_ros.links.relay.runtime import RelaySettings
+from chute_ros.settings import Settings, nested, parameter, parameters_of
 
-PARAMETERS = (
-    Parameter(
-        "connection",
+
+@dataclass(frozen=True)
+class RelayParameters(Settings):
+    """All parameters of the node; first its connection."""
+
+    connection: str = parameter(
         "serial:/dev/ttyUSB0:9600",
         f"the output: {FORMS}; file: an output in /sys, a device or a pipe",
-    ),
-    Parameter(
-        "output_fire",
-        "hex:a00101a2",
-        "what is written to fire: text as it is, or hex: and digits; the default closes channel 1 "
-        "of a serial relay board LCUS-1",
-    ),
-    Parameter(
-        "output_rest", "hex:a00100a1", "what is written at rest: text as it is, or hex: and digits"
-    ),
-    Parameter("pulse_time", 2.0, "the output fires for this long, s", 0.05, 60.0),
-    Parameter("repeat_interval", 0.1, "interval at which output_fire is repeated, s", 0.02, 10.0),
-    Parameter(
-        "rest_interval",
-        1.0,
-        "interval at which output_rest is repeated, s: an output that cannot be written is LOST",
-        0.05,
-        60.0,
-    ),
-    Parameter(
-        "give_up_after", 5.0, "a deploy that could not be written fails after this, s", 0.1, 60.0
-    ),
-)
-
-
-def config_from(values: Mapping[str, Any]) -> RelayConfig:
-    """The settings of the protocol; ParameterError for bytes that are none."""
-    fire, rest = (output_bytes(values[name], name) for name in ("output_fire", "output_rest"))
-    if fire == rest:
-        raise ParameterError(
-            f"parameters output_fire and output_rest are both {values['output_fire']!r}: need two "
-            "that differ"
-        )
-    return RelayConfig(
-        fire,
-        rest,
-        values["pulse_time"],
-        values["repeat_interval"],
-        values["rest_interval"],
-        values["give_up_after"],
     )
+    runtime: RelaySettings = nested(RelaySettings())
+
+
+PARAMETERS = parameters_of(RelayParameters)

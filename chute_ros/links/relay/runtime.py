@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from chute_ros.links.relay.protocol.link import RelayLink
+from dataclasses import dataclass
+
+from chute_ros.links.relay.protocol.link import RelayConfig, RelayLink
 from chute_ros.model import NAN, Action, Decision, LinkState, Outcome
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+from chute_ros.settings import nested
 
 _UNMONITORED = "nothing comes back from a relay output: what its parachute is can only be hoped"
 _NOT_WRITTEN = "its output cannot be written"
 
 
-class RelayRuntime(DeviceRuntime[DeviceSettings]):
+@dataclass(frozen=True)
+class RelaySettings(DeviceSettings):
+    """Settings of a RelayRuntime."""
+
+    link: RelayConfig = nested(RelayConfig())
+
+
+class RelayRuntime(DeviceRuntime[RelaySettings]):
     """Its link is a RelayLink."""
 
     BLOCKS_FLIGHT = False

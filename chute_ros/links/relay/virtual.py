@@ -11,11 +11,11 @@ from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.links.api import VehicleKind
 from chute_ros.links.relay import LINK
 from chute_ros.links.relay.protocol.link import RelayConfig, RelayLink
-from chute_ros.links.relay.runtime import RelayRuntime
+from chute_ros.links.relay.runtime import RelayRuntime, RelaySettings
 from chute_ros.links.relay.simulator.relay_board import RelayBoard
-from chute_ros.runtime.device import DeviceSettings
 
 _BOARD = "board"
+_STANDARD = RelayConfig()
 
 
 class RelayPart:
@@ -41,15 +41,17 @@ class VirtualRelay(VirtualNode):
     """relay."""
 
     def __init__(self, bus: Bus, process: Process, ros: Ros) -> None:
+        settings = RelaySettings()
+
         def make_link() -> RelayLink:
-            link = RelayLink(RelayConfig())
+            link = RelayLink(settings.link)
             link.wire_opened(ros.world.now)
             return link
 
         def runtime(shell: VirtualNode) -> RelayRuntime:
-            return RelayRuntime(process.name, DeviceSettings(), shell)
+            return RelayRuntime(process.name, settings, shell)
 
         super().__init__(bus, process, ros, make_link, runtime)
 
     def is_release(self, data: bytes) -> bool:
-        return data == RelayConfig.fire
+        return data == _STANDARD.fire

@@ -16,7 +16,7 @@ LINK = LinkKind(
     name=_NAME,
     description="a rocket's flight computer on a serial umbilical",
     node=f"{_FOLDER}.node:UmbilicalNode",
-    parameters=f"{_FOLDER}.parameters:PARAMETERS",
+    parameters=f"{_FOLDER}.parameters:UmbilicalParameters",
     argument=Argument("cable", "serial port of an umbilical"),
     vehicles=(
         VehicleKind(

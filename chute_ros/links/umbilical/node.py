@@ -19,11 +19,11 @@ from chute_ros.links.umbilical.diagnostics import (
 )
 from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.umbilical.layout_files import load_layouts
-from chute_ros.links.umbilical.parameters import PARAMETERS, config_from
+from chute_ros.links.umbilical.parameters import PARAMETERS, UmbilicalParameters
 from chute_ros.links.umbilical.protocol import events
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.protocol.sayings import LogLine
-from chute_ros.links.umbilical.runtime import UmbilicalRuntime, UmbilicalSettings
+from chute_ros.links.umbilical.runtime import UmbilicalRuntime
 from chute_ros.links.umbilical.services import UmbilicalServices
 from chute_ros.links.umbilical.telem_message import telem, unfit, without_place
 from chute_ros.nodes import messages, qos
@@ -31,6 +31,7 @@ from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.nodes.link_log import log_notice
 from chute_ros.protocol.events import Notice
 from chute_ros.runtime.device import Summary
+from chute_ros.settings import settings_from
 from chute_ros.supervisor.inputs import VehicleReport
 from chute_ros.transport.address import parse_serial_address
 from chute_ros.transport.loop import WireLoop
@@ -50,11 +51,11 @@ class UmbilicalNode(DeviceNode):
             if names := without_place(layout):
                 text = f"{layout.name}: umbilical/telem has no field for {', '.join(names)}"
                 self.get_logger().warning(text)
-        settings = self.settings(UmbilicalSettings)
+        settings = settings_from(UmbilicalParameters, self.values).runtime
         self.carry(UmbilicalRuntime(self.get_name(), settings, self, details_of))
         self.files = DumpFiles(self.values["dump_folder"])
         self.at_end.callback(self._end_dump)
-        link = UmbilicalLink(config_from(self.values), layouts)
+        link = UmbilicalLink(settings.link, layouts)
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written
         )
@@ -62,7 +63,7 @@ class UmbilicalNode(DeviceNode):
         # The flight computer's own log, told apart from ours by the logger's name.
         self._its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
-        if self.values["publish_vehicle_state"]:
+        if settings.publish_vehicle_state:
             vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
             self.follow(
                 VehicleReport,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
 from chute_ros.links.umbilical.protocol.events import TelemetryReceived
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.protocol.reasons import reasons_of
@@ -14,14 +15,18 @@ from chute_ros.model import NAN, Action, Decision
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import RequestFinished, VehicleChanged
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary, block_reason
+from chute_ros.settings import nested, parameter
 
 
 @dataclass(frozen=True)
 class UmbilicalSettings(DeviceSettings):
-    """The parameters of the same names."""
+    """Settings of an UmbilicalRuntime."""
 
-    decided_deploy_forces: bool = True
-    publish_vehicle_state: bool = False
+    link: UmbilicalConfig = nested(UmbilicalConfig())
+    publish_vehicle_state: bool = parameter(
+        False,
+        "publish vehicle/state from telemetry: for a vehicle without an autopilot on another link",
+    )
 
 
 class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
@@ -61,7 +66,7 @@ class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
 
             self.desk.request_for(decision, kill)
         elif decision.action is Action.DEPLOY:
-            force = self.settings.decided_deploy_forces
+            force = self.settings.link.decided_deploy_forces
             self.deploy_for(decision, lambda link, token, now: link.deploy(token, force, now))
         elif decision.action is not Action.NONE:
             self.carry_out_flight_block(

@@ -29,7 +29,7 @@ LINK = LinkKind(
     name=_NAME,
     description="a Flyfire UPF parachute on a DroneCAN bus",
     node=f"{_FOLDER}.node:UpfCanNode",
-    parameters=f"{_FOLDER}.parameters:PARAMETERS",
+    parameters=f"{_FOLDER}.parameters:UpfParameters",
     argument=Argument("bus", "where the CAN bus of a UPF is"),
     vehicles=(
         VehicleKind(

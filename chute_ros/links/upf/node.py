@@ -17,16 +17,18 @@ from chute_ros.links.upf.diagnostics import (
     device_tasks,
     vehicle_service_task,
 )
-from chute_ros.links.upf.parameters import PARAMETERS, config_from
+from chute_ros.links.upf.parameters import PARAMETERS, UpfParameters, config_from
+from chute_ros.links.upf.protocol.config import AllocatorUse
 from chute_ros.links.upf.protocol.events import TriggerChanged
 from chute_ros.links.upf.protocol.link import UpfLink
-from chute_ros.links.upf.runtime import UpfRuntime, UpfSettings
+from chute_ros.links.upf.runtime import UpfRuntime
 from chute_ros.links.upf.services import UpfServices
 from chute_ros.nodes import messages, qos
 from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.nodes.kept_file import Newest
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.runtime.device import Summary
+from chute_ros.settings import settings_from
 from chute_ros.transport.can_address import parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
 from chute_ros.transport.data_types import load_data_types
@@ -49,12 +51,13 @@ class UpfCanNode(DeviceNode):
         address = parse_can_address(self.values["connection"], self.values["bitrate"])
         types = load_data_types(self.values["dsdl_path"], "parameter dsdl_path")
         self._file = AllocationFile(self.values["allocation_table_file"], name)
-        table = self._file.load() if self.values["allocator"] != "false" else {}
+        settings = settings_from(UpfParameters, self.values).runtime
+        gives_ids = settings.link.allocator is not AllocatorUse.NO
+        table = self._file.load() if gives_ids else {}
         utc_offset = time.time() - time.monotonic()
-        settings = self.settings(UpfSettings)
         runtime = UpfRuntime(self.get_name(), settings, self, details_of)
         self.carry(runtime)
-        link = UpfLink(config_from(self.values, table, name, utc_offset), types)
+        link = UpfLink(config_from(settings.link, table, name, utc_offset), types)
         self._wire = make_can_wire(address)
         self.loop = WireLoop(link, self._wire, self.deliver)
         self._trigger_publisher = self.create_publisher(

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.protocol.errands import ErrandDone
 from chute_ros.links.upf.protocol.events import ErrandFinished
 from chute_ros.links.upf.protocol.link import UpfLink
@@ -16,6 +17,7 @@ from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import Ask, AskSupervisor, Notice, Severity
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import ActionTold, DeviceRequest, SafetyPicture
+from chute_ros.settings import nested, parameter
 from chute_ros.supervisor.config import TRIGGER
 
 #: Kills that were confirmed are remembered, so many.
@@ -24,9 +26,12 @@ _MOST_KILLS = 50
 
 @dataclass(frozen=True)
 class UpfSettings(DeviceSettings):
-    """The parameter of the same name."""
+    """Settings of a UpfRuntime."""
 
-    decided_deploy_forces: bool = True
+    link: UpfConfig = nested(UpfConfig())
+    decided_deploy_forces: bool = parameter(
+        True, "send a deploy that the supervisor decided as TYPE_DEPLOY_FORCE"
+    )
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, TRANSFER_TIMEOUT
 from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.settings import Settings, parameter
 
 #: Calls to one server and service that wait at the same time, urgent ones aside.
 MOST_AT_ONCE = 4
@@ -25,17 +25,15 @@ _UNANSWERED = TRANSFER_TIMEOUT
 
 
 @dataclass(frozen=True)
-class CallLimits:
-    """How long a response may take (s), and how often a call is sent."""
+class CallLimits(Settings):
+    """How long a response may take, and how often a call is sent."""
 
-    timeout: float = 0.25
-    tries: int = 3
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.timeout < math.inf:
-            raise ParameterError(f"timeout is {self.timeout}: need a time above 0 s")
-        if not 1 <= self.tries < TRANSFER_IDS // MOST_AT_ONCE:
-            raise ParameterError(f"tries is {self.tries}: need 1 to 7")
+    timeout: float = parameter(
+        0.25, "wait for a response before the request is sent again", 0.02, 60.0, "s"
+    )
+    tries: int = parameter(
+        3, "a request is sent at most this many times", 1, TRANSFER_IDS // MOST_AT_ONCE - 1
+    )
 
 
 @dataclass(frozen=True)

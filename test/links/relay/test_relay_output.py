@@ -10,7 +10,8 @@ from node_bench import Bench
 from relay_bench import Board
 
 from chute_ros.errors import ParameterError
-from chute_ros.links.relay.output import FileWire, make_output, output_bytes
+from chute_ros.links.relay.output import FileWire, make_output
+from chute_ros.links.relay.protocol.link import RelayConfig
 from chute_ros.model import LinkState
 
 
@@ -106,16 +107,20 @@ def test_what_cannot(given: str, said: str) -> None:
 
 
 def test_bytes_as_text_and_as_digits() -> None:
-    assert output_bytes("1", "output_fire") == b"1"
-    assert output_bytes("hex:a00101a2", "output_fire") == b"\xa0\x01\x01\xa2"
-    assert output_bytes("hex:A0 01", "output_fire") == b"\xa0\x01"
+    assert RelayConfig(output_fire="1").fire == b"1"
+    assert RelayConfig(output_fire="hex:a00101a2").fire == b"\xa0\x01\x01\xa2"
+    assert RelayConfig(output_rest="hex:A0 01").rest == b"\xa0\x01"
     for wrong in ("", "hex:", "hex:a", "hex:xy"):
-        with pytest.raises(ParameterError, match="parameter output_fire is"):
-            output_bytes(wrong, "output_fire")
+        with pytest.raises(
+            ParameterError, match=f"parameter output_fire is '{wrong}': need a text"
+        ):
+            RelayConfig(output_fire=wrong)
 
 
 def test_a_node_that_would_fire_at_rest_does_not_start(bench: Bench) -> None:
-    with pytest.raises(ParameterError, match="output_fire and output_rest are both '1'"):
+    with pytest.raises(
+        ParameterError, match="output_fire is 1 and output_rest is 1: the output would always fire"
+    ):
         Board(bench, output_fire="1", output_rest="1")
 
 

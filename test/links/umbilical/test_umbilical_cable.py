@@ -213,7 +213,7 @@ def test_each_way_that_a_port_cannot_be_opened_is_one_clear_line_and_it_keeps_tr
         ),
         (
             {"command_spacing": 1.0},
-            "parameter umbilical_heartbeat_interval is 1.0 and command_spacing 1.0",
+            "parameter umbilical_heartbeat_interval is 1.0 and command_spacing is 1.0",
         ),
         ({"command_spacing": 0.05}, "parameter command_spacing"),
         ({"deploy_stage": "both"}, "need one of drogue, main, next"),

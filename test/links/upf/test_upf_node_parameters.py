@@ -16,13 +16,11 @@ from upf_bench import OTHER_LAYOUT, Network, quick
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.links.upf.parameters import PARAMETERS
-from chute_ros.nodes.device_node import COMMON_PARAMETERS
 
 NAN, INF = float("nan"), float("inf")
 DSDL = Path(__file__).parents[3] / "msg_defs" / "dsdl" / "flyfire"
-ALL = (*COMMON_PARAMETERS, *PARAMETERS)
-RANGED = [one for one in ALL if one.minimum is not None]
-OTHERS = [one for one in ALL if one.minimum is None]
+RANGED = [one for one in PARAMETERS if one.minimum is not None]
+OTHERS = [one for one in PARAMETERS if one.minimum is None]
 
 
 def start(bench, **parameters):
@@ -44,12 +42,12 @@ def refusal(bench, **parameters):
 def test_each_has_the_default_that_its_table_says(bench, monkeypatch, tmp_path):
     monkeypatch.setenv("ROS_HOME", str(tmp_path))
     node = bench.add(UpfCanNode, connection=quick()["connection"])
-    for one in ALL:
+    for one in PARAMETERS:
         if one.name != "connection":
             assert node.get_parameter(one.name).value == one.default, one.name
             assert node.values[one.name] == one.default
         described = node.describe_parameter(one.name)
-        assert described.description == one.description
+        assert described.description == one.meaning
         assert described.additional_constraints == one.allowed()
         assert described.read_only != one.changeable
 
@@ -119,7 +117,7 @@ def test_a_bus_that_is_none_is_named_with_the_forms(bench, connection, need):
 
 def test_none_of_them_changes_while_running(bench):
     node = Network(bench).node
-    for one in ALL:
+    for one in PARAMETERS:
         (result,) = node.set_parameters([Parameter(one.name, value=node.values[one.name])])
         assert not result.successful, one.name
         assert "read-only" in result.reason
@@ -138,7 +136,7 @@ def test_a_device_is_stale_before_it_is_lost(bench, stale, lost):
 @pytest.mark.parametrize("name", ["controller_node_id", "trigger_node_id"])
 def test_a_node_id_belongs_to_one_node(bench, name):
     text = refusal(bench, **{"node_id": 33, name: 33})
-    assert f"{name} and node_id are both 33" in text
+    assert f"{name} is 33 and node_id is 33: a node id belongs to one node" in text
     assert "choose another node_id" in text
 
 
@@ -254,7 +252,10 @@ def run(namespace, tmp_path, *parameters):
         (["node_id:=0"], "parameter node_id of {ns}/upf_can is 0: need a whole number from 1 to"),
         (["connection:=can"], "connection 'can' is not understood: need mcast:BUS[:PORT]"),
         (["dsdl_path:=/none"], "parameter dsdl_path is '/none': there is no such folder"),
-        (["node_id:=33", "controller_node_id:=33"], "are both 33"),
+        (
+            ["node_id:=33", "controller_node_id:=33"],
+            "parameter controller_node_id is 33 and node_id is 33: ",
+        ),
         (["allocation_table_file:={tmp}/bad"], "{tmp}/bad cannot be used: it holds no table"),
     ],
 )

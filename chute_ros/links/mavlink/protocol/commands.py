@@ -13,27 +13,27 @@ import math
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
-from chute_ros.errors import ParameterError
 from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.unanswered import UnansweredSends
+from chute_ros.settings import Settings, parameter
 
 
 @dataclass(frozen=True)
-class CommandLimits:
-    """Times (s) and tries of a command."""
+class CommandLimits(Settings):
+    """Times and tries of a command. Each try has its number in a byte, confirmation."""
 
-    ack_timeout: float = 0.2
-    tries: int = 5
-    in_progress_timeout: float = 5.0
-    late_ack_window: float = 5.0
-
-    def __post_init__(self) -> None:
-        for name in ("ack_timeout", "in_progress_timeout", "late_ack_window"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} is {value}: need a time above 0 s")
-        if not 1 <= self.tries <= 255:
-            raise ParameterError(f"tries is {self.tries}: need 1 to 255 (confirmation is a byte)")
+    ack_timeout: float = parameter(
+        0.2, "wait for an acknowledgement before the command is sent again", 0.02, 60.0, "s"
+    )
+    tries: int = parameter(
+        5, "a command is sent at most this many times", 1, 100, name="ack_tries"
+    )
+    in_progress_timeout: float = parameter(
+        5.0, "wait for the result after the answer IN_PROGRESS", 0.1, 600.0, "s"
+    )
+    late_ack_window: float = parameter(
+        5.0, "a late acknowledgement may still come within this time", 0.1, 60.0, "s"
+    )
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from chute_ros.model import (
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.settings import Settings, parameter
 
 _UNHEALTHY_STATES = {
     dialect.MAV_STATE_CRITICAL: "critical",
@@ -60,11 +61,19 @@ class ComponentInformation:
 
 
 @dataclass(frozen=True)
-class StatusLimits:
-    """PARACHUTE_STATUS is overdue after this silence (s); error flags to take no notice of."""
+class StatusLimits(Settings):
+    """What of a PARACHUTE_STATUS is a fault."""
 
-    status_timeout: float = 3.5
-    ignored_errors: ErrorFlags = ErrorFlags(0)
+    status_timeout: float = parameter(
+        3.5, "a PARACHUTE_STATUS older than this is a fault", 0.1, 600.0, "s"
+    )
+    ignored_errors: ErrorFlags = parameter(
+        ErrorFlags(0),
+        "mask of PARACHUTE_ERROR_FLAGS that are not faults of this parachute",
+        0,
+        2**32 - 1,
+        name="ignored_error_flags",
+    )
 
 
 def packed_date(text: str) -> tuple[str, str]:

@@ -1,6 +1,6 @@
 """An output that fires a parachute and never answers.
 
-At rest the output is written again each rest_interval: that is all that can be tested of it. A
+At rest the output is written again each output_check_interval: that is all that can be tested of it. A
 deploy is a pulse: the firing bytes, repeated each repeat_interval, for pulse_time; then rest.
 """
 
@@ -9,10 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 
+from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, Outcome, ParachuteStatus
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
 from chute_ros.protocol.events import Event, ParachuteChanged, RequestFinished, RequestReport
+from chute_ros.settings import Settings, parameter
 
 #: The one device of an output.
 DEVICE = "output"
@@ -22,17 +25,63 @@ _SENT = "sent; a relay output confirms nothing"
 
 
 @dataclass(frozen=True)
-class RelayConfig:
-    """fire, rest: what is written to fire, and to rest; times in s. The defaults are those of a
-    serial relay board of one channel (LCUS-1)."""
+class RelayConfig(Settings):
+    """Settings of a RelayLink. The bytes are those of a serial relay board of one channel
+    (LCUS-1)."""
 
-    fire: bytes = bytes.fromhex("a00101a2")
-    rest: bytes = bytes.fromhex("a00100a1")
-    pulse_time: float = 2.0
-    repeat_interval: float = 0.1
-    rest_interval: float = 1.0
-    #: A deploy that could not be written fails after this.
-    give_up_after: float = 5.0
+    output_fire: str = parameter(
+        "hex:a00101a2",
+        "data written to fire: the text itself, or hex: and digits; the default closes channel 1 "
+        "of a serial relay board LCUS-1",
+    )
+    output_rest: str = parameter(
+        "hex:a00100a1", "data written at rest: the text itself, or hex: and digits"
+    )
+    pulse_time: float = parameter(2.0, "the output fires for this long", 0.05, 60.0, "s")
+    repeat_interval: float = parameter(
+        0.1, "interval at which output_fire is repeated", 0.02, 10.0, "s"
+    )
+    output_check_interval: float = parameter(
+        1.0,
+        "interval at which the output is checked at rest: output_rest is written again, and an "
+        "output that cannot be written is LOST",
+        0.05,
+        60.0,
+        "s",
+    )
+    give_up_after: float = parameter(
+        5.0, "a deploy fails if it cannot be written within this time", 0.1, 60.0, "s"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.fire == self.rest:
+            why = "the output would always fire; need two that differ"
+            raise self.contradiction(why, "output_fire", "output_rest")
+
+    @cached_property
+    def fire(self) -> bytes:
+        """The bytes of output_fire."""
+        return _bytes(self.output_fire, "output_fire")
+
+    @cached_property
+    def rest(self) -> bytes:
+        """The bytes of output_rest."""
+        return _bytes(self.output_rest, "output_rest")
+
+
+def _bytes(text: str, name: str) -> bytes:
+    digits = text.removeprefix("hex:")
+    try:
+        data = text.encode() if digits == text else bytes.fromhex(digits)
+    except ValueError:
+        data = b""
+    if not data:
+        raise ParameterError(
+            f"parameter {name} is {text!r}: need a text, or pairs of hexadecimal digits after "
+            "hex:, as hex:a00101a2"
+        )
+    return data
 
 
 class RelayLink:
@@ -83,7 +132,7 @@ class RelayLink:
         if self._is_open and now >= self._write_at:
             fires = bool(self._waiting) or now < self._fires_until
             self._output.append(self.config.fire if fires else self.config.rest)
-            wait = self.config.repeat_interval if fires else self.config.rest_interval
+            wait = self.config.repeat_interval if fires else self.config.output_check_interval
             self._write_at = now + wait
         for token in [one for one, until in self._waiting.items() if now >= until]:
             del self._waiting[token]

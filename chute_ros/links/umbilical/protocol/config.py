@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import enum
-import math
 from dataclasses import dataclass
 
-from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
 from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.settings import Settings, nested, parameter
 
 
 class DeployStage(enum.Enum):
@@ -30,38 +29,78 @@ class HeartbeatInFlight(enum.Enum):
 
 
 @dataclass(frozen=True)
-class MemoryLimits:
-    """Seconds: to the first sign of a dump or wipe; of silence in a dump, and in a wipe, after
-    which it is given up; after the last line of the FRAM, which has no end mark."""
+class MemoryLimits(Settings):
+    """How long a dump or a wipe may be silent."""
 
-    answer_within: float = 5.0
-    dump_silence: float = 3.0
-    wipe_silence: float = 60.0
-    fram_quiet: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name in ("answer_within", "dump_silence", "wipe_silence", "fram_quiet"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ParameterError(f"{name} is {value}: need a time above 0 s")
+    answer_within: float = parameter(
+        5.0,
+        "wait for the first sign of a dump or wipe after its request",
+        0.1,
+        60.0,
+        "s",
+        name="memory_answer_within",
+    )
+    dump_silence: float = parameter(
+        3.0, "a flash dump is given up after this silence", 0.1, 600.0, "s"
+    )
+    wipe_silence: float = parameter(
+        60.0, "a wipe is given up after this silence", 0.1, 3600.0, "s"
+    )
+    fram_quiet: float = parameter(
+        1.0, "a FRAM dump, which has no end mark, ends after this silence", 0.1, 60.0, "s"
+    )
 
 
 @dataclass(frozen=True)
-class UmbilicalConfig:
-    """layout: name of the only one, empty: recognised. settle_time: what comes within it after the
-    opening is of before, s. safe_opens_sv: of the firmware's <V>. decided_deploy_forces: a deploy
-    that the supervisor decided is sent in every flight mode."""
+class UmbilicalConfig(Settings):
+    """Settings of an UmbilicalLink."""
 
-    layout: str = ""
-    telemetry: LivenessLimits = LivenessLimits(3.0, 15.0)
-    scheduler: SchedulerLimits = SchedulerLimits()
+    layout: str = parameter(
+        "", "name of the $TELEM layout; empty: recognised from the received lines"
+    )
+    telemetry: LivenessLimits = nested(
+        LivenessLimits(3.0, 15.0), "telemetry", stale_after={"maximum": 30.0}
+    )
+    settle_time: float = parameter(
+        0.2,
+        "data received within this time after the port was opened is discarded as stale",
+        0.0,
+        10.0,
+        "s",
+    )
+    scheduler: SchedulerLimits = nested(SchedulerLimits())
+    heartbeat_in_flight: HeartbeatInFlight = parameter(
+        HeartbeatInFlight.AUTO,
+        "send <H> from Ascent until the landing: some firmware takes a connected umbilical in "
+        "flight for a fault; auto: as the layout says, which is false for the shipped layouts",
+    )
     #: Nothing is acknowledged: that a command was lost is known only by its missing effect, which
     #: telemetry (10 lines a second) shows soon after the receiver's 0.1 s. A rocket falls 90 m in
     #: 1.5 s.
-    effect: EffectLimits = EffectLimits(0.5, 0.25, 5.0)
-    memory: MemoryLimits = MemoryLimits()
-    settle_time: float = 0.2
-    deploy: DeployStage = DeployStage.DROGUE
-    safe_opens_sv: bool = False
-    heartbeat_in_flight: HeartbeatInFlight = HeartbeatInFlight.AUTO
-    decided_deploy_forces: bool = True
+    effect: EffectLimits = nested(
+        EffectLimits(0.5, 0.25, 5.0),
+        effect_timeout={
+            "meaning": "wait for the effect of a command after it was written; a command that may "
+            "be repeated is then sent again"
+        },
+        retry_interval={"meaning": "interval before retrying when the command queue is full"},
+        give_up_after={"maximum": 10.0},
+    )
+    deploy: DeployStage = parameter(
+        DeployStage.DROGUE,
+        "what ~/deploy and a decided deploy fire; next: the drogue, or the main if the drogue is "
+        "out or was fired from here",
+        name="deploy_stage",
+    )
+    decided_deploy_forces: bool = parameter(
+        True, "send a deploy that the supervisor decided in every flight mode"
+    )
+    safe_opens_sv: bool = parameter(
+        False, "the firmware's <V> opens the SV to vent; by the reference <V> closes it"
+    )
+    memory: MemoryLimits = nested(MemoryLimits())
+
+    @property
+    def give_up_after(self) -> float:
+        """Limit for all tries of a command together, s."""
+        return self.effect.give_up_after

@@ -15,8 +15,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chute_ros.errors import ParameterError
 from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.settings import Settings, parameter
 
 
 @dataclass(frozen=True)
@@ -31,25 +31,40 @@ HEARTBEAT = Command("heartbeat", b"<H>")
 
 
 @dataclass(frozen=True)
-class SchedulerLimits:
-    """Seconds between two writes; of the heartbeat; how much later one may be for what is urgent;
-    most_waiting: commands that wait at most."""
+class SchedulerLimits(Settings):
+    """When tokens are written. most_waiting: commands that wait at most."""
 
-    spacing: float = 0.12
-    heartbeat_interval: float = 1.0
-    heartbeat_slack: float = 0.5
+    spacing: float = parameter(
+        0.12,
+        "interval between two writes; the receiver sleeps 0.1 s after each command",
+        0.1,
+        1.0,
+        "s",
+        name="command_spacing",
+    )
+    heartbeat_interval: float = parameter(
+        1.0,
+        "interval between two <H> to the flight computer; its own limit is 3 to 15 s",
+        0.25,
+        5.0,
+        "s",
+        name="umbilical_heartbeat_interval",
+    )
+    heartbeat_slack: float = parameter(
+        0.5,
+        "a <H> may be late by this time to let <V>, <D> and <d> go first",
+        0.0,
+        10.0,
+        "s",
+        name="umbilical_heartbeat_slack",
+    )
     most_waiting: int = 32
 
     def __post_init__(self) -> None:
-        if not 0.1 <= self.spacing < math.inf:
-            raise ParameterError(f"spacing is {self.spacing} s: the receiver needs 0.1 s or more")
-        if not 2 * self.spacing <= self.heartbeat_interval < math.inf:
-            raise ParameterError(
-                f"heartbeat_interval is {self.heartbeat_interval} s: need at least two spacings "
-                f"of {self.spacing} s, so that commands fit in between"
-            )
-        if not 0.0 <= self.heartbeat_slack < math.inf:
-            raise ParameterError(f"heartbeat_slack is {self.heartbeat_slack}: need 0 s or more")
+        super().__post_init__()
+        if self.heartbeat_interval < 2 * self.spacing:
+            why = "commands must fit in between; need an interval of at least two spacings"
+            raise self.contradiction(why, "heartbeat_interval", "spacing")
 
     @property
     def latest_heartbeat(self) -> float:

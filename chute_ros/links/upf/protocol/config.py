@@ -1,17 +1,18 @@
-"""What one UPF link can be told to do differently. Times in s; node ids 1 to 127, 0: any."""
+"""Settings of a UPF link."""
 
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
 from chute_ros.protocol.dronecan.calls import CallLimits
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID
 from chute_ros.protocol.effect import EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
+from chute_ros.settings import Settings, nested, parameter
 
 #: Ours: far from autopilots (PX4 1, ArduPilot 10), from devices with low static ids, from those
 #: given out from 125 downwards and from the tools' own 126 and 127.
@@ -33,68 +34,96 @@ class Policy(enum.Enum):
     REJECT = "reject"
 
 
-@dataclass(frozen=True)
-class UpfConfig:
-    """Settings of a UpfLink."""
+class AllocatorUse(enum.Enum):
+    """Whether node ids are given to the nodes that ask for one."""
 
-    node_id: int = NODE_ID
+    #: Until another node on the bus does.
+    AUTO = "auto"
+    YES = "true"
+    NO = "false"
+
+
+@dataclass(frozen=True)
+class UpfConfig(Settings):
+    """Settings of a UpfLink. utc_offset: UTC minus monotonic time at the start, s."""
+
+    node_id: int = parameter(
+        NODE_ID,
+        "DroneCAN node id of this node; no other node may have it (ArduPilot has 10, PX4 1)",
+        1,
+        HIGHEST_NODE_ID,
+    )
     node_name: str = "org.chute_ros.upf_can"
     unique_id: bytes = bytes(16)
-    #: The controller and trigger that are ours; 0: the first ones heard.
-    controller_node_id: int = 0
-    trigger_node_id: int = 0
-    #: The vehicle has no controller: the trigger is the parachute.
-    without_controller: bool = False
-    liveness: LivenessLimits = field(default=LivenessLimits(1.5, 3.0))
-    status_timeout: float = 1.5
-    calls: CallLimits = field(default=CallLimits())
+    controller_node_id: int = parameter(0, "node id of the controller; 0: any", 0, HIGHEST_NODE_ID)
+    trigger_node_id: int = parameter(0, "node id of the trigger; 0: any", 0, HIGHEST_NODE_ID)
+    without_controller: bool = parameter(
+        False,
+        "the vehicle has no controller: its trigger is the parachute and is fired directly",
+    )
+    liveness: LivenessLimits = nested(LivenessLimits(1.5, 3.0), "device")
+    status_timeout: float = parameter(
+        1.5, "a ParachuteStatus older than this is a fault", 0.05, 600.0, "s"
+    )
+    calls: CallLimits = nested(CallLimits(), "call")
     #: A controller that acknowledges a deploy may not have reached its trigger: told again soon.
-    effect: EffectLimits = field(default=EffectLimits(0.5, 0.25, 5.0))
-    #: A deploy that the controller has not acknowledged by then goes to the triggers directly.
-    last_resort: bool = True
-    last_resort_after: float = 1.0
-    kill_policy: Policy = Policy.FORWARD
-    flight_block_policy: Policy = Policy.FORWARD
-    #: How long a device's request may take to happen before it is answered with a failure.
-    vehicle_service_timeout: float = 0.8
-    vehicle_status_interval: float = 0.1
-    #: Parts of vehicle/state that are older are told as not known.
-    vehicle_state_age: float = 1.0
-    allocator: bool = True
-    #: To another allocator on the bus, as an autopilot is one.
-    allocator_yields: bool = True
+    effect: EffectLimits = nested(EffectLimits(0.5, 0.25, 5.0))
+    last_resort: bool = parameter(
+        True, "send a deploy that the controller does not answer to the triggers directly"
+    )
+    last_resort_after: float = parameter(
+        1.0, "wait for the controller's answer to a deploy before last_resort", 0.05, 60.0, "s"
+    )
+    kill_policy: Policy = parameter(
+        Policy.FORWARD,
+        "reaction to the device's TYPE_KILLSWITCH: forward asks the supervisor and answers "
+        "success once the kill is confirmed; accept asks it and answers success at once; reject "
+        "does neither",
+        name="killswitch_policy",
+    )
+    flight_block_policy: Policy = parameter(
+        Policy.FORWARD,
+        "reaction to the device's TYPE_FLIGHT_BLOCK and TYPE_FLIGHT_BLOCK_RELEASE, as "
+        "killswitch_policy",
+    )
+    vehicle_service_timeout: float = parameter(
+        0.8,
+        "a request of the device fails if it is not fulfilled within this time",
+        0.05,
+        60.0,
+        "s",
+    )
+    vehicle_status_rate: float = parameter(
+        10.0, "rate of VehicleStatus on the bus", 0.1, 100.0, "Hz"
+    )
+    vehicle_state_age: float = parameter(
+        1.0,
+        "parts of vehicle/state older than this are sent to the device as unknown",
+        0.05,
+        60.0,
+        "s",
+    )
+    allocator: AllocatorUse = parameter(
+        AllocatorUse.AUTO,
+        "give node ids to the nodes that ask for one; auto: only while no other node on the bus, "
+        "such as an autopilot, does",
+    )
     allocation_table: Mapping[bytes, int] = field(default_factory=dict)
-    time_master: bool = True
-    #: UTC minus monotonic time at the start.
+    time_master: bool = parameter(True, "send the time to the bus (GlobalTimeSync)")
     utc_offset: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if len(self.unique_id) != 16:
             raise ParameterError(f"unique_id has {len(self.unique_id)} bytes: need 16")
         if not 1 <= len(self.node_name.encode("utf-8", "replace")) <= MOST_NAME_BYTES:
             raise ParameterError(
                 f"node_name is {self.node_name!r}: need 1 to {MOST_NAME_BYTES} bytes"
             )
-        if not 1 <= self.node_id <= 127:
-            raise ParameterError(f"node_id is {self.node_id}: need 1 to 127")
         for name in ("controller_node_id", "trigger_node_id"):
-            value = getattr(self, name)
-            if not 0 <= value <= 127:
-                raise ParameterError(f"{name} is {value}: need 0 (any) to 127")
-            if value == self.node_id:
-                raise ParameterError(
-                    f"{name} and node_id are both {value}: a node id belongs to one node; "
-                    "choose another node_id"
-                )
-        for name in (
-            "status_timeout",
-            "last_resort_after",
-            "vehicle_service_timeout",
-            "vehicle_status_interval",
-            "vehicle_state_age",
-        ):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need a time above 0 s")
+            if getattr(self, name) == self.node_id:
+                why = "a node id belongs to one node; choose another node_id"
+                raise self.contradiction(why, name, "node_id")
 
     def bus(self) -> BusNodeConfig:
         """Who we are on the bus."""
@@ -109,10 +138,15 @@ class UpfConfig:
             name=self.node_name,
             unique_id=self.unique_id,
             calls=self.calls,
-            allocator=self.allocator,
-            allocator_yields=self.allocator_yields,
+            allocator=self.allocator is not AllocatorUse.NO,
+            allocator_yields=self.allocator is AllocatorUse.AUTO,
             table=self.allocation_table,
             never=never,
             time_master=self.time_master,
             utc_offset=self.utc_offset,
         )
+
+    @property
+    def give_up_after(self) -> float:
+        """Limit for all tries of a command together, s."""
+        return self.effect.give_up_after

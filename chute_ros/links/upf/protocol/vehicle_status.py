@@ -78,7 +78,7 @@ class Vehicle:
             # Silent, and at once again when the owner is back.
             self._tell_at = self._owner_until
             return
-        self._tell_at = now + self._config.vehicle_status_interval
+        self._tell_at = now + 1.0 / self._config.vehicle_status_rate
         connected = any(one.alive for one in self._devices.controllers.values())
         age = self._config.vehicle_state_age
         try:
