@@ -78,8 +78,10 @@ def generate_launch_description() -> LaunchDescription:
                 "range",
                 default_value=_range(),
                 choices=["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF"],
-                description="who may hear the nodes: LOCALHOST, this computer alone; SUBNET, "
-                "others as well, as a ground station; docs/guide/security.md",
+                description=(
+                    "computers that receive the nodes: LOCALHOST, this computer alone; "
+                    "SUBNET, others as well, such as a ground station; docs/guide/security.md"
+                ),
             ),
             SetEnvironmentVariable(RANGE, LaunchConfiguration("range")),
             DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
@@ -87,7 +89,7 @@ def generate_launch_description() -> LaunchDescription:
                 "parachute",
                 default_value="mavlink",
                 choices=["mavlink", "upf", "both", "umbilical"],
-                description="what the vehicle carries",
+                description="kind of parachute",
             ),
             DeclareLaunchArgument(
                 "config",
@@ -97,17 +99,17 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "connection",
                 default_value="",
-                description="where the MAVLink network is; empty: as the parameter file says",
+                description="address of the MAVLink network; empty: from the parameter file",
             ),
             DeclareLaunchArgument(
                 "bus",
                 default_value="",
-                description="where the CAN bus of a UPF is; empty: as the parameter file says",
+                description="address of the CAN bus of a UPF; empty: from the parameter file",
             ),
             DeclareLaunchArgument(
                 "cable",
                 default_value="",
-                description="serial port of an umbilical; empty: as the parameter file says",
+                description="serial port of an umbilical; empty: from the parameter file",
             ),
             DeclareLaunchArgument(
                 "enclaves",

@@ -339,8 +339,8 @@ class DeviceNode(SuiteNode, ABC):
             self._look_at_wire(summary.link_state, statuses)
         counts = {
             "exceptions in the link's thread": self._loop_faults,
-            "pictures left out, as the executor did not keep up": self.inbox.left_out,
-            "looked late at what came (s, the most of 5 s)": f"{self.behind():.2f}",
+            "statuses left out, executor too slow": self.inbox.left_out,
+            "delay behind the wire (s, maximum of 5 s)": f"{self.behind():.2f}",
             **self.runtime.decisions.counts(),
         }
         watch = self.runtime.watch.tell(now)

@@ -145,7 +145,7 @@ class SafetySupervisorNode(SuiteNode):
         except Exception as error:
             if not self.context.ok():
                 raise  # nothing can be told any more
-            self._health.failed(error, "a turn was not done to its end")
+            self._health.failed(error, "a turn was not completed")
             self._tell_mistake()
 
     def _tell_mistake(self) -> None:

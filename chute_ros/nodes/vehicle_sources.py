@@ -167,7 +167,7 @@ class VehicleSources:
             self._refused.add(parameter)
             self._node.get_logger().error(
                 f"{self._values[parameter]}: frame {frame!r} has its axes pointing down, not as "
-                f"REP 103 has them: not used; set {parameter} to a topic with z up (said once)"
+                f"REP 103 has them: not used; set {parameter} to a topic with z up (reported once)"
             )
 
     # -- telling --------------------------------------------------------------------------------
@@ -186,8 +186,8 @@ class VehicleSources:
     def _told(self, report: VehicleReport, now: float) -> None:
         if new := sorted(report.disputed - self._disputed):
             self._node.get_logger().warning(
-                f"vehicle_sources: {', '.join(new)} is told otherwise by another source, or has "
-                "jumped: in doubt, and half a sign where one would decide alone "
+                f"vehicle_sources: {', '.join(new)} in doubt: another source differs, or the "
+                "value jumped; it counts as half a sign in rules that one sign would fulfil "
                 "(docs/reference/rules.md)"
             )
         self._disputed = report.disputed

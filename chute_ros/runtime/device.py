@@ -259,7 +259,7 @@ def link_notice(event: DeviceLinkChanged) -> Notice:
     """At the level that it deserves."""
     change = event.change
     if change.before is LinkState.NEVER_SEEN:
-        return Notice(Severity.INFO, f"{event.name} heard for the first time")
+        return Notice(Severity.INFO, f"{event.name} received for the first time")
     after = f"after {change.silence:.1f} s of silence"
     if change.regained:
         return Notice(Severity.WARNING, f"{event.name} regained {after}")

@@ -164,7 +164,7 @@ class LeaseKeeper:
                 self._followers[other.name] = now
         # Whoever it is: its number must not leave us without one that device nodes obey.
         if wrong := other.implausible(self.config.rank):
-            self._complain(f"{other.name} claims {wrong}: not listened to")
+            self._complain(f"{other.name} claims {wrong}: ignored")
             return
         self._other = (other.name, now)
         self.lease, event = self.lease.heard(self.config, self._own(now), other, now)
@@ -196,7 +196,9 @@ class LeaseKeeper:
         try:
             state = handover.followed(self._owner.state, told.state, now)
             if state.epoch != told.claim.epoch:
-                raise RecordError(f"it claims epoch {told.claim.epoch} and tells of {state.epoch}")
+                raise RecordError(
+                    f"it claims epoch {told.claim.epoch} and its state has epoch {state.epoch}"
+                )
         except RecordError as error:
             self._complain(f"cannot follow {told.claim.name}: {error}")
             return

@@ -241,10 +241,10 @@ class SupervisorRuntime:
         leads = self.lease.leading
         if leads:
             epoch = self.lease.next_epoch()
-            text = f"leads from now on, epoch {epoch}: {event.value}"
+            text = f"became leader, epoch {epoch}: {event.value}"
             new: inputs.Input = inputs.TakeOver(epoch)
         else:
-            text, new = f"only looks on from now on: {event.value}", inputs.StepDown(event.value)
+            text, new = f"became standby: {event.value}", inputs.StepDown(event.value)
         self._shell.log(Notice(Severity.WARNING, text))
         outputs = self._update((new,), now)
         self._shell.offer(leads)

@@ -1,7 +1,7 @@
 """Explores the supervisor's core: every story of so many steps from each beginning (make explore).
 
-Breadth first, so that the first story in which a property does not hold is a shortest one. It is
-printed, and the exit status is 1. Otherwise docs/evidence/exploration.md is written.
+Breadth first, so that the first story in which a property does not hold is a shortest one. That
+story is printed, and the exit status is 1. Otherwise docs/evidence/exploration.md is written.
 """
 
 from __future__ import annotations

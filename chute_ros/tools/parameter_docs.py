@@ -1,8 +1,7 @@
-"""Writes what is said of parameters elsewhere from the one table in the nodes (make docs).
+"""Writes config/ and the parameter tables of the docs from the table in the nodes (make docs).
 
-The files in config/ and the tables between the marks in docs/reference/parameters.md and
-docs/reference/rules.md. With
---check it only says which of them is out of date.
+The tables stand between marks in docs/reference/parameters.md and docs/reference/rules.md.
+With --check it only names the files that are out of date.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Writes docs/reference/states.* from the tables of the supervisor (make docs).
 
-With --check it only says which of them is out of date.
+With --check it only names the files that are out of date.
 """
 
 from __future__ import annotations

@@ -114,7 +114,7 @@ class PortUsers:
         else:
             return ""
         return (
-            f"{self._path} has a second reader, which takes a part of what comes: {who}; end it. "
+            f"{self._path} has a second reader, which takes part of the data: {who}; end it. "
             "The port stays open here"
         )
 

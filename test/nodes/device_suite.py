@@ -205,7 +205,7 @@ class DeviceSuite:
         assert {level for level, _ in rest.values()} == {DiagnosticStatus.STALE}
         assert all(text.startswith("not known now; was: ") for _, text in rest.values())
         monkeypatch.undo()
-        self.bench.until(lambda: len(self.beats) > told, "it is heard again")
+        self.bench.until(lambda: len(self.beats) > told, "it is received again")
         self.await_link(LinkState.OK)
 
     def test_a_device_that_breaks_down_is_not_healthy(self, device: SimulatedDevice) -> None:
@@ -289,7 +289,7 @@ class DeviceSuite:
     ) -> None:
         answer = self.bench.call(kind, f"{self.name}/{service}")
         assert not answer.success
-        assert "heard" in answer.message, answer.message
+        assert "received" in answer.message, answer.message
 
     def test_a_service_that_waits_stops_neither_heartbeat_nor_status(
         self, device: SimulatedDevice

@@ -13,7 +13,7 @@ from chute_ros.protocol.events import RequestFinished
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 
 #: How a flight block is reported by a node that must leave arming alone.
-_NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
+_NOT_UNDONE = "noted; arming is not undone (disarm_when_blocked is false)"
 
 
 @dataclass(frozen=True)
@@ -53,4 +53,4 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         elif decision.action is not Action.NONE:
             undone = self.settings.disarm_when_blocked
             blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
-            self.carry_out_flight_block(decision, blocked, "arming is left alone")
+            self.carry_out_flight_block(decision, blocked, "arming is not undone")

@@ -107,7 +107,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
 
     def event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):
-            text = f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
+            text = f"{event.device} requests {event.ask.name} from the supervisor: {event.reason}"
             lets_go = event.ask is Ask.FLIGHT_BLOCK_RELEASE
             self.shell.log(Notice(Severity.INFO if lets_go else Severity.WARNING, text))
         elif isinstance(event, ErrandFinished):

@@ -90,7 +90,7 @@ def test_also_the_one_that_is_named(device, known):
     bench.collect()
     sent = [f"{one.target_system}/{one.target_component}" for one in bench.commands(RELEASE)]
     assert sent == ([device] if known else [])
-    assert known or f"no parachute '{device}' was heard" in bench.end(1).finished.message
+    assert known or f"no parachute '{device}' was received" in bench.end(1).finished.message
 
 
 @pytest.mark.parametrize(

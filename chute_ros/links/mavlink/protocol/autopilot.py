@@ -269,7 +269,7 @@ class AutopilotTracker:
 
     def doubt(self, now: float) -> str:
         """Another device uses the same ids, in words; empty: none does."""
-        return self._twins.doubt(f"two autopilots are {self.device}", now)
+        return self._twins.doubt(f"two autopilots have the ids {self.device}", now)
 
     def _watch_clock(self, boot_ms: int, now: float) -> None:
         age = self._clock.observe(boot_ms)

@@ -119,9 +119,9 @@ class AutopilotCare:
 
     def _still_wanted(self, autopilot: AutopilotTracker, now: float) -> None:
         if not self.block.stands(autopilot, now):
-            why = "flight is not blocked any more, or the vehicle not known to be on the ground"
+            why = "flight is no longer blocked, or the vehicle is not known to be on the ground"
         elif self._requests.under_way(goals.FORCED) and not self.block.may_force(now):
-            why = "that the vehicle has not left the ground is not known any more"
+            why = "it is no longer known that the vehicle has not left the ground"
         else:
             return
         self._requests.abandon(self._disarming, why, now)

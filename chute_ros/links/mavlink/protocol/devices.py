@@ -90,7 +90,7 @@ class Devices:
             return ""
         if autopilot.armed is not Armed.ARMED or autopilot.motors_off:
             return ""
-        return f"WARNING: autopilot {autopilot.device} says that it is armed: the motors may turn"
+        return f"WARNING: autopilot {autopilot.device} reports armed: the motors may turn"
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""

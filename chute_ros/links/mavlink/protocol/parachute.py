@@ -173,7 +173,7 @@ class ParachuteTracker:
 
     def doubt(self, now: float) -> str:
         """Another device uses the same ids, in words; empty: none does."""
-        return self._twins.doubt(f"two parachutes are {self.device}", now)
+        return self._twins.doubt(f"two parachutes have the ids {self.device}", now)
 
     def status_overdue(self, now: float) -> bool:
         """The status stream stopped: the newest is too old, though the link may live."""

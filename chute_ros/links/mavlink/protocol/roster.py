@@ -68,7 +68,7 @@ class Roster(Generic[DeviceT]):
         return self._ours.get((system_id, component_id))
 
     def add(self, system_id: int, component_id: int, device: DeviceT) -> None:
-        """A device that admits let in was heard for the first time."""
+        """A device that admits let in was received for the first time."""
         self._ours[system_id, component_id] = device
 
     def all(self) -> list[DeviceT]:

@@ -68,4 +68,4 @@ class RoundTrip:
         if not self.late(now):
             return []
         took = f"answers after {self.seconds(now):.1f} s (TIMESYNC; limit {LIMIT:g} s)"
-        return [f"{took}, so what it tells comes late: {LINE_CURE}"]
+        return [f"{took}; its messages arrive late: {LINE_CURE}"]

@@ -272,7 +272,7 @@ class Controller(Device):
             faults.append(f"{p.ENABLE_PARACHUTE} is off: it never deploys")
         aps_off = self.values.get("is_enable_auto_launch") is False
         if aps_off or self.switch(p.ENABLE_APS) is False:
-            faults.append(f"{p.ENABLE_APS} is off: it deploys only when told to")
+            faults.append(f"{p.ENABLE_APS} is off: it deploys only by command")
         return faults
 
     @property

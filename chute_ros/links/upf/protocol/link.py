@@ -274,7 +274,7 @@ class UpfLink:
             if heard.name == names.VEHICLE_SERVICE:
                 self.vehicle_service.request(heard, now)
             else:
-                self.bus.endpoint.counts["requests that we do not serve"] += 1
+                self.bus.endpoint.counts["requests that this node does not serve"] += 1
         elif heard.name == names.PARACHUTE_STATUS:
             self.devices.parachute_status(heard.source, heard.values, now)
             controller = self.devices.controllers.get(heard.source)
