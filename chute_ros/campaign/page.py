@@ -105,7 +105,7 @@ def _counts(tally: Tally) -> list[str]:
     for count in Count:
         numbers = [str(tally.by_vehicle[v, p, count]) for p, v in columns]
         lines.append(f"| {count.value} | {' | '.join(numbers)} | {tally.counts[count]} |")
-    return [*lines, "", f"{sum(tally.counts[one] for one in WRONG)} of them must not be."]
+    return [*lines, "", f"{sum(tally.counts[one] for one in WRONG)} of them are wrong."]
 
 
 def _wrong(tally: Tally) -> list[str]:
