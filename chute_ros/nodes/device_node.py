@@ -1,4 +1,4 @@
-"""What every device node does: a device's runtime in ROS, with the thread of its link.
+"""Base of every device node: a device's runtime in ROS, with the thread of its link.
 
 One thread at a time has the link, its own or the executor's: the link's turn (transport/loop.py).
 Events go to the executor, which is the runtime's owner, through an inbox and a guard condition.

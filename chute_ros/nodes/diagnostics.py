@@ -74,7 +74,7 @@ def wire_task(
 def supervisor_task(
     node: str, one: WatchPicture, values: Mapping[str, object]
 ) -> DiagnosticStatus:
-    """How the supervisor is heard, with values beside."""
+    """State of the supervisor's link, with values beside."""
     level, text = OK, "received"
     if math.isnan(one.silence):
         level, text = STALE, "never received"
@@ -95,12 +95,12 @@ def supervisor_task(
 
 
 def never_heard(node: str, task: str = "parachute") -> DiagnosticStatus:
-    """The task of a device of a link on which none was heard."""
+    """Task of a device on a link on which none was received."""
     return status(node, task, STALE, "never received", {}, "")
 
 
 def liveness_values(live: Liveness, now: float) -> dict[str, object]:
-    """How well a device was heard; times in s, NaN: has not happened."""
+    """Reception of a device; times in s, NaN: has not happened."""
     return {
         "link": live.state.name,
         "received (s ago)": live.age(now),

@@ -1,4 +1,4 @@
-"""What a node says of its middleware: one packet can end it, or cannot."""
+"""/diagnostics of a node's middleware: can one packet end the node?"""
 
 from __future__ import annotations
 

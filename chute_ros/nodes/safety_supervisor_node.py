@@ -170,7 +170,7 @@ class SafetySupervisorNode(SuiteNode):
         log_notice(self.get_logger(), notice)
 
     def say(self, said: inputs.Say) -> None:
-        """What the core tells a person."""
+        """A text of the core for a person."""
         log = self.get_logger()
         log.error(said.text) if said.alarm else log.info(said.text)
 

@@ -1,4 +1,4 @@
-"""What comes to the supervisor on topics, given to its runtime."""
+"""Topics of the supervisor, given to its runtime."""
 
 from __future__ import annotations
 

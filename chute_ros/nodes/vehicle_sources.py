@@ -1,4 +1,4 @@
-"""Where the safety supervisor learns of the vehicle: its topics, made into one picture.
+"""Sources of the vehicle's picture: topics, merged into one.
 
 With vehicle/state alone, the default, each message is passed on as it came. With other sources
 (nav_msgs/Odometry, sensor_msgs/Imu, MAVROS's topics) or several, they are merged by part.

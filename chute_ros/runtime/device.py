@@ -1,4 +1,4 @@
-"""What every device node does: heartbeats, decisions, reports, requests, the flight block.
+"""Runtime of every device node: heartbeats, decisions, reports, requests, the flight block.
 
 A subclass for each kind of device says what its link is told. Nothing here knows ROS, a thread, a
 file or the clock: the shell carries out what it says, and gives it events and the time.
@@ -37,7 +37,7 @@ _SEQUENCES = 2**32
 
 @dataclass(frozen=True)
 class DeviceSettings:
-    """What a person can set of every device node; the parameters of the same names, s."""
+    """Settings of every device node; the parameters of the same names, s."""
 
     max_decision_age: float = 0.5
     supervisor_lost_after: float = 1.0

@@ -1,4 +1,4 @@
-"""What a supervisor makes of the claims on safety/lease: who leads, follows, or has its name."""
+"""A supervisor's handling of claims on safety/lease: leader, followers, namesakes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class LeaseKeeper:
 
     @property
     def leading(self) -> bool:
-        """What it decides is sent."""
+        """True: its decisions are sent."""
         return self.lease.role is Role.LEADING
 
     def deadline(self, now: float) -> float:
@@ -127,12 +127,12 @@ class LeaseKeeper:
         )
 
     def followers(self, now: float) -> list[str]:
-        """Who follows this one and is ready to take over."""
+        """Names of the followers that are ready to take over."""
         limit = self.config.timeout * RANKS
         return sorted(name for name, when in self._followers.items() if now - when < limit)
 
     def trouble(self, now: float) -> str:
-        """What is wrong with the supervisors' settings; empty: nothing."""
+        """Trouble with the supervisors' settings; empty: none."""
         if now - self._namesake_heard < self.config.timeout * RANKS:
             return f"another supervisor is called {self.config.name} as well: {_APART}"
         name, heard = self._other

@@ -128,7 +128,7 @@ class CanBusWire:
             self._echoes.sent(data, time.monotonic())
 
     def look(self, now: float) -> str:
-        """Who else reads the adapter's serial port; empty: nobody is known to."""
+        """Other readers of the adapter's serial port; empty: none known."""
         return "" if self._users is None else self._users.trouble(now)
 
     def describe(self) -> str:
@@ -210,7 +210,7 @@ class CanBusWire:
         return b""
 
     def _advice(self, error: BaseException) -> str:
-        """What the user can do about it, with a semicolon before."""
+        """Advice for the user, with a semicolon before."""
         address = self._address
         if address.interface == "udp_multicast":
             return "; is there a route for multicast? ip route add 224.0.0.0/4 dev lo"

@@ -1,4 +1,4 @@
-"""What /diagnostics says of a MAVLink link: the wire, each parachute, the autopilot."""
+"""/diagnostics of a MAVLink link: the wire, each parachute, the autopilot."""
 
 from __future__ import annotations
 
@@ -158,7 +158,7 @@ _SIGHTS = (
 
 
 def not_seen(rates: Mapping[str, float]) -> list[str]:
-    """What the supervisor does not see, as these messages do not come."""
+    """Accidents that the supervisor does not detect without these messages."""
     return [text for kinds, text in _SIGHTS if not any(kind in rates for kind in kinds)]
 
 

@@ -1,4 +1,4 @@
-"""What mavlink_parachute does with decisions, and when its device is healthy."""
+"""Decisions carried out by mavlink_parachute, and the health of its device."""
 
 from __future__ import annotations
 

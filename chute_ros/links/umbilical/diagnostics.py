@@ -1,4 +1,4 @@
-"""What /diagnostics says of an umbilical: the port, the flight computer, our heartbeat, memory."""
+"""/diagnostics of an umbilical: the port, the flight computer, our heartbeat, memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What /diagnostics says of a UPF link: the bus, the devices, what they asked of the vehicle."""
+"""/diagnostics of a UPF link: the bus, the devices, their requests to the vehicle."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def device_tasks(name: str, details: Details, without_controller: bool) -> list[
 
 
 def vehicle_service_task(name: str, details: Details) -> DiagnosticStatus:
-    """What devices asked of the vehicle, and what they were answered."""
+    """Requests of devices to the vehicle, and their answers."""
     failed = details.newest_answer.endswith(("FAILED", "BAD_MAGIC_NUMBER"))
     level = diagnostics.WARN if failed else diagnostics.OK
     text = details.newest_answer or "nothing was requested yet"

@@ -1,4 +1,4 @@
-"""What upf_can does with decisions and for its device, and when that is healthy."""
+"""Decisions carried out by upf_can, its device's requests, and the health of the device."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the ground station reads of us: why flight is blocked, and what becomes of each order.
+"""Texts for the ground station: reasons of a flight block, and the outcome of each order.
 
 Each text begins with what matters most, for a small screen shows the first words only.
 """

@@ -1,4 +1,4 @@
-"""What the autopilot on the same network says of the vehicle.
+"""Picture of the vehicle from the autopilot on the same network.
 
 Source: MAVLink common.xml: HEARTBEAT, SYSTEM_TIME, and what vehicle_readers.py reads.
 """

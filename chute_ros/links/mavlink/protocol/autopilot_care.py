@@ -1,4 +1,4 @@
-"""What is asked of our autopilot, and undone, without anybody's request.
+"""Care for our autopilot without a request: messages asked for, arming undone.
 
 Its settings are read and told, how long it takes to answer is measured, its heartbeats are had
 sooner, its arming is undone while flight is

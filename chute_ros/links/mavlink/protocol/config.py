@@ -1,4 +1,4 @@
-"""What one MAVLink link can be told to do differently. Times in s; ids 1 to 255, 0: any."""
+"""Settings of one MAVLink link. Times in s; ids 1 to 255, 0: any."""
 
 from __future__ import annotations
 

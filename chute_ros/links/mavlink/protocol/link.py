@@ -96,7 +96,7 @@ class MavlinkLink:
         return self._outbox.take()
 
     def take_events(self) -> list[Event]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         ends = self.requests.take_events()
         self._announcements.heard(ends)
         return self._devices.take_events() + ends
@@ -211,15 +211,15 @@ class MavlinkLink:
         return self._outbox.sent_count
 
     def has_parachute(self) -> bool:
-        """A device was heard that can be told to deploy."""
+        """A device that can deploy was received."""
         return self._devices.to_release("") is not None
 
     def has_autopilot(self) -> bool:
-        """One was heard that can be told to stop the motors."""
+        """A device that can stop the motors was received."""
         return self._devices.chosen_autopilot() is not None
 
     def chosen_parachute(self) -> ParachuteTracker | None:
-        """Where requests without a device go: the first that is not lost, or the first."""
+        """Device for requests without a device: the first that is not lost, or the first."""
         return self._devices.chosen_parachute()
 
     def setup(self) -> Setup | None:

@@ -1,4 +1,4 @@
-"""What one MAVLink parachute says of itself, normalised.
+"""Status of one MAVLink parachute, normalised.
 
 Source: Parachute Protocol, "Parachute Connection" (heartbeat, type, component id) and "STATUS".
 """

@@ -1,4 +1,4 @@
-"""What a person should know before flight of how this autopilot is set up, said once.
+"""Warnings about this autopilot's settings before flight, each reported once.
 
 Which way a kill goes, what stands against it, and whether a flight block can be kept.
 """

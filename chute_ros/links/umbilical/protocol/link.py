@@ -138,7 +138,7 @@ class UmbilicalLink:
         return [command.token for command in output]
 
     def take_events(self) -> list[UmbilicalEvent]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         notices = [*self.decoder.take_notices(), *self.orders.take_notices()]
         happened = [*self._events, *notices]
         self._events = []

@@ -203,7 +203,7 @@ class MemoryWorks:
         return math.inf if work is None else work.last + self._limit(work)
 
     def take_events(self) -> list[events.UmbilicalEvent]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         taken, self._events = self._events, []
         return taken
 

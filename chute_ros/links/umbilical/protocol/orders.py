@@ -1,4 +1,4 @@
-"""What a person or the supervisor wants of the flight computer: through the gate, to the wire.
+"""Orders of a person or the supervisor to the flight computer: through the gate, to the wire.
 
 Every command goes through gate.rule here and nowhere else.
 """

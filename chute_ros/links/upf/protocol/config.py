@@ -1,4 +1,4 @@
-"""What one UPF link can be told to do differently. Times in s; node ids 1 to 127, 0: any."""
+"""Settings of one UPF link. Times in s; node ids 1 to 127, 0: any."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_NAME_BYTES = 80
 
 
 class Policy(enum.Enum):
-    """What becomes of a device's request to the vehicle."""
+    """Handling of a device's request to the vehicle."""
 
     #: To the supervisor; success once it has happened.
     FORWARD = "forward"

@@ -1,4 +1,4 @@
-"""What one UPF controller, and one UPF trigger, say of themselves, normalised.
+"""Status of one UPF controller and of one UPF trigger, normalised.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "global working state" (flyfire.ParachuteStatus) and the
 architecture with triggers (flyfire.TriggerStatus).

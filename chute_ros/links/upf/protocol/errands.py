@@ -1,4 +1,4 @@
-"""What can be asked of a UPF device besides flying: its parameters, its memory, who it is.
+"""Requests to a UPF device besides flying: its parameters, its memory, its identity.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "standard UAVCAN protocols" and "parameters";
 uavcan.protocol.param.GetSet, param.ExecuteOpcode, GetTransportStats, GetNodeInfo, RestartNode.

@@ -14,7 +14,7 @@ from chute_ros.model import ParachuteState
 
 
 class Stimulus(enum.Enum):
-    """What moves a controller."""
+    """Event that moves a controller."""
 
     SELF_TEST_PASSED = "self test passed"
     SELF_TEST_FAILED = "self test failed"

@@ -191,7 +191,7 @@ class UpfDevices:
         return min((device.next_deadline() for device in self._all()), default=math.inf)
 
     def take_events(self) -> list[Event | TriggerChanged]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         events, self._events = self._events, []
         return events
 
