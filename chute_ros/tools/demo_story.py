@@ -59,7 +59,7 @@ def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
 
     director.until("the parachute is received", 15.0, all_heard)
     for link, one in director.parachutes.items():
-        director.say("parachute", f"{link} {one.device} heard")
+        director.say("parachute", f"{link} {one.device} received")
     director.until("flight is released", 15.0, director.stage(Stage.READY))
     director.say("supervisor", "READY: every required link is healthy")
 

@@ -210,7 +210,7 @@ def test_arming_that_the_flight_computer_blocks_ends_with_its_words():
     number = bench.order("key_arm")
     bench.after(0.2).hear("Arming blocked: wipe flash first")
     assert bench.end(number).message == (
-        "key_arm given up: the flight computer says: Arming blocked: wipe flash first; "
+        "key_arm given up: the flight computer reports: Arming blocked: wipe flash first; "
         "it had been sent once"
     )
     assert bench.after(9.0).tokens == ["<KA>"]

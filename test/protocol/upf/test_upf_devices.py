@@ -87,7 +87,7 @@ def test_state_that_says_more_than_overdue_stays(bench, state):
 @pytest.mark.parametrize(("health", "name"), [(1, "WARNING"), (2, "ERROR"), (3, "CRITICAL")])
 def test_health_of_its_node_status_counts(bench, health, name):
     story = bench("").status("READY").node_status(health=health)
-    assert f"NodeStatus of 33 says {name}" in story.picture().faults
+    assert f"NodeStatus of 33 reports {name}" in story.picture().faults
     assert (story.picture().state is S.ABNORMAL) is (health >= 2)
     assert story.picture().uptime == 5.0
 

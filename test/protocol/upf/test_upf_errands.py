@@ -220,7 +220,7 @@ def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
     story = set_it(bench().ready(), p.STATIC_NODE_ID, "0")
     assert story.errand(1).message == (
         "Static Node ID is 0; takes effect at the next start "
-        "(0: asks for a node id at each start); kept"
+        "(0: requests a node id at each start); kept"
     )
     story.link.errand(2, 33, errands.restart, story.now)
     story.after(6.0)

@@ -250,7 +250,7 @@ class ParachuteTracker:
         if self.liveness.state in (LinkState.STALE, LinkState.LOST):
             faults.append(f"heartbeat {self.liveness.state.name}: {silence:.1f} s old")
         if self._unhealthy:
-            faults.append(f"heartbeat says {self._unhealthy}")
+            faults.append(f"heartbeat reports {self._unhealthy}")
         if self._message is None:
             return [*faults, "no PARACHUTE_STATUS received"]
         if self.status_overdue(now):

@@ -85,6 +85,6 @@ class Roster(Generic[DeviceT]):
             return ""
         systems = sorted({self.system_id, *self._other_systems})
         return (
-            f"{self.kind}s of systems {', '.join(map(str, systems))} heard, "
-            f"using {self.system_id}: set {self.kind}_system_id"
+            f"{self.kind}s of systems {', '.join(map(str, systems))} received, using "
+            f"{self.system_id}: set {self.kind}_system_id"
         )

@@ -153,7 +153,7 @@ class Orders:
 
     def arming_blocked(self, text: str, now: float) -> None:
         """It does not arm."""
-        self._end(("key_arm",), f"the flight computer says: {text}", now)
+        self._end(("key_arm",), f"the flight computer reports: {text}", now)
 
     def judge_again(self, now: float) -> None:
         """Telemetry or the clock moved on: what has yet to leave, or would leave again, must still

@@ -110,7 +110,7 @@ class Device:
                 f"{self.kind} {self.node_id} {self.liveness.state.name}: {silence:.1f} s"
             )
         if self._health:
-            faults.append(f"NodeStatus of {self.node_id} says {_HEALTH[self._health]}")
+            faults.append(f"NodeStatus of {self.node_id} reports {_HEALTH[self._health]}")
         if self.overdue(now):
             faults.append(f"{name} {now - self.status_received:.1f} s old")
         return faults

@@ -107,7 +107,7 @@ def _when(after: DeviceParameter) -> list[str]:
     """When a new value begins to count, if it is not at once."""
     if after.name != p.STATIC_NODE_ID:
         return []
-    asks = "" if after.value else " (0: asks for a node id at each start)"
+    asks = "" if after.value else " (0: requests a node id at each start)"
     return [f"takes effect at the next start{asks}"]
 
 
