@@ -39,7 +39,7 @@ A supervisor begins in STARTUP.
 _LEASE = """\
 ## Which of several supervisors leads
 
-One that runs alone begins as LEADING; one of several begins as FOLLOWING and looks for a leader.
+A single supervisor begins as LEADING; one of several begins as FOLLOWING and looks for a leader.
 """
 
 

@@ -99,7 +99,7 @@ def test_with_a_upf_parachute_its_own_algorithm_fires_after_the_kill(runs):
     code, out, err, folder = runs["upf"]
     assert code == 0, out + err
     story = [
-        "upf_can 33 heard",
+        "upf_can 33 received",
         "upf_can 33 armed",
         "MOTOR FAILURE at",
         "KILL (upf_can 33: it is about to launch (TYPE_KILLSWITCH)",
