@@ -198,7 +198,7 @@ def report(measured: dict[str, dict[str, Times]], batches: int, before: str) -> 
     """The section without its heading. before: the load of the machine when it began."""
     text = (
         f"{before}\n\n"
-        "What the simulated devices say by themselves: an autopilot and a parachute on MAVLink,\n"
+        "The simulated devices' own messages: an autopilot and a parachute on MAVLink,\n"
         "one datagram a read; a UPF controller and trigger on DroneCAN, one CAN frame a read.\n"
         "Decoder: bytes to messages, each checked. Whole link: all that the node's link does\n"
         "with it, with the pictures of its devices. The ratios are to the library alone.\n"

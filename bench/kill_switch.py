@@ -225,12 +225,12 @@ def report(peers: list[Peer], before: str) -> str:
     kills = ", ".join(f"{peer.name} {peer.ends.kills}" for peer in peers)
     return (
         f"{before}\n\n"
-        "A UPF controller asks for TYPE_KILLSWITCH on the CAN bus (UDP multicast); the kill\n"
+        "A UPF controller requests TYPE_KILLSWITCH on the CAN bus (UDP multicast); the kill\n"
         "(a forced disarm) arrives at the autopilot, which acknowledges it and\n"
-        "whose heartbeat then says motors off; SUCCESS arrives at the controller. chute_ros: the\n"
-        "processes upf_can, safety_supervisor and mavlink_parachute, with two hops over ROS to\n"
-        "the kill and one back. ROS alone: three processes with the same hops and messages, that\n"
-        "decide and check nothing (`bench/ros_relay.py`). Bare relay: one process with two\n"
+        "whose heartbeat then reports motors off; SUCCESS arrives at the controller. chute_ros:\n"
+        "the processes upf_can, safety_supervisor and mavlink_parachute, with two hops over ROS\n"
+        "to the kill and one back. ROS alone: three processes with the same hops and messages,\n"
+        "that decide and check nothing (`bench/ros_relay.py`). Bare relay: one process with two\n"
         "sockets, that checks nothing (`bench/bare_relay.py`); the ratios are to it.\n"
         f"{count} requests to each, idle and as often under load, taking turns, in one run.\n"
         f"Under load, besides, {_LOAD * NOMINAL_RATE:.0f} valid frames/s on MAVLink and as many "

@@ -149,8 +149,8 @@ def report(measured: dict[str, dict[str, Times]], before: str) -> str:
         "until its air brake opens, what telem57_airbrake_deployment sends fits the reference's\n"
         f"layout as well, and it takes {LINES_TO_RECOGNISE} lines to believe in another. "
         "The link waits\n"
-        "with the first line of a flight that begins anew for the next one: a restart that text\n"
-        "without a checksum tells must be told twice.\n"
+        "with the first line of a new flight for the next one: a restart that text\n"
+        "without a checksum reports must be reported twice.\n"
         f"{count} batches of {BATCH} lines to each, taking turns, in one run.\n\n"
         + times_table("microseconds a line", measured, BARE)
         + "\n"

@@ -99,7 +99,7 @@ def main() -> None:
         if not good:
             wrong.append(part)
     if wrong:
-        sys.exit(f"hosts: not everything went as it must: {', '.join(wrong)}")
+        sys.exit(f"hosts: wrong results: {', '.join(wrong)}")
 
 
 if __name__ == "__main__":

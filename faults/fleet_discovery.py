@@ -162,7 +162,7 @@ def table(steps: list[Step]) -> str:
     lines = ["| what happens | after | what is found | |", "|---|---|---|---|"]
     for step in steps:
         after = "-" if step.seconds is None else f"{step.seconds:.2f} s"
-        verdict = "**not as it must be**" if step.wrong else "as fleet.md says"
+        verdict = "**wrong**" if step.wrong else "as fleet.md says"
         lines.append(f"| {step.name} | {after} | {step.found} | {verdict} |")
     return "\n".join(lines)
 

@@ -252,7 +252,7 @@ def _cells(flown: Flown) -> list[str]:
         f"{flown.late} (told by {flown.told_late})",
         _seconds(flown.released),
         _seconds(flown.commanded),
-        flown.wrong.rstrip("; ") or "as it must be",
+        flown.wrong.rstrip("; ") or "correct",
     ]
 
 

@@ -77,9 +77,7 @@ def _deploys_through_losses(station: str) -> Act:
         took = sorted(flight.harmless(operator) for _ in range(CALLS))
         _deploys(flight, seen, station)
         half = took[CALLS // 2]
-        seen.known = (
-            f"as it must be; of {CALLS} calls half within {half:.2f} s, all in {took[-1]:.2f} s"
-        )
+        seen.known = f"correct; of {CALLS} calls half within {half:.2f} s, all in {took[-1]:.2f} s"
 
     return act
 
@@ -152,7 +150,7 @@ def _waits(cut: float, station: str, gives_up: bool) -> Act:
             else:
                 seen.known = f"**{late}**"
         else:
-            seen.known = "not carried out, as it must be"
+            seen.known = "correctly not carried out"
 
     return act
 
@@ -184,8 +182,8 @@ STORIES: Sequence[Story] = (
         _waits(5.0, USUAL, gives_up=True),
         ("mute",),
     ),
-    Story("nothing is spoilt; the operator deploys", _deploys),
-    Story("nothing is spoilt; the operator kills", _kills),
+    Story("nothing is disturbed; the operator deploys", _deploys),
+    Story("nothing is disturbed; the operator kills", _kills),
     Story("cut; a motor fails; healed after the deploy", _falls_unseen, ("cut",)),
     Story("0.2 s each way; the operator deploys", _deploys, ("slow", "0.2")),
     Story("1 s each way; the operator deploys", _deploys, ("slow", "1.0")),
@@ -211,13 +209,13 @@ STORIES: Sequence[Story] = (
 def table(every: Sequence[tuple[Story, Seen]]) -> str:
     """As Markdown."""
     lines = [
-        "| what is spoilt | on the wire | answered | seen (again) | |",
+        "| disturbance | on the wire | answered | seen (again) | |",
         "|---|---|---|---|---|",
     ]
     for story, seen in every:
         times = (seen.wire, seen.answer, seen.again)
         cells = " | ".join("-" if math.isnan(one) else f"{one:.2f} s" for one in times)
-        verdict = seen.wrong or seen.known or "as it must be"
+        verdict = seen.wrong or seen.known or "correct"
         lines.append(f"| {story.name} | {cells} | {verdict} |")
     return "\n".join(lines)
 
@@ -248,7 +246,7 @@ def _fly(
             done.append((story, seen))
             print(f"-- {story.name}", flush=True)
             _tell(flight, story, seen, first=len(done) == 1)
-            print(f"   {seen.wrong or seen.known or 'as it must be'}", flush=True)
+            print(f"   {seen.wrong or seen.known or 'correct'}", flush=True)
             if seen.wrong:
                 break
     finally:

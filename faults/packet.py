@@ -278,7 +278,7 @@ def table(every: list[Told]) -> str:
         if told.story.may_miss and told.released != told.released:
             out = "**stays in**"
         peak = "-" if told.peak != told.peak else f"{told.peak:.0f} MB"
-        name, how, end = told.story.name, told.how or "-", told.wrong or "as it must be"
+        name, how, end = told.story.name, told.how or "-", told.wrong or "correct"
         lines.append(f"| {name} | {then} | {how} | {peak} | {ended} | {back} | {out} | {end} |")
     return "\n".join(lines)
 

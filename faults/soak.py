@@ -2,7 +2,7 @@
 
 python3 -m faults.soak [--loops N] [--seed S] [--supervisors 1|2] [--kind PART ...] [--only LOOP]
 
-Exit code 1: something was found. `--only LOOP` with the same seed repeats one loop.
+Exit code 1: a loop found a problem. `--only LOOP` with the same seed repeats one loop.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def main() -> None:
             findings=said,
         )
     if said != "None.":
-        sys.exit(f"soak: found something; repeat a loop with --seed {chosen.seed} --only LOOP")
+        sys.exit(f"soak: found a problem; repeat a loop with --seed {chosen.seed} --only LOOP")
 
 
 def _apart() -> contextlib.AbstractContextManager[object]:
@@ -86,8 +86,12 @@ def _apart() -> contextlib.AbstractContextManager[object]:
 
 def _options() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser("soak", description=__doc__)
-    options.add_argument("--loops", type=_positive, default=20, help="how many (default: 20)")
-    options.add_argument("--seed", type=int, default=0, help="of all that is random (default: 0)")
+    options.add_argument(
+        "--loops", type=_positive, default=20, help="number of loops (default: 20)"
+    )
+    options.add_argument(
+        "--seed", type=int, default=0, help="seed of all random choices (default: 0)"
+    )
     options.add_argument(
         "--supervisors", type=int, choices=(1, 2), help="default: first one, then two"
     )
@@ -96,7 +100,7 @@ def _options() -> argparse.ArgumentParser:
         action="append",
         default=[],
         metavar="PART",
-        help=f"only faults whose name holds it: {', '.join(KINDS)}",
+        help=f"only faults whose name contains it: {', '.join(KINDS)}",
     )
     options.add_argument("--only", type=int, metavar="LOOP", help="repeat this loop alone")
     options.add_argument("--page", type=Path, help=f"write the results there ({PAGE.name})")
@@ -170,7 +174,7 @@ def _tell(result: Result, took: float) -> None:
         if not plan.cause
         else (f"kill {result.until_kill:+.2f} s, out {result.until_out:+.2f} s")
     )
-    verdict = "; ".join(result.findings) or "as it must be"
+    verdict = "; ".join(result.findings) or "correct"
     print(f"{plan.number:4d}  {plan.text()}: {whole} ({took:.1f} s): {verdict}", flush=True)
 
 

@@ -43,7 +43,7 @@ class Happened:
     #: The flight goes on, or has ended with the parachute.
     state_text: str = ""
     ended_as_meant: bool = True
-    #: Tracebacks, ends of processes, mistakes inside nodes.
+    #: Tracebacks, ends of processes, internal errors of nodes.
     troubles: Sequence[str] = ()
 
 

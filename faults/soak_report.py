@@ -21,20 +21,20 @@ Written by `make soak LOOPS={loops} SEED={seed}`. The numbers belong to the mach
 
 One vehicle of real processes (`mavlink_parachute`, `upf_can`, `umbilical`, one supervisor, then
 two with `hot_standby`, black boxes on) lives through all loops; simulated autopilot, parachute
-and UPF are new with each flight. A simulated flight computer stands beside and talks: nothing is
+and UPF are new with each flight. A simulated flight computer stands beside and sends: nothing is
 deployed through it. In each loop one fault is put on the vehicle at a random moment in flight
 (none while it arms or takes off), and in some a motor then fails or a person deploys. The
-autopilot is stopped, not killed: that one starts anew in flight is flown in
-[campaign.md](campaign.md). What is lost is lost on the devices' wires; a network between
-supervisors that loses is in [hosts.md](hosts.md). A valid flood is copies of frames on MAVLink,
-NodeStatus of a stranger on CAN, and sayings of the flight computer on the cable. Relays between
-nodes and devices see what is on the wires. In each loop it is asked:
+autopilot is stopped, not killed: restarts of an autopilot in flight are in
+[campaign.md](campaign.md). Losses are on the devices' wires; losses of a network between
+supervisors are in [hosts.md](hosts.md). A valid flood is copies of frames on MAVLink,
+NodeStatus of a stranger on CAN, and lines of the flight computer on the cable. Relays between
+nodes and devices record the wires. Each loop is checked:
 
 - was nothing killed or deployed without a cause, by the wires and by the devices' own records;
 - after a cause: was the kill first, did each parachute come out once, within {answer} s;
 - is it whole within {whole} s after the fault: processes run, links OK, one supervisor leads,
   diagnostics OK;
-- no traceback, no process that ended by itself, no mistake inside a node.
+- no traceback, no process that ended by itself, no internal error of a node.
 
 {took}
 

@@ -34,9 +34,9 @@ _STATE_FRESH = 1.5  # s, it is said each second at the latest
 _HEARTBEAT = 0.1  # s
 _LINK_OK, _LINK_REGAINED = 1, 4
 #: What stays shown for long after it was, though all is well: it is counted, not waited for.
-_AFTERGLOW = ("mistakes inside 0,", "recording,", "heard; a wall clock was set")
+_AFTERGLOW = ("internal errors 0,", "recording,", "heard; a wall clock was set")
 #: And so it was set up.
-_MEANT = "Enable APS is off: it deploys only when told to"
+_MEANT = "Enable APS is off: it deploys only by command"
 _LASTING_TASKS = ("vehicle service", "decisions")
 
 
@@ -123,9 +123,11 @@ class Watch:
         said = []
         for name, (_, status) in self._tasks.items():
             values = {one.key: one.value for one in status.values}
-            for key in ("mistakes inside", "exceptions in the link's thread"):
+            for key in ("internal errors", "exceptions in the link's thread"):
                 if values.get(key, "0") != "0":
-                    said.append(f"{name}: {key}: {values[key]} {values.get('newest mistake', '')}")
+                    said.append(
+                        f"{name}: {key}: {values[key]} {values.get('newest internal error', '')}"
+                    )
         return said
 
     def recording_lost(self) -> int:

@@ -42,7 +42,7 @@ def fly_stories(
         print(f"-- {story.name}", flush=True)
         with tempfile.TemporaryDirectory(prefix="chute_ros_hosts_") as folder:
             told = fly(story, Path(folder), number)
-        print(f"   {told.wrong or 'as it must be'}", flush=True)
+        print(f"   {told.wrong or 'correct'}", flush=True)
         every.append(told)
     return every
 

@@ -38,7 +38,7 @@ class Story:
 
 
 STORIES = (
-    Story("nothing is spoilt", (), FIRST),
+    Story("nothing is disturbed", (), FIRST),
     Story("the leader's host is cut off", ((FIRST, "cut"),), SECOND),
     Story("the leader hears nothing, and is heard", ((FIRST, "deaf"),), SECOND),
     Story("the leader is not heard, and hears", ((FIRST, "mute"),), SECOND),
@@ -188,13 +188,13 @@ def _wrong(scene: Scene) -> str:
 def table(every: list[Told]) -> str:
     """As Markdown."""
     lines = [
-        "| what is spoilt | takeover | kill on the wire | parachute out | one leads again | |",
+        "| disturbance | takeover | kill on the wire | parachute out | one leads again | |",
         "|---|---|---|---|---|---|",
     ]
     for told in every:
         times = (told.taken_over, told.killed, told.released, told.healed)
         cells = " | ".join("-" if one != one else f"{one:.2f} s" for one in times)
-        lines.append(f"| {told.story.name} | {cells} | {told.wrong or 'as it must be'} |")
+        lines.append(f"| {told.story.name} | {cells} | {told.wrong or 'correct'} |")
     return "\n".join(lines)
 
 

@@ -18,17 +18,17 @@ _PAGE = """\
 Written by `make fuzz MINUTES={minutes:g}`. The numbers belong to the machine that made them:
 {machine}.
 
-The readers of foreign bytes that the table names, and the links with their transactions, are fed
-by libFuzzer (through atheris) with inputs that it changes until they reach new code. In the
+libFuzzer (through atheris) feeds the readers of foreign bytes in the table, and the links with
+their transactions, with inputs that it changes until they reach new code. In the
 targets of links an input is a program: time that passes, frames with fuzzed fields, requests.
-Whatever is fed: nothing is raised but the named errors of files and settings; no input takes
-long; nothing in an instance that reads variations of an input grows with each of them; what is
-dropped is counted; every request ends once; and nothing leaves that fires and was not ordered.
-`fuzz/targets/` says it for each.
+For every input: only the named errors of files and settings are raised; no input takes
+long; an instance that reads variations of an input does not grow with each of them; dropped data
+is counted; every request ends once; and nothing that fires leaves without an order.
+`fuzz/targets/` has the details of each.
 
-No target is there for ROS messages, which the middleware has given their types (only the state
-that a leading supervisor tells is fed); for the sockets and ports of the wires, whose bytes go
-to these readers; for DSDL files, which the DroneCAN library reads; and for what a node keeps of
+There is no target for ROS messages, which the middleware has given their types (only the state
+of a leading supervisor is fed); for the sockets and ports of the wires, whose bytes go
+to these readers; for DSDL files, which the DroneCAN library reads; and for a node's saved times of
 MAVLink signatures.
 
 {table}
@@ -40,8 +40,8 @@ is looked at; memory: of the process at its start and at most.
 {found}
 
 {stored} inputs ({size} kB) are stored in `fuzz/corpus/`: together they reached every edge that any
-had reached when they were last chosen among the stored and the new ones, which no run does by
-itself (`python3 -m fuzz --merge`). `make test` feeds them again. One file:
+had reached when they were last chosen among the stored and the new ones. Only
+`python3 -m fuzz --merge` chooses again. `make test` feeds them again. One file:
 `python3 -m fuzz --replay TARGET FILE`.
 """
 

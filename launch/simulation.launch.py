@@ -74,7 +74,7 @@ def generate_launch_description() -> LaunchDescription:
                 "parachute",
                 default_value="mavlink",
                 choices=list(vehicles()),
-                description="what the vehicle carries",
+                description="kind of parachute",
             ),
             DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
             OpaqueFunction(function=_vehicle),

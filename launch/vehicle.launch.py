@@ -73,8 +73,10 @@ def generate_launch_description() -> LaunchDescription:
                 "range",
                 default_value=_range(),
                 choices=["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF"],
-                description="who may hear the nodes: LOCALHOST, this computer alone; SUBNET, "
-                "others as well, as a ground station; docs/guide/security.md",
+                description=(
+                    "computers that receive the nodes: LOCALHOST, this computer alone; "
+                    "SUBNET, others as well, such as a ground station; docs/guide/security.md"
+                ),
             ),
             SetEnvironmentVariable(RANGE, LaunchConfiguration("range")),
             DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
@@ -82,7 +84,7 @@ def generate_launch_description() -> LaunchDescription:
                 "parachute",
                 default_value="mavlink",
                 choices=list(vehicles()),
-                description="what the vehicle carries",
+                description="kind of parachute",
             ),
             DeclareLaunchArgument(
                 "config",
@@ -93,7 +95,7 @@ def generate_launch_description() -> LaunchDescription:
                 DeclareLaunchArgument(
                     kind.argument.name,
                     default_value="",
-                    description=f"{kind.argument.description}; empty: as the parameter file says",
+                    description=f"{kind.argument.description}; empty: from the parameter file",
                 )
                 for kind in links().values()
             ),

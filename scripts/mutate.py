@@ -1,9 +1,9 @@
 """Mutation testing of chute_ros/supervisor: changes it a little, many times, and runs its tests.
 
-A mutant that no test notices is a survivor. Each must be explained in docs/evidence/mutation.md,
-where it stands as "`the line` becomes `the changed line`"; the run fails on one that does not. It
-works in a copy, first with the tests of the module, then what survives with all but the random
-ones.
+A mutant that no test notices is a survivor. Each survivor must be explained in
+docs/evidence/mutation.md as "`the line` becomes `the changed line`"; the run fails if one is not.
+The run works in a copy, first with the tests of the module, then, for the survivors, with all
+tests but the random ones.
 
     make mutate [MODULES="gate counter"]
 """

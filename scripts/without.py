@@ -1,10 +1,9 @@
-"""Flies a campaign as it is, and once more without parts of what decides: a rule of a profile, a
-condition of a rule, a heuristic that is named below. What no flight needs any more can go.
+"""Flies a campaign as it is, and again without a part of the decision: a rule of a profile, a
+condition of a rule, a heuristic that is named below. A part that no flight needs can go.
 
-The flights that were stored since they once went wrong are flown as well. A line tells which
-flights are wrong without a part and were right with it, and the other way round. --together takes
-all that are named away at once, flies each flight that differs again without each of them alone,
-and so asks far more flights in the same time.
+The stored wrong flights are flown as well. A line names the flights that are wrong without a part
+and right with it, and the other way round. --together removes all named parts at once, flies each
+flight that differs again without each part alone, and so covers far more flights in the same time.
 
     make without [FLIGHTS=1000] [SEED=0] [WITHOUT_ARGS="--together 'multirotor: falling' ..."]
 """
@@ -330,11 +329,13 @@ def main() -> None:
     parser.add_argument("what", nargs="*", type=part, help="only these (default: each)")
     parser.add_argument("--list", action="store_true", help="name all, and end")
     parser.add_argument("--together", action="store_true", help="all of them at once")
-    parser.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
+    parser.add_argument(
+        "--flights", type=positive, default=1000, help="number of flights (default: 1000)"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
     parser.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
     parser.add_argument(
-        "--python", type=command, default=[sys.executable], help="their interpreter"
+        "--python", type=command, default=[sys.executable], help="interpreter of the processes"
     )
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()

@@ -68,7 +68,7 @@ def main() -> None:
             if chosen.page:
                 _write_page(kept_in, autopilot.kind)
     if wrong:
-        sys.exit(f"sitl: {wrong} runs were not as they must be")
+        sys.exit(f"sitl: {wrong} runs were wrong")
 
 
 def _write_page(kept_in: Path, kind: str) -> None:
@@ -157,16 +157,18 @@ def _options() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser("sitl", description=__doc__)
     options.add_argument("autopilots", nargs="*", metavar="AUTOPILOT", help="simulator binary")
     options.add_argument("--stories", nargs="+", default=[], metavar="NAME", help="only these")
-    options.add_argument("--runs", type=int, default=3, help="of each story (default: 3)")
-    options.add_argument("--list", action="store_true", help="say what the stories are")
+    options.add_argument("--runs", type=int, default=3, help="runs of each story (default: 3)")
+    options.add_argument("--list", action="store_true", help="list the stories")
     options.add_argument(
         "--page",
         action="store_true",
         help=f"write docs/{PAGE.name}, without AUTOPILOT of --results",
     )
     options.add_argument("--results", type=Path, metavar="FILE",
-                         help="add the runs to those there; the page has all of them")  # fmt: skip
-    options.add_argument("--keep", type=Path, metavar="FOLDER", help="keep all records there")
+                         help="add the runs to this file; the page has all of them")  # fmt: skip
+    options.add_argument(
+        "--keep", type=Path, metavar="FOLDER", help="keep all records in this folder"
+    )
     return options
 
 

@@ -19,15 +19,15 @@ ArduPlane (as a quadplane) and PX4 that you have; each autopilot's part is writt
 numbers belong to the machine that made them: {machine}.
 
 The autopilot runs in its own simulator, on loopback, in real time. With it run the real nodes
-(`mavlink_parachute`, `safety_supervisor`, parameters as delivered but for what a story says), a
-simulated parachute, a router (what is addressed goes where the addressee was heard, as with
-mavlink-router) and a ground station. What happened is judged by the simulator's own state, never
-by the supervisor's picture. A fall that only a parachute helps must end with a release, in time
+(`mavlink_parachute`, `safety_supervisor`, default parameters unless a story names others), a
+simulated parachute, a router (an addressed message goes to the port of its addressee, as with
+mavlink-router) and a ground station. The simulator's own state judges each run, never
+the supervisor's picture. A fall that only a parachute helps must end with a release, in time
 (one motor dead to the release: 1.0 s; an operator's call to the release: 0.3 s); any other flight
-must see no kill and no release; a blocked vehicle must not rise. What of a run is not so stands in
+must see no kill and no release; a blocked vehicle must not rise. Deviations stand in
 the last column, in bold.
 
-A run in which the node or the simulator was held up by other load of the machine is flown again.
+A run in which other load of the machine delayed the node or the simulator is flown again.
 
 To run it, give the executable that a build of ArduPilot for the board SITL makes (`arducopter`,
 `arduplane`), or `bin/px4` in the folder of a PX4 build for POSIX with the SIH simulator.
@@ -62,7 +62,7 @@ def _part(flown: Sequence[Flown]) -> str:
     wrong = sum(bool(one.verdict.wrong) for one in flown)
     loads = [one.verdict.load for one in flown]
     told = (
-        f"{len(flown)} runs, {wrong} of them not as they must be. Load of the machine meanwhile: "
+        f"{len(flown)} runs, {wrong} of them wrong. Load of the machine meanwhile: "
         f"{min(loads):.1f} to {max(loads):.1f} (of a minute)."
     )
     rows = [_row([one for one in flown if one.story == name]) for name in _names(flown)]

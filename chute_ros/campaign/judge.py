@@ -24,7 +24,7 @@ _CARRIES_WITHIN = 3.0
 class Count(enum.Enum):
     """Under which a flight is counted."""
 
-    RIGHT = "as it must be"
+    RIGHT = "correct"
     MISSED = "missed: it should have been released and was not"
     LATE = "late: released too late for a soft landing"
     FALSE = "false: killed or released although it flew well"

@@ -17,52 +17,56 @@ from chute_ros.protocol.vehicle_merge import FRESH
 #: So many wrong flights are named, and so many causes.
 _MOST_NAMED = 50
 _INTRODUCTION = f"""\
-Each flight is a world in virtual time: the real core, what the nodes do around it (`runtime/`:
-the gate, requests, reports, the lease, what is kept), the real protocols (MAVLink, UPF on
+Each flight is a world in virtual time: the real core, the nodes' runtime around it (`runtime/`:
+the gate, requests, reports, the lease, the saved state), the real protocols (MAVLink, UPF on
 DroneCAN, the umbilical), the simulated devices on a network, a CAN bus or a cable, one supervisor
 or two.
 Frames and messages are lost, doubled, delayed, overtaken, damaged; cables flap; processes hang,
 stall, or die and start again; devices lose their power; wall clocks are set; sensors stick, drift,
 jump, are noisy or silent: up to {MOST_FAULTS} of these at a time, most of them around the failure.
-Some vehicles are armed by a person, some are killed or deployed by one; where that one wants the
+Some vehicles are armed by a person, some are killed or deployed by one; if that person wants the
 kill alone, no deploy may follow.
 Three of ten aircraft have an IMU, odometry or both besides their autopilot (`vehicle_sources`): on
 power of its own, in a process and over a way of its own, and sometimes with one more fault there.
-The autopilots answer, refuse, terminate and tell what they command as PX4, ArduCopter, ArduPlane
-or none of them (PX4 orders a release itself when it terminates the flight). Home is set anew or
-drifts in flight, and moves with a vehicle that is disarmed in the air. The ground is elsewhere
-than where it took off: beside a roof, in a valley, on a hill. An estimator is wrong with itself,
+The autopilots answer, refuse, terminate and report their commands like PX4, ArduCopter, ArduPlane
+or none of them (PX4 orders a release itself when it terminates the flight). Home is reset or
+drifts in flight, and moves with a vehicle that is disarmed in the air. The ground differs from the
+take-off: beside a roof, in a valley, on a hill. An estimator is wrong but consistent,
 in height, speed and attitude together. Flips, dives, throws and fast descents are flown on
-purpose, with one sensor wrong or none. Some lose a part of their thrust and sink upright;
+purpose, with one sensor wrong or none. Some vehicles lose a part of their thrust and sink upright;
 aeroplanes glide, stall, spin and dive. Some canopies open late, or tangle and do not carry.
 
-The truth comes from the flight models: since when only a parachute helps (a rocket: since when it
-comes down and no drogue will come by itself), and until when its release still lands it softly.
-Flights that left less time than the chain takes (2 s, and {FRESH:g} s more where the last word of
-an autopilot without power, that it does not sink, must get old first; until what sinks upright,
-spins or dives is faster than a soft landing; a rocket 6.5 s), or in which
-no such time in a row was free of cuts, stops, second wrong sensors and (rocket) of seconds without
-a whole line of telemetry, are named with the cause. So are those whose autopilot lost its power
-and that nobody else told of, those whose only parachute refused in time, as by the wrong height
-that it was told it stood, and those that were ended while two sensors told what was not so: every
-rule rests on two signs, and no more can be known than they tell; one sensor that is wrong must
-neither end a flight nor hide a fall. A sensor counts where the supervisor may go by it: its source
-is the preferred one of those that know this, or a preferred one falls silent.
-Where the autopilot has no power and an IMU is all that is left, no more can be known once drag
-carries half of the weight and its attitude is wrong, or lied in the last 10 s: just so it would
-tell of one that flies well, whose autopilot hangs and whose attitude alone is wrong. Those are
-named as well. So are level sinks while the estimator tells one thing and the barometer another, as
-nothing else tells them; and the time in which something falls past the height of its take-off high
-above other ground, which cannot be known. A canopy that is out and does not carry must be told of,
-or followed by the next parachute, within 3 s; a kill alone must open no parachute within 10 m of
-the height of the take-off."""
+The truth comes from the flight models: the moment from which only a parachute helps (a rocket:
+from which it comes down and no drogue will come by itself), and the last moment at which a release
+still lands it softly. These flights are named with their cause:
+
+- The time left was shorter than the chain takes: 2 s, and {FRESH:g} s more if the last report of
+  an autopilot without power, that it does not sink, must get old first; for a vehicle that sinks
+  upright, spins or dives, until it is faster than a soft landing; a rocket 6.5 s.
+- No such time in a row was free of cuts, stops, second wrong sensors and (rocket) of seconds
+  without a whole line of telemetry.
+- The autopilot lost its power and no other source reported.
+- The only parachute refused in time, for example because a wrong height told it that it stood.
+- The flight was ended while two sensors were wrong: every rule rests on two signs, and no more can
+  be known than they report. One wrong sensor must neither end a flight nor hide a fall. A sensor
+  counts if the supervisor may use it: its source is the preferred one of those with this
+  measurement, or a preferred one falls silent.
+- The autopilot has no power and only an IMU is left, once drag carries half of the weight and the
+  IMU's attitude is wrong, or was wrong in the last 10 s: a vehicle that flies well, with a hung
+  autopilot and only a wrong attitude, would look the same.
+- A level sink while the estimator and the barometer differ: nothing else reports it.
+- The time in which a vehicle falls past the height of its take-off high above other ground, which
+  cannot be known.
+
+A canopy that is out and does not carry must be reported, or followed by the next parachute, within
+3 s. A kill alone must open no parachute within 10 m of the height of the take-off."""
 
 #: Seeds that were looked at, flights, how many of each kind.
 _OF_EACH = """\
-Of {} seeds these are {} flights: the first {} of each kind, and no more. A kind is what fails on
-which vehicle with which sources, with which kinds of faults around it and which person; or with
-which sensors wrong, and how. So the rare are flown as often as the common, and the numbers below
-say nothing of how often anything happens."""
+Of {} seeds these are {} flights: the first {} of each kind, and no more. A kind is a failure on
+a vehicle with its sources, the kinds of faults around it and the person; or the
+wrong sensors, and how they are wrong. So rare kinds are flown as often as common ones, and the
+numbers below do not show how often anything happens."""
 
 
 def page(
@@ -105,7 +109,7 @@ def _counts(tally: Tally) -> list[str]:
     for count in Count:
         numbers = [str(tally.by_vehicle[v, p, count]) for p, v in columns]
         lines.append(f"| {count.value} | {' | '.join(numbers)} | {tally.counts[count]} |")
-    return [*lines, "", f"{sum(tally.counts[one] for one in WRONG)} of them must not be."]
+    return [*lines, "", f"{sum(tally.counts[one] for one in WRONG)} of them are wrong."]
 
 
 def _wrong(tally: Tally) -> list[str]:

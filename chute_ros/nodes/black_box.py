@@ -117,7 +117,7 @@ class BlackBox:
 
     @property
     def trouble(self) -> str:
-        """What is wrong now, in words. Empty: everything reaches the disk in time."""
+        """Trouble now, in words. Empty: everything reaches the disk in time."""
         behind = time.monotonic() - self._kept_until
         if not self._thread.is_alive():
             return "the black box has ended"

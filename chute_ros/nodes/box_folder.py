@@ -1,4 +1,4 @@
-"""Where the files of a black box are: their names, their order, and which have to go."""
+"""Files of a black box: their names, their order, and the ones to delete."""
 
 from __future__ import annotations
 

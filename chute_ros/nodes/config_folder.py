@@ -1,4 +1,4 @@
-"""Where the files are that are shipped beside the code."""
+"""Folder of the files that are shipped beside the code."""
 
 from __future__ import annotations
 

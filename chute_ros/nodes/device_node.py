@@ -1,4 +1,4 @@
-"""What every device node does: a device's runtime in ROS, with the thread of its link.
+"""Base of every device node: a device's runtime in ROS, with the thread of its link.
 
 One thread at a time has the link, its own or the executor's: the link's turn (transport/loop.py).
 Events go to the executor, which is the runtime's owner, through an inbox and a guard condition.
@@ -299,8 +299,8 @@ class DeviceNode(SuiteNode, ABC):
             self._look_at_wire(summary.link_state, statuses)
         counts = {
             "exceptions in the link's thread": self._loop_faults,
-            "pictures left out, as the executor did not keep up": self.inbox.left_out,
-            "looked late at what came (s, the most of 5 s)": f"{self.behind():.2f}",
+            "statuses left out, executor too slow": self.inbox.left_out,
+            "delay behind the wire (s, maximum of 5 s)": f"{self.behind():.2f}",
             **self.runtime.decisions.counts(),
         }
         watch = self.runtime.watch.tell(now)

@@ -63,7 +63,8 @@ def wire_task(
     elif wire.is_open and not received and dropped:
         # As with another baud rate, or where one side has a key and the other has not.
         most = max(dropped, key=lambda reason: dropped[reason])
-        level, text = ERROR, f"{text}; what comes cannot be read, mostly: {most} ({dropped[most]})"
+        level = ERROR
+        text += f"; the received data cannot be read, mostly: {most} ({dropped[most]})"
     elif wire.is_open and not received:
         level, text = WARN, f"{text}, nothing received yet"
     every = {**values, **{f"dropped: {reason}": n for reason, n in sorted(dropped.items())}}
@@ -73,16 +74,16 @@ def wire_task(
 def supervisor_task(
     node: str, one: WatchPicture, values: Mapping[str, object]
 ) -> DiagnosticStatus:
-    """How the supervisor is heard, with values beside."""
-    level, text = OK, "heard"
+    """State of the supervisor's link, with values beside."""
+    level, text = OK, "received"
     if math.isnan(one.silence):
-        level, text = STALE, "never heard"
+        level, text = STALE, "never received"
     elif one.lost:
         level, text = ERROR, f"silent for {one.silence:.1f} s"
     elif one.delay:
         level, text = ERROR, f"clocks differ: its heartbeat seems {one.delay:.3f} s old"
     elif one.offset:
-        text = f"heard; a wall clock was set, or differs, by {one.offset:.3f} s"
+        text = f"received; a wall clock was set, or differs, by {one.offset:.3f} s"
         level = WARN
     every = {
         "heartbeat age (s)": one.silence,
@@ -94,15 +95,15 @@ def supervisor_task(
 
 
 def never_heard(node: str, task: str = "parachute") -> DiagnosticStatus:
-    """The task of a device of a link on which none was heard."""
-    return status(node, task, STALE, "never heard", {}, "")
+    """Task of a device on a link on which none was received."""
+    return status(node, task, STALE, "never received", {}, "")
 
 
 def liveness_values(live: Liveness, now: float) -> dict[str, object]:
-    """How well a device was heard; times in s, NaN: has not happened."""
+    """Reception of a device; times in s, NaN: has not happened."""
     return {
         "link": live.state.name,
-        "heard (s ago)": live.age(now),
+        "received (s ago)": live.age(now),
         "in this link state for (s)": now - live.since,
         "times lost": live.lost_count,
         "regained (s ago)": now - live.regained_at,

@@ -109,7 +109,7 @@ def _look_at_arguments(name: str) -> None:
         print(f"usage: {usage}\nIts parameters, topics and services: docs/reference/")
         sys.exit(0)
     if others:
-        text = f"unknown argument {others[0]}: what sets a node up follows --ros-args"
+        text = f"unknown argument {others[0]}: the settings of a node follow --ros-args"
         print(f"{name}: {text}\nusage: {usage}", file=sys.stderr)
         sys.exit(2)
 
@@ -133,8 +133,8 @@ def _refused(name: str, error: RuntimeError) -> NoReturn:
     text = " ".join(str(error).partition(", at /")[0].split())
     if _security():
         text += (
-            " (ROS_SECURITY_ENABLE is true: docs/guide/security.md says what keystore, enclave "
-            "and middleware it needs)"
+            " (ROS_SECURITY_ENABLE is true: docs/guide/security.md lists the needed keystore, "
+            "enclave and middleware)"
         )
     print(f"{name}: {text}", file=sys.stderr)
     sys.exit(2)

@@ -1,4 +1,4 @@
-"""What an executor waits for, made once for the entities there are, and used again and again."""
+"""Wait set of an executor, made once for its entities and used again."""
 
 from __future__ import annotations
 

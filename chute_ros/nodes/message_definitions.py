@@ -1,4 +1,4 @@
-"""What a file of messages says of their types, so that other programs can read it.
+"""Type definitions in a file of messages, so that other programs can read it.
 
 The definitions are those that rosidl installs with each package of messages: read, not repeated.
 """

@@ -1,4 +1,4 @@
-"""How Fast DDS carries messages between our processes, unless the user says otherwise.
+"""Transport of Fast DDS between our processes, unless the user sets another.
 
 Over UDP, on one host too: what a process left in shared memory that was killed, or that ran out of
 descriptors, kept processes that were started after it from hearing some of the others for 20 s and

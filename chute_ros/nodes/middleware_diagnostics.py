@@ -1,4 +1,4 @@
-"""What a node says of its middleware: one packet can end it, or cannot."""
+"""/diagnostics of a node's middleware: can one packet end the node?"""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ def middleware_task(node: str) -> DiagnosticStatus:
     values = {"kept to this host": local, "memory limit (MB)": _limit()}
     if version is None:
         return _status(node, DiagnosticStatus.OK, "no Fast DDS", values)
-    values |= {"Fast DDS": _text(version), "CVE-2025-64438 is cured in": cured}
+    values |= {"Fast DDS": _text(version), "CVE-2025-64438 is fixed in": cured}
     name = f"Fast DDS {_text(version)}"
     if is_cured(version):
         return _status(node, DiagnosticStatus.OK, name, values)
     if local:
         return _status(node, DiagnosticStatus.OK, f"{name}, kept to this host", values)
     text = (
-        f"{name} can be ended by one packet of anybody on the network (CVE-2025-64438, cured in "
-        f"{cured}): set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST where nothing on another computer "
-        "must hear this node (docs/guide/security.md)"
+        f"{name}: one packet from anybody on the network can end this process (CVE-2025-64438, "
+        f"fixed in {cured}): set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if no other computer "
+        "must receive this node (docs/guide/security.md)"
     )
     return _status(node, DiagnosticStatus.WARN, text, values)
 

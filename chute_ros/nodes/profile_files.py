@@ -1,4 +1,4 @@
-"""Where the profiles of rules are: the ones that are shipped, by name, and the user's, by path."""
+"""Profiles of rules: the shipped ones by name, the user's by path."""
 
 from __future__ import annotations
 

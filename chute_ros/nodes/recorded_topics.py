@@ -1,4 +1,4 @@
-"""What the black box keeps besides the core's turns: every topic of the contract."""
+"""Topics in the black box besides the core's turns: every topic of the contract."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where nodes keep what outlives them."""
+"""Folder of the files that outlive a node."""
 
 from __future__ import annotations
 

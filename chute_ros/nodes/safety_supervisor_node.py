@@ -145,7 +145,7 @@ class SafetySupervisorNode(SuiteNode):
         except Exception as error:
             if not self.context.ok():
                 raise  # nothing can be told any more
-            self._health.failed(error, "a turn was not done to its end")
+            self._health.failed(error, "a turn was not completed")
             self._tell_mistake()
 
     def _tell_mistake(self) -> None:
@@ -170,7 +170,7 @@ class SafetySupervisorNode(SuiteNode):
         log_notice(self.get_logger(), notice)
 
     def say(self, said: inputs.Say) -> None:
-        """What the core tells a person."""
+        """A text of the core for a person."""
         log = self.get_logger()
         log.error(said.text) if said.alarm else log.info(said.text)
 

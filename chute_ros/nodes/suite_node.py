@@ -1,4 +1,4 @@
-"""What every node of the suite has: parameters, clocks, a heartbeat, diagnostics, and an end."""
+"""Base of every node of the suite: parameters, clocks, a heartbeat, diagnostics, and an end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The supervisor watches itself: late updates, lost messages, mistakes inside, and its lease."""
+"""The supervisor watches itself: late updates, lost messages, internal errors, and its lease."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Health:
     """Counts, and tells it in diagnostics."""
 
     def __init__(self) -> None:
-        #: The newest mistake in words; empty: none.
+        #: The newest internal error in words; empty: none.
         self.newest = ""
         self._failures = 0
         self._lost: dict[str, int] = {}
@@ -55,28 +55,28 @@ class Health:
         own_fault = (seen[0], seen[2]) != (self._seen[0], self._seen[2])
         self._own_fault = bool(self._shown) and (self._own_fault or own_fault)
         self._seen = seen
-        level, text = diagnostics.OK, "leads" if lease.leading else "looks on"
+        level, text = diagnostics.OK, "leader" if lease.leading else "standby"
         if trouble := lease.trouble(now):
             level, text = diagnostics.ERROR, trouble
         elif self._shown:
             # What a network loses is said again soon; what the loop did not do is not.
             level = diagnostics.ERROR if self._own_fault else diagnostics.WARN
-            text = f"mistakes inside {seen[0]}, messages lost {seen[1]}, updates late {seen[2]}"
+            text = f"internal errors {seen[0]}, messages lost {seen[1]}, updates late {seen[2]}"
         elif not lease.leading and math.isnan(lease.lease.leader_heard):
-            level, text = diagnostics.WARN, "looks on, and hears no leader"
+            level, text = diagnostics.WARN, "standby, and receives no leader"
         elif lease.leading and lease.config.standby and not lease.followers(now):
-            level, text = diagnostics.WARN, "leads, and nobody is ready to take over"
+            level, text = diagnostics.WARN, "leader, and no standby is ready to take over"
         values: dict[str, object] = {
             "ready to take over": ", ".join(lease.followers(now)),
-            "leads": lease.leading,
+            "is leader": lease.leading,
             "leader": lease.config.name if lease.leading else lease.lease.leader,
             "rank": lease.config.rank,
             "hot standby": lease.config.standby,
             "newest heartbeat late by (s)": runtime.beat_late,
             "updates late": state.late_count,
-            "mistakes inside": self._failures,
-            "newest mistake": self.newest,
-            "heard from the leader (s ago)": now - lease.lease.leader_heard,
+            "internal errors": self._failures,
+            "newest internal error": self.newest,
+            "leader received (s ago)": now - lease.lease.leader_heard,
         }
         values |= {f"messages lost on {topic}": n for topic, n in sorted(self._lost.items())}
         return diagnostics.status(name, "itself", level, text, values, "")

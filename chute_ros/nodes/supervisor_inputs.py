@@ -1,4 +1,4 @@
-"""What comes to the supervisor on topics, given to its runtime."""
+"""Topics of the supervisor, given to its runtime."""
 
 from __future__ import annotations
 
@@ -71,6 +71,6 @@ class SupervisorInputs:
             self._misasked.add(message.link)
             device = f"{message.link} {message.device}".strip()
             self._node.get_logger().error(
-                f"{device} asks for {message.request}: need KILL 1, FLIGHT_BLOCK 2 or "
-                "FLIGHT_BLOCK_RELEASE 3 (said once for each link)"
+                f"{device} requests {message.request}: need KILL 1, FLIGHT_BLOCK 2 or "
+                "FLIGHT_BLOCK_RELEASE 3 (reported once for each link)"
             )

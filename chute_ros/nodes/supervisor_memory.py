@@ -42,14 +42,14 @@ class Memory:
         self._path = folder / f"{own}.json"
         self._lock = NameLock(folder / f"{own}.lock", name)
         if self._lock.trouble:
-            self._log.warning(f"nobody is kept from this name: {self._lock.trouble}")
+            self._log.warning(f"this name is not locked: {self._lock.trouble}")
         told = json.dumps(dict(values), sort_keys=True) + CODEC.to_json(config, whole=True)
         self._settings = hashlib.sha256(told.encode()).hexdigest()
         self._boot = _BOOT_ID.read_text().strip() if self._within else ""
         self._file = KeptFile(self._path, self._text, "memory") if self._within else None
 
     def recall(self) -> State | None:
-        """The state to go on with, once: should it be what stops us, the next starts anew."""
+        """The saved state, read once: a state that ends this process does not end the next."""
         try:
             text = read_own_text(self._path) if self._within else ""
             self._path.unlink(missing_ok=True)
@@ -61,10 +61,10 @@ class Memory:
         except FileNotFoundError:
             return None
         except (OSError, ValueError, RecordError) as error:
-            self._log.warning(f"starts anew, {self._path} is of no use: {error}")
+            self._log.warning(f"ignoring the saved state {self._path}: {error}; starting fresh")
             return None
         if state is not None:
-            self._log.warning(f"goes on where it stopped in flight: {state.stage.name}")
+            self._log.warning(f"continuing the interrupted flight: {state.stage.name}")
         return state
 
     def keep(self, state: State) -> None:
@@ -76,10 +76,10 @@ class Memory:
         """For diagnostics."""
         level, text = diagnostics.OK, "off"
         if self._file is not None:
-            text = "kept while a flight lasts"
+            text = "saved during a flight"
             if self._file.trouble:
                 level = diagnostics.WARN
-                text = f"a start anew in flight would forget it: {self._file.trouble}"
+                text = f"a restart in flight would lose it: {self._file.trouble}"
         written_times = 0 if self._file is None else self._file.times_written
         values = {"file": str(self._path), "times written": written_times}
         return diagnostics.status(name, "memory", level, text, values, "")

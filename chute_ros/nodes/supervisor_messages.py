@@ -19,7 +19,7 @@ from chute_ros.supervisor.state import State
 
 #: What the modes mean in which no vehicle is protected.
 MODES = {
-    Mode.SHADOW: "SHADOW: says what it would do, and does nothing",
+    Mode.SHADOW: "SHADOW: reports its decisions and sends none",
     Mode.INHIBITED: "INHIBITED: decides nothing",
 }
 
@@ -77,7 +77,7 @@ def decisions_task(
         "epoch": state.epoch,
         "decisions": state.next_id - 1,
         "profile": config.profile.name,
-        "device asked to kill": ", ".join(state.asks),
+        "device requested a kill": ", ".join(state.asks),
         "sources contradict each other": ", ".join(sorted(state.disputed)),
     }
     for link in config.links:

@@ -1,4 +1,4 @@
-"""Where the safety supervisor learns of the vehicle: its topics, made into one picture.
+"""Sources of the vehicle's picture: topics, merged into one.
 
 With vehicle/state alone, the default, each message is passed on as it came. With other sources
 (nav_msgs/Odometry, sensor_msgs/Imu, MAVROS's topics) or several, they are merged by part.
@@ -175,7 +175,7 @@ class VehicleSources:
             self._refused.add(parameter)
             self._node.get_logger().error(
                 f"{self._values[parameter]}: frame {frame!r} has its axes pointing down, not as "
-                f"REP 103 has them: not used; set {parameter} to a topic with z up (said once)"
+                f"REP 103 has them: not used; set {parameter} to a topic with z up (reported once)"
             )
 
     # -- telling --------------------------------------------------------------------------------
@@ -194,8 +194,8 @@ class VehicleSources:
     def _told(self, report: VehicleReport, now: float) -> None:
         if new := sorted(report.disputed - self._disputed):
             self._node.get_logger().warning(
-                f"vehicle_sources: {', '.join(new)} is told otherwise by another source, or has "
-                "jumped: in doubt, and half a sign where one would decide alone "
+                f"vehicle_sources: {', '.join(new)} in doubt: another source differs, or the "
+                "value jumped; it counts as half a sign in rules that one sign would fulfil "
                 "(docs/reference/rules.md)"
             )
         self._disputed = report.disputed

@@ -1,4 +1,4 @@
-"""What follows a decision and nobody waits for: done once those who carry it out had their turn.
+"""Deferred work after a decision: done once the device nodes had the processor.
 
 To tell of a decision (log, safety/state, the file of what is remembered) takes the processor for
 longer than to make it, and just when the device nodes need it (docs/evidence/speed.md).

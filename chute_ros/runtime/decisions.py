@@ -86,7 +86,8 @@ class DecisionCarrier:
             self._log(
                 Severity.ERROR,
                 f"{_name(decision)} is {age:.3f} s old (limit {self._gate.max_decision_age:g} s): "
-                "not acted on; do the hosts' clocks agree? is this host overloaded?",
+                "not carried out; check that the hosts' clocks agree and this host is not "
+                "overloaded",
             )
 
     def _log(self, severity: Severity, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What every device node does: heartbeats, decisions, reports, requests, the flight block.
+"""Runtime of every device node: heartbeats, decisions, reports, requests, the flight block.
 
 A subclass for each kind of device says what its link is told. Nothing here knows ROS, a thread, a
 file or the clock: the shell carries out what it says, and gives it events and the time.
@@ -301,7 +301,7 @@ def link_notice(event: DeviceLinkChanged) -> Notice:
     """At the level that it deserves."""
     change = event.change
     if change.before is LinkState.NEVER_SEEN:
-        return Notice(Severity.INFO, f"{event.name} heard for the first time")
+        return Notice(Severity.INFO, f"{event.name} received for the first time")
     after = f"after {change.silence:.1f} s of silence"
     if change.regained:
         return Notice(Severity.WARNING, f"{event.name} regained {after}")

@@ -1,4 +1,4 @@
-"""What a supervisor makes of the claims on safety/lease: who leads, follows, or has its name."""
+"""A supervisor's handling of claims on safety/lease: leader, followers, namesakes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class LeaseKeeper:
 
     @property
     def leading(self) -> bool:
-        """What it decides is sent."""
+        """True: its decisions are sent."""
         return self.lease.role is Role.LEADING
 
     def deadline(self, now: float) -> float:
@@ -127,12 +127,12 @@ class LeaseKeeper:
         )
 
     def followers(self, now: float) -> list[str]:
-        """Who follows this one and is ready to take over."""
+        """Names of the followers that are ready to take over."""
         limit = self.config.timeout * RANKS
         return sorted(name for name, when in self._followers.items() if now - when < limit)
 
     def trouble(self, now: float) -> str:
-        """What is wrong with the supervisors' settings; empty: nothing."""
+        """Trouble with the supervisors' settings; empty: none."""
         if now - self._namesake_heard < self.config.timeout * RANKS:
             return f"another supervisor is called {self.config.name} as well: {_APART}"
         name, heard = self._other
@@ -164,7 +164,7 @@ class LeaseKeeper:
                 self._followers[other.name] = now
         # Whoever it is: its number must not leave us without one that device nodes obey.
         if wrong := other.implausible(self.config.rank):
-            self._complain(f"{other.name} claims {wrong}: not listened to")
+            self._complain(f"{other.name} claims {wrong}: ignored")
             return
         self._other = (other.name, now)
         self.lease, event = self.lease.heard(self.config, self._own(now), other, now)
@@ -196,7 +196,9 @@ class LeaseKeeper:
         try:
             state = handover.followed(self._owner.state, told.state, now)
             if state.epoch != told.claim.epoch:
-                raise RecordError(f"it claims epoch {told.claim.epoch} and tells of {state.epoch}")
+                raise RecordError(
+                    f"it claims epoch {told.claim.epoch} and its state has epoch {state.epoch}"
+                )
         except RecordError as error:
             self._complain(f"cannot follow {told.claim.name}: {error}")
             return

@@ -1,4 +1,4 @@
-"""What carries out the effects of a device node's runtime: a ROS node, or the campaign's."""
+"""Shell that carries out the effects of a device node's runtime: a ROS node, or the campaign's."""
 
 from __future__ import annotations
 

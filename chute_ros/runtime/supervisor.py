@@ -1,4 +1,4 @@
-"""What a supervisor does around its core: heartbeat, lease, arming, what it tells and keeps.
+"""Runtime of a supervisor around its core: heartbeat, lease, arming, reports, saved state.
 
 Every message and request becomes an input of the core, every output an effect of the shell.
 
@@ -67,7 +67,7 @@ class SupervisorShell(LeaseShell, ArmCaller, Protocol):
         """This is what a start anew goes on with."""
 
     def say(self, said: inputs.Say) -> None:
-        """What the core tells a person."""
+        """A text of the core for a person."""
 
     def offer(self, offered: bool) -> None:
         """Offer the services to people, or no longer: they must reach the one that decides."""
@@ -229,7 +229,7 @@ class SupervisorRuntime:
     # -- the lease ------------------------------------------------------------------------------
 
     def links_heard(self, now: float) -> int:
-        """How many links are heard."""
+        """Number of received links."""
         return self.state.links_heard(self.config, now)
 
     def follow(self, state: State) -> None:
@@ -237,14 +237,14 @@ class SupervisorRuntime:
         self.state = state
 
     def lease_event(self, event: Event, now: float) -> None:
-        """Who leads has changed."""
+        """The leader has changed."""
         leads = self.lease.leading
         if leads:
             epoch = self.lease.next_epoch()
-            text = f"leads from now on, epoch {epoch}: {event.value}"
+            text = f"became leader, epoch {epoch}: {event.value}"
             new: inputs.Input = inputs.TakeOver(epoch)
         else:
-            text, new = f"only looks on from now on: {event.value}", inputs.StepDown(event.value)
+            text, new = f"became standby: {event.value}", inputs.StepDown(event.value)
         self._shell.log(Notice(Severity.WARNING, text))
         outputs = self._update((new,), now)
         self._shell.offer(leads)

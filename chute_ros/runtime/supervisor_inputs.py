@@ -1,4 +1,4 @@
-"""What comes to the supervisor on topics, as inputs of its core."""
+"""Messages to the supervisor, as inputs of its core."""
 
 from __future__ import annotations
 

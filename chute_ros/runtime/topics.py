@@ -1,4 +1,4 @@
-"""What goes from one runtime to another over ROS. Who carries it puts the stamp on."""
+"""Messages from one runtime to another over ROS. The carrier puts the stamp on."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class SafetyTold:
 
 @dataclass(frozen=True)
 class LeaseClaim:
-    """What a supervisor says of itself to the others (safety/lease)."""
+    """Claim of a supervisor for the others (safety/lease)."""
 
     claim: Claim
     #: Tells it from another of its name; empty: it is not from a supervisor.
@@ -75,7 +75,7 @@ class SafetyPicture:
 
 @dataclass(frozen=True)
 class ActionTold:
-    """How far a device node got with a decision that wants this action (safety/action)."""
+    """Progress of a device node with a decision of this action (safety/action)."""
 
     action: Action
     report: ActionReport
@@ -83,7 +83,7 @@ class ActionTold:
 
 @dataclass(frozen=True)
 class DeviceRequest:
-    """What a device wants of the supervisor (safety/request)."""
+    """Request of a device to the supervisor (safety/request)."""
 
     link: str
     device: str

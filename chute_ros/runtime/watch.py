@@ -1,4 +1,4 @@
-"""What a device node knows of the supervisor: is it there, and how old is what it says?
+"""A device node's view of the supervisor: is it there, and how old are its messages?
 
 A supervisor that was heard and falls silent is lost: then the node does what its parameter
 on_supervisor_lost says. Of several supervisors one leads, and only that one counts.
@@ -19,7 +19,7 @@ _MOST_SENT = 500
 
 @dataclass(frozen=True)
 class WatchPicture:
-    """How the supervisor is, for diagnostics. Times are s; NaN: never heard."""
+    """State of the supervisor, for diagnostics. Times are s; NaN: never received."""
 
     silence: float
     lost: bool

@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 _FAULTS = (
     ("loss", "probability that a packet is lost, 0 to 1, each way"),
-    ("duplicate", "probability that a packet comes twice"),
+    ("duplicate", "probability that a packet is duplicated"),
     ("corrupt", "probability that a byte of a packet (of a CAN frame: of its data) is wrong"),
     ("delay", "longest delay of a packet, s"),
 )
 _CAN_FAULTS = (
-    ("reorder", "probability that a frame is overtaken by those of the next 2 ms"),
+    ("reorder", "probability that a frame is overtaken by the frames of the next 2 ms"),
     ("toggle", "probability that a frame's toggle bit is wrong"),
-    ("half", "probability that only the first frame of a transfer comes"),
+    ("half", "probability that only the first frame of a transfer arrives"),
 )
 
 
@@ -64,8 +64,9 @@ def parser(
         options.add_argument(
             "--signing-key-file",
             metavar="FILE",
-            help="sign with this key (32 bytes or 64 hexadecimal digits), hear only what is "
-            "signed",
+            help=(
+                "sign with this key (32 bytes or 64 hexadecimal digits), accept only signed frames"
+            ),
         )
     _add_seed_and_quiet(options)
     return options
@@ -175,7 +176,7 @@ def _check_action(device: Acting, action: str) -> None:
     try:
         taken.convert(argument)
     except (KeyError, ValueError):
-        text = f"--at: action {action!r}: {argument!r} is nothing that {name} can take"
+        text = f"--at: action {action!r}: {argument!r} is no argument of {name}"
         raise ParameterError(f"{text}: need {name}={taken.need}") from None
 
 

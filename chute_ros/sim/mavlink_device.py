@@ -100,7 +100,7 @@ class MavlinkDevice(Actor):
         return output
 
     def sign(self, signer: Signer, verifier: Verifier) -> None:
-        """From now on sign what is sent, and hear only what is signed."""
+        """From now on sign what is sent, and accept only signed frames."""
         self._encoder = FrameEncoder(self.system_id, self.component_id, signer)
         self._verifier = verifier
         self._decoders.clear()

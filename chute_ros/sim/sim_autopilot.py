@@ -12,7 +12,7 @@ def _run() -> None:
 
     options = parser(
         "sim_autopilot",
-        "A MAVLink autopilot: arms, takes off, fails and falls; a PARACHUTE_STATUS that says "
+        "A MAVLink autopilot: arms, takes off, fails and falls; a PARACHUTE_STATUS with "
         "deployed opens its canopy.",
         "udpout:127.0.0.1:14550",
         "mute, unmute, silent, speak, reboot, arm, takeoff=HEIGHT, fail-motor",
@@ -22,8 +22,10 @@ def _run() -> None:
         "--autopilot",
         choices=tuple(KINDS),
         default="generic",
-        help="which one it plays, where they differ: heartbeat, parameters, arming, termination "
-        "(px4 then orders the parachute's release itself)",
+        help=(
+            "autopilot to imitate, in heartbeat, parameters, arming and termination (px4 then "
+            "orders the parachute's release itself)"
+        ),
     )
     chosen = options.parse_args()
     kind = KINDS[chosen.autopilot]

@@ -24,9 +24,9 @@ from chute_ros.supervisor.state import CONTRADICTED_FOR, State
 
 #: MAV_STATE of an autopilot that cannot fly, or only ends a flight (MAVLink common.xml).
 _UNABLE = {
-    5: "the autopilot says MAV_STATE_CRITICAL (need STANDBY or ACTIVE): look at its own messages",
-    6: "the autopilot says MAV_STATE_EMERGENCY (need STANDBY or ACTIVE): look at its own messages",
-    8: "the autopilot says MAV_STATE_FLIGHT_TERMINATION (need STANDBY or ACTIVE): reboot it",
+    5: "the autopilot reports MAV_STATE_CRITICAL (need STANDBY or ACTIVE): read its own messages",
+    6: "the autopilot reports MAV_STATE_EMERGENCY (need STANDBY or ACTIVE): read its own messages",
+    8: "the autopilot reports MAV_STATE_FLIGHT_TERMINATION (need STANDBY or ACTIVE): reboot it",
 }
 _EPOCH = datetime.date(1970, 1, 1).toordinal()
 #: A wall clock that says less was never set.
@@ -40,13 +40,15 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
     judged = evidence.judged(limits, now)
     if judged is LinkJudgement.NEVER_SEEN:
         who = "node" if math.isnan(evidence.heard) else "device"
-        return f"{link}: its {who} was never heard"
+        return f"{link}: nothing received from its {who}"
     if judged is LinkJudgement.REGAINED:
         heard = now - evidence.regained_at
-        return f"{link}: REGAINED, heard again for {heard:.2f} s (need {limits.regain_after:g} s)"
+        return (
+            f"{link}: REGAINED, received again for {heard:.2f} s (need {limits.regain_after:g} s)"
+        )
     if judged is LinkJudgement.UNMONITORED:
         allowed = link in config.unmonitored_links
-        text = "UNMONITORED, its device never says how it is (to fly with it: unmonitored_links)"
+        text = "UNMONITORED, its device never reports anything (to fly with it: unmonitored_links)"
         return "" if allowed else f"{link}: {text}"
     if judged is not LinkJudgement.OK:
         silence = now - evidence.heard
@@ -127,16 +129,17 @@ def _measured_problems(config: SupervisorConfig, state: State, now: float) -> li
         if now >= since + CONTRADICTED_FOR and name in used and name not in state.unfit
     ]
     return wrong + [
-        f"{part} is told otherwise by another source, or has jumped"
+        f"{part} is in doubt: another source differs, or it has jumped"
         for part in sorted(state.disputed)
     ]
 
 
 #: Measurement on which a rule may rest -> what nobody sees of a vehicle that does not tell it.
 _BLIND = {
-    "sink_beyond_target": "no target is told: a level sink that nobody commanded is an alarm only",
-    "attitude_error": "no commanded attitude is told: one that is flown on purpose looks as any",
-    PRESSURE_ALTITUDE: "no pressure is told: an estimator that is wrong with itself is believed",
+    "sink_beyond_target": "no target is reported: an uncommanded level sink is only an alarm",
+    "attitude_error": "no commanded attitude is reported: "
+    "an attitude flown on purpose looks like an accident",
+    PRESSURE_ALTITUDE: "no pressure is reported: a wrong but consistent estimator is believed",
 }
 
 
@@ -159,7 +162,7 @@ def _rung_problem(rung: Rung, evidence: LinkEvidence) -> str:
     status = evidence.devices.get(rung.device)
     if status is None:
         heard = ", ".join(sorted(evidence.devices)) or "none"
-        return f"deploy_ladder names {rung}, which was never heard (heard: {heard})"
+        return f"deploy_ladder names {rung}, which was never received (received: {heard})"
     if status.link_state is not LinkState.OK:
         return f"deploy_ladder names {rung}, which is {status.link_state.name}"
     return ""
@@ -169,7 +172,7 @@ def _vehicle_problem(config: SupervisorConfig, state: State, now: float) -> str:
     """Without vehicle/state nobody can tell flight from ground; empty: it is there."""
     age = state.vehicle.armed_age + now - state.vehicle_received
     if math.isnan(age):
-        return "vehicle/state: whether the motors are armed was never told"
+        return "vehicle/state: armed or disarmed was never reported"
     if age > config.vehicle_state_age:
         limit = config.vehicle_state_age
         return f"vehicle/state: armed or not is {age:.1f} s old (limit {limit:g} s)"
@@ -186,7 +189,7 @@ def arm_reasons(config: SupervisorConfig, state: State, day: int, now: float) ->
         reasons.append(f"the vehicle is {state.stage.name} (need READY)")
     if 0 <= day < _FIRST_DAY:
         said = datetime.date.fromordinal(_EPOCH + day).isoformat()
-        reasons.append(f"the wall clock says {said} (need 2024-01-01 or later)")
+        reasons.append(f"the wall clock shows {said} (need 2024-01-01 or later)")
     for link in config.links:
         reasons += _clock(config, link, state.evidence(link).clock_difference)
     for link in config.deploy_links:

@@ -106,9 +106,9 @@ class Reports(Requests):
             self.state = replace(self.state, released_before=before)
             aloft = flight.in_air(self.config, self.state, self.now) is not False
             if was_out and aloft and self.state.stage is Stage.DEPLOYED:
-                text = f"{one.link} {status.device} says no more that it is deployed"
+                text = f"{one.link} {status.device} no longer reports deployed"
                 if self.state.deploys or not self.state.airborne or forgot:
-                    self.alarm(f"{text}; a forced deploy goes on with the next")
+                    self.alarm(f"{text}; a forced deploy continues with the next")
                 else:
                     # It may have erred when it said so; with nothing out, the rules must live.
                     self.alarm(text)
@@ -271,7 +271,7 @@ class Reports(Requests):
         unfit = dict(state.unfit)
         begun = state.denied_since.get(ACCELERATION, math.nan)
         if now >= begun + _NEVER_FALLS_FOR:
-            unfit.setdefault(ACCELERATION, f"it tells of a fall, and {state.denied[ACCELERATION]}")
+            unfit.setdefault(ACCELERATION, f"it reports a fall, but {state.denied[ACCELERATION]}")
         since = math.nan
         stands = not state.airborne and flight.says_down(self.config, state, now) is True
         speeds = (
@@ -289,8 +289,8 @@ class Reports(Requests):
                     unfit.pop(ACCELERATION, None)
                     if not fits:
                         unfit[ACCELERATION] = (
-                            f"it tells {force:.1f} m/s^2 while the vehicle stands (need {least:g} "
-                            f"to {most:g}; 0 is told by a driver that takes gravity out)"
+                            f"it reports {force:.1f} m/s^2 while the vehicle stands (need "
+                            f"{least:g} to {most:g}; a driver that removes gravity reports 0)"
                         )
         if unfit != state.unfit or since != state.fitness_since:
             self.state = replace(state, unfit=MappingProxyType(unfit), fitness_since=since)
@@ -381,7 +381,7 @@ class Reports(Requests):
         if self.config.standby and one.newest_epoch % RANKS != self.config.rank:
             self.outputs.append(i.Refused(one.newest_epoch))
             return
-        text = f"{one.link} has seen epoch {one.newest_epoch}: going on as {epoch}"
+        text = f"{one.link} has seen epoch {one.newest_epoch}: continuing as {epoch}"
         self.outputs.append(i.Say(text))
         self.state = replace(self.state, epoch=epoch)
         self.renew_not_begun(f"{one.link} knows a newer epoch")

@@ -1,7 +1,7 @@
-"""What campaign does: many flights in virtual time with faults at every layer, counted.
+"""Flies many flights in virtual time with faults at every layer, and counts the wrong ones.
 
-A flight that must not be is saved as a scenario, as text: --replay SEED or FILE tells it step by
-step. Ctrl-C ends it: what was flown until then is counted and written; --resume FILE goes on.
+A wrong flight is saved as a scenario, as text: --replay SEED or FILE shows it step by step.
+Ctrl-C ends the campaign: the flights until then are counted and written; --resume FILE continues.
 """
 
 from __future__ import annotations
@@ -36,38 +36,45 @@ _KEEP_EVERY = 60.0  # s
 _MOST_TOLD = 20
 _BROKEN = (
     "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault "
-    "of its interpreter); what was flown until then is told, and --resume FILE goes on from it"
+    "of its interpreter); the flights until then are reported, and --resume FILE "
+    "continues from them"
 )
 
 
 def main() -> None:
-    """Fly; exit code 1 if a flight was what must not be."""
+    """Fly; exit code 1 if a flight was wrong."""
     options = argparse.ArgumentParser("campaign", description=__doc__)
-    options.add_argument("--flights", type=positive, default=1000, help="how many (default: 1000)")
+    options.add_argument(
+        "--flights", type=positive, default=1000, help="number of flights (default: 1000)"
+    )
     options.add_argument("--seed", type=int, default=0, help="of the first flight (default: 0)")
     options.add_argument(
         "--each",
         type=positive,
-        metavar="N",
-        help="of so many seeds (--flights) fly only the first N of each kind of flight: the rare "
-        "as often as the common",
+        metavar=("N"),
+        help=(
+            "fly only the first N flights of each kind among the seeds (--flights): the rare "
+            "kinds as often as the common"
+        ),
     )
     options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
-    options.add_argument("--page", type=writable, help="write the results there, beside pictures")
+    options.add_argument(
+        "--page", type=writable, help="write the results to this page, with pictures beside it"
+    )
     options.add_argument(
         "--failures",
         type=Path,
         default=ros_home() / "campaign_failures",
-        help="folder for the flights that must not be (default: %(default)s)",
+        help="folder for the wrong flights (default: %(default)s)",
     )
     options.add_argument(
         "--resume",
         type=writable,
         metavar="FILE",
-        help="keep there what was flown, each minute; go on from it if it is there",
+        help="save the flights there each minute; continue from it if it exists",
     )
     options.add_argument(
-        "--replay", type=scenario, metavar="SEED|FILE", help="tell one flight step by step"
+        "--replay", type=scenario, metavar="SEED|FILE", help="show one flight step by step"
     )
     # `ros2 run` adds arguments for nodes, which this is none of.
     chosen, _ = options.parse_known_args()
@@ -99,9 +106,9 @@ def main() -> None:
         print(f"  {_told(line)}")
     print(f"{tally.flights} of {len(seeds)} flights in {tally.took:.0f} s")
     if progress.unsaved:
-        print(f"not saved, name another folder with --failures: {progress.unsaved}")
+        print(f"not saved (name another folder with --failures): {progress.unsaved}")
     elif tally.wrong:
-        print(f"saved in {chosen.failures}; --replay FILE tells one step by step")
+        print(f"saved in {chosen.failures}; --replay FILE shows one step by step")
     if chosen.page and tally.flights:
         how = f"{chosen.jobs} at a time on {machine()}"
         of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
@@ -134,7 +141,7 @@ class _Kept:
             return campaign.Tally()
         text = self._path.read_text(encoding="utf-8", errors="replace")
         tally = kept_tally.tally_of(text, self._seed, self._code, str(self._path))
-        print(f"goes on after {tally.flights} flights of {self._path}", file=sys.stderr)
+        print(f"continuing after {tally.flights} flights of {self._path}", file=sys.stderr)
         return tally
 
     def look(self, tally: campaign.Tally) -> None:
@@ -150,7 +157,7 @@ class _Kept:
         try:
             replace_text(self._path, kept_tally.text_of(tally, self._seed, self._code))
         except OSError as error:
-            print(f"not kept: {error}; trying again", file=sys.stderr, flush=True)
+            print(f"not saved: {error}; trying again", file=sys.stderr, flush=True)
 
 
 class _Progress:
@@ -177,7 +184,7 @@ class _Progress:
         self._told_at = time.monotonic()
         print(
             f"{tally.flights} of {self._flights} flights, {tally.a_minute:.0f} a minute, "
-            f"{len(tally.wrong)} that must not be",
+            f"{len(tally.wrong)} wrong",
             file=sys.stderr,
             flush=True,
         )
@@ -244,7 +251,7 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
         (up, "is up"),
         (up + scenario.failure_at, _failure(scenario)),
         (up + person.at if person else math.nan, f"a person wants: {person and person.does}"),
-        (up + flies.begin if flies else math.nan, f"is told to fly: {flies and flies.kind}"),
+        (up + flies.begin if flies else math.nan, f"begins to fly: {flies and flies.kind}"),
         (truth.at, "ONLY A PARACHUTE HELPS"),
         (truth.latest, "the last moment for its release"),
         (flown.released, "RELEASED"),

@@ -1,7 +1,7 @@
-"""What demo does: one simulated flight with the real nodes, told as it happens.
+"""Flies one simulated flight with the real nodes, and prints each step as it happens.
 
-The nodes and simulators run as processes of their own and speak over real UDP, CAN frames, a pty
-and real ROS. Every step is awaited with a time limit; one that does not happen ends the demo with
+The nodes and simulators run as processes of their own over real UDP, CAN frames, a pty
+and real ROS. Every step has a time limit; a step that does not happen ends the demo with
 code 1.
 """
 
@@ -37,11 +37,11 @@ def main() -> None:
         "--parachute",
         choices=KINDS,
         default="mavlink",
-        help="which one the drone carries (default: mavlink)",
+        help="parachute of the drone (default: mavlink)",
     )
     options.add_argument("--logs", type=Path, help="keep the logs of all processes in this folder")
     options.add_argument(
-        "--fault", choices=FAULTS, help="spoil a step, to see that the demo then fails"
+        "--fault", choices=FAULTS, help="break a step, to show that the demo then fails"
     )
     chosen = options.parse_args()
     if chosen.logs is not None:

@@ -35,12 +35,14 @@ def fly(rig: Rig, director: Director, pilot: Pilot) -> None:
 
 def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
     director.until("the supervisor speaks", 20.0, lambda: bool(director.safety.links))
-    director.until("the autopilot is heard", 20.0, lambda: director.vehicle.armed != 0)
-    director.say("vehicle", f"autopilot {director.vehicle.source} heard, disarmed, on the ground")
+    director.until("the autopilot is received", 20.0, lambda: director.vehicle.armed != 0)
+    director.say(
+        "vehicle", f"autopilot {director.vehicle.source} received, disarmed, on the ground"
+    )
     director.until("flight is blocked", 20.0, lambda: director.safety.flight_blocked)
     director.say("demo", f"no parachute yet: {'; '.join(director.safety.block_reasons)}")
 
-    director.say("pilot", "tries to arm the motors all the same")
+    director.say("pilot", "tries to arm the motors")
     pilot.arm()
     arm = dialect.MAV_CMD_COMPONENT_ARM_DISARM
     director.until("the autopilot arms", 5.0, lambda: pilot.accepted(arm))
@@ -55,9 +57,9 @@ def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
         heard = director.all_parachutes(lambda one: one.link_state == 1)
         return heard and set(director.parachutes) == set(rig.links)
 
-    director.until("the parachute is heard", 15.0, all_heard)
+    director.until("the parachute is received", 15.0, all_heard)
     for link, one in director.parachutes.items():
-        director.say("parachute", f"{link} {one.device} heard")
+        director.say("parachute", f"{link} {one.device} received")
     director.until("flight is released", 15.0, director.stage(Stage.READY))
     director.say("supervisor", "READY: every required link is healthy")
 
@@ -67,7 +69,7 @@ def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
     director.until("it is seen armed", 5.0, lambda: director.all_parachutes(lambda p: p.armed))
     for link, one in director.parachutes.items():
         names = ", ".join(flag_names(TriggerFlags(one.armed_triggers)))
-        director.say("parachute", f"{link} {one.device} armed, its own status says: {names}")
+        director.say("parachute", f"{link} {one.device} armed, its own status reports: {names}")
 
 
 def _climb(director: Director, pilot: Pilot) -> None:
@@ -122,10 +124,10 @@ def _automatic_deployment(director: Director) -> None:
     def killed() -> bool:
         return director.outcome(Action.KILL, Outcome.CONFIRMED) is not None
 
-    director.until("the parachute asks for the kill, and gets it", 5.0, killed)
+    director.until("the parachute requests the kill, and gets it", 5.0, killed)
     director.say("upf_can", "the motors are off: the kill switch is answered with success")
     director.until("the parachute is out", 5.0, lambda: bool(director.deployed_at))
-    director.say("parachute", "its own status says deployed")
+    director.say("parachute", "its own status reports deployed")
 
 
 def _descend(director: Director) -> None:
@@ -152,7 +154,7 @@ def _descend(director: Director) -> None:
     director.say("vehicle", f"TOUCHDOWN at {last['speed']:+.1f} m/s")
     if last["speed"] < CANOPY_SINK:
         raise StepFailedError(f"touchdown at {last['speed']:.1f} m/s (limit {CANOPY_SINK} m/s)")
-    director.until("the supervisor says deployed", 5.0, director.stage(Stage.DEPLOYED))
+    director.until("the supervisor reports deployed", 5.0, director.stage(Stage.DEPLOYED))
 
 
 def _summary(director: Director, rig: Rig) -> None:

@@ -1,7 +1,7 @@
 """Explores the supervisor's core: every story of so many steps from each beginning (make explore).
 
-Breadth first, so that the first story in which a property does not hold is a shortest one. It is
-printed, and the exit status is 1. Otherwise docs/evidence/exploration.md is written.
+Breadth first, so that the first story in which a property does not hold is a shortest one. That
+story is printed, and the exit status is 1. Otherwise docs/evidence/exploration.md is written.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ _PAGE_TEXT = """\
 # Exploration of the supervisor's core
 
 Written by `make explore DEPTH={depth}`. From each of the beginnings below, every story of up to
-{depth} further steps was told to the core as it runs in the node, with the profile
+{depth} further steps was given to the core as it runs in the node, with the profile
 `config/profiles/multirotor.yaml`, two links that both kill and deploy, and the ladder {ladder}.
 At every update all properties were checked; all held.
 
@@ -198,10 +198,10 @@ At every update all properties were checked; all held.
 | transitions | {found.transitions} |
 | updates of the core | {found.updates} |
 
-A step is what the vehicle, a link, a parachute, a device or a person says, for {tick:g} s or for
+A step is an input of the vehicle, a link, a parachute, a device or a person, for {tick:g} s or for
 {held_for:g} s (just over the longest hold of a rule that fires and of a landing), or silence for
 {silence:g} s (just over the longest limit). `chute_ros/tools/explore_steps.py` lists them. States
-are the same where they decide the same from now on: `chute_ros/tools/explore_key.py`.
+are the same if all their later decisions are the same: `chute_ros/tools/explore_key.py`.
 
 | beginning | steps that lead there from the start |
 |---|---|
@@ -211,7 +211,7 @@ are the same where they decide the same from now on: `chute_ros/tools/explore_ke
 |---|---|
 {properties}
 
-A check counts where the property had something to say: a property without any would be an error.
+A check counts if the property applied: a property without any check would be an error.
 The core is explored for the stated number of steps and these inputs, in these times; the
 property tests in `test/supervisor` go further, at random.
 """

@@ -1,4 +1,4 @@
-"""What happened in a recorded flight: decisions with what came of them, requests with their
+"""What happened in a recorded flight: decisions with their outcomes, requests with their
 answers, alarms, and the rows of its timeline."""
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Writes the files in config/ and the tables of docs/reference/ from the settings (make docs).
+"""Writes config/ and the tables of docs/reference/ from the settings (make docs).
 
-The tables stand between marks in docs/reference/parameters.md and docs/reference/rules.md. With
---check it only says which of them is out of date.
+The tables stand between marks in docs/reference/parameters.md and docs/reference/rules.md.
+With --check it only names the files that are out of date.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""What replay does: decides a recorded flight once more and compares decision by decision.
+"""Decides a recorded flight again and compares decision by decision.
 
-Without --config the settings are those of the recording, and everything must come out the same,
-bit for bit. With --config the flight is decided with the settings of that ROS parameter file (what
-it does not name has its default, as for the node); what would have differed is shown as a table
-and a picture. What the vehicle did remains as it was recorded: a recording cannot tell how a
-flight would have gone on after another decision.
+Without --config the settings are those of the recording, and every output must be the same,
+bit for bit. With --config the settings are those of that ROS parameter file (a parameter that it
+does not name has its default, as for the node); a table and a picture show the differences. The
+vehicle's motion remains the recorded one: a recording does not show how a flight would have
+continued after another decision.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _PROFILE = "profile.name"
 
 
 def main() -> None:
-    """Exit code 0: the same decisions; 1: others; 2: it cannot be read."""
+    """Exit code 0: the same decisions; 1: others; 2: the recording cannot be read."""
     options = recording_options("replay", __doc__)
     options.add_argument(
         "--config", type=Path, metavar="YAML", help="decide with this ROS parameter file instead"
@@ -40,7 +40,7 @@ def main() -> None:
         "--picture",
         type=Path,
         metavar="SVG",
-        help="where the timeline goes (default with --config: FILE.replay.svg)",
+        help="output file of the timeline (default with --config: FILE.replay.svg)",
     )
     chosen = options.parse_args()
     try:
@@ -146,7 +146,7 @@ def _print_end(recording: Recording, found: list[Row], now: Replayer, wrote: Pat
     replayed = len(recording.turns) - now.skipped
     print(f"\n{replayed} turns replayed, {len(found)} decisions and alarms, {different} different")
     if now.skipped:
-        print(f"{now.skipped} turns could not be replayed: what came before them is missing")
+        print(f"{now.skipped} turns could not be replayed: the state before them is missing")
     for wall in now.strayed:
         print(f"{recording.seconds(wall):.3f} s: the state differs from the recorded one")
     if wrote is not None:

@@ -135,7 +135,7 @@ def told(output: i.Output | None) -> str:
         return ""
     if isinstance(output, i.Decide):
         decision = output.decision
-        again = " once more" if output.again else ""
+        again = " again" if output.again else ""
         shadow = " (SHADOW)" if decision.shadow else ""
         targets = ", ".join(decision.targets) or "nobody"
         return (

@@ -1,7 +1,7 @@
-"""What report does: one HTML page of a recorded flight, which needs nothing else to be read.
+"""Writes one HTML page of a recorded flight. The page needs no other file.
 
 It has the timeline of the links, states, height and speed, the rules and their counters, and the
-decisions with their reasons and with what came of them.
+decisions with their reasons and outcomes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def main() -> None:
     """Exit code 0: written; 2: the recording cannot be read, or the page cannot be written."""
     options = recording_options("report", __doc__)
     options.add_argument(
-        "--output", type=Path, metavar="HTML", help="where it goes (default: FILE.html)"
+        "--output", type=Path, metavar="HTML", help="output file (default: FILE.html)"
     )
     chosen = options.parse_args()
     try:
@@ -62,7 +62,7 @@ def report(files: list[Path]) -> str:
     rows: list[Row] = [
         *state_rows(states),
         Marks("decisions", story.decision_marks()),
-        Marks("what came of them", story.report_marks()),
+        Marks("outcomes", story.report_marks()),
         Marks("alarms", story.alarm_marks()),
         *vehicle_curves(recording),
     ]

@@ -95,7 +95,7 @@ def _head(title: str, recording: Recording, story: FlightStory) -> str:
 
 def _decisions(decisions: Sequence[Decided]) -> str:
     return _table(
-        ("no.", "time, s", "decision", "rule", "reasons", "to", "what came of it"),
+        ("no.", "time, s", "decision", "rule", "reasons", "to", "outcome"),
         (
             (
                 _number(str(number)),
@@ -114,7 +114,7 @@ def _decisions(decisions: Sequence[Decided]) -> str:
 def _besides(one: Decided) -> str:
     text = f"{one.decision.epoch}.{one.decision.id}"
     if one.decision.shadow:
-        text += ", SHADOW: only said"
+        text += ", SHADOW: not sent"
     return f'<br><span class="dim">{escaped(text)}</span>'
 
 
@@ -127,7 +127,7 @@ def _outcomes(one: Decided) -> str:
         for after, report in one.reports
     ]
     if one.again:
-        lines.append(f'<span class="dim">sent {one.again} times again</span>')
+        lines.append(f'<span class="dim">resent {one.again} times</span>')
     return "<br>".join(lines) or '<span class="dim">no report</span>'
 
 
@@ -165,7 +165,7 @@ def _alarms(story: FlightStory) -> str:
 def _rules(rules: Sequence[RuleTold]) -> str:
     heads = ("rule", "action", "highest counter, s", "of, s", "at, s", "fulfilled at, s")
     return _table(
-        (*heads, "acted on at, s", "conditions at its highest"),
+        (*heads, "acted on at, s", "conditions at the highest counter"),
         (
             (
                 _cell(escaped(one.name)),
@@ -184,7 +184,7 @@ def _rules(rules: Sequence[RuleTold]) -> str:
 
 def _rule(rule: RuleTold) -> str:
     if not rule.alive:
-        return '<span class="dim">it never lived in a state of this flight</span>'
+        return '<span class="dim">never active in a state of this flight</span>'
     denied = f'<b class="warn">not acted on: {escaped(rule.denied)}</b>' if rule.denied else ""
     return _list(rule.conditions) + denied
 

@@ -52,8 +52,8 @@ class RocketStory:
 
         director.say("demo", "plugs the cable in")
         self.rig.plug_cable_in()
-        director.until("the flight computer is heard", 15.0, lambda: bool(director.parachutes))
-        director.until("telemetry comes", 5.0, lambda: self.telem.sequence > 0)
+        director.until("the flight computer is received", 15.0, lambda: bool(director.parachutes))
+        director.until("telemetry is received", 5.0, lambda: self.telem.sequence > 0)
         director.say("rocket", f"telemetry {self.telem.layout}, flight mode Startup")
         director.until("flight is released", 15.0, director.stage(Stage.READY))
         director.say("supervisor", "READY: every required link is healthy")
@@ -68,7 +68,7 @@ class RocketStory:
         if not wiped.success:
             raise StepFailedError(f"wiping: {wiped.message}")
         director.say("rocket", wiped.message)
-        director.until("it is heard again", 10.0, director.stage(Stage.READY))
+        director.until("it is received again", 10.0, director.stage(Stage.READY))
         armed = self._answer(director.ask_arm(), "arming is answered")
         if not armed.success:
             raise StepFailedError(f"arming: {armed.message}")

@@ -1,6 +1,6 @@
 """Writes docs/reference/states.* from the tables of the supervisor (make docs).
 
-With --check it only says which of them is out of date.
+With --check it only names the files that are out of date.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ A supervisor begins in STARTUP.
 _LEASE = """\
 ## Which of several supervisors leads
 
-One that runs alone begins as LEADING; one of several begins as FOLLOWING and looks for a leader.
+A single supervisor begins as LEADING; one of several begins as FOLLOWING and looks for a leader.
 """
 
 

@@ -1,4 +1,4 @@
-"""Where a byte wire is, in one string.
+"""Address of a byte wire, in one string.
 
 udpin:HOST:PORT                        listen; answer everyone who was heard there
 udpout:HOST:PORT                       send there; listen to what comes back

@@ -1,4 +1,4 @@
-"""Where a CAN bus is, in one string.
+"""Address of a CAN bus, in one string.
 
 mcast:BUS[:PORT]         CAN over UDP multicast on this host, as pydronecan, the DroneCAN GUI Tool
                          and ArduPilot's simulation speak it: bus 0 to 255, port 57732 if not said

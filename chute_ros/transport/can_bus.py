@@ -128,7 +128,7 @@ class CanBusWire:
             self._echoes.sent(data, time.monotonic())
 
     def look(self, now: float) -> str:
-        """Who else reads the adapter's serial port; empty: nobody is known to."""
+        """Other readers of the adapter's serial port; empty: none known."""
         return "" if self._users is None else self._users.trouble(now)
 
     def describe(self) -> str:
@@ -167,7 +167,7 @@ class CanBusWire:
                 port = _serial_port(self._bus)
                 if port is not None and not hung_up(port.fileno()):
                     self._users.ready_without_data(time.monotonic())
-                    return self._drop("reads that another program got before")
+                    return self._drop("reads that another program took first")
             kind = bad_frame(error)
             if not kind:
                 raise OSError(f"{reason(error)}{self._advice(error)}") from None
@@ -177,7 +177,7 @@ class CanBusWire:
         """Count a bad frame, and go on behind it."""
         self._failures += 1
         if self._failures > _MOST_FAILURES and self._address.interface not in _DIRECT:
-            raise OSError(f"nothing but failures, the last one: {reason(error)}") from None
+            raise OSError(f"only failures, the last one: {reason(error)}") from None
         undecoded = getattr(self._bus, "_buffer", None)
         if isinstance(error.__cause__, UnicodeError) and isinstance(undecoded, bytearray):
             # slcan would keep what it cannot decode, and stumble over it for ever. Its own flush
@@ -199,7 +199,7 @@ class CanBusWire:
             number = number if self._address.interface == "socketcan" else 0
             return pack(CanFrame(number, data, extended=False, error=True))
         if not 0 <= number <= (0x1FFFFFFF if message.is_extended_id else 0x7FF):
-            return self._drop("identifiers that no CAN frame has")
+            return self._drop("impossible CAN identifiers")
         remote = bool(message.is_remote_frame)
         frame = pack(CanFrame(number, data, bool(message.is_extended_id), remote))
         own = self._echoes is not None and self._echoes.take(frame, time.monotonic())
@@ -210,7 +210,7 @@ class CanBusWire:
         return b""
 
     def _advice(self, error: BaseException) -> str:
-        """What the user can do about it, with a semicolon before."""
+        """Advice for the user, with a semicolon before."""
         address = self._address
         if address.interface == "udp_multicast":
             return "; is there a route for multicast? ip route add 224.0.0.0/4 dev lo"

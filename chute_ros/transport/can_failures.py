@@ -1,4 +1,4 @@
-"""What an exception of python-can, or of a driver below it, means for the wire."""
+"""Meaning of exceptions of python-can and of drivers below it for the wire."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ class CanMulticastWire:
             return self._drop("packets of a wrong length")
         frame = unpack(_FRAME.pack(identifier, len(data), data))
         if frame is None:
-            return self._drop("identifiers that no CAN frame has")
+            return self._drop("impossible CAN identifiers")
         if frame.error:
             # They tell about a controller, and there is none: nobody may report bus-off here.
             return self._drop("error frames")

@@ -1,4 +1,4 @@
-"""How late what has come is looked at: where the processor is short, evidence is older than it
+"""Delay in handling received data: if the processor is short, evidence is older than it
 seems."""
 
 from __future__ import annotations

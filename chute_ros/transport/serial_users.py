@@ -105,7 +105,7 @@ class PortUsers:
         self._signs = [*self._signs[1 - _CERTAIN :], now]
 
     def trouble(self, now: float) -> str:
-        """Who else reads the port, in words; empty: nobody is known to. now: monotonic s."""
+        """Other readers of the port, in words; empty: none known. now: monotonic s."""
         names, when = self._seen
         if names and now - when < _SIGN_LASTS:
             who = ", ".join(names)
@@ -114,7 +114,7 @@ class PortUsers:
         else:
             return ""
         return (
-            f"{self._path} has a second reader, which takes a part of what comes: {who}; end it. "
+            f"{self._path} has a second reader, which takes part of the data: {who}; end it. "
             "The port stays open here"
         )
 

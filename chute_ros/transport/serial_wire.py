@@ -81,7 +81,7 @@ class SerialWire:
             raise BlockingIOError(f"{self._path} takes no more data")
 
     def look(self, now: float) -> str:
-        """Who else reads the port; empty: nobody is known to."""
+        """Other readers of the port; empty: none known."""
         return "" if self._users is None else self._users.trouble(now)
 
     def describe(self) -> str:

@@ -1,4 +1,4 @@
-"""Where the wire contracts that chute_msgs installs are."""
+"""Folder of the wire contracts that chute_msgs installs."""
 
 from __future__ import annotations
 

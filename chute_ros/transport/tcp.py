@@ -135,7 +135,7 @@ class TcpServerWire:
                 _end(client)
         if now - self._given_back_at >= _TELL_FOR:
             return ""
-        why = f"sent no frame that counts here for {GIVE_BACK_AFTER:g} s and was disconnected"
+        why = f"sent no accepted frame for {GIVE_BACK_AFTER:g} s and was disconnected"
         return f"{self.describe()}: a client {why}"
 
     def describe(self) -> str:

@@ -1,4 +1,4 @@
-"""What every byte wire can do, and the making of one from its address."""
+"""Interface of every byte wire, and its making from an address."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Wire(Protocol):
         """Send to whoever is at the other end; OSError if it cannot be."""
 
     def describe(self) -> str:
-        """Where it goes, with the port that was really bound."""
+        """Address of the wire, with the port that was really bound."""
 
 
 def make_wire(address: Address) -> Wire:

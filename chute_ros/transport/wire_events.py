@@ -1,4 +1,4 @@
-"""What a loop tells of its wire, among the events of the protocol."""
+"""Events of a loop's wire, among the events of the protocol."""
 
 from __future__ import annotations
 

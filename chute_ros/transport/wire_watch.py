@@ -1,4 +1,4 @@
-"""What is wrong with a wire though it is open, and which of its clients send frames."""
+"""Troubles of an open wire, and the clients that send frames."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def test_it_says_what_became_of_those_whose_autopilot_lost_its_power() -> None:
     text = page(LOST, 5, "2 at a time on this machine", PICTURES)
     table = text.split("## Autopilot without power\n\n")[1].split("\n\n")[0]
     assert table.splitlines() == [
-        "| besides it | as it must be | late | not told |",
+        "| besides it | correct | late | not told |",
         "|---|---|---|---|",
         "| nothing | 0 | 0 | 3 |",
         "| imu | 0 | 1 | 0 |",

@@ -152,7 +152,7 @@ class NodeSuite:
         assert {level for level, _ in rest.values()} == {DiagnosticStatus.STALE}
         assert all(text.startswith("not known now; was: ") for _, text in rest.values())
         monkeypatch.undo()
-        self.bench.until(lambda: len(self.beats) > told, "it is heard again")
+        self.bench.until(lambda: len(self.beats) > told, "it is received again")
         self.await_link(self.alive)
 
     def test_a_decision_to_deploy_is_carried_out_and_each_step_reported(
@@ -440,7 +440,7 @@ class DeviceSuite(NodeSuite):
     ) -> None:
         answer = self.bench.call(kind, f"{self.name}/{service}")
         assert not answer.success
-        assert "heard" in answer.message, answer.message
+        assert "received" in answer.message, answer.message
 
     def test_a_service_that_waits_stops_neither_heartbeat_nor_status(
         self, device: SimulatedDevice

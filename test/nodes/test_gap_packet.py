@@ -70,4 +70,4 @@ def test_a_supervisor_that_one_packet_ended_goes_on_with_its_flight(pair, strang
     pair.start("a", 0, hot_standby=False)
     assert pair.epoch("a") > epoch
     pair.await_stage(SafetyState.IN_FLIGHT)
-    assert "goes on where it stopped in flight: IN_FLIGHT" in pair.processes.tail("a", 40)
+    assert "continuing the interrupted flight: IN_FLIGHT" in pair.processes.tail("a", 40)

@@ -71,7 +71,7 @@ def test_where_no_parachute_comes_it_fails_in_time_and_says_why(bench, link):
     decide(bench, vehicle.name)
     report = bench.until(lambda: reports and reports[-1], "it is reported")
     assert report.outcome == Outcome.FAILED
-    assert "heard" in report.detail
+    assert "received" in report.detail
 
 
 def test_a_controller_does_not_wait_for_the_kill_that_the_decision_has_waited_for(bench):

@@ -129,7 +129,7 @@ def test_the_version_is_that_of_the_library_that_is_loaded(file, beside, version
 @pytest.mark.parametrize(
     ("version", "local", "level", "words"),
     [
-        ((2, 14, 5), False, b"\x01", "Fast DDS 2.14.5 can be ended by one packet of anybody on"),
+        ((2, 14, 5), False, b"\x01", "Fast DDS 2.14.5: one packet from anybody on the network"),
         ((2, 14, 5), True, b"\x00", "Fast DDS 2.14.5, kept to this host"),
         ((2, 14, 6), False, b"\x00", "Fast DDS 2.14.6"),
         (None, False, b"\x00", "no Fast DDS"),

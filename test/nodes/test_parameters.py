@@ -353,8 +353,8 @@ def test_ctrl_c_as_the_link_has_just_begun_ends_the_node(namespace):
     ("arguments", "code", "said"),
     [
         (["--help"], 0, "usage: safety_supervisor --ros-args [-p PARAMETER:=VALUE]"),
-        (["--bogus"], 2, "unknown argument --bogus: what sets a node up follows --ros-args"),
-        (["-p", "mode:=SHADOW"], 2, "unknown argument -p: what sets a node up"),
+        (["--bogus"], 2, "unknown argument --bogus: the settings of a node follow --ros-args"),
+        (["-p", "mode:=SHADOW"], 2, "unknown argument -p: the settings of a node"),
         (["--ros-args", "-p", "mode:=SHADOW", "--", "x"], 2, "unknown argument x"),
     ],
 )

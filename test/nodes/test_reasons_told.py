@@ -22,7 +22,7 @@ def told(beats, healthy=False):
 def test_upf_can_tells_every_reason(bench):
     beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
     network = Network(bench, controller_node_id=33)
-    first = "controller 33 was never heard: need its ParachuteStatus from this node id"
+    first = "controller 33 was never received: need its ParachuteStatus from this node id"
     bench.until(lambda: told(beats) == [first], "the controller is missing")
     devices = Devices(network)
     bench.until(lambda: beats[-1].device_healthy, "all is well")
@@ -36,7 +36,7 @@ def test_upf_can_tells_every_reason(bench):
 def test_umbilical_tells_every_reason(bench):
     cable = Cable(bench)
     beats = cable.heartbeats
-    first = "the flight computer was never heard: 0 bytes received, no $TELEM record, need one"
+    first = "the flight computer was never received: 0 bytes received, no $TELEM record, need one"
     bench.until(lambda: told(beats) == [first], "it is missing")
     cable.plugged()
     cable.act("fault")
@@ -79,5 +79,5 @@ def test_a_deploy_over_turning_motors_says_so_in_its_answer(bench):
     bench.until(answered, "it is answered")
     answer = future.result()
     assert answer.success, answer.message
-    assert answer.message.startswith("WARNING: the vehicle said 0.")
+    assert answer.message.startswith("WARNING: the vehicle reported armed 0.")
     assert "the motors may turn, STOP THEM" in answer.message

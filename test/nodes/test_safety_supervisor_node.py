@@ -140,8 +140,8 @@ def test_what_no_device_may_ask_for_is_logged_once_for_each_link_and_nothing_els
     assert state.decision_id == before + 1, "nothing but the block was decided"
     said = [line for line in capfd.readouterr().err.splitlines() if "need KILL 1" in line]
     assert len(said) == 2
-    assert "upf_can 33 asks for 0: " in said[0]
-    assert "another 33 asks for 4: " in said[1]
+    assert "upf_can 33 requests 0: " in said[0]
+    assert "another 33 requests 4: " in said[1]
 
 
 # Its own heartbeat and diagnostics
@@ -306,7 +306,7 @@ def test_what_a_person_asks_for_is_in_the_log_whatever_came_of_it(ready, capfd):
 @pytest.mark.parametrize(
     ("mode", "meaning"),
     [
-        ("SHADOW", "SHADOW: says what it would do, and does nothing"),
+        ("SHADOW", "SHADOW: reports its decisions and sends none"),
         ("INHIBITED", "INHIBITED: decides nothing"),
     ],
 )

@@ -57,14 +57,14 @@ def failing(which):
 
 def test_an_input_that_the_core_cannot_take_is_left_out_and_reported(bench, monkeypatch):
     scene = Watched(bench)
-    scene.await_itself(DiagnosticStatus.OK, "leads")
+    scene.await_itself(DiagnosticStatus.OK, "leader")
     poison = failing(lambda new: any(isinstance(one, inputs.ActionReport) for one in new))
     monkeypatch.setattr(runtime, "update", poison)
     scene.link.flying = True
     scene.await_stage(SafetyState.IN_FLIGHT)  # it reports on the release meanwhile
     scene.link.report_newest(Action.FLIGHT_BLOCK_RELEASE, 3)
-    values = scene.await_itself(DiagnosticStatus.ERROR, "mistakes inside")
-    assert values["newest mistake"].startswith("left out ActionReport: ZeroDivisionError")
+    values = scene.await_itself(DiagnosticStatus.ERROR, "internal errors")
+    assert values["newest internal error"].startswith("left out ActionReport: ZeroDivisionError")
     seen = len(scene.own_beats())
     bench.until(lambda: len(scene.own_beats()) > seen + 3, "the loop goes on")
 
@@ -81,9 +81,9 @@ def test_who_called_for_what_the_core_cannot_take_is_answered(bench, monkeypatch
 def test_what_fails_beside_the_core_is_reported_and_does_not_end_the_process(bench, monkeypatch):
     scene = Watched(bench)
     monkeypatch.setattr(scene.supervisor.runtime, "_beat", lambda now: 1 / 0)
-    values = scene.await_itself(DiagnosticStatus.ERROR, "mistakes inside")
-    told = "a turn was not done to its end: ZeroDivisionError: division by zero"
-    assert values["newest mistake"] == told
+    values = scene.await_itself(DiagnosticStatus.ERROR, "internal errors")
+    told = "a turn was not completed: ZeroDivisionError: division by zero"
+    assert values["newest internal error"] == told
     seen = len(scene.own_beats())
     bench.turns(0.5)
     assert len(scene.own_beats()) == seen, "it falls silent"

@@ -61,7 +61,7 @@ def test_the_deploy_that_follows_the_kill_is_not_lost(pair):
     assert pair.epoch("a") > first
     pair.bench.until(lambda: pair.acted(Action.DEPLOY), "the deploy leaves")
     assert pair.acted(Action.DEPLOY) == [(pair.epoch("a"), pair.acted(Action.DEPLOY)[0][1])]
-    assert "goes on where it stopped in flight: KILLING" in pair.processes.tail("a", 40)
+    assert "continuing the interrupted flight: KILLING" in pair.processes.tail("a", 40)
 
 
 def test_an_autopilot_that_falls_silent_meanwhile_is_lost_and_not_never_seen(pair):
@@ -113,7 +113,7 @@ def test_a_damaged_file_is_said_and_the_flight_goes_on(pair):
     path.write_bytes(path.read_bytes()[:100])
     kill_and_start_again(pair)
     pair.await_stage(SafetyState.IN_FLIGHT)
-    assert "starts anew" in pair.processes.tail("a", 60)
+    assert "ignoring the saved state" in pair.processes.tail("a", 60)
 
 
 def test_the_file_is_ours_alone_and_goes_with_the_landing(pair):
@@ -142,5 +142,5 @@ def test_where_nothing_can_be_written_diagnostics_say_so(bench, monkeypatch):
         return [s for s in mine if s.level == DiagnosticStatus.WARN]
 
     task = bench.until(warned, "it is told")[-1]
-    assert task.message.startswith("a start anew in flight would forget it: [Errno 17]")
+    assert task.message.startswith("a restart in flight would lose it: [Errno 17]")
     assert str(nowhere) in task.message

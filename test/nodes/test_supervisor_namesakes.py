@@ -87,7 +87,7 @@ def test_one_that_hangs_keeps_its_name_and_one_that_was_killed_does_not(pair):
     pair.start("a", 0, **ALONE)
     assert pair.epoch("a") > first
     pair.await_stage(SafetyState.IN_FLIGHT)
-    assert "goes on where it stopped in flight: IN_FLIGHT" in pair.processes.tail("a", 40)
+    assert "continuing the interrupted flight: IN_FLIGHT" in pair.processes.tail("a", 40)
 
 
 @pytest.mark.parametrize("parameters", [ALONE, {"hot_standby": True}], ids=str)

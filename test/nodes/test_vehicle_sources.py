@@ -171,7 +171,7 @@ def test_sources_that_contradict_each_other_are_told_and_logged_once(bench, list
         bench.until(lambda heard=heard: len(node.told) > heard + 1, "the IMU is told")
     assert node.disputed == {"attitude"}
     assert node.told_by == {"acceleration": "imu"}
-    assert capfd.readouterr().err.count("attitude is told otherwise by another source") == 1
+    assert capfd.readouterr().err.count("attitude in doubt: another source differs") == 1
 
 
 def test_odometry_with_axes_that_point_down_is_not_used(bench, listen):

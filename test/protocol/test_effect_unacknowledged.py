@@ -12,7 +12,7 @@ from chute_ros.protocol.effect import NO_ANSWER, EffectLimits, EffectLoop, Goal
 from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase
 from chute_ros.transitions import after
 
-SHOWN = "telemetry says open"
+SHOWN = "telemetry reports open"
 
 
 class Refused:
@@ -83,7 +83,7 @@ def test_sent_and_then_shown():
     assert bench.reports == [Outcome.SENT, Outcome.CONFIRMED]
     end = bench.end
     assert (end.success, end.accepted, end.sent, end.shown) == (True, False, True, True)
-    assert end.message == "telemetry says open after 0.30 s; sent once"
+    assert end.message == "telemetry reports open after 0.30 s; sent once"
     assert end.result == NO_ANSWER
 
 
@@ -94,14 +94,14 @@ def test_sent_and_never_shown_is_sent_again_and_given_up_in_time():
     assert (end.success, end.sent, end.shown) == (False, True, False)
     assert end.message == (
         "open given up after 5.0 s: sent 4 times, but the device's own status never showed that "
-        "telemetry says open"
+        "telemetry reports open"
     )
     assert bench.reports == [Outcome.SENT, Outcome.FAILED]
 
 
 def test_the_effect_of_a_second_try_counts():
     bench = Bench().at(2.0).shows()
-    assert bench.end.message == "telemetry says open after 2.00 s; sent 2 times"
+    assert bench.end.message == "telemetry reports open after 2.00 s; sent 2 times"
     assert bench.at(20.0).sent == [0.0, 1.5]
 
 

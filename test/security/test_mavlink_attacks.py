@@ -262,7 +262,7 @@ def test_without_a_key_who_speaks_as_the_parachute_is_believed_and_diagnostics_s
     attacked.send(*deployed(CHUTE))
     bench.until(lambda: statuses and statuses[-1].deployed, "the stranger is believed")
     task = bench.until(lambda: attacked.task("signing"), "diagnostics speak of it")
-    assert task.message.startswith("off: whoever reaches this wire can speak as the parachute")
+    assert task.message.startswith("off: anybody on this wire can imitate the parachute")
 
 
 def test_a_flood_from_many_ports_does_not_keep_a_release_from_a_fixed_address(bench):

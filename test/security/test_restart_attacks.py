@@ -86,10 +86,8 @@ def test_damaged_times_are_said_and_the_node_works_all_the_same(attacked, bench,
     bench.remove(attacked.network.node)
     path.write_text(text)
     attacked.network = Network(bench, **attacked.parameters)
-    bench.until(
-        lambda: "is of no use (it holds no times of signing)" in capfd.readouterr().err,
-        "it is said",
-    )
+    told = f"ignoring {path} (it holds no signing times)"
+    bench.until(lambda: told in capfd.readouterr().err, "it is said")
 
 
 def test_times_that_cannot_be_kept_are_a_warning(bench, monkeypatch):

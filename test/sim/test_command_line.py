@@ -322,11 +322,11 @@ def test_a_mistake_is_told_in_one_line(simulator, arguments, said, fail):
 @pytest.mark.parametrize(
     ("simulator", "arguments", "said"),
     [
-        (PARACHUTE, ("--at", "5:error=TIRED"), "'TIRED' is nothing that error can take"),
+        (PARACHUTE, ("--at", "5:error=TIRED"), "'TIRED' is no argument of error"),
         (
             PARACHUTE,
             ("--at", "5:deploy"),
-            "'' is nothing that deploy can take: need deploy=one of MANUAL, ",
+            "'' is no argument of deploy: need deploy=one of MANUAL, ",
         ),
         (PARACHUTE, ("--packed-date", "2024-13-01"), "packed date '2024-13-01' is no date YYYY-"),
         (PARACHUTE, ("--packed-date", "yesterday"), "packed date 'yesterday' is no date YYYY-MM"),
@@ -338,9 +338,9 @@ def test_a_mistake_is_told_in_one_line(simulator, arguments, said, fail):
         (
             AUTOPILOT,
             ("--at", "5:takeoff=high"),
-            "'high' is nothing that takeoff can take: need takeoff=0 to 10000 m",
+            "'high' is no argument of takeoff: need takeoff=0 to 10000 m",
         ),
-        (AUTOPILOT, ("--at", "5:takeoff=nan"), "'nan' is nothing that takeoff can take: need "),
+        (AUTOPILOT, ("--at", "5:takeoff=nan"), "'nan' is no argument of takeoff: need "),
     ],
 )
 def test_a_mistake_in_its_own_options_is_told_too(simulator, arguments, said, fail):

@@ -13,9 +13,7 @@ def run(kind: str, took: float, wrong: str = "") -> Flown:
 def test_the_times_of_several_runs_are_told_with_their_middle_and_ends():
     page = with_autopilot("", [run("PX4", took) for took in (0.9, 0.8, 1.0)])
     assert "## PX4 1.2.3 (abcd)" in page
-    assert (
-        "3 runs, 0 of them not as they must be. Load of the machine meanwhile: 0.0 to 0.0" in page
-    )
+    assert "3 runs, 0 of them wrong. Load of the machine meanwhile: 0.0 to 0.0" in page
     assert (
         "| `motor-30`: one motor dead | 3 | released at 27 m | failure to release 0.90 s "
         "(0.80 to 1.00) | right |"
@@ -24,7 +22,7 @@ def test_the_times_of_several_runs_are_told_with_their_middle_and_ends():
 
 def test_what_was_wrong_stands_in_its_row():
     page = with_autopilot("", [run("PX4", 0.9), run("PX4", 1.4, "late: released after 1.40 s")])
-    assert "2 runs, 1 of them not as they must be." in page
+    assert "2 runs, 1 of them wrong." in page
     assert "**late: released after 1.40 s**" in page
 
 

@@ -74,12 +74,12 @@ def test_success_is_the_devices_own_confirmation() -> None:
     story.at(1.2, story.report(D, Outcome.SENT))
     story.at(1.3, story.report(D, Outcome.ACCEPTED))
     assert story.answers(5) == []
-    story.at(1.4, story.report(D, Outcome.CONFIRMED, detail="PARACHUTE_STATUS says deployed"))
+    story.at(1.4, story.report(D, Outcome.CONFIRMED, detail="PARACHUTE_STATUS reports deployed"))
     assert story.state.stage is Stage.DEPLOYED
     answer = story.answer(5)
     assert answer.success
     assert answer.accepted
-    assert "PARACHUTE_STATUS says deployed" in answer.message
+    assert "PARACHUTE_STATUS reports deployed" in answer.message
 
 
 def test_a_status_that_says_released_is_believed_and_the_report_awaited_for_the_answer() -> None:

@@ -310,7 +310,7 @@ def test_a_release_that_nobody_ordered_and_that_is_taken_back_leaves_the_rules_a
     assert story.state.stage is Stage.DEPLOYED
     story.at(story.t + 0.1, parachute(deployed=False))
     assert story.state.stage is Stage.IN_FLIGHT
-    assert story.alarms()[-1].endswith("1/161 says no more that it is deployed")
+    assert story.alarms()[-1].endswith("1/161 no longer reports deployed")
     story.fall(story.t + 3.0, armed=Armed.DISARMED)
     assert story.fired()[-1] == "DEPLOY"
     story.at(story.t + 0.1, story.heartbeat(), parachute(deployed=True))
@@ -326,7 +326,7 @@ def test_a_device_that_restarts_after_its_own_release_takes_nothing_back() -> No
     packed = parachute(deployed=False)
     story.at(story.t + 0.5, replace(packed, status=replace(packed.status, uptime=0.4)))
     assert story.state.stage is Stage.DEPLOYED
-    assert "a forced deploy goes on" in story.alarms()[-1]
+    assert "a forced deploy continues" in story.alarms()[-1]
     story.fall(story.t + 3.0, armed=Armed.DISARMED)
     assert story.fired() == ["KILL"], "it hangs under the canopy that it had released"
 
@@ -353,8 +353,8 @@ def test_a_device_node_that_restarts_after_the_release_takes_nothing_back() -> N
     assert story.state.stage is Stage.DEPLOYED
     assert len(story.decisions(D)) == 1
     assert story.alarms()[-1] == (
-        "mavlink_parachute 1/161 says no more that it is deployed; a forced deploy goes on with "
-        "the next"
+        "mavlink_parachute 1/161 no longer reports deployed; a forced deploy continues "
+        "with the next"
     )
 
 

@@ -287,7 +287,7 @@ def test_an_imu_without_gravity_is_named_and_forbids_the_take_off() -> None:
     teller.stand(4.0, force=0.2)
     assert teller.story.state.stage is Stage.BLOCKED
     said = teller.story.said()
-    assert "acceleration cannot be used: it tells 0." in said
+    assert "acceleration cannot be used: it reports 0." in said
     assert "while the vehicle stands (need 7.8 to 11.8" in said
     # Then its driver is set right.
     teller.stand(3.0, force=9.8)
@@ -308,7 +308,7 @@ def test_accelerometers_that_differ_forbid_the_take_off() -> None:
     teller = told_to("multirotor")
     teller.stand(1.0, acceleration_spread=9.0)
     assert teller.story.state.stage is Stage.BLOCKED
-    assert "acceleration is told otherwise by another source" in teller.story.said()
+    assert "acceleration is in doubt: another source differs" in teller.story.said()
 
 
 @AIRCRAFT

@@ -62,8 +62,8 @@ def test_a_step_for_a_device_that_is_not_there_blocks_flight() -> None:
     """It would stop the motors and release nothing."""
     step = "deploy_ladder names mavlink_parachute:1/162, which"
     second = replace(GOOD, device="1/162")
-    assert after_hearing() == (f"{step} was never heard (heard: none)",)
-    assert after_hearing(GOOD) == (f"{step} was never heard (heard: 1/161)",)
+    assert after_hearing() == (f"{step} was never received (received: none)",)
+    assert after_hearing(GOOD) == (f"{step} was never received (received: 1/161)",)
     assert after_hearing(GOOD, replace(second, link_state=LinkState.LOST)) == (f"{step} is LOST",)
     assert after_hearing(GOOD, second) == ()
 
@@ -77,7 +77,7 @@ def test_a_step_on_a_link_that_may_be_missing_blocks_nothing_while_it_is() -> No
     assert block_reasons(config, story.state, START) == ()
     story.at(0.1, story.heartbeat(other))
     (reason,) = block_reasons(config, story.state, START + 0.1)
-    assert reason == "deploy_ladder names upf_can:34, which was never heard (heard: none)"
+    assert reason == "deploy_ladder names upf_can:34, which was never received (received: none)"
 
 
 def reasons(story: Story, day: int = TODAY) -> tuple[str, ...]:
@@ -164,7 +164,7 @@ def test_where_today_is_not_known_the_age_of_the_pack_is_not_held_against_it() -
 
 def test_a_wall_clock_that_was_never_set_is_named() -> None:
     told = reasons(standing(), day=0)
-    assert "the wall clock says 1970-01-01 (need 2024-01-01 or later)" in told
+    assert "the wall clock shows 1970-01-01 (need 2024-01-01 or later)" in told
 
 
 def test_flags_in_which_its_node_finds_no_fault_are_not_held_against_it() -> None:
@@ -231,7 +231,7 @@ def test_every_reason_is_told_at_once() -> None:
         "vehicle/state: armed or not is 3.0 s old (limit 2.5 s)",
         "supervisor mode is SHADOW (need ACTIVE)",
         "the vehicle is BLOCKED (need READY)",
-        "the wall clock says 1970-01-01",
+        "the wall clock shows 1970-01-01",
         "1/161: its state is ABNORMAL",
         "1/161: errors GPS_ERROR",
     ):
@@ -241,7 +241,7 @@ def test_every_reason_is_told_at_once() -> None:
 def test_a_regained_link_is_not_yet_good_enough_to_arm() -> None:
     story = standing()
     story.at(5.0, story.heartbeat(), i.VehicleReport(STANDING))
-    assert f"{LINK}: REGAINED, heard again for 0.00 s (need 1 s)" in reasons(story)
+    assert f"{LINK}: REGAINED, received again for 0.00 s (need 1 s)" in reasons(story)
 
 
 def test_disarming_needs_only_the_ground() -> None:
@@ -294,8 +294,8 @@ def test_a_rule_of_another_action_blocks_nothing() -> None:
 
 def test_what_a_vehicle_does_not_tell_is_said_to_be_not_seen() -> None:
     story = Story(shipped("multirotor")).ready()
-    assert "not seen in flight: no target is told" in story.said()
-    assert "no pressure is told" in story.said()
+    assert "not seen in flight: no target is reported" in story.said()
+    assert "no pressure is reported" in story.said()
     assert not any("not seen" in text for text in story.alarms())
 
 

@@ -60,7 +60,7 @@ def test_an_unhealthy_device_is_told_with_its_faults_if_it_has_any(
 @pytest.mark.parametrize(
     ("told", "words"),
     [
-        (LinkState.NEVER_SEEN, "a: its device was never heard"),
+        (LinkState.NEVER_SEEN, "a: nothing received from its device"),
         (LinkState.LOST, "a: its device is LOST (1 hot)"),
     ],
 )
@@ -92,8 +92,8 @@ def test_after_a_kill_or_a_deploy_only_a_reset_unblocks(stage: Stage) -> None:
 def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link() -> None:
     config = SupervisorConfig(required_links=("a",), kill_links=("b",), deploy_links=("c",))
     assert block_reasons(config, standing(c=link()), NOW) == (
-        "a: its node was never heard",
-        "b: its node was never heard",
+        "a: nothing received from its node",
+        "b: nothing received from its node",
     )
     assert block_reasons(config, standing(a=link(), b=link(), c=link()), NOW) == ()
 
@@ -101,7 +101,7 @@ def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link() -> None
 def test_a_vehicle_that_never_told_of_its_motors_blocks_flight() -> None:
     state = replace(standing(a=link()), vehicle=VehicleState())
     assert block_reasons(CONFIG, state, NOW) == (
-        "vehicle/state: whether the motors are armed was never told",
+        "vehicle/state: armed or disarmed was never reported",
     )
 
 
@@ -118,7 +118,7 @@ def test_what_the_vehicle_says_of_its_motors_counts_up_to_its_age(
 @pytest.mark.parametrize(
     ("today", "told"),
     [
-        ("2023-12-31", ("the wall clock says 2023-12-31 (need 2024-01-01 or later)",)),
+        ("2023-12-31", ("the wall clock shows 2023-12-31 (need 2024-01-01 or later)",)),
         ("2024-01-01", ()),
     ],
 )
@@ -130,7 +130,7 @@ def test_a_wall_clock_may_say_the_first_day_and_none_before(
 
 def test_a_wall_clock_that_was_never_set_makes_a_pack_look_like_one_from_the_future() -> None:
     assert arm_reasons(CONFIG, standing(a=link(READY)), 0, NOW) == (
-        "the wall clock says 1970-01-01 (need 2024-01-01 or later)",
+        "the wall clock shows 1970-01-01 (need 2024-01-01 or later)",
         "a 1: packed on 2026-06-01, 20605 days from now",
     )
 

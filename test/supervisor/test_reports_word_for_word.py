@@ -145,7 +145,7 @@ def test_the_picture_of_one_takes_nothing_of_what_is_known_of_its_link() -> None
     assert evidence.heard == START
 
 
-BACK = "mavlink_parachute 1/161 says no more that it is deployed"
+BACK = "mavlink_parachute 1/161 no longer reports deployed"
 
 
 @pytest.mark.parametrize(
@@ -444,7 +444,7 @@ def test_a_newer_epoch_is_overtaken_in_these_words() -> None:
     story = Story().ready()
     old = story.newest(RELEASE)
     story.at(0.1, seen(900))
-    assert "mavlink_parachute has seen epoch 900: going on as 904" in story.said().splitlines()
+    assert "mavlink_parachute has seen epoch 900: continuing as 904" in story.said().splitlines()
     new = story.newest(RELEASE)
     assert (new.epoch, story.state.epoch) == (904, 904)
     assert new.reasons == (*old.reasons, "mavlink_parachute knows a newer epoch")

@@ -35,7 +35,7 @@ def reasons(story: Story) -> str:
 def test_it_forbids_flight_where_nobody_allows_it() -> None:
     story = standing()
     assert story.state.stage is Stage.BLOCKED
-    assert "relay: UNMONITORED, its device never says how it is" in reasons(story)
+    assert "relay: UNMONITORED, its device never reports anything" in reasons(story)
     assert "unmonitored_links" in reasons(story), "what to do is named"
 
 

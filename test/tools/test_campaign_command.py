@@ -104,7 +104,7 @@ def test_one_that_was_interrupted_goes_on_and_counts_the_same(monkeypatch, tmp_p
     assert "goes on" not in capsys.readouterr().err
     in_two = fly_on(monkeypatch, tmp_path / "apart", 8)
     told = capsys.readouterr()
-    assert f"goes on after 3 flights of {tmp_path}" in told.err
+    assert f"continuing after 3 flights of {tmp_path}" in told.err
     assert "8 of 8 flights in" in told.out
     assert in_two == fly_on(monkeypatch, tmp_path / "whole", 8)
 
@@ -152,7 +152,7 @@ def test_a_full_disk_does_not_end_the_flights(monkeypatch, tmp_path, capsys):
     fly_on(monkeypatch, tmp_path, 2)
     told = capsys.readouterr()
     assert "2 of 2 flights in" in told.out
-    assert "not kept: [Errno 28] No space left on device" in told.err
+    assert "not saved: [Errno 28] No space left on device" in told.err
 
 
 def full_disk(*_):
@@ -216,7 +216,7 @@ def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_pa
     taken.write_text("")
     with pytest.raises(SystemExit):
         run(monkeypatch, "--flights", "1", "--jobs", "1", "--failures", str(taken))
-    assert "not saved, name another folder with --failures: " in capsys.readouterr().out
+    assert "not saved (name another folder with --failures): " in capsys.readouterr().out
 
 
 @contextlib.contextmanager

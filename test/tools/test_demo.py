@@ -99,12 +99,12 @@ def test_with_a_upf_parachute_its_own_algorithm_fires_after_the_kill(runs):
     code, out, err, folder = runs["upf"]
     assert code == 0, out + err
     story = [
-        "upf_can 33 heard",
+        "upf_can 33 received",
         "upf_can 33 armed",
         "MOTOR FAILURE at",
         "KILL (upf_can 33: it is about to launch (TYPE_KILLSWITCH)",
         "KILL CONFIRMED",
-        "its own status says deployed",
+        "its own status reports deployed",
         "CANOPY OPEN",
         "DEMO PASSED",
     ]
@@ -139,8 +139,8 @@ def test_a_rocket_flies_to_its_landing_under_the_canopies_that_were_called_for(r
         "IN_FLIGHT",
         "burnout at",
         "and no drogue",
-        "KILL CONFIRMED: telemetry says mav_open 0",
-        "DEPLOY CONFIRMED: telemetry says ssa_drogue_deployed 1",
+        "KILL CONFIRMED: telemetry reports mav_open 0",
+        "DEPLOY CONFIRMED: telemetry reports ssa_drogue_deployed 1",
         "MAIN at",
         "LANDED at",
         "DEMO PASSED",

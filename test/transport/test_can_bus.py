@@ -90,8 +90,8 @@ def test_a_line_that_is_no_frame_is_counted_by_its_kind_and_the_wire_lives(
         # Cut off behind a whole byte: the frame would be another, shorter one.
         b"T00000001801": "frames of a wrong length",
         b"T000000019" + b"00" * 9: "frames of a wrong length",
-        b"T200000000": "identifiers that no CAN frame has",
-        b"t8000": "identifiers that no CAN frame has",
+        b"T200000000": "impossible CAN identifiers",
+        b"t8000": "impossible CAN identifiers",
         b"d1230": "CAN FD frames",
         b"B000000019" + b"00" * 12: "CAN FD frames",
         b"\xff\xfe": "bad frames: Could not read from serial device",
@@ -118,10 +118,10 @@ def test_an_adapter_that_delivers_nothing_but_garbage_is_opened_again(adapter, p
         adapter.deliver(*[b"T123"] * 150)
         await_until(lambda: len(node.changes) == 3, "it is closed, and opened again")
         assert [change.is_open for change in node.changes] == [True, False, True]
-        assert "nothing but failures, the last one: " in node.changes[1].text
+        assert "only failures, the last one: " in node.changes[1].text
         await_until(lambda: adapter.commands[-2:] == [b"C", b"O"], "the adapter has seen it")
         adapter.deliver(*LINES)
-        await_until(lambda: node.frames == FRAMES, "it is heard again")
+        await_until(lambda: node.frames == FRAMES, "it is received again")
 
 
 def test_unplugged_and_plugged_in_again_at_the_same_path(adapter, path, await_until):
@@ -142,7 +142,7 @@ def test_unplugged_and_plugged_in_again_at_the_same_path(adapter, path, await_un
             assert again.channel_open.wait(20.0)
             assert b"S6" in again.commands, "and is told its bitrate again"
             again.deliver(LINES[1])
-            await_until(lambda: node.frames == FRAMES[:2], "it is heard again")
+            await_until(lambda: node.frames == FRAMES[:2], "it is received again")
             node.send_frame(FRAMES[2])
             await_until(lambda: again.sent == LINES[2:3], "it is sent to again")
         finally:
@@ -162,7 +162,7 @@ def test_a_second_reader_of_the_adapters_port_is_named_and_the_bus_is_kept(
 
             await_until(told, "it is told")
             (trouble,) = told()
-            assert "has a second reader, which takes a part of what comes" in trouble.text
+            assert "has a second reader, which takes part of the data" in trouble.text
             assert other.name in trouble.text
             assert [change.is_open for change in node.changes] == [True]
         finally:

@@ -150,7 +150,7 @@ def test_a_bad_packet_is_counted_by_its_kind_and_the_wire_lives(bus, stranger, a
         "packets of another kind": [packet(1, b"x", magic=0x2935), b"GET / HTTP/1.1\r\n"],
         "packets with a wrong CRC": [good[:-1] + b"D", good[:-1]],
         "CAN FD frames": [packet(1, bytes(64), flags=1), packet(1, b"", flags=1)],
-        "identifiers that no CAN frame has": [packet(0x800, b"")],
+        "impossible CAN identifiers": [packet(0x800, b"")],
         "error frames": [packet(0x20000040, bytes(8))],
     }
     with running_can(bus.connection) as node:

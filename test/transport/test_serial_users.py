@@ -73,7 +73,7 @@ def test_a_second_reader_is_named_and_the_port_is_kept(device, program, await_un
         assert len(troubles(node)) == 1, "once"
         (text,) = troubles(node)
         assert other.name in text
-        assert "has a second reader, which takes a part of what comes" in text
+        assert "has a second reader, which takes part of the data" in text
         assert node.wire.is_open
         assert [change.is_open for change in node.changes] == [True], "never closed, nor reopened"
         other.end()

@@ -48,7 +48,7 @@ def test_clients_that_send_no_frame_lose_their_places_to_true_ones(node, await_u
         assert true.recv(100) == b"to you"
     told = [event.text for event in node.delivered if isinstance(event, WireTrouble)]
     assert len(told) == 1, "once, however many there are"
-    assert "a client sent no frame that counts here for 0.5 s and was disconnected" in told[0]
+    assert "a client sent no accepted frame for 0.5 s and was disconnected" in told[0]
     for client in idle:
         client.close()
 

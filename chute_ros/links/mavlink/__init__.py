@@ -25,7 +25,7 @@ LINK = LinkKind(
     description="a parachute on a MAVLink network, and the autopilot there",
     node=f"{_FOLDER}.node:MavlinkParachuteNode",
     parameters=f"{_FOLDER}.parameters:MavlinkParameters",
-    argument=Argument("connection", "where the MAVLink network is"),
+    argument=Argument("connection", "address of the MAVLink network"),
     vehicles=(
         VehicleKind(
             "mavlink", "a MAVLink parachute, all as delivered", (AUTOPILOT_LINK,), {}, often=4

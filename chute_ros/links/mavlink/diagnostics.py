@@ -1,4 +1,4 @@
-"""What /diagnostics says of a MAVLink link: the wire, each parachute, the autopilot."""
+"""/diagnostics of a MAVLink link: the wire, each parachute, the autopilot."""
 
 from __future__ import annotations
 
@@ -71,8 +71,8 @@ def link_task(
     """The wire, and what was dropped on it."""
     values = {
         **traffic,
-        "acknowledgements that came late": details.late_acknowledgements,
-        "heartbeats of devices beyond the sixteen that are followed": details.not_followed,
+        "late acknowledgements": details.late_acknowledgements,
+        "heartbeats of devices beyond the limit of sixteen": details.not_followed,
     }
     return diagnostics.wire_task(
         name, wire, details.doubts, details.received, values, details.dropped
@@ -112,7 +112,7 @@ def autopilot_task(name: str, details: Details) -> DiagnosticStatus:
     vehicle = details.vehicle
     level, text = diagnostics.OK, f"{vehicle.armed.name}, {vehicle.landed_state.name}"
     if vehicle.link_state is model.LinkState.NEVER_SEEN:
-        level, text = diagnostics.STALE, "never heard"
+        level, text = diagnostics.STALE, "never received"
     elif vehicle.link_state is not model.LinkState.OK:
         level, text = diagnostics.ERROR, f"heartbeat {vehicle.link_state.name}"
     elif vehicle.rebooted_in_flight:
@@ -131,7 +131,7 @@ def autopilot_task(name: str, details: Details) -> DiagnosticStatus:
         "restarts": vehicle.reboot_count,
         "rates (Hz)": ", ".join(f"{kind} {hz:.1f}" for kind, hz in sorted(details.rates.items())),
         "answers after (s, TIMESYNC)": details.round_trip,
-        "not seen": "; ".join(not_seen(details.rates)),
+        "not detected": "; ".join(not_seen(details.rates)),
     }
     return diagnostics.status(name, "autopilot", level, text, values, vehicle.source)
 
@@ -148,17 +148,17 @@ _SIGHTS = (
     ),
     (
         ("ATTITUDE_TARGET",),
-        "no ATTITUDE_TARGET: an attitude that was commanded looks like one that was not",
+        "no ATTITUDE_TARGET: a commanded attitude looks like an accident",
     ),
     (
         ("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED", "NAV_CONTROLLER_OUTPUT"),
-        "no targets: a level sink that nobody commanded raises an alarm only",
+        "no targets: an uncommanded level sink raises only an alarm",
     ),
 )
 
 
 def not_seen(rates: Mapping[str, float]) -> list[str]:
-    """What the supervisor does not see, as these messages do not come."""
+    """Accidents that the supervisor does not detect without these messages."""
     return [text for kinds, text in _SIGHTS if not any(kind in rates for kind in kinds)]
 
 

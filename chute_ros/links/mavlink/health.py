@@ -34,14 +34,14 @@ def health(
 
 
 _NO_PARACHUTE = (
-    "no parachute was heard: check its power and wiring, parachute_system_id, and that its "
-    "HEARTBEAT (type MAV_TYPE_PARACHUTE, 43) comes through to this connection"
+    "no parachute was received: check its power and wiring, parachute_system_id, and that its "
+    "HEARTBEAT (type MAV_TYPE_PARACHUTE, 43) reaches this connection"
 )
 
 _HEARTBEATS_ALONE = (
-    "sends heartbeats and no PARACHUTE_STATUS (430), though asked for it: check its firmware, and "
-    "that what passes its messages on (a router; ArduPilot with MAVn_OPTIONS bit 3; PX4 does not) "
-    "lets it through"
+    "sends heartbeats but no PARACHUTE_STATUS (430), although requested: check its "
+    "firmware, and that every router on the way passes it on (ArduPilot does with "
+    "MAVn_OPTIONS bit 3; PX4 does not)"
 )
 
 
@@ -64,7 +64,7 @@ def _autopilot(vehicle: model.VehicleState) -> str:
     """Why no kill can be ordered; empty: it can."""
     if vehicle.link_state is model.LinkState.NEVER_SEEN:
         return (
-            "no autopilot was heard that a kill could go to: check its wiring, "
+            "no autopilot was received to send a kill to: check its wiring, "
             "autopilot_system_id and autopilot_component_id"
         )
     if vehicle.link_state is not model.LinkState.OK:

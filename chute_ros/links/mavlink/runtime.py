@@ -1,4 +1,4 @@
-"""What mavlink_parachute does with decisions, and when its device is healthy."""
+"""Decisions carried out by mavlink_parachute, and the health of its device."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.settings import nested, parameter
 
 #: How a flight block is reported by a node that must leave arming alone.
-_NOT_UNDONE = "noted; arming is left alone, as disarm_when_blocked says"
+_NOT_UNDONE = "noted; arming is not undone (disarm_when_blocked is false)"
 
 
 @dataclass(frozen=True)
@@ -61,4 +61,4 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         elif decision.action is not Action.NONE:
             undone = self.settings.link.disarm_when_blocked
             blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
-            self.carry_out_flight_block(decision, blocked, "arming is left alone")
+            self.carry_out_flight_block(decision, blocked, "arming is not undone")

@@ -45,8 +45,8 @@ class SigningMemory:
             pass  # the first start
         except (OSError, ValueError) as error:
             node.get_logger().warning(
-                f"{path} is of no use ({error}): what was recorded in the last minute may be "
-                "replayed to this node until its devices are heard"
+                f"ignoring {path} ({error}): frames recorded in the last minute may "
+                "be replayed to this node until its devices are received"
             )
         self.signer, self.verifier = signing_from_file(
             values["signing_key_file"], self._link_id, "parameter signing_key_file", before
@@ -68,15 +68,16 @@ class SigningMemory:
     def task(self, name: str) -> DiagnosticStatus:
         """For diagnostics."""
         if self._file is None:
-            text = "off: whoever reaches this wire can speak as the parachute or the autopilot"
+            text = "off: anybody on this wire can imitate the parachute or the autopilot"
             return diagnostics.status(name, "signing", diagnostics.OK, text, {}, "")
-        level, text = diagnostics.OK, "on: every frame is signed, and dropped if it is not"
+        level = diagnostics.OK
+        text = "on: every frame sent is signed, every unsigned frame received is dropped"
         if self._file.trouble:
             level = diagnostics.WARN
-            text = f"on; its times cannot be kept for a restart: {self._file.trouble}"
+            text = f"on; its times cannot be saved for a restart: {self._file.trouble}"
         values = {
             "link id": self._link_id,
-            "times are kept in": str(self._file.path),
+            "times are saved in": str(self._file.path),
             "times written": self._file.times_written,
         }
         return diagnostics.status(name, "signing", level, text, values, "")
@@ -104,7 +105,7 @@ def times_from(text: str) -> Times:
             return times
     except (AttributeError, LookupError, TypeError, ValueError, RecursionError):
         pass  # said below
-    raise ValueError("it holds no times of signing")
+    raise ValueError("it holds no signing times")
 
 
 def _stream(name: str) -> tuple[int, int, int]:

@@ -24,7 +24,7 @@ LINK = LinkKind(
     description="a parachute without telemetry, fired by a relay, GPIO or PWM output",
     node=f"{_FOLDER}.node:RelayNode",
     parameters=f"{_FOLDER}.parameters:RelayParameters",
-    argument=Argument("output", "the output that fires a parachute without telemetry"),
+    argument=Argument("output", "output that fires a parachute without telemetry"),
     vehicles=(
         VehicleKind(
             "relay",

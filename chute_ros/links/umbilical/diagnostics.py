@@ -1,4 +1,4 @@
-"""What /diagnostics says of an umbilical: the port, the flight computer, our heartbeat, memory."""
+"""/diagnostics of an umbilical: the port, the flight computer, our heartbeat, memory."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def port_task(
     """The port, and what was dropped on it."""
     troubles = []
     if details.received_bytes and not details.records:
-        troubles.append("bytes come, but no telemetry record yet")
+        troubles.append("bytes are received, but no telemetry record yet")
     values = {
         "bytes received": details.received_bytes,
         "records": details.records,

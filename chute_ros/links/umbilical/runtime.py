@@ -1,4 +1,4 @@
-"""What umbilical does with decisions, and when the flight computer is healthy."""
+"""Decisions carried out by umbilical, and the health of the flight computer."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ LINK = LinkKind(
     description="a Flyfire UPF parachute on a DroneCAN bus",
     node=f"{_FOLDER}.node:UpfCanNode",
     parameters=f"{_FOLDER}.parameters:UpfParameters",
-    argument=Argument("bus", "where the CAN bus of a UPF is"),
+    argument=Argument("bus", "address of the CAN bus of a UPF"),
     vehicles=(
         VehicleKind(
             "upf",

@@ -57,7 +57,7 @@ class AllocationFile:
     def _unusable(self, why: str) -> ParameterError:
         return ParameterError(
             f"parameter allocation_table_file: {self.path} cannot be used: {why}; repair it, or "
-            "move it away to begin anew with no device on the bus"
+            "move it away and start with no device on the bus"
         )
 
 

@@ -1,4 +1,4 @@
-"""What /diagnostics says of a UPF link: the bus, the devices, what they asked of the vehicle."""
+"""/diagnostics of a UPF link: the bus, the devices, their requests to the vehicle."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def details_of(link: UpfLink, now: float) -> Details:
         allocation_left_to=bus.allocator.left_to,
         time_master=bus.time.is_master(now),
         data_types={
-            "fields that are not told here": ", ".join(link.definitions.absent),
-            "fields that are new here": ", ".join(link.definitions.new),
+            "fields missing here": ", ".join(link.definitions.absent),
+            "fields new here": ", ".join(link.definitions.new),
         },
     )
 
@@ -114,16 +114,16 @@ def device_tasks(name: str, details: Details, without_controller: bool) -> list[
     ]
     if without_controller or any(one.kind == Controller.kind for one in details.devices):
         return heard
-    told = "never heard, and without it there is no parachute here (controller_node_id: "
+    told = "never received, and without it this link has no parachute (controller_node_id: "
     told += "its node id, or 0; without_controller: true where the vehicle has none)"
     return [diagnostics.status(name, Controller.kind, diagnostics.ERROR, told, {}, ""), *heard]
 
 
 def vehicle_service_task(name: str, details: Details) -> DiagnosticStatus:
-    """What devices asked of the vehicle, and what they were answered."""
+    """Requests of devices to the vehicle, and their answers."""
     failed = details.newest_answer.endswith(("FAILED", "BAD_MAGIC_NUMBER"))
     level = diagnostics.WARN if failed else diagnostics.OK
-    text = details.newest_answer or "nothing was asked for yet"
+    text = details.newest_answer or "nothing was requested yet"
     values = dict(sorted(details.asked.items()))
     return diagnostics.status(name, "vehicle service", level, text, values, "")
 
@@ -133,7 +133,7 @@ def allocation_task(name: str, details: Details, path: str) -> DiagnosticStatus:
     level = diagnostics.WARN if details.refusal else diagnostics.OK
     text = details.refusal or f"{len(details.given)} node ids given out"
     if details.allocation_left_to:
-        level, text = diagnostics.OK, f"left to node {details.allocation_left_to}, which does it"
+        level, text = diagnostics.OK, f"node {details.allocation_left_to} gives out node ids"
     return diagnostics.status(name, "node ids", level, text, {**details.given, "file": path}, "")
 
 
@@ -141,8 +141,8 @@ def _controller(link: UpfLink, one: Controller, now: float) -> DeviceDetails:
     values: dict[str, object] = {
         "state": one.state.name,
         "in this state for (s)": now - one.state_since,
-        "changes of state that the document does not know": one.unknown_jumps,
-        "the newest of them": one.newest_unknown_jump,
+        "changes of state that are not in the document": one.unknown_jumps,
+        "newest such change": one.newest_unknown_jump,
         "height (m)": one.number("height_of_home"),
         "backup supply (V)": one.number("backup_power_voltage"),
     }

@@ -127,10 +127,10 @@ class UpfCanNode(DeviceNode):
         except OSError as error:
             # Without a kept table nobody gets a node id: the device asks again and again.
             self.get_logger().error(
-                f"the table of node ids cannot be kept, none is given out: {error}",
+                f"the table of node ids cannot be saved, no id is given out: {error}",
                 throttle_duration_sec=5.0,
             )
             return
-        self.get_logger().info(f"node ids kept: {sorted(event.table.values())}")
+        self.get_logger().info(f"node ids saved: {sorted(event.table.values())}")
         if (loop := self.loop) is not None:
             loop.call(lambda link, now: link.table_kept(event.number, now))

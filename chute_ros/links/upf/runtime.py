@@ -1,4 +1,4 @@
-"""What upf_can does with decisions and for its device, and when that is healthy."""
+"""Decisions carried out by upf_can, its device's requests, and the health of the device."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
 
     def event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):
-            text = f"{event.device} asks the supervisor for {event.ask.name}: {event.reason}"
+            text = f"{event.device} requests {event.ask.name} from the supervisor: {event.reason}"
             lets_go = event.ask is Ask.FLIGHT_BLOCK_RELEASE
             self.shell.log(Notice(Severity.INFO if lets_go else Severity.WARNING, text))
         elif isinstance(event, ErrandFinished):

@@ -125,7 +125,7 @@ class Allocator:
             return
         unique_id, self._query = self._query, b""
         if not all_discovered:
-            self.refusal = "not every node has said who it is yet"
+            self.refusal = "not every node has identified itself yet"
             return
         self._allocate(unique_id, int(values["node_id"]), in_use, now)
 
@@ -182,7 +182,7 @@ class Allocator:
             if self._on_duty:
                 self.other = 0
             else:
-                self.refusal = "waiting whether another allocator answers"
+                self.refusal = "waiting for another allocator to answer"
         return self._on_duty
 
     def _allocate(

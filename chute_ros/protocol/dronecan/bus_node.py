@@ -195,7 +195,7 @@ class BusNode:
         elif request.name == "uavcan.protocol.param.GetSet":
             self.endpoint.respond(request, {})
         else:
-            self.endpoint.counts["requests that we do not serve"] += 1
+            self.endpoint.counts["requests that this node does not serve"] += 1
 
     def _information(self, now: float) -> dict[str, object]:
         major, minor = _SOFTWARE_VERSION
@@ -227,10 +227,13 @@ class BusNode:
         """Once each time it changes. before: the node that did."""
         now = self.allocator.left_to
         if now and now != before:
-            text = f"node {now} gives out node ids: it is left to it (parameter allocator)"
+            text = f"node {now} gives out node ids, so this node does not (parameter allocator)"
             self._events.append(Notice(Severity.INFO, text))
         elif before and not now:
-            text = f"node {before} answers no request for a node id any more: given out here again"
+            text = (
+                f"node {before} no longer answers requests for a node id: this node gives "
+                "them out again"
+            )
             self._events.append(Notice(Severity.WARNING, text))
 
     def _answer_allocations(self) -> None:
@@ -246,7 +249,7 @@ class BusNode:
                 self._events.append(Notice(Severity.ERROR, text))
         for key, text in self._troubles.items():
             if key not in now_wrong:
-                self._events.append(Notice(Severity.INFO, f"over: {text}"))
+                self._events.append(Notice(Severity.INFO, f"resolved: {text}"))
         self._troubles = now_wrong
 
     def _find_trouble(self, now: float) -> dict[str, str]:
@@ -259,8 +262,8 @@ class BusNode:
             found["own id"] = f"another node uses our node id {own}: set node_id to a free one"
         if endpoint.bus_off:
             found["bus-off"] = (
-                "the CAN controller is bus-off (wiring, bit rate, resistor?); "
-                "a restart time brings it back: ip link set canX type can restart-ms 100"
+                "the CAN controller is bus-off (wiring, bit rate, resistor?); set a "
+                "restart time to recover: ip link set canX type can restart-ms 100"
             )
         rivals = self.config.allocator and not self.config.allocator_yields
         if rivals and self.allocator.another_is_there(now):

@@ -152,9 +152,9 @@ class ServiceCalls:
                 return
         late = self._given_up.pop((server, service, transfer_id), None)
         if late is None or now - late[1] >= _UNANSWERED:
-            self.counts["responses that nobody waited for"] += 1
+            self.counts["unexpected responses"] += 1
         else:
-            self.counts["responses that came too late"] += 1
+            self.counts["late responses"] += 1
             # Nobody waits for it any more; whoever reads answers may still want to know.
             self._read(CallFinished(0, late[0], values, 0, 0.0))
 

@@ -167,7 +167,7 @@ class Assembler:
         if head.kind is not Kind.MESSAGE and 0 in (head.source, head.destination):
             return self._drop("services from or to nobody")
         if self._types.by_id(head.type_id, head.kind.value) is None:
-            return self._drop("transfers of types that are not known")
+            return self._drop("transfers of unknown types")
         if head.source == 0:
             return self._anonymous(head, frame)
         return self._next(head, frame, now)
@@ -203,7 +203,7 @@ class Assembler:
                 newest = session.done[-1][0] == head.transfer_id
                 anew = newest and tail & _END and session.said not in (b"", chunk)
                 if not anew:
-                    return self._drop("transfers that came twice")
+                    return self._drop("duplicate transfers")
             tells_a_state = head.kind is Kind.MESSAGE and head.type_id != _NODE_STATUS
             if tells_a_state and session.is_old_news(head.transfer_id, now):
                 return self._drop("messages that a newer one has overtaken")

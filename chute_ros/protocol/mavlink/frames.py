@@ -30,7 +30,7 @@ LONGEST_FRAME_TIME = 0.3  # s
 #: Reasons under which received bytes are dropped.
 NOISE = "bytes that are no MAVLink frame"
 BAD_CHECKSUM = "frame with a wrong checksum"
-UNKNOWN_MESSAGE = "frame of a message that the dialect does not know"
+UNKNOWN_MESSAGE = "frame of a message unknown to the dialect"
 UNKNOWN_FLAGS = "frame with incompatible flags"
 TRUNCATED = "datagram that ends inside a frame"
 

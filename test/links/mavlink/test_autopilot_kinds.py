@@ -47,7 +47,7 @@ class Rig:
         vehicle = f"udpout:{LOCAL}:{port_of(autopilot.loop)}"
         bench.simulate(self.module, network, vehicle)
         bench.until(lambda: self.beats and self.beats[-1].device_healthy, "the parachute is well")
-        bench.until(lambda: self.vehicle, "the autopilot is heard")
+        bench.until(lambda: self.vehicle, "the autopilot is received")
 
     def decide(self, action):
         message = SafetyDecision(
@@ -108,7 +108,7 @@ def test_a_kill_that_an_aeroplane_refuses_is_followed_by_the_other_way(bench):
     assert not autopilot.model.armed
     (refused,), (forced,) = autopilot.heard_command(TERMINATE), autopilot.forced
     assert refused[0] < forced[0]
-    assert "kill (forced_disarm): the autopilot says motors off" in report.detail
+    assert "kill (forced_disarm): the autopilot reports motors off" in report.detail
     assert "kill (flight_termination): failed" in report.detail
 
 
@@ -131,7 +131,7 @@ def test_a_deploy_over_motors_that_turn_says_so_in_its_answer(bench):
     Rig(bench, autopilot)
     answer = bench.call(Deploy, "mavlink_parachute/deploy", reason="a test")
     assert answer.success
-    assert "WARNING: autopilot 1/1 says that it is armed" in answer.message
+    assert "WARNING: autopilot 1/1 reports armed: the motors may turn" in answer.message
 
 
 # What is said before flight
@@ -169,8 +169,8 @@ def test_a_setting_that_makes_the_kill_impossible_forbids_take_off(bench):
 @pytest.mark.parametrize(
     ("settings", "expect", "reason"),
     [
-        (None, True, "no parachute was heard"),
-        (None, False, "no autopilot was heard that a kill could go to"),
+        (None, True, "no parachute was received"),
+        (None, False, "no autopilot was received to send a kill to"),
         (ParachuteSettings(errors=8), True, "1/161 LOW_POWER"),
         (ParachuteSettings(system_status=1), True, "1/161 is NOT_READY"),
         (ParachuteSettings(deployment=2), True, "1/161 is released"),
@@ -195,7 +195,7 @@ def test_a_parachute_of_heartbeats_alone_is_said_with_what_to_do(bench):
     del module.default_intervals[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS]
     del module.streams[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS]
     bench.simulate(module, f"udpout:{LOCAL}:{port_of(node.loop)}")
-    told = "1/161 sends heartbeats and no PARACHUTE_STATUS (430)"
+    told = "1/161 sends heartbeats but no PARACHUTE_STATUS (430)"
     bench.until(lambda: beats and any(told in text for text in beats[-1].reasons), "it is said")
     assert "check its firmware" in beats[-1].reasons[0]
 

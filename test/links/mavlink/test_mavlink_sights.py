@@ -49,8 +49,8 @@ def test_diagnostics_tell_rates_and_what_is_not_seen(bench):
         return status if status and "GLOBAL_POSITION_INT" in value(status, "rates (Hz)") else None
 
     status = bench.until(autopilot, "the rates are told")
-    assert "no SCALED_PRESSURE: a wrong estimator" in value(status, "not seen")
-    assert "a level sink that nobody commanded" in value(status, "not seen")
+    assert "no SCALED_PRESSURE: a wrong estimator" in value(status, "not detected")
+    assert "an uncommanded level sink" in value(status, "not detected")
     bench.until(
         lambda: value(told(diagnostics, "autopilot"), "answers after (s, TIMESYNC)") != "nan",
         "two answers came",
@@ -67,7 +67,7 @@ def test_a_stream_that_is_too_slow_is_named_in_the_state_and_in_diagnostics(benc
     state = bench.until(lambda: states and states[-1].faults and states[-1], "it is told")
     (fault,) = state.faults
     assert fault.startswith("GLOBAL_POSITION_INT comes at 2.")
-    assert "(need 5 Hz): something else sets its rate, or the line is full: " in fault
+    assert "(need 5 Hz): another program sets its rate, or the line is full: " in fault
     bench.until(
         lambda: (status := told(diagnostics, "autopilot")) and status.level == b"\x02",
         "diagnostics tell it as well",
@@ -88,7 +88,7 @@ def test_two_autopilots_with_the_same_ids_forbid_take_off(bench):
     bench.until(lambda: beats[-1].reasons, "two are an error")
     assert not beats[-1].device_healthy
     (reason,) = beats[-1].reasons
-    assert reason.startswith("two autopilots are 1/1 (their clocks are ")
+    assert reason.startswith("two autopilots have the ids 1/1 (their clocks are ")
     assert states[-1].reboot_count <= 1
     assert math.isfinite(states[-1].height)
 
@@ -97,6 +97,6 @@ def test_a_parachute_that_is_not_ready_has_its_reason_in_the_heartbeat(bench):
     network = Network(bench)
     beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
     bench.until(lambda: beats, "they come")
-    assert beats[-1].reasons[0].startswith("no parachute was heard: check its power")
+    assert beats[-1].reasons[0].startswith("no parachute was received: check its power")
     network.plug(Module(ParachuteSettings(deployment=4)))
     bench.until(lambda: "1/161 is released" in beats[-1].reasons, "a released one is no parachute")

@@ -71,7 +71,7 @@ def test_who_does_not_sign_with_the_key_is_not_heard_but_counted(bench, key_file
     bench.until(counted, "it is counted")
     links = [s for array in diagnostics for s in array.status if s.name.endswith(": link")]
     assert links[-1].level == DiagnosticStatus.ERROR
-    assert f"what comes cannot be read, mostly: {reason} (" in links[-1].message
+    assert f"the received data cannot be read, mostly: {reason} (" in links[-1].message
     assert {beat.link_state for beat in beats} == {LinkState.NEVER_SEEN}
     assert not bench.call(Arm, "mavlink_parachute/arm", arm=True).success
 

@@ -81,7 +81,7 @@ def test_nobody_flies_with_it_who_has_not_said_so(bench: Bench) -> None:
     flight = Flight(bench, unmonitored_links=[""])
     flight.board.plug_in()
     flight.await_stage(SafetyState.BLOCKED)
-    text = "relay: UNMONITORED, its device never says how it is"
+    text = "relay: UNMONITORED, its device never reports anything"
     bench.until(
         lambda: any(text in reason for reason in flight.safety[-1].block_reasons),
         "the reason is told",
@@ -111,7 +111,7 @@ def test_an_output_that_is_pulled_out_forbids_take_off(bench: Bench, away: bool)
     flight.await_stage(SafetyState.BLOCKED)
     bench.until(
         lambda: any(
-            "relay: its device is" in one or "never heard" in one
+            "relay: its device is" in one or "nothing received from its device" in one
             for one in flight.safety[-1].block_reasons
         ),
         "the reason is told",

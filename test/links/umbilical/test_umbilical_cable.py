@@ -73,7 +73,7 @@ def test_many_pulled_cables_leave_nothing_behind(bench, monkeypatch, pulls):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_any_garbage_is_counted_and_dropped_and_the_next_record_is_told(bench, seed):
-    """Given a cable with noise on it, when telemetry comes after all, then it is told."""
+    """Given a cable with noise on it, when telemetry is received after all, then it is told."""
     chance = random.Random(seed)
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     cable = Cable(bench, FlightComputerSettings(rate=RATE), **PATIENT)

@@ -235,7 +235,9 @@ def test_diagnostics_tell_the_truth_through_a_day_with_a_cable(bench):
     cable = Cable(bench)
     bench.until(lambda: newest(diagnostics, "link").level == ERROR, "no port")
     assert "no such port" in newest(diagnostics, "link").message
-    bench.until(lambda: newest(diagnostics, "parachute").message == "never heard", "never heard")
+    bench.until(
+        lambda: newest(diagnostics, "parachute").message == "never received", "never received"
+    )
     bench.until(
         lambda: "the port is closed" in newest(diagnostics, "umbilical heartbeat").message,
         "no heartbeat without a port",

@@ -80,8 +80,8 @@ def test_what_the_data_types_do_not_tell_is_nan_and_not_zero(bench):
         assert math.isnan(getattr(told, name)) == gone, name
     bench.until(lambda: "controller 33" in tasks(diagnostics), "it has a task")
     said = values(tasks(diagnostics)["link"])
-    assert said["fields that are not told here"] == ", ".join(absent)
-    assert said["fields that are new here"] == ", ".join(network.definitions.new)
+    assert said["fields missing here"] == ", ".join(absent)
+    assert said["fields new here"] == ", ".join(network.definitions.new)
     new = [one for one in network.definitions.new if one.startswith(f"{PARACHUTE_STATUS}.")]
     shown = values(tasks(diagnostics)["controller 33"])
     assert {f"new field {one.rpartition('.')[2]}" for one in new} <= set(shown)

@@ -34,9 +34,9 @@ def test_diagnostics_say_what_is_missing_and_what_is_there(bench):
     }
     assert (said["link"].level, said["parachute"].level) == (WARN, STALE)
     assert said["link"].message == f"{network.connection} is open, nothing received yet"
-    assert said["parachute"].message == "never heard"
+    assert said["parachute"].message == "never received"
     assert said["supervisor"].level == STALE
-    assert said["vehicle service"].message == "nothing was asked for yet"
+    assert said["vehicle service"].message == "nothing was requested yet"
     assert said["node ids"].message == "0 node ids given out"
     devices = Devices(network)
     well = {"link", "controller 33", "trigger 34", "vehicle service", "node ids"}
@@ -85,7 +85,7 @@ def test_a_launch_that_nobody_ordered_is_told_by_its_reason(bench):
     party = network.party(34)
     state = network.definitions.constant(TRIGGER_STATUS, "STATE_LAUNCHED")
     party.say(TRIGGER_STATUS, state=state)
-    reason = "dropped: launched that nobody ordered, not believed yet"
+    reason = "dropped: launched without an order, not believed yet"
     bench.until(
         lambda: (
             "trigger 34" in tasks(diagnostics)
@@ -124,4 +124,4 @@ def test_a_controller_that_is_missing_beside_its_trigger_is_an_error(
     assert ("controller" in said) is not without_controller
     if not without_controller:
         assert said["controller"].level == ERROR
-        assert said["controller"].message.startswith("never heard, and without it")
+        assert said["controller"].message.startswith("never received, and without it")

@@ -126,7 +126,7 @@ def test_without_a_place_for_the_table_nothing_is_given_out_until_there_is_one(b
     trigger = network.trigger(**DYNAMIC)
     party = network.party()
     network.plug(trigger)
-    refusal = "the table of node ids cannot be kept, none is given out"
+    refusal = "the table of node ids cannot be saved, no id is given out"
     bench.until(lambda: any(refusal in one.msg for one in said), "it is told")
     assert trigger.node_id == 0
     whole = [one for one in party.values(MESSAGE) if len(one["unique_id"]) == 16]
@@ -182,7 +182,7 @@ def test_an_autopilot_that_gives_out_node_ids_is_left_to_it(bench, tmp_path):
             answered.append(one)
             autopilot.say(MESSAGE, unique_id=bytes(one.values["unique_id"]), node_id=0)
         task = tasks(diagnostics).get("node ids")
-        return task and task.message == "left to node 10, which does it"
+        return task and task.message == "node 10 gives out node ids"
 
     bench.until(left, "it is told")
     link = tasks(diagnostics)["link"]

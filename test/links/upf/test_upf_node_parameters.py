@@ -212,7 +212,7 @@ def test_types_that_lack_what_fires_are_refused_with_the_list(
     ]
     path.write_text("\n".join(kept) + "\n")
     text = refusal(bench, dsdl_path=str(folder))
-    assert "the flyfire data types lack what is needed to fire or to answer" in text
+    assert "the flyfire data types lack names needed to fire or to answer" in text
     assert f"flyfire.{file.partition('.')[2]}" in text
     for one in lacking:
         assert one in text

@@ -122,8 +122,8 @@ def test_a_command_that_is_none_is_refused_with_those_that_are(bench, devices, n
 def test_a_command_to_what_is_no_controller_is_refused(bench, devices, number, node_id):
     answer = command(bench, number, node_id=node_id)
     assert not answer.success
-    assert f"no controller {node_id} was heard on this link (heard: 33" in answer.message
-    assert "triggers heard: 34" in answer.message
+    assert f"no controller {node_id} was received on this link (received: 33" in answer.message
+    assert "triggers received: 34" in answer.message
     assert not devices.trigger.fired
 
 
@@ -168,7 +168,7 @@ def test_what_was_not_saved_is_gone_after_a_restart_and_what_was_is_not(bench, d
     assert call(bench, SetParam, "set_param", name=p.AUTO_SAVE, value="false").success
     answer = call(bench, SetParam, "set_param", name=p.LIGHT, value="false")
     assert answer.success, answer.message
-    assert "not kept over a restart until ~/save_params" in answer.message
+    assert "lost at a restart until ~/save_params" in answer.message
     assert call(bench, NodeRequest, "restart").success
     assert call(bench, GetParam, "get_param", name=p.LIGHT).value == "true"
     assert call(bench, SetParam, "set_param", name=p.LIGHT, value="off").success
@@ -252,7 +252,7 @@ def test_without_any_device_each_service_says_so_at_once(bench, name):
     kind, fields = KINDS[name]
     answer = call(bench, kind, name, **fields)
     assert not answer.success
-    assert "heard" in answer.message
+    assert "received" in answer.message
 
 
 @pytest.mark.parametrize("name", [n for n in KINDS if n not in ("command", "arm", "deploy")])

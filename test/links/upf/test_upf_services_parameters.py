@@ -155,7 +155,7 @@ def test_protection_is_not_switched_off_in_the_air(bench, devices, name, off):
     devices.fly()
     answer = set_param(bench, name, off)
     assert not answer.success
-    assert f"{name} would be off while the vehicle is in the air" in answer.message
+    assert f"{name} off would leave the vehicle without protection in the air" in answer.message
     assert "force does it all the same; nothing was sent" in answer.message
     assert devices.controller.values[name] is True
 

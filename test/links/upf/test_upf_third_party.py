@@ -226,7 +226,7 @@ def test_by_default_node_ids_are_left_to_its_allocator(bench, bus, tmp_path, par
 
     def told():
         task = tasks(diagnostics).get("node ids")
-        return task and task.message == "left to node 60, which does it" and task
+        return task and task.message == "node 60 gives out node ids" and task
 
     assert bench.until(told, "diagnostics say so").level == DiagnosticStatus.OK
     assert "gives out node ids" not in tasks(diagnostics)["link"].message

@@ -288,7 +288,7 @@ def test_in_the_architecture_without_a_controller_the_trigger_is_the_parachute(b
     # causes may come before the answer to the second.
     answer = vehicle.deploy()
     assert answer.success, answer.message
-    assert "TriggerStatus of 34 says launched" in answer.message
+    assert "TriggerStatus of 34 reports launched" in answer.message
     assert vehicle.trigger.fired
     bench.until(lambda: vehicle.statuses[-1].state == ParachuteState.LAUNCHED, "it is told")
 

@@ -184,7 +184,7 @@ class Devices:
             fits = ours and all(getattr(ours[-1], n) == value for n, value in fields.items())
             return ours[-1] if fits else None
 
-        return self.bench.until(so, f"the heartbeat says {fields}")
+        return self.bench.until(so, f"the heartbeat reports {fields}")
 
     def act(self, action: str) -> None:
         """Have them do so."""

@@ -84,7 +84,7 @@ def test_nobody_gets_an_id_before_the_bus_was_listened_to():
     bench = Bench(allocator=True).at(1.1)
     asking(bench)
     assert bench.tables() == []
-    assert bench.node.allocator.refusal == "not every node has said who it is yet"
+    assert bench.node.allocator.refusal == "not every node has identified itself yet"
     bench.at(1.9)
     asking(bench)
     assert len(bench.tables()) == 1
@@ -124,7 +124,7 @@ def test_another_allocator_makes_ours_silent_and_is_told_of():
     assert bench.said(ALLOCATION) == []
     assert bench.node.allocator.refusal == "node 50 allocates as well"
     bench.at(11.6)
-    assert bench.notices()[1:] == [f"over: {notice}"]
+    assert bench.notices()[1:] == [f"resolved: {notice}"]
     asking(bench)
     assert len(bench.tables()) == 1
 
@@ -288,7 +288,7 @@ def asks_until(desk, end, every=0.8, unique_id=OTHER, answered_by=0):
 def test_requests_that_nobody_else_answers_are_ours_after_two_seconds():
     desk = yielding()
     assert asks_until(desk, 1.9) is None
-    assert desk.allocator.refusal == "waiting whether another allocator answers"
+    assert desk.allocator.refusal == "waiting for another allocator to answer"
     assert asks_until(desk, 4.0) == 125
     assert (desk.allocator.refusal, desk.allocator.left_to) == ("", 0)
     assert desk.ask(UID) == 124, "at once from then on"
@@ -329,12 +329,12 @@ def test_who_gives_out_the_ids_is_told_once_each_time_it_changes():
         asking(bench.at(float(second)))
         bench.hear(50, ALLOCATION, unique_id=UID[:6])
     assert bench.said(ALLOCATION) == []
-    left = "node 50 gives out node ids: it is left to it (parameter allocator)"
+    left = "node 50 gives out node ids, so this node does not (parameter allocator)"
     assert bench.notices() == [left]
     assert bench.node.troubles() == [], "it is no error, and forbids nothing"
     for second in range(20, 32):
         asking(bench.at(float(second)))
-    again = "node 50 answers no request for a node id any more: given out here again"
+    again = "node 50 no longer answers requests for a node id: this node gives them out again"
     assert bench.notices() == [left, again]
     assert len(bench.tables()) >= 1
 

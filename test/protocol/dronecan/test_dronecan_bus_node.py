@@ -133,7 +133,7 @@ def test_the_answer_goes_to_who_asked_under_the_same_transfer_id():
 def test_what_it_does_not_serve_is_counted():
     bench = Bench().clear().asked(33, "uavcan.protocol.AccessCommandShell")
     assert bench.frames == []
-    assert bench.node.counts == {"requests that we do not serve": 1}
+    assert bench.node.counts == {"requests that this node does not serve": 1}
 
 
 def test_what_is_not_standard_is_handed_on():
@@ -216,7 +216,7 @@ def story_of(bench, begins):
     first, last = [one for one in bench.events if one.severity in (Severity.ERROR, Severity.INFO)]
     assert first.severity is Severity.ERROR
     assert first.text.startswith(begins)
-    assert (last.severity, last.text) == (Severity.INFO, f"over: {first.text}")
+    assert (last.severity, last.text) == (Severity.INFO, f"resolved: {first.text}")
     assert bench.node.troubles() == []
 
 

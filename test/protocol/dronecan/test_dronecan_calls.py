@@ -71,7 +71,7 @@ def test_a_late_answer_to_an_earlier_try_counts_and_the_next_is_nobodys():
     (end,) = answer(calls, 0, 0.3, result=0)
     assert (end.token, end.sends) == (1, 2)
     assert answer(calls, 1, 0.31, result=0) == []
-    assert calls.counts == {"responses that nobody waited for": 1}
+    assert calls.counts == {"unexpected responses": 1}
 
 
 def test_an_answer_of_another_server_service_or_id_is_nobodys():
@@ -80,7 +80,7 @@ def test_an_answer_of_another_server_service_or_id_is_nobodys():
     assert answer(calls, 0, 0.1, server=34) == []
     assert answer(calls, 0, 0.1, service=OTHER.service) == []
     assert answer(calls, 9, 0.1) == []
-    assert calls.counts == {"responses that nobody waited for": 3}
+    assert calls.counts == {"unexpected responses": 3}
 
 
 def test_each_server_and_service_counts_its_own_ids():

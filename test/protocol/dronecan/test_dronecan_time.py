@@ -50,7 +50,7 @@ def test_a_node_with_a_higher_id_should_yield_to_us():
     assert trouble.startswith("node 20 is a time master as well and should yield to us (10)")
     bench.at(3.0)
     assert bench.node.troubles() == []
-    assert bench.notices()[-1].startswith("over: node 20 is a time master")
+    assert bench.notices()[-1].startswith("resolved: node 20 is a time master")
 
 
 def test_of_two_others_the_lower_one_counts_until_it_is_silent():

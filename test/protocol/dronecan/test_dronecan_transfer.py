@@ -128,7 +128,7 @@ def test_services_from_or_to_nobody(identifier):
 def test_types_that_are_not_known():
     ear = Ear()
     assert ear.hear([raw(0x10FFFF21, "00c0"), raw(0x10FF8AA1, "00c0")]) == []
-    assert ear.counts == {"transfers of types that are not known": 2}
+    assert ear.counts == {"transfers of unknown types": 2}
 
 
 def test_an_anonymous_transfer_has_one_frame():
@@ -142,7 +142,7 @@ def test_a_transfer_that_came_twice():
     ear = Ear()
     for transfer, frames in (single(), status(source=34)):
         assert ear.hear([*frames, *frames], 1.0) == [transfer]
-    assert ear.counts == {"transfers that came twice": 2, "frames without their beginning": 1}
+    assert ear.counts == {"duplicate transfers": 2, "frames without their beginning": 1}
 
 
 def test_a_frame_that_came_twice_within_its_transfer():
@@ -168,7 +168,7 @@ def test_an_older_transfer_that_is_late_once_more_does_not_count_twice():
     ear = Ear()
     first, second, third = (single(transfer_id=number)[1] for number in range(3))
     assert len(ear.hear([*first, *second, *first, *third, *second], 0.5)) == 3
-    assert ear.counts == {"transfers that came twice": 2}
+    assert ear.counts == {"duplicate transfers": 2}
 
 
 @pytest.mark.parametrize("newest", [2, 8, 31, 0, 1])
@@ -222,7 +222,7 @@ def test_a_device_that_restarts_at_once_with_the_same_id_is_heard_if_it_says_som
     after, again = single(payload=b"anew...")
     assert ear.hear(frames, 0.0) == [before]
     assert ear.hear([*again, *again], 0.1) == [after]
-    assert ear.counts == {"transfers that came twice": 1}
+    assert ear.counts == {"duplicate transfers": 1}
 
 
 def test_a_lost_frame_loses_its_transfer_and_not_the_next():

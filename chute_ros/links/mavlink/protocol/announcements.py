@@ -1,4 +1,4 @@
-"""What the ground station reads of us: why flight is blocked, and what becomes of each order.
+"""Texts for the ground station: reasons of a flight block, and the outcome of each order.
 
 Each text begins with what matters most, for a small screen shows the first words only.
 """
@@ -62,7 +62,7 @@ class Announcements:
                 new = report.token not in self._refused
                 if what is not None and report.outcome is Outcome.REFUSED and new:
                     self._refused.add(report.token)
-                    self.say(f"{what} refused, trying on: {report.detail}")
+                    self.say(f"{what} refused, still trying: {report.detail}")
             elif isinstance(event, RequestFinished):
                 finished = event.finished
                 what = self._orders.pop(finished.token, None)

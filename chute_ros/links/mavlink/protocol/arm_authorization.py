@@ -58,7 +58,7 @@ def block_warning(settings: AutopilotSettings, system_id: int) -> str:
     no_ramp = settings.get("MPC_TKO_RAMP_T") == 0 or settings.absent("MPC_TKO_RAMP_T")
     if settings.get("COM_SPOOLUP_TIME") == 0 and no_ramp:
         return (
-            "a flight block may not be kept: COM_SPOOLUP_TIME is 0 and MPC_TKO_RAMP_T is "
+            "a flight block may not hold: COM_SPOOLUP_TIME is 0 and MPC_TKO_RAMP_T is "
             f"{settings.text('MPC_TKO_RAMP_T')}, the vehicle takes off before its arming is "
             "undone; set COM_SPOOLUP_TIME to 1, or COM_ARM_AUTH_REQ to 1 and COM_ARM_AUTH_ID to "
             f"{system_id}"
@@ -66,6 +66,6 @@ def block_warning(settings: AutopilotSettings, system_id: int) -> str:
     if settings.get("COM_ARM_AUTH_REQ") == 1:
         return (
             f"COM_ARM_AUTH_ID is {settings.text('COM_ARM_AUTH_ID')}, and not our system id "
-            f"{system_id}: the autopilot asks another whether it may arm"
+            f"{system_id}: the autopilot asks another component before it arms"
         )
     return ""

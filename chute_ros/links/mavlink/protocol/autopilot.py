@@ -1,4 +1,4 @@
-"""What the autopilot on the same network says of the vehicle.
+"""Picture of the vehicle from the autopilot on the same network.
 
 Source: MAVLink common.xml: HEARTBEAT, SYSTEM_TIME, and what vehicle_readers.py reads.
 """
@@ -269,7 +269,7 @@ class AutopilotTracker:
 
     def doubt(self, now: float) -> str:
         """Another device uses the same ids, in words; empty: none does."""
-        return self._twins.doubt(f"two autopilots are {self.device}", now)
+        return self._twins.doubt(f"two autopilots have the ids {self.device}", now)
 
     def _watch_clock(self, boot_ms: int, now: float) -> None:
         age = self._clock.observe(boot_ms)

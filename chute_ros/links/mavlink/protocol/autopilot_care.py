@@ -1,4 +1,4 @@
-"""What is asked of our autopilot, and undone, without anybody's request.
+"""Care for our autopilot without a request: messages asked for, arming undone.
 
 Its settings are read and told, how long it takes to answer is measured, its heartbeats are had
 sooner, its arming is undone while flight is
@@ -119,9 +119,9 @@ class AutopilotCare:
 
     def _still_wanted(self, autopilot: AutopilotTracker, now: float) -> None:
         if not self.block.stands(autopilot, now):
-            why = "flight is not blocked any more, or the vehicle not known to be on the ground"
+            why = "flight is no longer blocked, or the vehicle is not known to be on the ground"
         elif self._requests.under_way(goals.FORCED) and not self.block.may_force(now):
-            why = "that the vehicle has not left the ground is not known any more"
+            why = "it is no longer known that the vehicle has not left the ground"
         else:
             return
         self._requests.abandon(self._disarming, why, now)

@@ -50,7 +50,7 @@ class Devices:
     # -- who -------------------------------------------------------------------------------------
 
     def chosen_parachute(self) -> ParachuteTracker | None:
-        """Where requests without a device go: the first that is not lost, or the first."""
+        """Device for requests without a device: the first that is not lost, or the first."""
         return first_alive(self.parachutes.all())
 
     def target(self, device: str) -> ParachuteTracker | None:
@@ -90,7 +90,7 @@ class Devices:
             return ""
         if autopilot.armed is not Armed.ARMED or autopilot.motors_off:
             return ""
-        return f"WARNING: autopilot {autopilot.device} says that it is armed: the motors may turn"
+        return f"WARNING: autopilot {autopilot.device} reports armed: the motors may turn"
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
@@ -153,7 +153,7 @@ class Devices:
         return replace(state, faults=(*state.faults, fault)) if fault else state
 
     def take_events(self) -> list[Event]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         events, self._events = self._events, []
         return events
 

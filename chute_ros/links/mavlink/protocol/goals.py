@@ -61,7 +61,7 @@ def set_triggers(
     return Goal(
         "MAV_CMD_SET_PARACHUTE_ARM",
         (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, float(arm), float(select)),),
-        f"PARACHUTE_STATUS says {changed}",
+        f"PARACHUTE_STATUS reports {changed}",
         shown,
         request_status(parachute),
         hinders_release=bool(disarmed),
@@ -92,7 +92,7 @@ def release(
     return Goal(
         RELEASE,
         commands,
-        "PARACHUTE_STATUS says deployed",
+        "PARACHUTE_STATUS reports deployed",
         shown,
         request_status(parachute),
         insist=force,
@@ -112,7 +112,7 @@ def _why_not_released(parachute: ParachuteTracker) -> str:
         need = "this module may need FC" if offboard else "need FC or OFFBOARD"
         hints.append(f"armed triggers: {armed}; {need}, which force arms on the way")
     if not parachute.ground_cleared:
-        hints.append("its own status does not say GROUND_CLEARED")
+        hints.append("its own status does not report GROUND_CLEARED")
     return "; ".join(hints)
 
 
@@ -155,7 +155,7 @@ def kill(
         return Goal(
             f"kill ({way.method.value})",
             (_stop_order(autopilot, way.method),),
-            "the autopilot says motors off",
+            "the autopilot reports motors off",
             shown,
             _request_heartbeat(autopilot),
             insist=True,
@@ -190,7 +190,7 @@ def disarm_on_ground(
         return Goal(
             FORCED if forced else "disarm on the ground",
             (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
-            "the autopilot's heartbeat says disarmed",
+            "the autopilot's heartbeat reports disarmed",
             lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
             _request_heartbeat(autopilot),
             # The plain one, which may be tried on, must not keep it waiting.

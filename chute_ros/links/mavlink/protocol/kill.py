@@ -114,9 +114,11 @@ def _forced_disarm(settings: AutopilotSettings) -> Way:
 def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
     way = KillMethod.FLIGHT_TERMINATION
     if settings.firmware is Firmware.PX4:
-        return Way(way, releases="PX4 itself orders the parachute's release as it terminates")
+        return Way(way, releases="PX4 itself orders the parachute's release when it terminates")
     if settings.firmware is Firmware.OTHER:
-        return Way(way, releases="what else this autopilot does as it terminates is not known")
+        return Way(
+            way, releases="the other effects of termination on this autopilot are not known"
+        )
     enabled, action = settings.get("AFS_ENABLE"), settings.get("AFS_TERM_ACTION")
     if enabled is None and not settings.absent("AFS_ENABLE"):
         return Way(way, releases="AFS_ENABLE of the autopilot is not known")

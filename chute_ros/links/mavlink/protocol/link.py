@@ -96,7 +96,7 @@ class MavlinkLink:
         return self._outbox.take()
 
     def take_events(self) -> list[Event]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         ends = self.requests.take_events()
         self._announcements.heard(ends)
         return self._devices.take_events() + ends
@@ -170,7 +170,7 @@ class MavlinkLink:
         """Stop the motors through the autopilot."""
         autopilot = self._devices.chosen_autopilot()
         if autopilot is None:
-            why = "no autopilot of ours was ever heard; set autopilot_system_id"
+            why = "no autopilot of ours was received yet; set autopilot_system_id"
             self.requests.refuse(token, why)
         else:
             goal = goals.kill(
@@ -211,15 +211,15 @@ class MavlinkLink:
         return self._outbox.sent_count
 
     def has_parachute(self) -> bool:
-        """A device was heard that can be told to deploy."""
+        """A device that can deploy was received."""
         return self._devices.to_release("") is not None
 
     def has_autopilot(self) -> bool:
-        """One was heard that can be told to stop the motors."""
+        """A device that can stop the motors was received."""
         return self._devices.chosen_autopilot() is not None
 
     def chosen_parachute(self) -> ParachuteTracker | None:
-        """Where requests without a device go: the first that is not lost, or the first."""
+        """Device for requests without a device: the first that is not lost, or the first."""
         return self._devices.chosen_parachute()
 
     def setup(self) -> Setup | None:
@@ -276,7 +276,7 @@ class MavlinkLink:
         if not ours or message.target_component not in (0, self.config.component_id):
             self.counts["acknowledgements for another component"] += 1
         elif self._acknowledgements.is_copy(frame, now):
-            self.counts["acknowledgements that came twice"] += 1
+            self.counts["duplicate acknowledgements"] += 1
         else:
             ack = Acknowledgement(
                 frame.system_id, frame.component_id, message.command, message.result
@@ -299,7 +299,7 @@ class MavlinkLink:
         if target is None:
             known = ", ".join(p.device for p in self.parachutes.all()) or "none"
             what = f"no parachute {device!r}" if device else "no parachute"
-            self.requests.refuse(token, f"{what} was heard on this link (heard: {known})")
+            self.requests.refuse(token, f"{what} was received on this link (received: {known})")
         return target
 
     def _begin(self, token: int, goal: goals.MavlinkGoal, now: float) -> None:

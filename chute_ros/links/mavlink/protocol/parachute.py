@@ -1,4 +1,4 @@
-"""What one MAVLink parachute says of itself, normalised.
+"""Status of one MAVLink parachute, normalised.
 
 Source: Parachute Protocol, "Parachute Connection" (heartbeat, type, component id) and "STATUS".
 """
@@ -182,7 +182,7 @@ class ParachuteTracker:
 
     def doubt(self, now: float) -> str:
         """Another device uses the same ids, in words; empty: none does."""
-        return self._twins.doubt(f"two parachutes are {self.device}", now)
+        return self._twins.doubt(f"two parachutes have the ids {self.device}", now)
 
     def status_overdue(self, now: float) -> bool:
         """The status stream stopped: the newest is too old, though the link may live."""
@@ -259,7 +259,7 @@ class ParachuteTracker:
         if self.liveness.state in (LinkState.STALE, LinkState.LOST):
             faults.append(f"heartbeat {self.liveness.state.name}: {silence:.1f} s old")
         if self._unhealthy:
-            faults.append(f"heartbeat says {self._unhealthy}")
+            faults.append(f"heartbeat reports {self._unhealthy}")
         if self._message is None:
             return [*faults, "no PARACHUTE_STATUS received"]
         if self.status_overdue(now):

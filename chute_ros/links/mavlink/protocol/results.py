@@ -32,5 +32,5 @@ _WORDS: dict[int, str] = {
 
 
 def result_text(result: int) -> str:
-    """What the device means by result."""
+    """Meaning of a device's result, in words."""
     return _WORDS.get(result, f"result {result}, which MAVLink does not define")

@@ -68,7 +68,7 @@ class Roster(Generic[DeviceT]):
         return self._ours.get((system_id, component_id))
 
     def add(self, system_id: int, component_id: int, device: DeviceT) -> None:
-        """A device that admits let in was heard for the first time."""
+        """A device that admits let in was received for the first time."""
         self._ours[system_id, component_id] = device
 
     def all(self) -> list[DeviceT]:
@@ -85,6 +85,6 @@ class Roster(Generic[DeviceT]):
             return ""
         systems = sorted({self.system_id, *self._other_systems})
         return (
-            f"{self.kind}s of systems {', '.join(map(str, systems))} heard, "
-            f"using {self.system_id}: set {self.kind}_system_id"
+            f"{self.kind}s of systems {', '.join(map(str, systems))} received, using "
+            f"{self.system_id}: set {self.kind}_system_id"
         )

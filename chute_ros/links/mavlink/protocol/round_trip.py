@@ -1,4 +1,4 @@
-"""How long the line to an autopilot and back takes.
+"""Round-trip time of the line to an autopilot.
 
 A line that is full still carries its messages nearly as often as asked for, but seconds late: an
 autopilot keeps what waits in a buffer. The age of what comes cannot be told by the autopilot's
@@ -68,4 +68,4 @@ class RoundTrip:
         if not self.late(now):
             return []
         took = f"answers after {self.seconds(now):.1f} s (TIMESYNC; limit {LIMIT:g} s)"
-        return [f"{took}, so what it tells comes late: {LINE_CURE}"]
+        return [f"{took}; its messages arrive late: {LINE_CURE}"]

@@ -1,4 +1,4 @@
-"""What a person should know before flight of how this autopilot is set up, said once.
+"""Warnings about this autopilot's settings before flight, each reported once.
 
 Which way a kill goes, what stands against it, and whether a flight block can be kept.
 """
@@ -62,7 +62,7 @@ def _by_itself(settings: AutopilotSettings) -> list[str]:
         told.append("CHUTE_ENABLED is 1: the autopilot releases a parachute of its own")
     if settings.get("HOME_RESET_ALT") == 0:
         told.append(
-            "HOME_RESET_ALT is 0: the autopilot sets its height to zero as it is disarmed, also "
+            "HOME_RESET_ALT is 0: the autopilot sets its height to zero when it is disarmed, also "
             "by a kill in the air; set it to -1"
         )
     return told

@@ -1,4 +1,4 @@
-"""How often a stream of messages comes."""
+"""Rate of a stream of messages."""
 
 from __future__ import annotations
 

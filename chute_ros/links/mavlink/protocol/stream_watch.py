@@ -165,10 +165,10 @@ class StreamWatch:
 
 #: What a person can do about a line that is full.
 LINE_CURE = (
-    "the line to the autopilot is too slow for what it carries: raise its baud rate, or switch "
-    "off streams that others ask for on it"
+    "the line to the autopilot is overloaded: raise its baud rate, or switch off streams "
+    "that other programs request on it"
 )
 _STREAM_CURE = (
-    "something else sets its rate, or the line is full: end the ground station or program that "
-    "asks for it, or its stream rates in the autopilot's settings"
+    "another program sets its rate, or the line is full: end the ground station or "
+    "program that requests it, or remove its stream rates in the autopilot's settings"
 )

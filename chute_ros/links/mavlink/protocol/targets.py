@@ -1,4 +1,4 @@
-"""What the vehicle is commanded: attitude, vertical speed, height.
+"""Commands to the vehicle: attitude, vertical speed, height.
 
 Source: MAVLink common.xml: ATTITUDE_TARGET, POSITION_TARGET_LOCAL_NED, POSITION_TARGET_GLOBAL_INT,
 NAV_CONTROLLER_OUTPUT; and ArduPilot 4.7.0-dev and PX4 main of 2026-08 for what they fill in:

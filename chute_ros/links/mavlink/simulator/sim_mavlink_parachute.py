@@ -49,7 +49,7 @@ def _run() -> None:
         "--ground-cleared",
         choices=("auto", "yes", "no"),
         default=start.ground_cleared,
-        help="auto: by the height that an autopilot on the network tells, yes where none is heard",
+        help="auto: by the height of an autopilot on the network, yes without one",
     )
     options.add_argument(
         "--clear-height", type=real("m", 0.0, 10_000.0), default=start.clear_height, help="m"
@@ -58,7 +58,7 @@ def _run() -> None:
         "--ats-arm-altitude", type=number("m", 0, 255), default=start.ats_arm_altitude
     )
     options.add_argument(
-        "--packed-date", type=_date, default=start.packed_date, help="YYYY-MM-DD; empty: not told"
+        "--packed-date", type=_date, default=start.packed_date, help="YYYY-MM-DD; empty: not sent"
     )
     options.add_argument(
         "--system-status",

@@ -1,6 +1,6 @@
 """An output that fires a parachute and never answers.
 
-At rest the output is written again each output_check_interval: that is all that can be tested of it. A
+At rest the output is written again each output_check_interval: no more can be tested of it. A
 deploy is a pulse: the firing bytes, repeated each repeat_interval, for pulse_time; then rest.
 """
 

@@ -56,12 +56,12 @@ class CommandKind:
 
 
 def _flag(name: str, value: int) -> Effect:
-    text = f"telemetry says {name} {value}"
+    text = f"telemetry reports {name} {value}"
     return Effect(text, lambda r: bool(r[name]) == bool(value))
 
 
 def _mode(*modes: FlightMode) -> Effect:
-    text = f"telemetry says flight mode {modes[0].label}"
+    text = f"telemetry reports flight mode {modes[0].label}"
     return Effect(text, lambda r: r["flight_mode"] in modes)
 
 
@@ -71,16 +71,16 @@ def mode_alone(mode: FlightMode) -> Effect:
 
 
 def _deployed(flag: str, mode: FlightMode) -> Effect:
-    text = f"telemetry says {flag} 1, or flight mode {mode.label}"
+    text = f"telemetry reports {flag} 1, or flight mode {mode.label}"
     return Effect(text, lambda r: r[flag] != 0 or r["flight_mode"] == mode)
 
 
 def _payload(flag: str) -> Effect:
-    return Effect(f"telemetry says {flag} 1", lambda r: flag in r and r[flag] != 0)
+    return Effect(f"telemetry reports {flag} 1", lambda r: flag in r and r[flag] != 0)
 
 
 def _safe(sv_open: int) -> Effect:
-    text = f"telemetry says mav_open 0 and sv_open {sv_open}"
+    text = f"telemetry reports mav_open 0 and sv_open {sv_open}"
     return Effect(text, lambda r: r["mav_open"] == 0 and r["sv_open"] == sv_open)
 
 
@@ -133,7 +133,7 @@ def _kinds() -> dict[str, CommandKind]:
         kind("dump_fram", "f", "dump the FRAM", once=True, lasting=True),
         kind("dump_flash", "G", "dump the flash", once=True, lasting=True),
         kind("wipe_flash", "W", "wipe the flash", once=True, lasting=True),
-        kind("flash_info", "I", "say how full the flash is", once=True),
+        kind("flash_info", "I", "report how full the flash is", once=True),
         kind("wipe_fram_and_reboot", "X", "wipe the FRAM and reboot", once=True, lasting=True),
     ]
     return {one.command.name: one for one in kinds}
@@ -186,5 +186,5 @@ def set_target(layout: Layout, values: tuple[float, ...]) -> CommandKind:
                 for name, value in pairs
             )
 
-        effect = Effect(f"telemetry says {told}", shown)
+        effect = Effect(f"telemetry reports {told}", shown)
     return CommandKind(Command("set_target", f"<T,{text}>".encode()), "set the target", effect)

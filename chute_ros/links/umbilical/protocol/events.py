@@ -1,4 +1,4 @@
-"""What the umbilical link tells its owner besides what all links tell."""
+"""Events of the umbilical link besides those of every link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the flight computer says of itself by its telemetry, normalised.
+"""Status of the flight computer from its telemetry, normalised.
 
 Source: Umbilical Reference, sections 1 and 3.
 """

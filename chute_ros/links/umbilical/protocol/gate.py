@@ -79,15 +79,15 @@ TABLE: dict[tuple[str, Situation], Verdict] = {
 #: Why a row is not all "allowed", for the person who is refused.
 _REASONS = {
     "launch": "launch needs the key armed and Standby",
-    "drogue": "the drogue is not fired on the ground, nor where it may be the ground",
-    "main": "the main is not fired on the ground, nor where it may be the ground",
+    "drogue": "the drogue is not fired on the ground, nor if it may be on the ground",
+    "main": "the main is not fired on the ground, nor if it may be on the ground",
     "close_mav": "closing the MAV stops the motor",
     "open_mav": "the MAV is not opened by hand in flight",
     "open_sv": "the SV is not opened by hand in flight",
     "key_arm": "the key is turned on the ground",
     "key_disarm": "the key is turned on the ground",
     "reboot": "a flight computer that reboots fires no parachute",
-    "reset_fram": "what it stores is needed in flight",
+    "reset_fram": "its stored data is needed in flight",
     "dump_fram": "it may send no telemetry while it dumps",
     "dump_flash": "it sends no telemetry while it dumps",
     "wipe_flash": "it does nothing else while it wipes",

@@ -40,7 +40,7 @@ _MOST_SHOWN = 60
 #: Lines for the log a second, at most.
 MOST_TOLD = 50
 #: Counted: its clock leapt or ran back, or it ended a flight.
-DOUBTED = "record that is believed once the next one agrees"
+DOUBTED = "record held until the next one agrees"
 
 
 class UmbilicalLink:
@@ -138,7 +138,7 @@ class UmbilicalLink:
         return [command.token for command in output]
 
     def take_events(self) -> list[UmbilicalEvent]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         notices = [*self.decoder.take_notices(), *self.orders.take_notices()]
         happened = [*self._events, *notices]
         self._events = []
@@ -164,7 +164,7 @@ class UmbilicalLink:
         self.command(token, "key_arm" if arm else "key_disarm", False, now)
 
     def deploy(self, token: int, force: bool, now: float, again: bool = False) -> None:
-        """Fire what the configuration says. again: though telemetry says that it is out."""
+        """Fire what the configuration says. again: though telemetry reports that it is out."""
         self.orders.deploy(token, force, again, now)
         self._drive(now)
 
@@ -269,7 +269,7 @@ class UmbilicalLink:
             return
         self._show_unknown_at = now + _SHOW_UNKNOWN_EACH
         text = s.printable(line[:_MOST_SHOWN].decode("utf-8", errors="replace"))
-        self._events.append(Notice(Severity.INFO, f"a line that is nothing known: {text!r}"))
+        self._events.append(Notice(Severity.INFO, f"unknown line: {text!r}"))
 
     def _telemetry(self, body: str, now: float) -> None:
         record = self.decoder.decode(body, now)

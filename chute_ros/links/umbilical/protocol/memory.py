@@ -138,7 +138,7 @@ class MemoryWorks:
         elif isinstance(said, DumpBytes):
             self._bytes(said.data, now)
         elif isinstance(said, DumpEnded) and self.work is not None:
-            why = "" if said.complete else "its end mark did not come before telemetry went on"
+            why = "" if said.complete else "no end mark before telemetry resumed"
             self._end(said.complete, why)
         elif isinstance(said, MemoryText):
             self._memory_text(said.text, now)
@@ -160,7 +160,7 @@ class MemoryWorks:
         if work.name == "dump_fram":
             self._end(True, "")
         elif not work.is_dump and not work.is_wiped:
-            self._end(False, "telemetry goes on, but its end was not told")
+            self._end(False, "telemetry resumed, but its end was not reported")
 
     def restarted(self) -> None:
         """The flight computer started anew."""
@@ -190,7 +190,7 @@ class MemoryWorks:
 
     def silent(self) -> str:
         """Why a flash dump was given up."""
-        return f"silent for {self._limits.dump_silence:g} s, its end mark did not come"
+        return f"silent for {self._limits.dump_silence:g} s, no end mark"
 
     def give_up(self, why: str) -> None:
         """End the work, if there is one."""
@@ -203,7 +203,7 @@ class MemoryWorks:
         return math.inf if work is None else work.last + self._limit(work)
 
     def take_events(self) -> list[events.UmbilicalEvent]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         taken, self._events = self._events, []
         return taken
 

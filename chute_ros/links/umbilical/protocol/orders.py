@@ -1,4 +1,4 @@
-"""What a person or the supervisor wants of the flight computer: through the gate, to the wire.
+"""Orders of a person or the supervisor to the flight computer: through the gate, to the wire.
 
 Every command goes through gate.rule here and nowhere else.
 """
@@ -82,7 +82,7 @@ class Orders:
         self._order(token, kind, force, even_if_shown, now)
 
     def deploy(self, token: int, force: bool, again: bool, now: float) -> None:
-        """Fire the stage of the configuration. again: though telemetry says that it is out."""
+        """Fire the stage of the configuration. again: though telemetry reports that it is out."""
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
             # The same deploy may be ordered once more, as by a supervisor that took over.
@@ -96,9 +96,7 @@ class Orders:
         """Set the landing target."""
         layout = self._decoder.layout
         if layout is None:
-            why = (
-                "how many floats the firmware takes is not known before its telemetry: set layout"
-            )
+            why = "the number of floats is not known before the first telemetry: set layout"
             self._requests.refuse(token, f"set_target refused: {why}; nothing was sent")
             return
         try:
@@ -155,7 +153,7 @@ class Orders:
 
     def arming_blocked(self, text: str, now: float) -> None:
         """It does not arm."""
-        self._end(("key_arm",), f"the flight computer says: {text}", now)
+        self._end(("key_arm",), f"the flight computer reports: {text}", now)
 
     def judge_again(self, now: float) -> None:
         """Telemetry or the clock moved on: what has yet to leave, or would leave again, must still
@@ -239,11 +237,11 @@ class Orders:
         if self._block:
             return f"launch refused: flight is blocked ({self._block}); nothing was sent"
         if self._key_disarmed:
-            return "launch refused: the key was disarmed from here; nothing was sent"
+            return "launch refused: the key was disarmed by this node; nothing was sent"
         return ""
 
     def _never_heard(self) -> str:
-        return "" if self._computer.record is not None else " (no telemetry was ever heard)"
+        return "" if self._computer.record is not None else " (no telemetry was received yet)"
 
     def _shown(
         self, kind: CommandKind, even_if_shown: bool, now: float
@@ -263,9 +261,9 @@ class Orders:
 
         if name == "reboot":
             before = computer.restarts
-            return lambda: computer.restarts > before, "its clock starts anew"
+            return lambda: computer.restarts > before, "its clock restarts"
         if name == "flash_info":
-            return lambda: self._flash_usage_at > since(), "it says how full the flash is"
+            return lambda: self._flash_usage_at > since(), "it reports how full the flash is"
         effect = self._effect(kind)
         if effect is None:
             return None, _NOTHING_SHOWS

@@ -15,7 +15,7 @@ def reasons_of(
         return ()
     if status.link_state is LinkState.NEVER_SEEN:
         heard = f"{received_bytes} bytes received, no $TELEM record"
-        return (f"the flight computer was never heard: {heard}, need one",)
+        return (f"the flight computer was never received: {heard}, need one",)
     found = [
         f"{fault}, need younger than {stale_after:g} s" if fault.endswith(" s old") else fault
         for fault in status.faults

@@ -1,4 +1,4 @@
-"""What one line of the umbilical is: telemetry, a log line, progress, a snapshot, or unknown.
+"""Kind of one line of the umbilical: telemetry, a log line, progress, a snapshot, or unknown.
 
 When the flight computer's queue overflows, the rest of a line is lost and the next one follows on
 its heels: what is known is looked for at the end of a line, and what stands before it is a cut

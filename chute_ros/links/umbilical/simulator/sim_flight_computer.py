@@ -32,7 +32,7 @@ def _run() -> None:
     for name, unit, text in (
         ("rate", "HZ", "lines of telemetry a second"),
         ("speed", "FACTOR", "the flight is this much faster than real time"),
-        ("heartbeat-timeout", "S", "without a heartbeat for so long it is not connected"),
+        ("heartbeat-timeout", "S", "s without a heartbeat until it counts as disconnected"),
         ("cut", "X", "probability that a line is cut, 0 to 1"),
         ("garbage", "X", "probability that random bytes follow a line, 0 to 1"),
     ):
@@ -42,7 +42,7 @@ def _run() -> None:
     for name, text in (
         ("debug", "log lines on the wire"),
         ("interlock", "arming needs a wiped flash"),
-        ("drogue-fails", "at the apogee nothing comes out; by command it still does"),
+        ("drogue-fails", "at the apogee nothing comes out; the command still works"),
         ("safe-opens-sv", "<V> opens SV, as newer firmware does"),
         ("faults-on-heartbeat", "a <H> in Ascent or Coast is a fault"),
         ("binary-dump", "<G> sends bytes in place of lines"),

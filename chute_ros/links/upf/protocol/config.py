@@ -24,7 +24,7 @@ MOST_NAME_BYTES = 80
 
 
 class Policy(enum.Enum):
-    """What becomes of a device's request to the vehicle."""
+    """Handling of a device's request to the vehicle."""
 
     #: To the supervisor; success once it has happened.
     FORWARD = "forward"

@@ -119,7 +119,7 @@ class Definitions:
             self.new += tuple(f"{need.name}.{n}" for n in kind.fields if n not in known)
         if missing:
             raise ParameterError(
-                "the flyfire data types lack what is needed to fire or to answer: "
+                "the flyfire data types lack names needed to fire or to answer: "
                 + ", ".join(missing)
             )
         status = types.message(PARACHUTE_STATUS)

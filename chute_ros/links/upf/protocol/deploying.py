@@ -60,7 +60,7 @@ class Deploying:
             return
         # TriggerLaunch needs to know of none, as one may listen that does not speak.
         was = "TriggerLaunch was broadcast" if self._broadcast() else "nothing was sent"
-        self._requests.refuse(token, f"no trigger was ever heard; {was}")
+        self._requests.refuse(token, f"no trigger was received yet; {was}")
 
     def update(self, now: float) -> bool:
         """Look at the clock; whether something was put among the calls."""

@@ -39,7 +39,7 @@ class ErrandDesk:
         if target:
             self._bus.begin(token, make(target), now)
         else:
-            what = f"there is no node id {node_id}" if node_id else "no UPF device was heard"
+            what = f"there is no node id {node_id}" if node_id else "no UPF device was received"
             self._refuse(token, node_id, f"{what} on this link; name a node id from 1 to 127")
 
     def set_parameter(
@@ -49,8 +49,8 @@ class ErrandDesk:
         if name in p.PROTECTION and not p.switches_on(text):
             if self._in_air(now) and not force:
                 why = (
-                    f"{name} would be off while the vehicle is in the air, and with it the "
-                    "protection; force does it all the same; nothing was sent"
+                    f"{name} off would leave the vehicle without protection in the air; force "
+                    "does it all the same; nothing was sent"
                 )
                 self._refuse(token, node_id, why)
                 return

@@ -1,4 +1,4 @@
-"""What one UPF controller, and one UPF trigger, say of themselves, normalised.
+"""Status of one UPF controller and of one UPF trigger, normalised.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "global working state" (flyfire.ParachuteStatus) and the
 architecture with triggers (flyfire.TriggerStatus).
@@ -110,7 +110,7 @@ class Device:
                 f"{self.kind} {self.node_id} {self.liveness.state.name}: {silence:.1f} s"
             )
         if self._health:
-            faults.append(f"NodeStatus of {self.node_id} says {_HEALTH[self._health]}")
+            faults.append(f"NodeStatus of {self.node_id} reports {_HEALTH[self._health]}")
         if self.overdue(now):
             faults.append(f"{name} {now - self.status_received:.1f} s old")
         return faults
@@ -272,7 +272,7 @@ class Controller(Device):
             faults.append(f"{p.ENABLE_PARACHUTE} is off: it never deploys")
         aps_off = self.values.get("is_enable_auto_launch") is False
         if aps_off or self.switch(p.ENABLE_APS) is False:
-            faults.append(f"{p.ENABLE_APS} is off: it deploys only when told to")
+            faults.append(f"{p.ENABLE_APS} is off: it deploys only by command")
         return faults
 
     @property

@@ -1,4 +1,4 @@
-"""What can be asked of a UPF device besides flying: its parameters, its memory, who it is.
+"""Requests to a UPF device besides flying: its parameters, its memory, its identity.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "standard UAVCAN protocols" and "parameters";
 uavcan.protocol.param.GetSet, param.ExecuteOpcode, GetTransportStats, GetNodeInfo, RestartNode.
@@ -87,14 +87,16 @@ def set_parameter(
     answer = yield Call(node_id, GET_SET, values)
     unknown = replace(before, value=None)
     if answer.values is None:
-        return ErrandDone(False, f"{name} may be set or not: {answer.text()}", node_id, (unknown,))
+        return ErrandDone(
+            False, f"{name} may or may not be set: {answer.text()}", node_id, (unknown,)
+        )
     answer = yield _get(node_id, name)
     after = _read(answer)
     if after is None or after.name != name:
         why = f"{name} was sent, but not read back: {answer.text()}"
         return ErrandDone(False, why, node_id, (unknown,))
     if not _same(after.value, wanted):
-        why = f"{name} was not taken: it still is {p.words(after.value)}"
+        why = f"{name} was not accepted: it is still {p.words(after.value)}"
         return ErrandDone(False, why, node_id, (after,))
     keeps = p.as_switch(after.value) if name == p.AUTO_SAVE else auto_save()
     what_follows = [f"{name} is {p.words(after.value)}", *_when(after), *_kept(keeps)]
@@ -105,7 +107,7 @@ def _when(after: DeviceParameter) -> list[str]:
     """When a new value begins to count, if it is not at once."""
     if after.name != p.STATIC_NODE_ID:
         return []
-    asks = "" if after.value else " (0: asks for a node id at each start)"
+    asks = "" if after.value else " (0: requests a node id at each start)"
     return [f"takes effect at the next start{asks}"]
 
 
@@ -115,7 +117,7 @@ def _kept(keeps: bool | None) -> list[str]:
         return []
     if keeps:
         return ["kept"]
-    return [f"not kept over a restart until ~/save_params: {p.AUTO_SAVE} is off"]
+    return [f"lost at a restart until ~/save_params: {p.AUTO_SAVE} is off"]
 
 
 def list_parameters(node_id: int) -> Errand:
@@ -141,7 +143,7 @@ def execute_opcode(node_id: int, opcode: int) -> Errand:
     if answer.values is None:
         return ErrandDone(False, f"{name}: {answer.text()}", node_id)
     done = bool(answer.values["ok"])
-    text = "done" if done else "the device answered that it did not"
+    text = "done" if done else "the device answered: not done"
     return ErrandDone(done, f"{name}: {text}", node_id, values=answer.values)
 
 

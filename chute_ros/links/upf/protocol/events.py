@@ -1,4 +1,4 @@
-"""What a UpfLink tells its owner besides the events of every link."""
+"""Events of a UpfLink besides those of every link."""
 
 from __future__ import annotations
 

@@ -87,8 +87,8 @@ def excluded(controller: Controller, type_name: str) -> str:
     if switch is None or not controller.switch(switch):
         return ""
     return (
-        f"{switch} of controller {controller.node_id} is on: it does so by itself and rejects "
-        f"{type_name}; set {switch!r} to false to decide it here"
+        f"{switch} of controller {controller.node_id} is on: the controller does this by itself "
+        f"and rejects {type_name}; set {switch!r} to false to command it from here"
     )
 
 
@@ -107,7 +107,7 @@ def request(
     return Goal(
         type_name,
         (_call(controller, definitions, type_name),),
-        f"ParachuteStatus says {names}",
+        f"ParachuteStatus reports {names}",
         lambda: (alive or controller.status_received > now) and controller.state in wanted,
         hinders_release=type_name in _LESS_READY,
         needs_acknowledgement=even_if_shown,
@@ -138,7 +138,7 @@ def deploy(
     return Goal(
         DEPLOY,
         (_call(controller, definitions, type_name, FIRE_PRIORITY),),
-        "ParachuteStatus says LAUNCHED",
+        "ParachuteStatus reports LAUNCHED",
         shown,
         insist=force,
         urgent=True,
@@ -157,7 +157,7 @@ def fire_trigger(
     return Goal(
         DEPLOY,
         (trigger_call(trigger, definitions),),
-        f"TriggerStatus of {trigger.node_id} says launched",
+        f"TriggerStatus of {trigger.node_id} reports launched",
         lambda: any(_fired(one, now) for one in (trigger, *triggers())),
         insist=True,
         urgent=True,

@@ -110,7 +110,7 @@ class UpfLink:
         return self.bus.take_output()
 
     def take_events(self) -> list[UpfEvent]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         events: list[UpfEvent] = [*self._events, *self.bus.take_events()]
         events += self.devices.take_events()
         events += self.vehicle_service.take_asks()
@@ -252,7 +252,7 @@ class UpfLink:
         self._drive(now)
 
     def has_parachute(self) -> bool:
-        """A device was heard that can be told to deploy."""
+        """A device that can deploy was received."""
         return bool(self.devices.controllers or self.devices.triggers)
 
     # -- what the node may look at -------------------------------------------------------------
@@ -274,7 +274,7 @@ class UpfLink:
             if heard.name == names.VEHICLE_SERVICE:
                 self.vehicle_service.request(heard, now)
             else:
-                self.bus.endpoint.counts["requests that we do not serve"] += 1
+                self.bus.endpoint.counts["requests that this node does not serve"] += 1
         elif heard.name == names.PARACHUTE_STATUS:
             self.devices.parachute_status(heard.source, heard.values, now)
             controller = self.devices.controllers.get(heard.source)

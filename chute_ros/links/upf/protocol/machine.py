@@ -14,7 +14,7 @@ from chute_ros.model import ParachuteState
 
 
 class Stimulus(enum.Enum):
-    """What moves a controller."""
+    """Event that moves a controller."""
 
     SELF_TEST_PASSED = "self test passed"
     SELF_TEST_FAILED = "self test failed"
@@ -22,7 +22,7 @@ class Stimulus(enum.Enum):
     ARM = "arm, by Auto-Arm or TYPE_ARM"
     DISARM = "disarm, by Auto-Disarm or TYPE_DISARM"
     LAND = "land, by Auto-Land or TYPE_LAND"
-    TRIGGER_FIRED = "the trigger said that it has fired"
+    TRIGGER_FIRED = "the trigger reported fired"
     AT_REST = "at rest for 5 s"
     FAULT = "a fault"
     FAULT_CLEARED = "the fault is gone"

@@ -32,7 +32,7 @@ class OverMotors:
         if not deploys or not finished.sent or not turn:
             return finished
         warning = (
-            f"WARNING: the vehicle said {now - armed_at:.1f} s ago that it is armed, and no kill "
+            f"WARNING: the vehicle reported armed {now - armed_at:.1f} s ago, and no kill "
             "was confirmed: the motors may turn, STOP THEM"
         )
         self._devices.notice(Severity.ERROR, f"deploy: {warning}")

@@ -34,7 +34,7 @@ def _never_heard(config: UpfConfig) -> str:
         kind, wanted, status = "trigger", config.trigger_node_id, "TriggerStatus"
     name = f"{kind} {wanted}" if wanted else f"a {kind}"
     where = "from this node id" if wanted else f"({kind}_node_id 0: of any node)"
-    return f"{name} was never heard: need its {status} {where}"
+    return f"{name} was never received: need its {status} {where}"
 
 
 def _of_picture(picture: ParachuteStatus, devices: UpfDevices) -> list[str]:
@@ -54,6 +54,6 @@ def _of_trigger(trigger: Trigger, now: float) -> list[str]:
     voltage = trigger.number("supply_voltage")
     supply = "" if voltage != voltage else f", supply {voltage:.1f} V"
     state = trigger.state or "not known"
-    doubted = ", says that it has fired" if trigger.launched or trigger.doubted else ""
+    doubted = ", reports fired" if trigger.launched or trigger.doubted else ""
     text = f"trigger {trigger.node_id}: state {state}{doubted}{supply}, need READY"
     return [*trigger.faults(now), text]

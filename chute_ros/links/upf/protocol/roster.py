@@ -81,8 +81,8 @@ class UpfDevices:
         known = ", ".join(map(str, self.controllers)) or "none"
         what = f"no controller {node_id}" if node_id else "no controller"
         triggers = ", ".join(map(str, self.triggers))
-        beside = f"; triggers heard: {triggers}" if triggers else ""
-        return f"{what} was heard on this link (heard: {known}{beside})"
+        beside = f"; triggers received: {triggers}" if triggers else ""
+        return f"{what} was received on this link (received: {known}{beside})"
 
     def picture(self, now: float) -> ParachuteStatus | None:
         """The parachute, as this link sees it; None: there is none yet."""
@@ -114,8 +114,8 @@ class UpfDevices:
         elif controller.unknown_jumps > jumps:
             self.notice(
                 Severity.WARNING,
-                f"controller {node_id} went from {controller.newest_unknown_jump}, "
-                "which its document does not know",
+                f"controller {node_id} went from {controller.newest_unknown_jump}, which "
+                "is not in its document",
             )
         elif controller.state is not before:
             text = f"controller {node_id}: {before.name} to {controller.state.name}"
@@ -143,10 +143,10 @@ class UpfDevices:
                 return
             self._trigger_changed(trigger, now)
             if trigger.doubted and not ordered:
-                self.counts["launched that nobody ordered, not believed yet"] += 1
+                self.counts["launched without an order, not believed yet"] += 1
             if trigger.doubted and not doubted and not ordered:
-                text = f"trigger {node_id} says that it has fired, not by an order from here"
-                until = "it goes on saying so, or its controller does"
+                text = f"trigger {node_id} reports fired, without an order from this node"
+                until = "it repeats this, or its controller reports it"
                 self.notice(Severity.WARNING, f"{text}: believed once {until}")
 
     def node_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
@@ -191,7 +191,7 @@ class UpfDevices:
         return min((device.next_deadline() for device in self._all()), default=math.inf)
 
     def take_events(self) -> list[Event | TriggerChanged]:
-        """What happened, oldest first; each is handed out once."""
+        """New events, oldest first; each is handed out once."""
         events, self._events = self._events, []
         return events
 

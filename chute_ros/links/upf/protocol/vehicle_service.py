@@ -101,7 +101,7 @@ class VehicleService:
             self._respond(request, "BAD_MAGIC_NUMBER")
             return
         if name not in _ASKS:
-            self.counts["requests of a type that is not known"] += 1
+            self.counts["requests of an unknown type"] += 1
             self._respond(request, "REJECTED")
             return
         ask, config = _ASKS[name], self._config
@@ -118,7 +118,7 @@ class VehicleService:
         if ask is Ask.KILL:
             self._asks.append(_kill_asked(device))
         else:
-            self._want(device, f"it said so ({name})" if ask is Ask.FLIGHT_BLOCK else "", now)
+            self._want(device, f"requested by {name}" if ask is Ask.FLIGHT_BLOCK else "", now)
         if policy is Policy.ACCEPT:
             self._respond(request, "SUCCESS")
             return
@@ -227,7 +227,7 @@ class VehicleService:
         else:
             self._blocks.pop(device, None)
             self._released.add(device)
-            text = "it does not ask for it any more"
+            text = "the device no longer requests it"
             self._asks.append(AskSupervisor(Ask.FLIGHT_BLOCK_RELEASE, device, text))
 
     def _happened(self, one: _Pending, now: float) -> bool:

@@ -90,9 +90,7 @@ class Vehicle:
             # The vendor's types have no way to say "not known": then nothing is said at all.
             if not self._unsendable:
                 self._unsendable = True
-                self._devices.notice(
-                    Severity.WARNING, f"VehicleStatus is not sent while it is so: {error}"
-                )
+                self._devices.notice(Severity.WARNING, f"VehicleStatus is not sent: {error}")
 
     def next_deadline(self) -> float:
         """When update has something to do; infinity: never."""

@@ -26,7 +26,7 @@ def _run() -> None:
             f"--{which}-node-id",
             type=number("node id", 0, 125),
             default=default,
-            help=f"static node id; 0: asks for one (default: {default})",
+            help=f"static node id; 0: requests one (default: {default})",
         )
         options.add_argument(f"--no-{which}", action="store_true", help=f"there is no {which}")
     options.add_argument(
@@ -55,7 +55,7 @@ def _run() -> None:
     options.add_argument(
         "--vehicle",
         metavar="WIRE",
-        help=f"feel a simulated autopilot there, and open its canopy: {FORMS}",
+        help=f"follow a simulated autopilot there, and open its canopy: {FORMS}",
     )
     options.add_argument("--system-id", type=number("id", 1, 255), default=1, help="of --vehicle")
     chosen = options.parse_args()
@@ -93,7 +93,7 @@ def _run() -> None:
     nodes: list[UpfNode] = [] if chosen.no_controller else [controller]
     nodes += [] if chosen.no_trigger else [trigger]
     if not nodes:
-        raise ParameterError("--no-controller and --no-trigger: nothing is left to simulate")
+        raise ParameterError("--no-controller and --no-trigger: nothing to simulate")
 
     sense = sensing(
         chosen.vehicle,

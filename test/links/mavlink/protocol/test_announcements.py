@@ -85,7 +85,7 @@ def test_a_kill_that_is_refused_and_one_that_fails_are_said():
     bench.stream(20.0, 0.5, PILOT, lambda: copter(armed=True))
     texts = bench.texts()
     assert texts[0] == "KILL ordered"
-    assert texts[1].startswith("KILL refused, trying on: ")
+    assert texts[1].startswith("KILL refused, still trying: ")
     assert texts[-1].startswith("KILL FAILED: ")
     assert len(texts) == 3
 

@@ -28,7 +28,7 @@ class Bench:
         self.goal = Goal(
             "release",
             (ORDER,),
-            "PARACHUTE_STATUS says deployed",
+            "PARACHUTE_STATUS reports deployed",
             (lambda: self.there) if effect else None,
             ASK,
             **goal,
@@ -91,7 +91,7 @@ def test_acknowledged_and_then_shown():
     assert bench.asked == [0.1]
     bench.at(0.3).shows()
     assert (bench.end.success, bench.end.accepted, bench.end.result) == (True, True, 0)
-    assert bench.end.message.startswith("PARACHUTE_STATUS says deployed after 0.30 s")
+    assert bench.end.message.startswith("PARACHUTE_STATUS reports deployed after 0.30 s")
     assert bench.reports == [Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED]
 
 
@@ -110,7 +110,7 @@ def test_acknowledged_but_never_shown_says_which_did_not_come_and_when_it_gave_u
     assert (bench.end.success, bench.end.accepted) == (False, True)
     assert "given up after 5.0 s" in bench.end.message
     assert "acknowledged after 0.10 s" in bench.end.message
-    assert "never showed that PARACHUTE_STATUS says deployed" in bench.end.message
+    assert "never showed that PARACHUTE_STATUS reports deployed" in bench.end.message
 
 
 def test_neither_says_both():

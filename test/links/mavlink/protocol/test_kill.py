@@ -95,7 +95,7 @@ def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
     )
     end = bench.end(1).finished
     assert end.success
-    assert "kill (flight_termination): the autopilot says motors off" in end.message
+    assert "kill (flight_termination): the autopilot reports motors off" in end.message
     assert "kill (forced_disarm): temporarily rejected" in end.message
 
 
@@ -209,8 +209,8 @@ def test_the_way_is_said_once_the_settings_are_read():
     (text,) = bench.notices()
     assert text == (
         "autopilot 1/1 (PX4): kill by forced disarm; if it is refused or not answered: flight "
-        "termination, only once a deploy is decided (PX4 itself orders the parachute's release "
-        "as it terminates)"
+        "termination, only once a deploy is decided (PX4 itself orders the parachute's "
+        "release when it terminates)"
     )
     bench.stream(5.0, 0.1, PILOT, copter)
     assert len(bench.notices()) == 1

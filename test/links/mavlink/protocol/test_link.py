@@ -90,7 +90,7 @@ def test_also_the_one_that_is_named(device, known):
     bench.collect()
     sent = [f"{one.target_system}/{one.target_component}" for one in bench.commands(RELEASE)]
     assert sent == ([device] if known else [])
-    assert known or f"no parachute '{device}' was heard" in bench.end(1).finished.message
+    assert known or f"no parachute '{device}' was received" in bench.end(1).finished.message
 
 
 @pytest.mark.parametrize(
@@ -192,8 +192,8 @@ def test_doubt_names_the_parameter_to_set():
     assert bench.link.doubts(bench.now) == []
     bench.hear((3, 161), heartbeat()).hear((3, 1), copter())
     assert bench.link.doubts(bench.now) == [
-        "parachutes of systems 1, 3 heard, using 1: set parachute_system_id",
-        "autopilots of systems 1, 3 heard, using 1: set autopilot_system_id",
+        "parachutes of systems 1, 3 received, using 1: set parachute_system_id",
+        "autopilots of systems 1, 3 received, using 1: set autopilot_system_id",
     ]
 
 

@@ -34,8 +34,8 @@ def test_release_is_done_when_the_parachute_itself_says_deployed():
     bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
     assert steps(bench, 1) == ["SENT", "ACCEPTED", "CONFIRMED"]
     assert bench.end(1).finished.message == (
-        "PARACHUTE_STATUS says deployed after 0.30 s; acknowledged after 0.10 s; "
-        "WARNING: autopilot 1/1 says that it is armed: the motors may turn"
+        "PARACHUTE_STATUS reports deployed after 0.30 s; acknowledged after 0.10 s; "
+        "WARNING: autopilot 1/1 reports armed: the motors may turn"
     )
     count = len(bench.commands(RELEASE))
     bench.at(10.0)
@@ -67,7 +67,7 @@ def test_release_acknowledged_but_never_shown_is_a_failure_that_says_so():
     bench.at(0.6).hear(CHUTE, ack(RELEASE)).at(20.0)
     end = bench.end(1).finished
     assert (end.success, end.accepted) == (False, True)
-    assert "never showed that PARACHUTE_STATUS says deployed" in end.message
+    assert "never showed that PARACHUTE_STATUS reports deployed" in end.message
 
 
 def test_release_without_ground_clearance_goes_on_until_it_is_accepted():
@@ -196,7 +196,7 @@ def test_kill_without_an_autopilot_says_so():
     bench = Bench().hear(CHUTE, heartbeat())
     bench.link.kill(1, bench.now)
     bench.collect()
-    assert "no autopilot of ours was ever heard" in bench.end(1).finished.message
+    assert "no autopilot of ours was received yet" in bench.end(1).finished.message
 
 
 # -- the rest ---------------------------------------------------------------------------------
@@ -215,7 +215,7 @@ def test_device_that_is_not_there_is_refused_and_nothing_sent(ask):
     bench = ready()
     ask(bench.link, 9, "1/7", bench.now)
     bench.collect()
-    text = "no parachute '1/7' was heard on this link (heard: 1/161)"
+    text = "no parachute '1/7' was received on this link (received: 1/161)"
     assert bench.end(9).finished.message == text
     assert bench.commands() == []
 
@@ -266,7 +266,7 @@ def test_copy_of_an_acknowledgement_settles_nothing_twice():
     bench.collect()
     assert bench.end(1).finished.success
     assert bench.ends(2) == []
-    assert bench.link.counts["acknowledgements that came twice"] == 1
+    assert bench.link.counts["duplicate acknowledgements"] == 1
 
 
 STREAMED = [245, 33, 30, 26, 1]
@@ -315,7 +315,7 @@ def test_a_refused_release_names_what_the_parachute_says_of_itself():
     bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED))
     message = bench.end(1).finished.message
     assert "armed triggers: ATS; need FC or OFFBOARD, which force arms on the way" in message
-    assert "does not say GROUND_CLEARED" in message
+    assert "does not report GROUND_CLEARED" in message
 
 
 def test_a_refused_release_of_one_whose_offboard_trigger_alone_is_armed_names_the_other():

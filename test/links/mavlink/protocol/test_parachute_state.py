@@ -37,15 +37,15 @@ def test_state_in_the_numbering_of_upf(fields, state):
         (d.MAV_STATE_CALIBRATING, ParachuteState.NOT_READY, ""),
         (d.MAV_STATE_STANDBY, ParachuteState.READY, ""),
         (d.MAV_STATE_ACTIVE, ParachuteState.READY, ""),
-        (d.MAV_STATE_CRITICAL, ParachuteState.ABNORMAL, "heartbeat says critical"),
-        (d.MAV_STATE_EMERGENCY, ParachuteState.ABNORMAL, "heartbeat says emergency"),
-        (d.MAV_STATE_POWEROFF, ParachuteState.ABNORMAL, "heartbeat says powering off"),
+        (d.MAV_STATE_CRITICAL, ParachuteState.ABNORMAL, "heartbeat reports critical"),
+        (d.MAV_STATE_EMERGENCY, ParachuteState.ABNORMAL, "heartbeat reports emergency"),
+        (d.MAV_STATE_POWEROFF, ParachuteState.ABNORMAL, "heartbeat reports powering off"),
         (
             d.MAV_STATE_FLIGHT_TERMINATION,
             ParachuteState.ABNORMAL,
-            "heartbeat says flight termination",
+            "heartbeat reports flight termination",
         ),
-        (99, ParachuteState.ABNORMAL, "heartbeat says state 99, which has no name"),
+        (99, ParachuteState.ABNORMAL, "heartbeat reports state 99, which has no name"),
     ],
 )
 def test_health_from_the_heartbeats_system_status(system_status, state, fault):

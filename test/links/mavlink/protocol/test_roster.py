@@ -37,7 +37,9 @@ def test_without_a_name_the_first_system_is_ours_and_a_second_makes_doubt():
     assert roster.doubt() == ""
     assert not heard(roster, 1, 161)
     assert roster.get(1, 161) is None
-    assert roster.doubt() == ("parachutes of systems 1, 2 heard, using 2: set parachute_system_id")
+    assert roster.doubt() == (
+        "parachutes of systems 1, 2 received, using 2: set parachute_system_id"
+    )
     assert heard(roster, 2, 162)
 
 

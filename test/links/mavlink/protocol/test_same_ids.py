@@ -37,7 +37,9 @@ def test_two_autopilots_with_the_same_ids_are_one_clear_error(other):
     bench = autopilots(Bench(**ASLEEP).hear(PILOT, copter()), 5.0, 100.0)
     autopilots(bench, 10.0, 100.0, other)
     (doubt,) = bench.link.doubts(bench.now)
-    assert doubt.startswith(f"two autopilots are 1/1 (their clocks are {abs(100 - other):.1f} s")
+    assert doubt.startswith(
+        f"two autopilots have the ids 1/1 (their clocks are {abs(100 - other):.1f} s"
+    )
     assert "system id of its own" in doubt
     assert len(restarts(bench)) <= 1
     assert bench.link.vehicle_state(bench.now).reboot_count == 0
@@ -77,5 +79,5 @@ def test_two_parachutes_with_the_same_ids_are_one_clear_error():
         bench.at(second).hear(CHUTE, heartbeat(), status(boot_ms=50_000 + 1000 * second))
         bench.at(second + 0.5).hear(CHUTE, heartbeat(), status(boot_ms=1000 * second, armed=2))
     (doubt,) = bench.link.doubts(bench.now)
-    assert doubt.startswith("two parachutes are 1/161")
+    assert doubt.startswith("two parachutes have the ids 1/161")
     assert len(restarts(bench)) <= 1

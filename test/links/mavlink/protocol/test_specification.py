@@ -67,7 +67,7 @@ def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
     assert bench.events == []
     bench.link.arm(1, True, 0, bench.now)
     bench.collect()
-    assert "no parachute was heard on this link" in bench.end(1).finished.message
+    assert "no parachute was received on this link" in bench.end(1).finished.message
     assert bench.commands() == []
 
 
@@ -138,7 +138,7 @@ def test_SET_PARACHUTE_ARM_worked_example():  # noqa: N802
     assert on_the_wire(bench) == (0b00000110, 0b00010111)
     bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=0b00001110))
     assert bench.end(3).finished.success
-    text = "PARACHUTE_STATUS says ATS armed, FC armed, MANUAL disarmed, GEOFENCE disarmed"
+    text = "PARACHUTE_STATUS reports ATS armed, FC armed, MANUAL disarmed, GEOFENCE disarmed"
     assert text in bench.end(3).finished.message
 
 
@@ -163,7 +163,7 @@ def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: 
     bench.stream(5.5, 0.5, PARACHUTE, lambda: status(boot_ms=next(boot), armed=0))
     end = bench.end(3).finished
     assert (end.success, end.accepted) == (False, True)
-    assert "never showed that PARACHUTE_STATUS says FC armed" in end.message
+    assert "never showed that PARACHUTE_STATUS reports FC armed" in end.message
 
 
 def test_SET_PARACHUTE_ARM_bit_beyond_128_is_the_devices_to_deny():  # noqa: N802
@@ -257,4 +257,4 @@ def test_kill(method, number, params):
     assert bench.ends(6) == []
     bench.at(0.2).hear((1, 1), ardupilot(armed=False))
     assert bench.end(6).finished.success
-    assert "the autopilot says motors off" in bench.end(6).finished.message
+    assert "the autopilot reports motors off" in bench.end(6).finished.message

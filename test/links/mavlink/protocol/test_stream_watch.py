@@ -189,7 +189,7 @@ def test_one_stream_that_somebody_slows_down_is_not_a_slow_line():
             if part != "tilt" or step % 10 == 0:
                 watch.heard(part, now + step / 10)
     (text,) = watch.faults(now + 40.0)
-    assert text.startswith("ATTITUDE comes at 1.0 Hz (need 5 Hz): something else sets its rate")
+    assert text.startswith("ATTITUDE comes at 1.0 Hz (need 5 Hz): another program sets its rate")
 
 
 def test_it_is_said_after_two_seconds_and_not_any_more_when_it_is_over():

@@ -108,7 +108,7 @@ def test_an_effect_that_telemetry_shows_confirms_it(name, before, shows, other):
     bench.talk(**shows).after(0.2)
     end = bench.end(number)
     assert (end.success, end.sent, end.shown) == (True, True, True)
-    assert end.message.startswith("telemetry says ")
+    assert end.message.startswith("telemetry reports ")
     assert end.message.endswith("; sent once")
     assert bench.steps(number) == ["SENT", "CONFIRMED"]
 
@@ -121,7 +121,7 @@ def test_what_else_telemetry_shows_does_not_confirm_it(name, before, shows, othe
     end = bench.end(number)
     assert (end.success, end.sent, end.shown) == (False, True, False)
     assert f"{name} given up after 5.0 s: sent " in end.message
-    assert "but the device's own status never showed that telemetry says" in end.message
+    assert "but the device's own status never showed that telemetry reports" in end.message
     assert bench.steps(number) == ["SENT", "FAILED"]
 
 
@@ -157,7 +157,7 @@ def test_a_reboot_is_confirmed_by_its_clock():
     assert bench.after(0.5).ends(number) == []
     bench.restarts(flight_mode=STARTUP).after(0.5)
     assert bench.end(number).success
-    assert bench.end(number).message.startswith("its clock starts anew after 0.")
+    assert bench.end(number).message.startswith("its clock restarts after 0.")
     assert bench.tokens == ["<R>"]
 
 
@@ -170,7 +170,7 @@ def test_the_target_of_the_reference():
     assert bench.tokens == ["<T,42.4419130,-76.4878000>"]
     bench.talk(blims_target_lat=as_f32(42.441913), blims_target_lon=as_f32(-76.4878)).after(0.3)
     assert bench.end(number).message.startswith(
-        "telemetry says blims_target_lat 42.441913, blims_target_lon -76.487800 after 0."
+        "telemetry reports blims_target_lat 42.441913, blims_target_lon -76.487800 after 0."
     )
 
 
@@ -257,7 +257,7 @@ def test_before_the_layout_is_known_no_target_can_be_set():
     bench = Bench().talk(flight_mode=STANDBY).at(0.45)
     number = bench.target(1.0, 2.0)
     assert bench.end(number).message == (
-        "set_target refused: how many floats the firmware takes is not known before its "
+        "set_target refused: the number of floats is not known before the first "
         "telemetry: set layout; nothing was sent"
     )
     assert bench.after(1.0).tokens == []

@@ -142,7 +142,7 @@ def test_on_the_ground_it_is_refused_unless_forced(stage, mode):
 def test_without_telemetry_it_is_refused_unless_forced():
     bench = Bench().at(1.0)
     number = bench.deploy()
-    assert bench.end(number).message.endswith("(no telemetry was ever heard)")
+    assert bench.end(number).message.endswith("(no telemetry was received yet)")
     bench.deploy(force=True)
     assert bench.after(0.5).tokens == ["<D>"]
 
@@ -154,7 +154,7 @@ def test_it_fires_again_until_telemetry_shows_it():
     assert bench.times("<D>") == [1.05, 2.55, 4.05]
     message = bench.end(number).message
     assert message == (
-        "telemetry says ssa_drogue_deployed 1, or flight mode DrogueDeployed after 3.55 s; "
+        "telemetry reports ssa_drogue_deployed 1, or flight mode DrogueDeployed after 3.55 s; "
         "sent 3 times"
     )
 
@@ -187,7 +187,7 @@ def test_it_ends_when_the_time_is_up_and_says_so():
     assert (end.success, end.sent, end.shown) == (False, True, False)
     assert end.message == (
         "drogue given up after 5.0 s: sent 4 times, but the device's own status never showed that "
-        "telemetry says ssa_drogue_deployed 1, or flight mode DrogueDeployed"
+        "telemetry reports ssa_drogue_deployed 1, or flight mode DrogueDeployed"
     )
 
 

@@ -112,7 +112,7 @@ def test_launch_asks_for_a_confirmation_and_not_for_force():
 
 def test_a_refusal_says_why_and_what_would_help():
     assert rule("drogue", Situation.STANDBY, False).refusal == (
-        "drogue refused: the drogue is not fired on the ground, nor where it may be the ground "
+        "drogue refused: the drogue is not fired on the ground, nor if it may be on the ground "
         "(flight mode Standby); force sends it all the same; nothing was sent"
     )
     assert rule("launch", Situation.ASCENT, True).refusal == (
@@ -182,7 +182,7 @@ def test_a_name_that_is_no_command_is_refused_in_words(name):
 def test_without_any_telemetry_the_refusal_says_that_none_was_heard():
     bench = Bench().at(1.0)
     number = bench.order("wipe_flash")
-    assert bench.end(number).message.endswith("(no telemetry was ever heard)")
+    assert bench.end(number).message.endswith("(no telemetry was received yet)")
     assert bench.writes == []
 
 
@@ -275,7 +275,7 @@ def test_launch_is_refused_after_the_key_was_disarmed_from_here_until_it_is_arme
     bench.order("key_disarm")
     first = bench.after(0.5).order("launch", force=True)
     assert bench.end(first).message == (
-        "launch refused: the key was disarmed from here; nothing was sent"
+        "launch refused: the key was disarmed by this node; nothing was sent"
     )
     bench.after(9.0)  # the key was not turned; telemetry still says Standby
     second = bench.order("launch", force=True)

@@ -102,7 +102,7 @@ def test_a_dump_that_falls_silent_is_given_up_with_what_came():
     assert bench.ends(number) == []
     bench.after(0.2)
     assert dumped(bench) == b"1,2\n-"
-    text = "dump flash failed, 5 bytes: silent for 3 s, its end mark did not come"
+    text = "dump flash failed, 5 bytes: silent for 3 s, no end mark"
     assert bench.of(DumpFinished) == [DumpFinished(number, False, text)]
     assert bench.end(number).message == text
     # What is said after is read as lines again.
@@ -115,7 +115,7 @@ def test_a_dump_without_its_end_mark_ends_when_telemetry_goes_on():
     bench, number = dumping()
     bench.hear_bytes(b"1,2\n").after(0.5).talk().after(0.5)
     assert dumped(bench) == b"1,2\n"
-    text = "dump flash failed, 4 bytes: its end mark did not come before telemetry went on"
+    text = "dump flash failed, 4 bytes: no end mark before telemetry resumed"
     assert bench.of(DumpFinished) == [DumpFinished(number, False, text)]
     assert not bench.end(number).success
 
@@ -234,7 +234,7 @@ def test_a_wipe_whose_end_was_lost_ends_when_telemetry_goes_on():
     bench, number = wiping()
     end = bench.after(9.0).talk().after(0.3).end(number)
     assert not end.success
-    assert end.message == "wipe flash failed: telemetry goes on, but its end was not told"
+    assert end.message == "wipe flash failed: telemetry resumed, but its end was not reported"
 
 
 def test_a_wipe_that_falls_silent_is_given_up():

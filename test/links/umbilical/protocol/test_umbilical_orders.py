@@ -21,7 +21,7 @@ def test_an_effect_that_does_not_show_is_ordered_again_until_the_time_is_up():
     assert bench.times("<M>") == [1.05, 2.55, 4.05, 5.55]
     assert bench.end(number).message == (
         "open_mav given up after 5.0 s: sent 4 times, but the device's own status never showed "
-        "that telemetry says mav_open 1"
+        "that telemetry reports mav_open 1"
     )
 
 
@@ -29,7 +29,7 @@ def test_nothing_is_sent_again_once_the_effect_shows():
     bench = ready()
     number = bench.order("open_mav")
     bench.after(2.0).talk(mav_open=1).after(0.2)
-    assert bench.end(number).message == "telemetry says mav_open 1 after 2.05 s; sent 2 times"
+    assert bench.end(number).message == "telemetry reports mav_open 1 after 2.05 s; sent 2 times"
     assert bench.after(9.0).times("<M>") == [1.05, 2.55]
 
 
@@ -210,7 +210,7 @@ def test_arming_that_the_flight_computer_blocks_ends_with_its_words():
     number = bench.order("key_arm")
     bench.after(0.2).hear("Arming blocked: wipe flash first")
     assert bench.end(number).message == (
-        "key_arm given up: the flight computer says: Arming blocked: wipe flash first; "
+        "key_arm given up: the flight computer reports: Arming blocked: wipe flash first; "
         "it had been sent once"
     )
     assert bench.after(9.0).tokens == ["<KA>"]

@@ -17,7 +17,7 @@ def test_nothing_is_wrong_with_a_healthy_one():
 
 def test_never_heard():
     assert reasons(Bench().at(2.0)) == (
-        "the flight computer was never heard: 0 bytes received, no $TELEM record, need one",
+        "the flight computer was never received: 0 bytes received, no $TELEM record, need one",
     )
 
 

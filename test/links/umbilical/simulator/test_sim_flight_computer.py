@@ -239,7 +239,7 @@ def test_help_names_every_action_and_layout_default():
         ),
         (("--telem-path", "/no/folder"), "--telem-path is '/no/folder': there is no layout"),
         (("--at", "5:explode"), "action 'explode' is not known: need one of dump-stalls, fault"),
-        (("--at", "5:jump=Moon"), "jump can take: need jump=one of Startup, "),
+        (("--at", "5:jump=Moon"), "is no argument of jump: need jump=one of Startup, "),
         (("--at", "soon:land"), "--at 'soon:land': need SECONDS:ACTION"),
         (("--rate", "0"), "rate is 0.0: need 0.01 to 100 Hz"),
         (("--speed", "-1"), "speed is -1.0: need 0.01 to 1000"),

@@ -99,7 +99,7 @@ def test_everything_that_is_missing_is_named_at_once(changed):
     with pytest.raises(ParameterError) as raised:
         Definitions(types)
     assert str(raised.value) == (
-        "the flyfire data types lack what is needed to fire or to answer: "
+        "the flyfire data types lack names needed to fire or to answer: "
         "flyfire.ParachuteService (request) field type, "
         "flyfire.ParachuteService (response) constant RESULT_REJECTED, "
         "flyfire.ParachuteStatus constant STATE_READY, "

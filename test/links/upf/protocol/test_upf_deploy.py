@@ -146,7 +146,7 @@ def test_acknowledged_deploy_that_is_never_shown_is_a_failure_that_says_so(bench
     story.trigger.stuck = True
     deploy(story).after(8.0)
     assert not story.end(1).success
-    assert "never showed that ParachuteStatus says LAUNCHED" in story.end(1).message
+    assert "never showed that ParachuteStatus reports LAUNCHED" in story.end(1).message
 
 
 def test_answer_to_another_request_is_no_answer_to_a_deploy(bench):
@@ -353,7 +353,7 @@ def test_last_resort_waits_as_long_as_it_is_told(bench):
 def test_trigger_is_fired_where_there_is_no_controller(bench):
     story = deploy(bench("trigger", without_controller=True).ready()).after(1.0)
     assert story.end(1).success
-    assert story.end(1).message.startswith("TriggerStatus of 34 says launched")
+    assert story.end(1).message.startswith("TriggerStatus of 34 reports launched")
     assert story.trigger.fired
     assert story.picture().deployed
 
@@ -391,7 +391,7 @@ def test_trigger_that_has_fired_is_not_fired_again(bench):
 
 def test_deploy_without_anybody_is_refused(bench):
     story = deploy(bench(""))
-    assert story.end(1).message == "no controller was heard on this link (heard: none)"
+    assert story.end(1).message == "no controller was received on this link (received: none)"
     assert not fired_at(story)
 
 
@@ -438,7 +438,7 @@ def test_triggers_that_have_fired_are_not_fired_again_at_the_end_of_a_ladder(ben
 def test_triggers_that_were_never_heard_may_listen(bench):
     story = fire(bench("").status("ARMED").clear())
     assert not story.end(1).success
-    assert story.end(1).message == "no trigger was ever heard; TriggerLaunch was broadcast"
+    assert story.end(1).message == "no trigger was received yet; TriggerLaunch was broadcast"
     assert len(story.messages(LAUNCH)) == 1
 
 

@@ -28,8 +28,8 @@ def test_over_turning_motors_it_is_said_loudly(bench, by_triggers):
     story = bench().in_flight()
     story.supervised = False
     answer = answer_of(story, flying(), by_triggers=by_triggers)
-    assert answer.startswith("WARNING: the vehicle said 0.")
-    assert " s ago that it is armed, and no kill was confirmed: the motors may turn" in answer
+    assert answer.startswith("WARNING: the vehicle reported armed 0.")
+    assert " s ago, and no kill was confirmed: the motors may turn" in answer
     assert LOUD in answer
     assert sum(LOUD in text for text in story.notices()) == 1, "and in the log, once"
 

@@ -87,7 +87,7 @@ def test_state_that_says_more_than_overdue_stays(bench, state):
 @pytest.mark.parametrize(("health", "name"), [(1, "WARNING"), (2, "ERROR"), (3, "CRITICAL")])
 def test_health_of_its_node_status_counts(bench, health, name):
     story = bench("").status("READY").node_status(health=health)
-    assert f"NodeStatus of 33 says {name}" in story.picture().faults
+    assert f"NodeStatus of 33 reports {name}" in story.picture().faults
     assert (story.picture().state is S.ABNORMAL) is (health >= 2)
     assert story.picture().uptime == 5.0
 
@@ -125,12 +125,12 @@ def test_controller_that_never_deploys_is_abnormal(bench):
 def test_controller_without_aps_says_so(bench):
     story = bench(parameters={**BY_REQUEST, p.ENABLE_APS: False}).ready()
     assert story.picture().healthy
-    assert "Enable APS is off: it deploys only when told to" in story.picture().faults
+    assert "Enable APS is off: it deploys only by command" in story.picture().faults
 
 
 def test_aps_that_is_off_by_the_status_alone_is_told():
     story = Bench(layout_of("ours"), "").status("READY", is_enable_auto_launch=False)
-    assert "Enable APS is off: it deploys only when told to" in story.picture().faults
+    assert "Enable APS is off: it deploys only by command" in story.picture().faults
 
 
 def test_status_says_how_often_it_comes(bench):

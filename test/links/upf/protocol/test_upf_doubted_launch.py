@@ -5,10 +5,10 @@ from upf_link_bench import Bench
 
 from chute_ros.model import LinkState, ParachuteState
 
-COUNT = "launched that nobody ordered, not believed yet"
+COUNT = "launched without an order, not believed yet"
 DOUBT = (
-    "trigger 34 says that it has fired, not by an order from here: believed once it goes on "
-    "saying so, or its controller does"
+    "trigger 34 reports fired, without an order from this node: believed once it repeats "
+    "this, or its controller reports it"
 )
 
 

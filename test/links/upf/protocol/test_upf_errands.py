@@ -124,7 +124,7 @@ def test_device_that_does_not_take_a_value_is_believed(bench):
     for _ in range(3):
         off = parameter(p.LIGHT, {"boolean_value": 0})
         story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
-    assert story.errand(1).message == "Enable Light was not taken: it still is false"
+    assert story.errand(1).message == "Enable Light was not accepted: it is still false"
     assert not story.errand(1).success
 
 
@@ -141,7 +141,7 @@ def test_device_that_answers_late_is_asked_again_and_heard(bench):
     ("answered", "text"),
     [
         (0, "Enable Light: no acknowledgement"),
-        (1, "Enable Light may be set or not: no acknowledgement"),
+        (1, "Enable Light may or may not be set: no acknowledgement"),
         (2, "Enable Light was sent, but not read back: no acknowledgement"),
     ],
 )
@@ -181,8 +181,7 @@ def test_value_is_not_kept_where_auto_save_is_off(bench):
     story = bench(parameters={p.AUTO_SAVE: False}).ready()
     done = set_it(story, p.LIGHT, "false").errand(1)
     assert done.message == (
-        "Enable Light is false; not kept over a restart until ~/save_params: "
-        "Enable Auto-Save is off"
+        "Enable Light is false; lost at a restart until ~/save_params: Enable Auto-Save is off"
     )
     story.link.errand(2, 0, errands.restart, story.now)
     story.after(1.0)
@@ -207,7 +206,7 @@ def test_nothing_is_said_of_what_is_kept_where_auto_save_is_not_known(bench):
 
 def test_auto_save_tells_of_itself(bench):
     story = bench().ready()
-    assert "not kept" in set_it(story, p.AUTO_SAVE, "false").errand(1).message
+    assert "lost at a restart" in set_it(story, p.AUTO_SAVE, "false").errand(1).message
     done = set_it(story, p.AUTO_SAVE, "true", token=2).errand(2)
     assert done.message == "Enable Auto-Save is true; kept"
 
@@ -221,7 +220,7 @@ def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
     story = set_it(bench().ready(), p.STATIC_NODE_ID, "0")
     assert story.errand(1).message == (
         "Static Node ID is 0; takes effect at the next start "
-        "(0: asks for a node id at each start); kept"
+        "(0: requests a node id at each start); kept"
     )
     story.link.errand(2, 33, errands.restart, story.now)
     story.after(6.0)
@@ -329,7 +328,7 @@ def test_opcode_that_the_device_refuses(bench):
     story = bench().ready()
     story.link.errand(1, 0, lambda one: errands.execute_opcode(one, 7), story.now)
     done = story.after(0.5).errand(1)
-    assert done.message == "erase: the device answered that it did not"
+    assert done.message == "erase: the device answered: not done"
     assert not done.success
 
 
@@ -368,7 +367,7 @@ def test_errand_goes_to_the_trigger_where_there_is_no_controller(bench):
 
 
 @pytest.mark.parametrize(
-    ("node_id", "why"), [(0, "no UPF device was heard"), (128, "there is no node id 128")]
+    ("node_id", "why"), [(0, "no UPF device was received"), (128, "there is no node id 128")]
 )
 def test_errand_without_a_device_ends_at_once(bench, node_id, why):
     story = bench("")

@@ -102,9 +102,7 @@ def test_jump_that_the_table_does_not_know_is_followed_and_reported(bench, befor
     controller = story.link.devices.controllers[33]
     assert (controller.state, controller.unknown_jumps) == (after, 1)
     assert controller.newest_unknown_jump == f"{before.name} to {after.name}"
-    wanted = (
-        f"controller 33 went from {before.name} to {after.name}, which its document does not know"
-    )
+    wanted = f"controller 33 went from {before.name} to {after.name}, which is not in its document"
     assert wanted in story.notices()
 
 

@@ -18,9 +18,12 @@ def test_nothing_is_wrong_with_healthy_devices(bench):
 @pytest.mark.parametrize(
     ("config", "text"),
     [
-        ({}, "a controller was never heard: need its ParachuteStatus (controller_node_id 0: of"),
-        ({"controller_node_id": 33}, "controller 33 was never heard: need its ParachuteStatus"),
-        ({"without_controller": True}, "a trigger was never heard: need its TriggerStatus"),
+        (
+            {},
+            "a controller was never received: need its ParachuteStatus (controller_node_id 0: of",
+        ),
+        ({"controller_node_id": 33}, "controller 33 was never received: need its ParachuteStatus"),
+        ({"without_controller": True}, "a trigger was never received: need its TriggerStatus"),
     ],
 )
 def test_never_heard(bench, config, text):

@@ -40,7 +40,7 @@ def test_request_is_sent_once_and_done_when_the_status_shows_it(bench, type_name
     assert story.controller.requests_heard == [type_name]
     assert story.steps(1) == ["SENT", "ACCEPTED", "CONFIRMED"]
     assert story.end(1).success
-    assert story.end(1).message.startswith(f"ParachuteStatus says {' or '.join(shown_by)}")
+    assert story.end(1).message.startswith(f"ParachuteStatus reports {' or '.join(shown_by)}")
 
 
 @EACH
@@ -135,7 +135,7 @@ def test_request_that_is_accepted_but_never_shown_fails_in_time(bench):
         story.heard.clear()
         story.after(0.1).status("READY")
     assert not story.end(1).success
-    assert "never showed that ParachuteStatus says TAKEOFF or ARMED" in story.end(1).message
+    assert "never showed that ParachuteStatus reports TAKEOFF or ARMED" in story.end(1).message
 
 
 def test_request_that_nobody_answers_fails_in_time(bench):
@@ -164,9 +164,13 @@ def test_request_can_name_its_controller(bench):
 @pytest.mark.parametrize(
     ("heard", "node_id", "why"),
     [
-        ("", 0, "no controller was heard on this link (heard: none)"),
-        ("33", 40, "no controller 40 was heard on this link (heard: 33)"),
-        ("34", 0, "no controller was heard on this link (heard: none; triggers heard: 34)"),
+        ("", 0, "no controller was received on this link (received: none)"),
+        ("33", 40, "no controller 40 was received on this link (received: 33)"),
+        (
+            "34",
+            0,
+            "no controller was received on this link (received: none; triggers received: 34)",
+        ),
     ],
 )
 def test_request_without_its_controller_is_refused(bench, heard, node_id, why):
@@ -214,7 +218,7 @@ def test_arming_a_ready_controller_takes_off_first(bench):
     assert story.controller.requests_heard == ["TYPE_TAKEOFF", "TYPE_ARM"]
     assert story.controller.state.name == "ARMED"
     assert story.steps(1) == ["SENT", "ACCEPTED", "CONFIRMED"]
-    assert story.end(1).message.startswith("ParachuteStatus says ARMED")
+    assert story.end(1).message.startswith("ParachuteStatus reports ARMED")
 
 
 def test_arming_in_flight_sends_arm_alone(bench):
@@ -267,5 +271,5 @@ def test_controller_as_delivered_does_all_by_itself(bench):
     assert story.controller.values == CONTROLLER_PARAMETERS
     for token, type_name in enumerate(("TYPE_TAKEOFF", "TYPE_ARM"), start=1):
         ask(story, type_name, token)
-        assert "is on: it does so by itself" in story.end(token).message
+        assert "is on: the controller does this by itself" in story.end(token).message
     assert story.controller.requests_heard == []

@@ -322,7 +322,7 @@ def test_type_that_is_not_known_is_rejected_and_counted(alone):
     story = alone().ask(KILL, type=99)
     assert story.answers() == ["REJECTED"]
     assert story.asked() == []
-    assert story.link.counts["requests of a type that is not known"] == 1
+    assert story.link.counts["requests of an unknown type"] == 1
     assert story.link.vehicle_service.newest_answer == "bad request of 33: REJECTED"
 
 
@@ -331,7 +331,7 @@ def test_service_that_the_vehicle_does_not_offer_is_counted(alone):
     puppet = story.puppet(33)
     puppet.request(US, "flyfire.TriggerService", 0, {}, 16)
     story.deliver(puppet)
-    assert story.link.counts["requests that we do not serve"] == 1
+    assert story.link.counts["requests that this node does not serve"] == 1
 
 
 def test_flood_of_requests_is_bounded_and_answered(alone):

@@ -134,7 +134,7 @@ def changed(tmp_path):
 def test_nothing_is_said_while_the_only_numbers_mean_something_else(changed):
     story = changed(("uint3 STATE_UNKNOWN = 0", ""), ("ON_GROUND = 1", "ON_GROUND = 0")).at(1.0)
     assert story.messages(VEHICLE_STATUS) == []
-    (notice,) = [text for text in story.notices() if "not sent while" in text]
+    (notice,) = [text for text in story.notices() if "is not sent: " in text]
     assert "has no STATE_UNKNOWN, and 0 means another state" in notice
     assert told(story, landed())["state"] == "ON_GROUND"
 
@@ -142,7 +142,7 @@ def test_nothing_is_said_while_the_only_numbers_mean_something_else(changed):
 def test_nothing_is_said_while_a_whole_number_cannot_hold_what_is_not_known(changed):
     story = changed(("float16 vz", "int16 vz")).at(1.0)
     assert story.messages(VEHICLE_STATUS) == []
-    assert len([text for text in story.notices() if "not sent while" in text]) == 1
+    assert len([text for text in story.notices() if "is not sent: " in text]) == 1
     assert told(story, flying(vertical_speed=-2))["vz"] == -2
 
 

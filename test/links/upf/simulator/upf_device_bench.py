@@ -81,7 +81,7 @@ class Vehicle:
     def receive(self, data: bytes, now: float) -> None:
         heard = self.endpoint.receive(data, now)
         # A device that has just restarted begins to count anew.
-        wrong = set(self.endpoint.counts) - {"transfers that came twice"}
+        wrong = set(self.endpoint.counts) - {"duplicate transfers"}
         assert not wrong, "a device sends nothing but whole transfers"
         if heard is None:
             return
