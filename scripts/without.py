@@ -36,9 +36,10 @@ from chute_ros.campaign.shipped import Shipped
 from chute_ros.interrupts import at_ctrl_c
 from chute_ros.model import Action
 from chute_ros.supervisor import contradictions, counter, flight, measurements, reports
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.rules import MeasurementCondition, Profile
+from chute_ros.supervisor.rules import Profile
 from chute_ros.tools.campaign_command import positive
 from chute_ros.tools.entry import INTERRUPTED
 

@@ -19,7 +19,6 @@ from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.lease import LeaseConfig
 from chute_ros.supervisor.link_evidence import LinkLimits
-from chute_ros.supervisor.rules import AutopilotFact, is_silence
 
 PARAMETERS = (
     Parameter(
@@ -248,8 +247,8 @@ def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
     return [
         rule.name
         for rule in config.profile.rules
-        if rule.asks(AutopilotFact.LOST)
-        and sum(one.weight for one in rule.conditions if is_silence(one)) < rule.needed
+        if rule.misses_the_autopilot
+        and sum(one.weight for one in rule.conditions if one.is_silence) < rule.needed
     ]
 
 

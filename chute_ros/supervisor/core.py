@@ -22,7 +22,7 @@ from chute_ros.supervisor.orders import ON_GROUND
 from chute_ros.supervisor.policy import rule_deadlines
 from chute_ros.supervisor.preflight import block_reasons, not_seen
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.state import ASK_LASTS, Pending, State
+from chute_ros.supervisor.state import Pending, State
 from chute_ros.supervisor.steps import Slot
 
 #: What people ask for, besides a kill, which devices want as well.
@@ -81,7 +81,6 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     deadlines.append(state.alarm_at)
     if state.stage is Stage.FAULT:
         deadlines.append(state.stage_since + config.deploy_timeout)
-    deadlines += [ask.at + ASK_LASTS for ask in state.asks.values()]
     if state.airborne:
         deadlines.append(flight.landed_at(config, state))
         if state.stage is Stage.KILLING:

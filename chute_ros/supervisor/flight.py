@@ -10,9 +10,9 @@ import math
 from functools import lru_cache
 from itertools import pairwise
 from statistics import fmean, median
+from typing import TYPE_CHECKING
 
 from chute_ros.model import Armed, LandedState
-from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY, NO_DROP, NOT_TOLD, Drop, Rise
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
@@ -25,7 +25,10 @@ from chute_ros.supervisor.measurements import (
     VERTICAL_ACCELERATION,
     VERTICAL_SPEED,
 )
-from chute_ros.supervisor.state import State
+
+if TYPE_CHECKING:  # both hold rules, whose conditions are found here
+    from chute_ros.supervisor.config import SupervisorConfig
+    from chute_ros.supervisor.state import State
 
 #: One that is armed and says so higher than a deploy needs, on a roof or a hill, for so long, s:
 #: the land detectors of autopilots have erred in a hover.

@@ -12,10 +12,10 @@ import math
 from collections.abc import Sequence
 
 from chute_ros.supervisor import flight
-from chute_ros.supervisor.conditions import Finding
+from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import BelowMinimum, Rule, is_silence
+from chute_ros.supervisor.rules import BelowMinimum, Rule
 from chute_ros.supervisor.state import State
 
 #: For so long after a kill in flight what tells of a vehicle that stands may be one that falls, s.
@@ -49,7 +49,7 @@ def against_rule(
     told = [
         finding
         for condition, finding in zip(rule.conditions, findings, strict=True)
-        if finding.holds and not is_silence(condition)
+        if finding.holds and not condition.is_silence
     ]
     wrong = against_any_rule(config, state, now)
     if not wrong and not told:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from chute_ros.model import Action
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.conditions import Finding, find
+from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import Look, RuleEvidence
 from chute_ros.supervisor.gate import against_any_rule, against_rule, too_low
@@ -42,7 +42,7 @@ class Judged(NamedTuple):
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     before = state.rule(rule.name)
-    findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
+    findings = tuple([condition.find(config, state, now) for condition in rule.conditions])
     if len(before.kept) == len(findings):  # otherwise none is kept, or it is another rule's
         findings = tuple(
             one._replace(holds=True) if left > 0.0 and one.lingers else one
@@ -67,21 +67,11 @@ def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequen
     """When a rule's counter is full or empty, or what it rests on too old."""
     deadlines = []
     for rule in config.profile.rules:
-        if state.stage not in rule.states:
-            continue
-        evidence = state.rule(rule.name)
-        deadlines.append(evidence.deadline(rule, now))
-        if rule.asks_the_autopilot:
-            deadlines.append(state.vehicle_received + config.vehicle_state_age)
-        deadlines += [
-            state.measured(name).turns_at(config.profile.limits[name], now)
-            for name in rule.turned_by_time
-        ]
-        if evidence.holds:
-            deadlines += [
-                state.measured(name).measured_at + config.profile.limits[name].max_age
-                for name in rule.measured
-            ]
+        if state.stage in rule.states:
+            evidence, doubts = state.rule(rule.name), rule.doubted != 1.0
+            deadlines.append(evidence.deadline(rule, now))
+            for one in rule.conditions:
+                deadlines += one.deadlines(config, state, evidence.holds, doubts, now)
     return deadlines
 
 

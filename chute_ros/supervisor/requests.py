@@ -13,7 +13,7 @@ from chute_ros.supervisor.machine import Stage, Stimulus, listed
 from chute_ros.supervisor.orders import ON_GROUND, Orders
 from chute_ros.supervisor.preflight import arm_reasons
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.state import ASK_LASTS, Ask
+from chute_ros.supervisor.state import Ask
 
 #: Devices whose wish to block flight is remembered: made-up names must not grow us.
 MOST_DEVICE_BLOCKS = 64
@@ -59,7 +59,7 @@ class Requests(Orders):
             self._nothing_sent(one.token)
 
     def _device_asks(self, one: i.KillRequest) -> None:
-        asks = {who: ask for who, ask in self.state.asks.items() if self.now < ask.at + ASK_LASTS}
+        asks = {who: ask for who, ask in self.state.asks.items() if self.now < ask.ends_at}
         if one.by in asks or len(asks) < MOST_DEVICE_BLOCKS:
             asks[one.by] = Ask(self.now, one.by.partition(" ")[0], one.reason)
         rules = dict(self.state.rules)

@@ -37,6 +37,11 @@ class Ask:
     link: str
     reason: str
 
+    @property
+    def ends_at(self) -> float:
+        """Until when it is taken to want it, monotonic s."""
+        return self.at + ASK_LASTS
+
 
 @dataclass(frozen=True)
 class Pending:

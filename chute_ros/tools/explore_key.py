@@ -12,12 +12,13 @@ from collections.abc import Hashable
 
 from chute_ros.model import Action
 from chute_ros.supervisor import flight
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
-from chute_ros.supervisor.rules import MeasurementCondition, Rule
+from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
 #: Fields that do not decide: texts, counts for people, what only times a repetition, and what is

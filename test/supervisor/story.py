@@ -19,12 +19,14 @@ from chute_ros.model import (
     VehicleState,
 )
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.base import Condition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import TRIGGER, SupervisorConfig
 from chute_ros.supervisor.core import next_deadline, update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import Turn
-from chute_ros.supervisor.rules import Condition, MeasurementCondition, Profile, Rule
+from chute_ros.supervisor.rules import Profile, Rule
 from chute_ros.supervisor.state import State
 
 LINK = "mavlink_parachute"

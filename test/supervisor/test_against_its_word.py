@@ -12,9 +12,9 @@ from story import LINK, START, Story, falling, parachute, rule, shipped, vehicle
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import MeasurementCondition
 
 K, D = Action.KILL, Action.DEPLOY
 TILT = rule(MeasurementCondition("tilt_deg", above=60.0), hold=0.3, samples=3)

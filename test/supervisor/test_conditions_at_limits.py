@@ -8,20 +8,15 @@ import pytest
 from told import Told, told
 
 from chute_ros.model import LinkState, ParachuteState, ParachuteStatus, VehicleState
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
 from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.rules import (
-    ALL,
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    Profile,
-)
+from chute_ros.supervisor.profile_lines import ALL, ANY
+from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import ASK_LASTS, Ask, State
 
 LINKS = ("a", "b")

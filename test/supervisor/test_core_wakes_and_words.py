@@ -22,12 +22,13 @@ from story import (
 from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import DeviceCondition, DeviceFact, Profile
+from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import Ask, Pending, State
 
 K, D = Action.KILL, Action.DEPLOY
@@ -48,7 +49,14 @@ SETTINGS = SupervisorConfig(
     report_wait=0.5,
     resend_interval=0.1,
     vehicle_state_age=2.5,
-    profile=Profile("tested", (rule(SINKS, hold=1.0),), landed_hold=5.0),
+    profile=Profile(
+        "tested",
+        (
+            rule(SINKS, hold=1.0),
+            rule(DeviceCondition(DeviceFact.ASKS_FOR_KILL), action=K, name="asked"),
+        ),
+        landed_hold=5.0,
+    ),
 )
 
 
@@ -88,7 +96,8 @@ def heard(at: float, **parts: float) -> MappingProxyType[str, LinkEvidence]:
         ({"stage": Stage.KILLING, "deploy_due": 100.3}, math.inf),
         ({"stage": Stage.DEPLOYING, "deploy_rule": "r", "deploy_due": 100.3}, math.inf),
         ({"alarm_at": 101.25}, 101.25),
-        ({"asks": MappingProxyType({"a": Ask(99.5, LINK, "why")})}, 100.5),
+        # What rules wait for, just after it.
+        ({"asks": MappingProxyType({"a": Ask(99.5, LINK, "why")})}, 100.500001),
         ({"airborne": True, "down_since": 99.0}, 104.0),
         ({"airborne": False, "down_since": 99.0}, math.inf),
         # The earliest of several.

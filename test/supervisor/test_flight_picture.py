@@ -9,9 +9,9 @@ from story import FLYING, STANDING, START, Story, rule, vehicle, with_rules
 from chute_ros.model import Armed, LandedState, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import MeasurementCondition
 
 GROUND, AIR = LandedState.ON_GROUND, LandedState.IN_AIR
 NOTHING = LandedState.UNKNOWN

@@ -8,16 +8,13 @@ from story import LINK, SINKS, STANDING, TILTS, Story, rule, with_rules
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    LinkCondition,
-)
+from chute_ros.supervisor.profile_lines import ANY
+from chute_ros.supervisor.rules import BelowMinimum
 
 K, D = Action.KILL, Action.DEPLOY
 EVERYWHERE = tuple(Stage)

@@ -10,11 +10,12 @@ from story import DOWN, LINK, SINKS, Story, parachute, rule, shipped, with_rules
 
 from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome
 from chute_ros.supervisor import gate
-from chute_ros.supervisor.conditions import Finding
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, BelowMinimum, Profile
+from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.supervisor.state import Pending, State
 
 HOLDS = Finding(True, lambda: "it sinks")

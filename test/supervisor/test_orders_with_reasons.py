@@ -8,9 +8,10 @@ from story import FLYING, LINK, SINKS, START, Story, rule, with_rules
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import BelowMinimum, MeasurementCondition
+from chute_ros.supervisor.rules import BelowMinimum
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"

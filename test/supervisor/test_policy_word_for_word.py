@@ -9,17 +9,12 @@ from story import SINKS, START, TILTS, Story, rule, vehicle, with_rules
 
 from chute_ros.model import Action, Armed, LandedState
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import JUMP_DOUBTED, Measured
 from chute_ros.supervisor.policy import judge, rule_deadlines
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    MeasurementCondition,
-    Rule,
-)
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 
 K, ALARM = Action.KILL, Action.NONE
 LOW = {"minimum_height": 10.0, "below_minimum": BelowMinimum.NOTHING}

@@ -13,23 +13,15 @@ from story import FLYING_WELL, LINK, Story, parachute, shipped, vehicle
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    ALL,
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    Profile,
-    Rule,
-)
+from chute_ros.supervisor.profile_lines import ALL, ANY
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Profile, Rule
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"

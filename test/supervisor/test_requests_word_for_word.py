@@ -21,10 +21,11 @@ from story import (
 from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
-from chute_ros.supervisor.rules import Clears, DeviceCondition, DeviceFact
+from chute_ros.supervisor.rules import Clears
 from chute_ros.supervisor.state import ASK_LASTS, State
 
 K, D = Action.KILL, Action.DEPLOY

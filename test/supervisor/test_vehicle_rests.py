@@ -12,19 +12,15 @@ from story import LINK, START, TILTS, Story, falling, rule, shipped, with_rules
 from chute_ros.model import Action, Armed, LinkState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor import policy
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import rests_until
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    AutopilotFact,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    LinkJudgement,
-    MeasurementCondition,
-    Rule,
-)
+from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.rules import Rule
 
 LOST = AutopilotCondition(AutopilotFact.LOST)
 DISARMED = AutopilotCondition(AutopilotFact.DISARMED)
