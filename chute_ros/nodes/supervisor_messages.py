@@ -9,11 +9,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros.nodes import diagnostics, messages
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.flight import doubt, measured, unusable
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.readings import doubt, measured, unusable
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
 

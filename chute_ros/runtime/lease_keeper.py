@@ -11,7 +11,7 @@ from chute_ros.runtime.topics import LeaseClaim
 from chute_ros.supervisor import handover
 from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND
 from chute_ros.supervisor.state import State
 
 #: One that lives claims ten times a second; a single claim may be anybody's.

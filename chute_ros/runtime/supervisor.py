@@ -25,10 +25,11 @@ from chute_ros.runtime.supervisor_inputs import input_of
 from chute_ros.runtime.topics import DeviceBeat, LeaseClaim, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.epochs import epoch_above
 from chute_ros.supervisor.lease import Event, LeaseConfig
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 HEARTBEAT_INTERVAL = 0.1  # s
 STATE_INTERVAL = 1.0  # s, at the latest

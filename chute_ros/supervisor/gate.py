@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
@@ -95,11 +95,11 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
     minimum = profile.minimum_height
-    height = flight.measured(config, state, "height", now)
+    height = readings.measured(config, state, "height", now)
     known = state.measured("height")
     if known.has_jumped(now) and known.value < known.before_jump:
         height = math.nan  # it has jumped down: that it is low may be as wrong as before
-    by_pressure = flight.pressure_height(config, state, now)
+    by_pressure = readings.pressure_height(config, state, now)
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
     low = -minimum <= height < minimum
     low = low and not flight.above_its_ground(state, height) >= minimum

@@ -24,6 +24,9 @@ class Stage(enum.IntEnum):
     FAULT = 9
 
 
+ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
+
+
 class Stimulus(enum.Enum):
     """What can move the vehicle from one stage to another."""
 

@@ -14,7 +14,7 @@ from chute_ros.model import (
     TriggerFlags,
     flag_names,
 )
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
@@ -238,7 +238,7 @@ def _battery(config: SupervisorConfig, state: State, now: float) -> list[str]:
         ("battery_remaining", limits.min_battery_remaining, ""),
         ("battery_voltage", limits.min_battery_voltage, " V"),
     ):
-        value = flight.measured(config, state, name, now)
+        value = readings.measured(config, state, name, now)
         if value < least:
             told.append(f"{name} {value:.2f}{unit} (need {least:g}{unit})")
     return told

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
 from chute_ros.supervisor.handover import check_numbers
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND
 from chute_ros.supervisor.state import State
 
 

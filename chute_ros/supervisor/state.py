@@ -13,7 +13,7 @@ from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 
 #: Forward, and not.
 _STEPS = frozenset({Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED})

@@ -17,7 +17,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
+from chute_ros.supervisor.measured import JUMP_DOUBTED, REJECTION_DOUBTED
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.state import State
 
 _EPSILON = 1e-6

@@ -10,8 +10,7 @@ import itertools
 import math
 from xml.sax.saxutils import escape
 
-from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND, TRANSITIONS, Stage, Stimulus
 
 Point = tuple[float, float]
 

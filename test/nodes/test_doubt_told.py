@@ -14,7 +14,7 @@ from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.state import State
 
 NOW = 100.0

@@ -9,13 +9,14 @@ from dataclasses import replace
 from story import LINK, START
 
 from chute_ros.model import Action, Armed, LandedState, Outcome, VehicleState
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import BelowMinimum
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 #: A reason that begins so tells only of silence, or of how far the deploy has got.
@@ -172,7 +173,7 @@ class Watch:
         told = state.deploy_reasons
         assert any(not reason.startswith(_SILENCE) for reason in told), "silence alone deploys"
         profile = self.config.profile
-        height = flight.measured(self.config, state, "height", now)
+        height = readings.measured(self.config, state, "height", now)
         if profile.below_minimum is not BelowMinimum.DEPLOY:
             assert not height < profile.minimum_height, "below the minimum height"
         assert before.airborne or state.airborne, "a rule deploys what is not in flight"

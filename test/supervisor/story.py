@@ -22,12 +22,13 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import TRIGGER, SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import Turn
 from chute_ros.supervisor.rules import Profile, Rule
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 LINK = "mavlink_parachute"
 START = 1000.0

@@ -11,8 +11,8 @@ from story import DOWN, START, Story, shipped
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 BOTH_AIRCRAFT = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])

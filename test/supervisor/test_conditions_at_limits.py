@@ -14,7 +14,7 @@ from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.profile_lines import ALL, ANY
 from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import ASK_LASTS, Ask, State

@@ -11,7 +11,7 @@ from story import START, Story, with_rules
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions import CONDITIONS
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
-from chute_ros.supervisor.conditions.base import Condition, Finding
+from chute_ros.supervisor.conditions.base import JUST_AFTER, Condition, Finding
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.record import CODEC
 
@@ -28,7 +28,7 @@ OWN: dict[str, Any] = {
 def test_one_that_says_all_of_itself_can_be_made() -> None:
     made = type("Whole", (Condition,), OWN)()
     assert made.counted
-    assert not (made.measured or made.rests_on_the_vehicle or made.goes_on)
+    assert [made.measured, made.rests_on_the_vehicle, made.goes_on] == [(), False, False]
 
 
 @pytest.mark.parametrize("missing", OWN)
@@ -53,7 +53,7 @@ def test_every_fact_of_the_autopilot_is_found_and_waited_for(fact: AutopilotFact
     story, one = Story().flying(), AutopilotCondition(fact)
     now = START + story.t
     assert one.find(story.config, story.state, now).text
-    received = story.state.vehicle_received + story.config.vehicle_state_age
+    received = story.state.vehicle_received + story.config.vehicle_state_age + JUST_AFTER
     assert received in one.deadlines(story.config, story.state, None, False, now)
 
 

@@ -9,8 +9,8 @@ from story import FLYING, LINK, STANDING, START, Story, parachute
 from chute_ros.model import Action, Armed, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 TWO = SupervisorConfig(deploy_links=(LINK, "upf_can"))

@@ -24,12 +24,12 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import Ask, Pending, State
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 BLOCK, RELEASE = Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE
@@ -96,8 +96,7 @@ def heard(at: float, **parts: float) -> MappingProxyType[str, LinkEvidence]:
         ({"stage": Stage.KILLING, "deploy_due": 100.3}, math.inf),
         ({"stage": Stage.DEPLOYING, "deploy_rule": "r", "deploy_due": 100.3}, math.inf),
         ({"alarm_at": 101.25}, 101.25),
-        # What rules wait for, just after it.
-        ({"asks": MappingProxyType({"a": Ask(99.5, LINK, "why")})}, 100.500001),
+        ({"asks": MappingProxyType({"a": Ask(99.5, LINK, "why")})}, 100.5),
         ({"airborne": True, "down_since": 99.0}, 104.0),
         ({"airborne": False, "down_since": 99.0}, math.inf),
         # The earliest of several.

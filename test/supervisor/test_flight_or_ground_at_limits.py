@@ -9,10 +9,10 @@ import pytest
 from story import Story, with_rules
 
 from chute_ros.model import Armed, LandedState, VehicleState
-from chute_ros.supervisor import flight, gate
+from chute_ros.supervisor import flight, gate, readings
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.supervisor.state import State
 
@@ -78,26 +78,26 @@ def told_by_heights(*heights: tuple[float, float]) -> State:
 
 def test_a_climb_rate_needs_heights_just_so_far_apart() -> None:
     far = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
-    assert flight.climb_rate(CONFIG, far, 0.4) == pytest.approx(-15.0)
+    assert readings.climb_rate(CONFIG, far, 0.4) == pytest.approx(-15.0)
     near = told_by_heights((0.1, 50.0), (0.2, 47.0), (0.4, 44.0))
-    assert math.isnan(flight.climb_rate(CONFIG, near, 0.4))
+    assert math.isnan(readings.climb_rate(CONFIG, near, 0.4))
 
 
 def test_a_climb_rate_is_not_known_where_the_height_is_not() -> None:
     falls = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
-    assert math.isnan(flight.climb_rate(CONFIG, falls, 9.0)), "the newest is old"
-    assert math.isnan(flight.climb_rate(CONFIG, replace(falls, heights=()), 0.4))
+    assert math.isnan(readings.climb_rate(CONFIG, falls, 9.0)), "the newest is old"
+    assert math.isnan(readings.climb_rate(CONFIG, replace(falls, heights=()), 0.4))
 
 
 def test_one_that_started_anew_falls_as_fast_but_it_is_no_sign_of_its_own() -> None:
     falls = told_by_heights((0.0, 50.0), (0.2, 47.0), (0.4, 44.0))
     anew = replace(falls, rebooted=True)
-    rate = flight.climb_rate(CONFIG, falls, 0.4)
-    assert flight.climb_rate(CONFIG, anew, 0.4) == rate == pytest.approx(-15.0)
-    assert flight.measured(CONFIG, anew, "vertical_speed", 0.4) == rate
-    assert flight.measured(CONFIG, falls, "climb_rate", 0.4) == rate
+    rate = readings.climb_rate(CONFIG, falls, 0.4)
+    assert readings.climb_rate(CONFIG, anew, 0.4) == rate == pytest.approx(-15.0)
+    assert readings.measured(CONFIG, anew, "vertical_speed", 0.4) == rate
+    assert readings.measured(CONFIG, falls, "climb_rate", 0.4) == rate
     for name in ("climb_rate", "height"):
-        value, why = flight.reading(CONFIG, anew, name, 0.4)
+        value, why = readings.reading(CONFIG, anew, name, 0.4)
         assert math.isnan(value)
         assert why == "the autopilot started anew in flight, and its height with it"
 
@@ -135,7 +135,7 @@ def every_tenth(*values: float) -> State:
 
 
 def told_rate(*values: float) -> tuple[float, str]:
-    return flight.reading(CONFIG, every_tenth(*values), "climb_rate", (len(values) - 1) / 10)
+    return readings.reading(CONFIG, every_tenth(*values), "climb_rate", (len(values) - 1) / 10)
 
 
 def test_too_few_heights_say_so() -> None:

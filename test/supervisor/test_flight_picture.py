@@ -7,7 +7,7 @@ import pytest
 from story import FLYING, STANDING, START, Story, rule, vehicle, with_rules
 
 from chute_ros.model import Armed, LandedState, VehicleState
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
@@ -146,12 +146,12 @@ def test_the_height_of_an_autopilot_that_started_anew_is_not_used() -> None:
     story = Story(landing()).flying()
     story.fly(0.5, height=80.0)
     now = START + story.t
-    assert flight.measured(story.config, story.state, "height", now) == pytest.approx(80.0)
+    assert readings.measured(story.config, story.state, "height", now) == pytest.approx(80.0)
     story.fly(1.0, height=0.0, reboot_count=1, rebooted_in_flight=True)
     now = START + story.t
-    assert math.isnan(flight.measured(story.config, story.state, "height", now))
-    assert "started anew" in flight.unusable(story.config, story.state, "height", now)
-    assert flight.unusable(story.config, story.state, "acceleration", now) == ""
+    assert math.isnan(readings.measured(story.config, story.state, "height", now))
+    assert "started anew" in readings.unusable(story.config, story.state, "height", now)
+    assert readings.unusable(story.config, story.state, "acceleration", now) == ""
 
 
 def test_a_restart_that_is_only_counted_is_none_in_flight() -> None:

@@ -14,7 +14,7 @@ from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, Autopi
 from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.rules import BelowMinimum, Profile
 from chute_ros.supervisor.state import Pending, State
 

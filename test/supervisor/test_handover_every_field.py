@@ -18,7 +18,7 @@ from chute_ros.supervisor.handover import followed, told
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.state import Ask, Pending, State
 
 #: When it is told, by the clock of each host, s.

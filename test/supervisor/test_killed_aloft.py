@@ -12,9 +12,9 @@ from story import DOWN, LINK, START, Story, shipped
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.link_evidence import LinkLimits
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 D = Action.DEPLOY
 BOTH = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])

@@ -14,8 +14,9 @@ from chute_ros.supervisor.handover import followed
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
+from chute_ros.supervisor.sending import fire
 from chute_ros.supervisor.state import Pending
-from chute_ros.supervisor.steps import Steps
+from chute_ros.supervisor.turn import Turn
 
 K, D = Action.KILL, Action.DEPLOY
 TWO = SupervisorConfig(deploy_links=(LINK, "upf_can"))
@@ -35,18 +36,18 @@ def test_after_a_confirmation_no_step_is_fired_whoever_asks() -> None:
     (step,) = story.state.deploys
     confirmed = MappingProxyType({LINK: frozenset({Outcome.CONFIRMED})})
     state = replace(story.state, deploys=(replace(step, outcomes=confirmed),))
-    steps = Steps(story.config, state, START + 1.2)
-    steps.fire(D, "mistake", ())
-    assert steps.outputs == []
+    turn = Turn(story.config, state, START + 1.2)
+    fire(turn, D, "mistake", ())
+    assert turn.outputs == []
 
 
 def test_beyond_the_last_step_of_the_ladder_nothing_is_fired() -> None:
     story = deploying()
     (step,) = story.state.deploys
     state = replace(story.state, deploys=(step, step))
-    steps = Steps(story.config, state, START + 1.2)
-    steps.fire(D, "mistake", ())
-    assert steps.outputs == []
+    turn = Turn(story.config, state, START + 1.2)
+    fire(turn, D, "mistake", ())
+    assert turn.outputs == []
 
 
 @pytest.mark.parametrize(

@@ -14,11 +14,11 @@ from story import START, Story, shipped, with_rules
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.deploying import release_due
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 LOST = {"link_state": LinkState.LOST}

@@ -10,9 +10,9 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import Clears, Rule
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D, ALARM = Action.KILL, Action.DEPLOY, Action.NONE
 HIGH = MeasurementCondition("height", above=100.0)

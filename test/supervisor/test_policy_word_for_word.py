@@ -10,9 +10,10 @@ from story import SINKS, START, TILTS, Story, rule, vehicle, with_rules
 from chute_ros.model import Action, Armed, LandedState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.base import JUST_AFTER
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import JUMP_DOUBTED, Measured
+from chute_ros.supervisor.measured import JUMP_DOUBTED, Measured
 from chute_ros.supervisor.policy import judge, rule_deadlines
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 
@@ -115,7 +116,9 @@ def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends() -> None:
     story = flying(rule(SINKS, doubted=0.5))
     jumped = {"vertical_speed": Measured(jumped_at=START)}
     state = replace(story.state, measurements=jumped)
-    assert START + JUMP_DOUBTED in rule_deadlines(story.config, state, START + story.t)
+    assert START + JUMP_DOUBTED + JUST_AFTER in rule_deadlines(
+        story.config, state, START + story.t
+    )
 
 
 def test_a_sample_that_is_looked_at_twice_showed_it_once() -> None:

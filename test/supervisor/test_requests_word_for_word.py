@@ -19,8 +19,8 @@ from story import (
 )
 
 from chute_ros.model import Action, Armed, Outcome
-from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor import readings
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
@@ -354,7 +354,7 @@ def test_after_a_reset_the_height_of_an_autopilot_that_started_anew_counts_again
     story.fly(14.0, **again, **DOWN, height=0.0, vertical_speed=0.0)
     story.at(14.1, story.told(**again, **DOWN, height=0.0), i.ResetRequest(2))
     assert story.answer(2).success
-    assert flight.unusable(story.config, story.state, "height", START + story.t) == ""
+    assert readings.unusable(story.config, story.state, "height", START + story.t) == ""
 
 
 def test_after_a_reset_a_rule_speaks_again() -> None:

@@ -11,7 +11,7 @@ from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.state import Pending, State
 
 UPF = "upf_can"

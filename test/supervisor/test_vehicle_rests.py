@@ -17,9 +17,9 @@ from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.core import update
+from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import rests_until
-from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.rules import Rule
 
 LOST = AutopilotCondition(AutopilotFact.LOST)

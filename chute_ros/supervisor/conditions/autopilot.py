@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from chute_ros.model import Armed, LinkState
 from chute_ros.supervisor import flight
-from chute_ros.supervisor.conditions.base import Condition, Finding
+from chute_ros.supervisor.conditions.base import JUST_AFTER, Condition, Finding
 from chute_ros.supervisor.conditions.measurement import known_by
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import FALL_SIGNS
@@ -80,10 +80,10 @@ class AutopilotCondition(Condition):
         self, config: SupervisorConfig, state: State, holds: bool | None, doubts: bool, now: float
     ) -> Iterable[float]:
         """When what it says is too old, and when what tells of a fall is."""
-        yield state.vehicle_received + config.vehicle_state_age
+        yield state.vehicle_received + config.vehicle_state_age + JUST_AFTER
         if self.fact is AutopilotFact.KILLED_ALOFT:
             for name in (one for sign in FALL_SIGNS for one in known_by(sign)):
-                yield state.measured(name).turns_at(config.profile.limits[name], now)
+                yield state.measured(name).turns_at(config.profile.limits[name], now) + JUST_AFTER
 
 
 def _rebooted(config: SupervisorConfig, state: State, now: float) -> Finding:

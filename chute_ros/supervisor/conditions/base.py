@@ -15,6 +15,10 @@ if TYPE_CHECKING:  # both hold rules, which hold conditions
     from chute_ros.supervisor.state import State
 
 
+#: A limit that an age may just reach has passed this much later, s.
+JUST_AFTER = 1e-6
+
+
 class Finding(NamedTuple):
     """holds None: it cannot be said. tell: says what was found, asked only where somebody reads
     it. samples: so many distinct ones came so far; -1: none do. doubted: the sensor that tells it
@@ -92,6 +96,6 @@ class Condition(ABC):
     def deadlines(
         self, config: SupervisorConfig, state: State, holds: bool | None, doubts: bool, now: float
     ) -> Iterable[float]:
-        """When time alone may change it, monotonic s; what is past does not count. The limits of
+        """When time alone may have changed it, monotonic s; what is past does not count. Those of
         every link's silence are waited for without it. holds: of its rule; doubts: what is in
         doubt counts less there."""

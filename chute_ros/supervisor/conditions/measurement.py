@@ -9,8 +9,8 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
-from chute_ros.supervisor import flight
-from chute_ros.supervisor.conditions.base import Condition, Finding
+from chute_ros.supervisor import readings
+from chute_ros.supervisor.conditions.base import JUST_AFTER, Condition, Finding
 from chute_ros.supervisor.contradictions import DIVE
 from chute_ros.supervisor.measurements import (
     ACCELERATION,
@@ -169,7 +169,7 @@ class MeasurementCondition(Condition):
         """What is measured, unless others deny it, against the limits."""
         name, known = self.measurement, state.measured(self.measurement)
         samples = known.count
-        value, why = flight.reading(config, state, name, now)
+        value, why = readings.reading(config, state, name, now)
         if why:
 
             def tell() -> str:
@@ -179,9 +179,9 @@ class MeasurementCondition(Condition):
             if self.if_unknown:
                 return Finding(True, tell, presumed=True)
             return Finding(None, tell, samples)
-        doubt = flight.doubt(state, name, value, now)
+        doubt = readings.doubt(state, name, value, now)
         if name == CLIMB_RATE or value != known.value:
-            samples = flight.rate_count(config, state, now)  # told by heights instead
+            samples = readings.rate_count(config, state, now)  # told by heights instead
         if name == VERTICAL_ACCELERATION:
             samples = state.measured(VERTICAL_SPEED).count
         holds = self.holds_at(value)
@@ -206,7 +206,7 @@ class MeasurementCondition(Condition):
         below = not math.isnan(self.below)
         claims_a_fall = below if name in _CLAIMED_BELOW else not math.isnan(self.above)
         by_barometer = name == CLIMB_RATE and not math.isnan(
-            flight.pressure_rate(config, state, now)
+            readings.pressure_rate(config, state, now)
         )
         if not claims_a_fall:
             return ""
@@ -221,10 +221,10 @@ class MeasurementCondition(Condition):
         limits = config.profile.limits
         names = self.measured if doubts else ()
         for name in known_by(self.measurement) if self.if_unknown else names:
-            yield state.measured(name).turns_at(limits[name], now)
+            yield state.measured(name).turns_at(limits[name], now) + JUST_AFTER
         if holds:
             for name in self.measured:
-                yield state.measured(name).measured_at + limits[name].max_age
+                yield state.measured(name).measured_at + limits[name].max_age + JUST_AFTER
 
 
 def _until(lines: ProfileLines, what: str, where: Where, limits: dict[str, float]) -> float:

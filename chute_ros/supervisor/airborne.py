@@ -1,0 +1,156 @@
+"""Has it taken off, landed, come down after a kill, been high? Which stage follows from that."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+
+from chute_ros.supervisor import flight, readings
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import ON_GROUND, Stage, Stimulus, listed
+from chute_ros.supervisor.orders import armed_since, note_released
+from chute_ros.supervisor.quick_replace import replace
+from chute_ros.supervisor.samples import on_earth
+from chute_ros.supervisor.turn import Turn
+
+#: Off the ground for so long it was seen to be up, on it to be down, s; no look counts for more.
+_UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 0.5, 1.0, 0.2
+
+
+def check_vehicle(turn: Turn) -> None:
+    note_down(turn)
+    in_air = flight.in_air(turn.config, turn.state, turn.now)
+    stage = turn.state.stage
+    blocked = stage in (Stage.STARTUP, Stage.BLOCKED)
+    if in_air and blocked and flight.low_as_at_take_off(turn.config, turn.state, turn.now):
+        return  # it says so because it was ordered to take off, and is kept down
+    if in_air and listed(stage, Stimulus.TAKEN_OFF) and _may_take_off(turn):
+        if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
+            turn.alarm(f"in the air although {stage.name}")
+        turn.move(Stimulus.TAKEN_OFF)
+        _took_off(turn, anew=stage is not Stage.LANDED)
+    elif in_air and _falls_since_kill(turn):
+        turn.alarm("it falls since the kill, although it said that it stood")
+        turn.state = replace(
+            turn.state, airborne=True, airborne_since=turn.now, killed_in_flight=True
+        )
+    elif in_air is False and listed(stage, Stimulus.LANDED):
+        turn.move(Stimulus.LANDED)
+        turn.state = replace(turn.state, airborne=False, rebooted=False, landed_at=turn.now)
+    if in_air is False and not math.isnan(turn.state.killed_height):
+        # It has come down, whatever is told, or not told any more, from now on.
+        turn.state = replace(turn.state, killed_height=math.nan)
+    if _down_since_kill(turn):
+        # As one that was killed on the ground: who lifts it is not to be met by its canopy.
+        turn.state = replace(
+            turn.state,
+            airborne=False,
+            killed_in_flight=False,
+            rebooted=False,
+            landed_at=turn.now,
+        )
+    if turn.state.stage is Stage.LANDED and flight.disarmed(turn.config, turn.state, turn.now):
+        turn.move(Stimulus.SECURED)
+        _disarm_parachutes(turn)
+    if in_air is False and not turn.state.flown and turn.state.stage in ON_GROUND:
+        note_released(turn)
+
+
+def _may_take_off(turn: Turn) -> bool:
+    """From KILLING only one that was killed on the ground and has armed again."""
+    state = turn.state
+    if state.stage is not Stage.KILLING:
+        return True
+    again = state.kill is not None and armed_since(turn, state.kill)
+    return not state.killed_in_flight and not state.deploy_rule and again
+
+
+def _down_since_kill(turn: Turn) -> bool:
+    """It was killed in the air, nothing is to follow, and it has come down for good."""
+    state = turn.state
+    killed = state.stage is Stage.KILLING and state.killed_in_flight and not state.deploy_rule
+    return killed and turn.now >= flight.down_after_kill_at(turn.config, state)
+
+
+def _falls_since_kill(turn: Turn) -> bool:
+    """It was killed as one on the ground, and was in the air all the same."""
+    state = turn.state
+    on_ground = state.stage is Stage.KILLING and not state.killed_in_flight
+    return on_ground and bool(flight.moving(turn.config, state, turn.now))
+
+
+def note_down(turn: Turn) -> None:
+    """Since when it says that it stands, and nothing contradicts it."""
+    down = flight.down_undisputed(turn.config, turn.state, turn.now)
+    known = not math.isnan(turn.state.down_since)
+    if down != known:
+        turn.state = replace(turn.state, down_since=turn.now if down else math.nan)
+    still = flight.is_still(turn.config, turn.state, turn.now)
+    if still == math.isnan(turn.state.still_since):
+        turn.state = replace(turn.state, still_since=turn.now if still else math.nan)
+
+
+def _disarm_parachutes(turn: Turn) -> None:
+    """After a flight nobody is to carry an armed one; those that arm themselves disarm
+    themselves."""
+    state = turn.state
+    if turn.config.disarm_after_landing and state.armed_by_us and state.mode is i.Mode.ACTIVE:
+        turn.outputs.append(i.ArmDevices(0, False, 0, turn.config.deploy_links))
+        turn.state = replace(state, armed_by_us=False)
+
+
+def note_height(turn: Turn) -> None:
+    """Since when a deploy is worth it; without any height, some time after the take-off."""
+    state, now, minimum = turn.state, turn.now, turn.config.profile.minimum_height
+    if not state.airborne:
+        return
+    height = readings.measured(turn.config, state, "height", now)
+    # Which no estimator moves; it says where the ground was, and so that it is there again.
+    by_pressure = readings.pressure_height(turn.config, state, now)
+    passed = min(max(now - turn.before.updated_at, 0.0), _LONGEST_LOOK)
+    up = flight.seen_up(turn.config, state, height, by_pressure, now)
+    up_for = state.up_for + (passed if up else 0.0)
+    told = height if math.isnan(by_pressure) else by_pressure
+    # Far below the take-off nobody knows the height above the ground.
+    high = told >= minimum or (told <= -minimum and up_for >= _UP_TAKES)
+    if math.isnan(told):
+        # One that tells what cannot be is no silence: it may run away on the ground.
+        wrong = now < state.measured("height").doubted_at + flight.HIGH_AFTER
+        high = not wrong and now >= state.airborne_since + flight.HIGH_AFTER
+    since = state.at_ground_since
+    if not flight.at_ground(turn.config, state, by_pressure, now):
+        since = math.nan
+    elif math.isnan(since):
+        since = now
+    down = now >= since + _DOWN_TAKES
+    was_high, up_for = (state.was_high or high) and not down, 0.0 if down else up_for
+    if (was_high, up_for, since) != (state.was_high, state.up_for, state.at_ground_since):
+        turn.state = replace(
+            state, was_high=was_high, up_for=min(up_for, _UP_TAKES), at_ground_since=since
+        )
+
+
+def _took_off(turn: Turn, anew: bool) -> None:
+    """anew: it stood disarmed before; otherwise it bounced, or was not down at all."""
+    vehicle, home = turn.state.vehicle, None if anew else turn.state.home
+    here = (vehicle.latitude, vehicle.longitude)
+    if home is None and on_earth(*here):
+        home = here
+    measurements = dict(turn.state.measurements)
+    if home != turn.state.home:
+        measurements.pop("distance_from_home", None)  # it was that from another place
+    turn.state = replace(
+        turn.state,
+        flown=True,
+        airborne=True,
+        airborne_since=turn.now,
+        was_high=False,
+        up_for=0.0,
+        at_ground_since=math.nan,
+        took_off_height=readings.measured(turn.config, turn.state, "height", turn.now),
+        home=home,
+        measurements=MappingProxyType(measurements),
+        # What was acted on in an earlier flight says nothing about this one.
+        rules=MappingProxyType({}) if anew else turn.state.rules,
+        asks=MappingProxyType({}) if anew else turn.state.asks,
+    )
