@@ -90,7 +90,7 @@ class SupervisorHost:
             self._vehicle_sources,
             self.config.vehicle_state_age,
             self._vehicle_told,
-            LinkState.NEVER_SEEN if before is None else before.vehicle.link_state,
+            LinkState.NEVER_SEEN if before is None else before.heard.vehicle.link_state,
             now,
         )
 

@@ -105,7 +105,7 @@ class SafetySupervisorNode(SuiteNode):
             self,
             self.values,
             lambda report, now: self._turn(report),
-            before=self.runtime.state.vehicle.link_state,
+            before=self.runtime.state.heard.vehicle.link_state,
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().warning(

@@ -145,7 +145,7 @@ class LeaseKeeper:
 
     def _own(self, now: float) -> Claim:
         state = self._owner.state
-        empty = not self._experienced and not state.flown and state.stage in ON_GROUND
+        empty = not self._experienced and not state.flight.flown and state.stage in ON_GROUND
         name, rank = self.config.name, self.config.rank
         return Claim(name, rank, state.epoch, self.leading, empty, self._owner.links_heard(now))
 

@@ -28,7 +28,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.epochs import epoch_above
 from chute_ros.supervisor.lease import Event, LeaseConfig
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
 from chute_ros.supervisor.wakes import next_deadline
 
 HEARTBEAT_INTERVAL = 0.1  # s
@@ -90,7 +90,7 @@ class SupervisorRuntime:
     ) -> None:
         self.config, self._shell = config, shell
         epoch = epoch_above(start.epoch, lease.rank)
-        self.state = State(epoch, now, mode=start.mode, leading=not lease.standby)
+        self.state = State(epoch, now, mode=start.mode, own=Own(leading=not lease.standby))
         self._first: tuple[inputs.Input, ...] = ()
         if start.before is not None:
             self.state = start.before
@@ -262,7 +262,7 @@ class SupervisorRuntime:
 
     def _changed(self) -> bool:
         before, now = self._published, self.state
-        told = attrgetter("stage", "mode", "next_id", "alarms", "device_blocks")
+        told = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
         return before is None or bool(told(before) != told(now))
 
     def _publish_state(self, now: float) -> None:

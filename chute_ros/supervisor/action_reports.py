@@ -29,7 +29,7 @@ def take_action_report(turn: Turn, one: i.ActionReport) -> None:
     foreign = same and one.newest_id >= turn.state.next_id
     if not foreign:
         _take_outcome(turn, one)
-    if of_our_epoch and turn.state.leading and (foreign or one.newest_epoch > turn.state.epoch):
+    if of_our_epoch and turn.own.leading and (foreign or one.newest_epoch > turn.state.epoch):
         _overtake(turn, one)
 
 

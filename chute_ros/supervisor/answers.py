@@ -10,17 +10,17 @@ from chute_ros.supervisor.turn import Turn
 
 def deploy_reached(turn: Turn, outcome: Outcome) -> bool:
     """A step of the deploy has got this far, or further."""
-    return any(deploy.reached(outcome) for deploy in turn.state.deploys)
+    return any(deploy.reached(outcome) for deploy in turn.deploying.deploys)
 
 
 def deploy_details(turn: Turn) -> str:
     """What was reported last on each step of the deploy, in words."""
-    return "; ".join(d.newest_details() for d in turn.state.deploys if d.details)
+    return "; ".join(d.newest_details() for d in turn.deploying.deploys if d.details)
 
 
 def end_kill(turn: Turn) -> None:
     """Say how the kill went as soon as that is known, before another takes its place."""
-    kill = turn.state.kill
+    kill = turn.killing.kill
     if kill is None:
         return
     failed = kill_failed(turn, kill)
@@ -35,23 +35,24 @@ def end_kill(turn: Turn) -> None:
 
 def finish_kill(turn: Turn, success: bool, accepted: bool, message: str) -> None:
     """Answer everyone who waits for the kill."""
-    for token in turn.state.kill_tokens:
+    for token in turn.own.kill_tokens:
         turn.finish(token, success, accepted, message)
-    turn.state = replace(turn.state, kill_tokens=())
+    turn.own = replace(turn.own, kill_tokens=())
 
 
 def finish_deploy(turn: Turn, success: bool, accepted: bool, message: str) -> None:
     """Answer everyone who waits for the deploy."""
-    for token in turn.state.deploy_tokens:
+    for token in turn.own.deploy_tokens:
         turn.finish(token, success, accepted, message)
-    turn.state = replace(turn.state, deploy_tokens=(), deploy_rule="", deploy_reasons=())
+    turn.own = replace(turn.own, deploy_tokens=())
+    turn.deploying = replace(turn.deploying, deploy_rule="", deploy_reasons=())
 
 
 def answer_all(turn: Turn, why: str) -> None:
     """Nobody waits any more; what was ordered goes on, here or elsewhere."""
-    for token in (*turn.state.kill_tokens, *turn.state.deploy_tokens):
+    for token in (*turn.own.kill_tokens, *turn.own.deploy_tokens):
         turn.finish(token, False, False, why)
-    turn.state = replace(turn.state, kill_tokens=(), deploy_tokens=())
+    turn.own = replace(turn.own, kill_tokens=(), deploy_tokens=())
 
 
 def give_up_waiting(turn: Turn, why: str) -> None:

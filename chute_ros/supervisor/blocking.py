@@ -76,7 +76,7 @@ def block_or_release(turn: Turn) -> None:
 
 def _killed_on_ground(turn: Turn) -> bool:
     """The kill has ended, so that a block does not overtake it, and nothing follows it."""
-    state = turn.state
-    ended = state.kill is not None and (state.kill.confirmed or kill_failed(turn, state.kill))
-    on_ground = not state.killed_in_flight and not state.deploy_rule
-    return state.stage is Stage.KILLING and ended and on_ground
+    kill = turn.killing.kill
+    ended = kill is not None and (kill.confirmed or kill_failed(turn, kill))
+    on_ground = not turn.killing.killed_in_flight and not turn.deploying.deploy_rule
+    return turn.state.stage is Stage.KILLING and ended and on_ground

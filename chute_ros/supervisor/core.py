@@ -49,25 +49,25 @@ def update(
 ) -> tuple[State, tuple[i.Output, ...]]:
     """Take in what came since the last call, look at the clock, and decide."""
     # Time does not run backwards; a clock that says so is not followed. (NaN is never the larger.)
-    now = max(now, state.updated_at)
+    now = max(now, state.own.updated_at)
     turn = Turn(config, state, now)
     _begin(turn)
     for one in inputs:
         _take(turn, one)
     _check(turn)
-    turn.state = replace(turn.state, updated_at=now)
+    turn.own = replace(turn.own, updated_at=now)
     return turn.state, tuple(turn.outputs)
 
 
 def _begin(turn: Turn) -> None:
     """What time has done since the last update."""
     state = turn.state
-    if math.isnan(state.updated_at):
+    if math.isnan(state.own.updated_at):
         return
-    passed = turn.now - state.updated_at
+    passed = turn.now - state.own.updated_at
     # A deadline lies after the last update: none can be missed by more than what has passed.
     if passed > turn.config.late_after:
-        late = turn.now - next_deadline(turn.config, state, state.updated_at)
+        late = turn.now - next_deadline(turn.config, state, state.own.updated_at)
         if late > turn.config.late_after:
             _was_late(turn, late)
             passed -= late
@@ -78,7 +78,7 @@ def _was_late(turn: Turn, late: float) -> None:
     """While nobody listened, nobody was silent: what was sent meanwhile is still to come."""
     heard = {
         link: replace(evidence, heard=evidence.heard + late)
-        for link, evidence in turn.state.links.items()
+        for link, evidence in turn.heard.links.items()
     }
     rules = dict(turn.state.rules)
     # Full before a silence that was our own, they would fire at its first word.
@@ -87,13 +87,12 @@ def _was_late(turn: Turn, late: float) -> None:
         if not all(one.counted for one in rule.conditions) and rule.name in rules:
             rules[rule.name] = replace(rules[rule.name], level=0.0, holds=False, kept=())
     unseen = late * _CLIMBS_UNSEEN >= turn.config.profile.minimum_height
-    turn.state = replace(
-        turn.state,
-        links=MappingProxyType(heard),
-        rules=MappingProxyType(rules),
-        late_count=turn.state.late_count + 1,
-        # A height that can be used counts all the same.
-        was_high=turn.state.was_high or (turn.state.airborne and unseen),
+    turn.heard = replace(turn.heard, links=MappingProxyType(heard))
+    turn.state = replace(turn.state, rules=MappingProxyType(rules))
+    turn.own = replace(turn.own, late_count=turn.own.late_count + 1)
+    turn.flight = replace(
+        turn.flight,  # A height that can be used counts all the same.
+        was_high=turn.flight.was_high or (turn.flight.airborne and unseen),
     )
     text = f"an update came {late:.2f} s late (limit {turn.config.late_after:g} s)"
     turn.warn(f"{text}: silence meanwhile does not count")
@@ -101,7 +100,7 @@ def _was_late(turn: Turn, late: float) -> None:
 
 def _take(turn: Turn, one: i.Input) -> None:
     """One input, in the order in which it came. One that follows does nothing for people."""
-    if not turn.state.leading and isinstance(one, _PERSONS):
+    if not turn.own.leading and isinstance(one, _PERSONS):
         turn.finish(one.token, False, False, f"refused: {i.CALL_AGAIN}")
         return
     _HANDLERS[type(one)](turn, one)
@@ -110,7 +109,8 @@ def _take(turn: Turn, one: i.Input) -> None:
 def _take_over(turn: Turn, one: i.TakeOver) -> None:
     """What has not been begun is decided anew, so that no shot is lost; what a device has
     begun goes on there, so that there is no second one."""
-    turn.state = replace(turn.state, leading=True, epoch=one.epoch)
+    turn.own = replace(turn.own, leading=True)
+    turn.state = replace(turn.state, epoch=one.epoch)
     # A parachute that this one has heard to be out is not ordered once more.
     check_parachutes(turn)
     renew_not_begun(turn, "another supervisor took over")
@@ -118,7 +118,7 @@ def _take_over(turn: Turn, one: i.TakeOver) -> None:
 
 def _step_down(turn: Turn, one: i.StepDown) -> None:
     answer_all(turn, f"{i.CALL_AGAIN}: {one.why}")
-    turn.state = replace(turn.state, leading=False)
+    turn.own = replace(turn.own, leading=False)
 
 
 #: What is done with each kind of input.
@@ -142,7 +142,7 @@ _HANDLERS: dict[type[i.Input], Callable[[Turn, Any], None]] = {
 def _check(turn: Turn) -> None:
     """What follows from all that is known now. One that follows only counts: what it was
     told by the leader is what was decided."""
-    if not turn.state.leading:
+    if not turn.own.leading:
         note_down(turn)
         note_height(turn)
         check_rules(turn)

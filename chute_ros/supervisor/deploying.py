@@ -19,7 +19,7 @@ from chute_ros.supervisor.turn import Turn
 
 def step_deadline(config: SupervisorConfig, state: State, step: Pending) -> float:
     """When the newest step of the ladder is given up, monotonic s."""
-    if len(state.deploys) >= len(state.ladder(config)):
+    if len(state.deploying.deploys) >= len(state.ladder(config)):
         return step.decided_at + config.deploy_timeout
     return step.decided_at + config.ladder_step_timeout
 
@@ -28,12 +28,13 @@ def release_due(config: SupervisorConfig, state: State, now: float) -> float:
     """When a deploy that waits for its kill waits no longer, monotonic s. Sooner where the vehicle
     is low: lines above motors that may still turn are a risk, the ground that comes first is none.
     That it falls on unheard is assumed only where a rule that deploys has acted."""
-    if state.kill is None:
-        return state.deploy_due
+    if state.killing.kill is None:
+        return state.deploying.deploy_due
     deploys = (one.name for one in config.profile.rules if one.action is Action.DEPLOY)
     falls = any(state.rule(name).latched for name in deploys)
     low = flight.low_at(config, state, falls, now)
-    return min(state.deploy_due, max(low, state.kill.decided_at + config.low_kill_to_deploy_delay))
+    soonest = state.killing.kill.decided_at + config.low_kill_to_deploy_delay
+    return min(state.deploying.deploy_due, max(low, soonest))
 
 
 def check_parachutes(turn: Turn) -> None:
@@ -46,20 +47,20 @@ def check_parachutes(turn: Turn) -> None:
 
 def check_kill(turn: Turn) -> None:
     """The deploy follows the kill's confirmation, or its delay."""
-    kill = turn.state.kill
+    kill = turn.killing.kill
     if kill is None:
         return
     end_kill(turn)
-    if turn.state.stage is not Stage.KILLING or not turn.state.deploy_rule:
+    if turn.state.stage is not Stage.KILLING or not turn.deploying.deploy_rule:
         return
     if kill.confirmed or turn.now >= release_due(turn.config, turn.state, turn.now):
         low = too_low(turn.config, turn.state, turn.now)
-        if low and turn.state.deploy_rule != OPERATOR:
+        if low and turn.deploying.deploy_rule != OPERATOR:
             # It was high enough when the kill left; a canopy needs the height now.
-            turn.alarm(f"no deploy by rule '{turn.state.deploy_rule}' after the kill: {low}")
-            put_off(turn, turn.state.deploy_rule)
+            turn.alarm(f"no deploy by rule '{turn.deploying.deploy_rule}' after the kill: {low}")
+            put_off(turn, turn.deploying.deploy_rule)
             # Nobody waits for it: a person's is held back by no height.
-            turn.state = replace(turn.state, deploy_rule="", deploy_reasons=())
+            turn.deploying = replace(turn.deploying, deploy_rule="", deploy_reasons=())
             return
         if kill.unreported():
             # A node that misses the kill must not see the deploy first: it would refuse the
@@ -75,7 +76,7 @@ def check_kill(turn: Turn) -> None:
 def _limit(turn: Turn, kill: Pending) -> str:
     """For how long this deploy waits for its kill, in words."""
     config, height = turn.config, turn.state.measured("height")
-    low = release_due(config, turn.state, turn.now) < turn.state.deploy_due
+    low = release_due(config, turn.state, turn.now) < turn.deploying.deploy_due
     if kill.confirmed or not low:
         return f"limit {config.kill_to_deploy_delay:g} s"
     told = f"{height.value:.1f} m told {turn.now - height.measured_at:.2f} s ago"
@@ -89,7 +90,7 @@ def check_deploy(turn: Turn) -> None:
     # Also while somebody kills once more after the ladder's end.
     if confirmed and turn.state.stage in (Stage.KILLING, Stage.DEPLOYING, Stage.FAULT):
         turn.move(Stimulus.PARACHUTE_OPEN, deploy_details(turn))
-    elif turn.state.stage is Stage.DEPLOYING and turn.state.deploys:
+    elif turn.state.stage is Stage.DEPLOYING and turn.deploying.deploys:
         _climb(turn)
     elif turn.state.stage is Stage.FAULT:
         _try_again(turn)
@@ -103,8 +104,9 @@ def _try_again(turn: Turn) -> None:
     since = turn.state.stage_since
     back = any(turn.state.evidence(rung.link).regained_at > since for rung in turn.ladder)
     over = back or turn.now >= since + turn.config.deploy_timeout
-    if over and _still_in_air(turn) and turn.state.deploys and turn.state.mode is i.Mode.ACTIVE:
-        rule = turn.state.deploys[0].decision.rule
+    deploys = turn.deploying.deploys
+    if over and _still_in_air(turn) and deploys and turn.state.mode is i.Mode.ACTIVE:
+        rule = deploys[0].decision.rule
         if rule != OPERATOR and too_low(turn.config, turn.state, turn.now):
             return
         waited = turn.now - turn.state.stage_since
@@ -116,16 +118,16 @@ def _still_in_air(turn: Turn) -> bool:
     """As the autopilot says; where it is silent, because it moves as nothing on the ground."""
     in_air = flight.in_air(turn.config, turn.state, turn.now)
     moves = flight.moving(turn.config, turn.state, turn.now)
-    return bool(in_air or (in_air is None and turn.state.airborne and moves))
+    return bool(in_air or (in_air is None and turn.flight.airborne and moves))
 
 
 def _climb(turn: Turn) -> None:
     """Step by step, each with its limit. One whose node is silent is sent, not awaited."""
     for _ in turn.ladder:
-        step = turn.state.deploys[-1]
+        step = turn.deploying.deploys[-1]
         text = step.newest_details() or "no device node reported"
         waited = turn.now - step.decided_at
-        last = len(turn.state.deploys) >= len(turn.ladder)
+        last = len(turn.deploying.deploys) >= len(turn.ladder)
         silent = all(
             turn.state.evidence(link).silent(turn.config.limits(link).lost_after, turn.now)
             for link in step.targets
@@ -136,36 +138,36 @@ def _climb(turn: Turn) -> None:
         if not over and (last or not silent):
             return
         if last:
-            first = turn.state.deploys[0].decided_at
+            first = turn.deploying.deploys[0].decided_at
             turn.move(Stimulus.DEPLOY_FAILED, text)
             turn.alarm(f"no parachute confirmed within {turn.now - first:.1f} s: {text}")
             alarm_at = turn.now + turn.config.alarm_interval
-            turn.state = replace(turn.state, alarm_at=alarm_at)
+            turn.alarming = replace(turn.alarming, alarm_at=alarm_at)
             return
-        number = len(turn.state.deploys)
+        number = len(turn.deploying.deploys)
         rung = turn.ladder[number - 1]
         why = "its node is silent" if silent and not over else f"not confirmed: {text}"
         _fire(turn, f"step {number} of {len(turn.ladder)}, {rung}: {why} ({waited:.2f} s)")
 
 
 def _fire(turn: Turn, why: str) -> None:
-    fire(turn, Action.DEPLOY, turn.state.deploy_rule, (*turn.state.deploy_reasons, why))
+    fire(turn, Action.DEPLOY, turn.deploying.deploy_rule, (*turn.deploying.deploy_reasons, why))
 
 
 def _answer(turn: Turn) -> None:
     accepted, text = deploy_reached(turn, Outcome.ACCEPTED), deploy_details(turn)
     out = turn.state.stage is Stage.DEPLOYED
     text = text or ("its own status says deployed" if out else "no device node reported")
-    kill = turn.state.kill
+    kill = turn.killing.kill
     if kill is not None and not kill.confirmed:
         why = kill.newest_details() or "nobody reported"
         text = f"WARNING, the motors may still turn ({why}): {text}"
     if turn.state.stage is Stage.FAULT:
         finish_deploy(turn, False, accepted, text)
     elif turn.state.stage is Stage.DEPLOYED:
-        reported = not turn.state.deploys or deploy_reached(turn, Outcome.CONFIRMED)
+        reported = not turn.deploying.deploys or deploy_reached(turn, Outcome.CONFIRMED)
         waited = turn.now >= turn.state.stage_since + turn.config.report_wait
-        if reported or waited or not turn.state.deploy_tokens:
+        if reported or waited or not turn.own.deploy_tokens:
             finish_deploy(turn, True, accepted, text)
 
 
@@ -173,10 +175,10 @@ def _alarm_again(turn: Turn) -> None:
     """The end of the ladder without a parachute is an alarm that does not stop until one is
     out or a person resets, whatever is tried meanwhile; so is a canopy that does not carry."""
     out = turn.state.stage is Stage.DEPLOYED
-    if (not out or turn.state.canopy_fails) and turn.now >= turn.state.alarm_at:
+    if (not out or turn.alarming.canopy_fails) and turn.now >= turn.alarming.alarm_at:
         # A state that was handed over or read from a black box may know of no alarm.
         begin = "the canopy does not carry" if out else "still no parachute"
-        text = ": ".join((begin, *turn.state.alarms[-1:]))
+        text = ": ".join((begin, *turn.alarming.alarms[-1:]))
         turn.warn(text)
         alarm_at = turn.now + turn.config.alarm_interval
-        turn.state = replace(turn.state, alarm_at=alarm_at)
+        turn.alarming = replace(turn.alarming, alarm_at=alarm_at)

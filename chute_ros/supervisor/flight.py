@@ -54,7 +54,7 @@ HIGH_AFTER = 5.0
 def silent_since_kill(config: SupervisorConfig, state: State, now: float) -> bool:
     """The vehicle was heard until the kill, whoever stops its motors is heard, and nothing that
     can be used tells whether it falls. Where nobody is heard, the vehicle may not be silent."""
-    if not state.vehicle_received >= state.killed_at - _HEARD_BEFORE:
+    if not state.heard.vehicle_received >= state.killing.killed_at - _HEARD_BEFORE:
         return False
     links = [(state.evidence(link), config.limits(link)) for link in config.kill_links]
     heard = any(not evidence.silent(limits.stale_after, now) for evidence, limits in links)
@@ -65,16 +65,18 @@ def height_since_kill(config: SupervisorConfig, state: State, now: float) -> flo
     """What a body without drag has left of the height, m, in which our kill was decided in
     flight; NaN: it was not, or height or speed were not known, or it was seen since not to fall.
     One that said that it stood, or that its motors were off, was not stopped by it."""
-    if not state.killed_in_flight or state.killed_standing or _seen_not_to_fall(config, state):
+    kill = state.killing
+    if not kill.killed_in_flight or kill.killed_standing or _seen_not_to_fall(config, state):
         return math.nan
-    passed = now - state.killed_at
-    return state.killed_height - state.killed_sinking * passed - GRAVITY / 2.0 * passed**2
+    passed = now - kill.killed_at
+    return kill.killed_height - kill.killed_sinking * passed - GRAVITY / 2.0 * passed**2
 
 
 def _seen_not_to_fall(config: SupervisorConfig, state: State) -> bool:
     """What was told last, at a time at which it had to fall since the kill, was no fall."""
     known = {name: state.measured(name) for name in FALL_SIGNS}
-    told = [n for n, one in known.items() if one.measured_at > state.killed_at + _FALLS_AFTER]
+    falls_from = state.killing.killed_at + _FALLS_AFTER
+    told = [name for name, one in known.items() if one.measured_at > falls_from]
     sinks = known["vertical_speed"].value < -config.profile.moving_speed
     falls = {"vertical_speed": sinks, "acceleration": known["acceleration"].value < FREE_FALL}
     return bool(told) and not any(falls[name] for name in told)
@@ -87,8 +89,8 @@ def low_at(config: SupervisorConfig, state: State, falls: bool, now: float) -> f
     known, limit = state.measured(HEIGHT), config.profile.low_height
     height = min(known.value, known.before_jump) if known.has_jumped(now) else known.value
     # Far below the take-off it says nothing of the ground beneath.
-    tells = not state.rebooted and height >= -limit
-    if not state.airborne or not tells or limit <= 0.0:
+    tells = not state.flight.rebooted and height >= -limit
+    if not state.flight.airborne or not tells or limit <= 0.0:
         return math.inf
     ground = above_its_ground(state, height)
     above = height - limit if math.isnan(ground) else max(height, ground) - limit
@@ -109,23 +111,23 @@ def low_at(config: SupervisorConfig, state: State, falls: bool, now: float) -> f
 def above_its_ground(state: State, height: float) -> float:
     """A height above the ground of this flight, m, where that lies below home: an autopilot may
     count from a home that is not where it was armed. NaN: that ground is not known."""
-    if math.isnan(state.took_off_height):
+    if math.isnan(state.flight.took_off_height):
         return math.nan
     # One that sets its home anew on arming tells another height once it takes off.
-    return height - max(state.armed_height, state.took_off_height)
+    return height - max(state.flight.armed_height, state.flight.took_off_height)
 
 
 def moving(config: SupervisorConfig, state: State, now: float) -> str:
     """How the vehicle moves as nothing on the ground does, in words; empty: it does not."""
     speed = measured(config, state, VERTICAL_SPEED, now)
     limit = config.profile.moving_speed
-    if abs(speed) > limit and not (speed < 0.0 and VERTICAL_SPEED in state.denied):
+    if abs(speed) > limit and not (speed < 0.0 and VERTICAL_SPEED in state.heard.denied):
         return f"vertical_speed {speed:.1f} m/s (nothing on the ground beyond {limit:g})"
     rate = pressure_rate(config, state, now)
-    if VERTICAL_SPEED in state.denied and abs(rate) > limit:
+    if VERTICAL_SPEED in state.heard.denied and abs(rate) > limit:
         return f"climb_rate {rate:.1f} m/s (nothing on the ground beyond {limit:g})"
     force = measured(config, state, ACCELERATION, now)
-    if force < FREE_FALL and ACCELERATION not in state.denied:
+    if force < FREE_FALL and ACCELERATION not in state.heard.denied:
         return f"acceleration {force:.1f} m/s^2 (nothing on the ground below {FREE_FALL:g})"
     return ""
 
@@ -139,7 +141,7 @@ def seen_up(
         return abs(by_pressure) > _OFF_GROUND
     calm = not abs(measured(config, state, VERTICAL_SPEED, now)) > _CALM_SPEED
     upright = not measured(config, state, TILT, now) > _CALM_TILT
-    return height - state.armed_height > config.takeoff_height and calm and upright
+    return height - state.flight.armed_height > config.takeoff_height and calm and upright
 
 
 def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: float) -> bool:
@@ -151,7 +153,7 @@ def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: f
 def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool:
     """After a kill or a deploy it has not moved for a while: the autopilot of a vehicle that has
     crashed may say for ever that it is in the air."""
-    return state.stage in _ENDED and now >= state.still_since + STILL_FOR
+    return state.stage in _ENDED and now >= state.heard.still_since + STILL_FOR
 
 
 def is_still(config: SupervisorConfig, state: State, now: float) -> bool:
@@ -163,7 +165,7 @@ def is_still(config: SupervisorConfig, state: State, now: float) -> bool:
 
 def low_as_at_take_off(config: SupervisorConfig, state: State, now: float) -> bool:
     """Its height is known, and is that of where it was armed."""
-    height = measured(config, state, HEIGHT, now) - state.armed_height
+    height = measured(config, state, HEIGHT, now) - state.flight.armed_height
     by_pressure = pressure_height(config, state, now)
     limit = config.takeoff_height
     return height <= limit and not by_pressure > limit and not moving(config, state, now)
@@ -172,20 +174,20 @@ def low_as_at_take_off(config: SupervisorConfig, state: State, now: float) -> bo
 def fresh(config: SupervisorConfig, state: State, age: float, now: float) -> bool:
     """Is a part of vehicle/state that had this age when it came still young enough? One that
     claims to come from the future came just now."""
-    return max(age, 0.0) + (now - state.vehicle_received) <= config.vehicle_state_age
+    return max(age, 0.0) + (now - state.heard.vehicle_received) <= config.vehicle_state_age
 
 
 def armed(config: SupervisorConfig, state: State, now: float) -> Armed:
     """What the autopilot says freshly of its motors."""
-    if fresh(config, state, state.vehicle.armed_age, now):
-        return state.vehicle.armed
+    if fresh(config, state, state.heard.vehicle.armed_age, now):
+        return state.heard.vehicle.armed
     return Armed.UNKNOWN
 
 
 def says_down(config: SupervisorConfig, state: State, now: float) -> bool | None:
     """Does the autopilot say freshly that the vehicle stands? None: it says nothing of it."""
-    landed = state.vehicle.landed_state
-    known = fresh(config, state, state.vehicle.landed_state_age, now)
+    landed = state.heard.vehicle.landed_state
+    known = fresh(config, state, state.heard.vehicle.landed_state_age, now)
     if known and landed is not LandedState.UNKNOWN:
         return landed is LandedState.ON_GROUND
     if armed(config, state, now) is Armed.DISARMED:
@@ -201,7 +203,7 @@ def down_undisputed(config: SupervisorConfig, state: State, now: float) -> bool:
 def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
     """Is the vehicle in the air? None: nothing that is fresh says so or otherwise."""
     down = says_down(config, state, now)
-    if state.airborne:
+    if state.flight.airborne:
         if down is None:
             return True if armed(config, state, now) is Armed.ARMED else None
         if not down or moving(config, state, now):
@@ -213,7 +215,7 @@ def in_air(config: SupervisorConfig, state: State, now: float) -> bool | None:
         return (not down and not off) or _falls_against_its_word(config, state, down and off, now)
     height = measured(config, state, "height", now)
     if armed(config, state, now) is Armed.ARMED and not math.isnan(height):
-        return height - state.armed_height > config.takeoff_height
+        return height - state.flight.armed_height > config.takeoff_height
     return None
 
 
@@ -227,34 +229,34 @@ def _falls_against_its_word(
     """
     falls = measured(config, state, "acceleration", now) < FREE_FALL
     sinks = measured(config, state, "vertical_speed", now) < -config.profile.moving_speed
-    height = measured(config, state, "height", now) - state.armed_height
+    height = measured(config, state, "height", now) - state.flight.armed_height
     high = height > max(config.takeoff_height, config.profile.minimum_height)
     if stands_off:
-        return falls and sinks and high and now < state.landed_at + _FLIGHT_JUST_BEFORE
+        return falls and sinks and high and now < state.flight.landed_at + _FLIGHT_JUST_BEFORE
     return falls and (sinks or high)
 
 
 def _told_high(config: SupervisorConfig, state: State) -> bool:
     """By the last height that was told, it is high enough for a deploy."""
-    height = state.measured("height").value - state.armed_height
+    height = state.measured("height").value - state.flight.armed_height
     return height > config.profile.minimum_height
 
 
 def landed_at(config: SupervisorConfig, state: State) -> float:
     """When one that says that it stands is believed, monotonic s; NaN: it does not say so."""
-    return state.down_since + landed_hold(config, state)
+    return state.flight.down_since + landed_hold(config, state)
 
 
 def down_after_kill_at(config: SupervisorConfig, state: State) -> float:
     """When one that was killed in the air and says that it stands has come down for good,
     monotonic s; NaN: it does not say so."""
-    return state.down_since + max(landed_hold(config, state), _DOWN_AFTER_KILL)
+    return state.flight.down_since + max(landed_hold(config, state), _DOWN_AFTER_KILL)
 
 
 def landed_hold(config: SupervisorConfig, state: State) -> float:
     """For how long one must say that it stands, s."""
     hold = config.profile.landed_hold
-    if hold > 0.0 and state.vehicle.armed is Armed.ARMED and _told_high(config, state):
+    if hold > 0.0 and state.heard.vehicle.armed is Armed.ARMED and _told_high(config, state):
         return max(hold, _LANDED_HOLD_ALOFT)
     return hold
 
@@ -264,4 +266,4 @@ def disarmed(config: SupervisorConfig, state: State, now: float) -> bool:
     that started anew there or of a vehicle that falls."""
     if armed(config, state, now) is not Armed.DISARMED:
         return False
-    return not (state.airborne and (state.rebooted or moving(config, state, now)))
+    return not (state.flight.airborne and (state.flight.rebooted or moving(config, state, now)))

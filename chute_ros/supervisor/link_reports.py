@@ -24,7 +24,7 @@ def take_heartbeat(turn: Turn, one: i.LinkHeartbeat) -> None:
     known = not math.isnan(before.heard)
     silent = before.silent(limits.lost_after, turn.now)
     _set_evidence(turn, one.link, before.with_heartbeat(one, limits, turn.now))
-    if turn.state.leading:
+    if turn.own.leading:
         # The alarms of one that follows are those of the leader, which has another clock.
         _check_clock(turn, one.link)
         _check_delay(turn, one.link, before.looks_late)
@@ -46,19 +46,19 @@ def _check_clock(turn: Turn, link: str) -> None:
     """Its wall clock against the one here."""
     text = f"{link}: its wall clock differs; it may refuse decisions as too old"
     difference = abs(turn.state.evidence(link).clocks_differ_by)
-    told, limit = text in turn.state.alarms, turn.config.preflight.max_clock_difference
+    told, limit = text in turn.alarming.alarms, turn.config.preflight.max_clock_difference
     if difference > limit and not told:
         turn.alarm(text)
     elif difference <= limit and told:
-        alarms = tuple(one for one in turn.state.alarms if one != text)
-        turn.state = replace(turn.state, alarms=alarms)
+        alarms = tuple(one for one in turn.alarming.alarms if one != text)
+        turn.alarming = replace(turn.alarming, alarms=alarms)
         turn.log(f"{link}: its wall clock agrees again")
 
 
 def _check_delay(turn: Turn, link: str, before: str) -> None:
     """On the ground it forbids take-off."""
     text = turn.state.evidence(link).looks_late
-    if turn.state.airborne and text and not before:
+    if turn.flight.airborne and text and not before:
         turn.warn(f"{link}: {text}")
 
 
@@ -73,12 +73,12 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
     forgot = said is not None and status.uptime < said.uptime
     _set_evidence(turn, one.link, turn.state.evidence(one.link).with_status(status, turn.now))
     if alive and not status.deployed:
-        before = turn.state.released_before - {(one.link, status.device)}
-        turn.state = replace(turn.state, released_before=before)
+        before = turn.flight.released_before - {(one.link, status.device)}
+        turn.flight = replace(turn.flight, released_before=before)
         aloft = flight.in_air(turn.config, turn.state, turn.now) is not False
         if was_out and aloft and turn.state.stage is Stage.DEPLOYED:
             text = f"{one.link} {status.device} says no more that it is deployed"
-            if turn.state.deploys or not turn.state.airborne or forgot:
+            if turn.deploying.deploys or not turn.flight.airborne or forgot:
                 turn.alarm(f"{text}; a forced deploy goes on with the next")
             else:
                 # It may have erred when it said so; with nothing out, the rules must live.
@@ -98,5 +98,5 @@ def _unlatch_deploys(turn: Turn) -> None:
 
 
 def _set_evidence(turn: Turn, link: str, evidence: LinkEvidence) -> None:
-    links = {**turn.state.links, link: evidence}
-    turn.state = replace(turn.state, links=MappingProxyType(links))
+    links = {**turn.heard.links, link: evidence}
+    turn.heard = replace(turn.heard, links=MappingProxyType(links))

@@ -107,13 +107,16 @@ class Measured:
 
     def turns_at(self, limits: Limits, now: float) -> float:
         """When time alone makes it usable, or too old; infinity: it does not."""
-        turns = (
+        soonest = math.inf
+        for turn in (
             self.measured_at - _JITTER,
             self.measured_at + limits.max_age,
             self.doubted_at + REJECTION_DOUBTED,
             self.jumped_at + JUMP_DOUBTED,
-        )
-        return min([turn for turn in turns if turn >= now], default=math.inf)
+        ):
+            if now <= turn < soonest:
+                soonest = turn
+        return soonest
 
     def has_jumped(self, now: float) -> bool:
         """A moment ago it was another, and which of the two is right nobody knows."""

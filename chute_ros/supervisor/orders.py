@@ -28,12 +28,12 @@ def order_kill(
         return
     end_kill(turn)
     if token:
-        turn.state = replace(turn.state, kill_tokens=(*turn.state.kill_tokens, token))
+        turn.own = replace(turn.own, kill_tokens=(*turn.own.kill_tokens, token))
     # Beside an open canopy it changes nothing else; nor does it end what FAULT tries again.
     if turn.state.stage not in (Stage.DEPLOYED, Stage.FAULT):
         _to_killing(turn, "; ".join(reasons))
     if token:
-        turn.state = replace(turn.state, kill_only=kill_only)
+        turn.killing = replace(turn.killing, kill_only=kill_only)
     if not _kill_joined(turn, token):
         fire(turn, Action.KILL, rule, reasons)
 
@@ -45,7 +45,7 @@ def order_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
             fire(turn, action, rule, reasons)
         return
     again = turn.state.stage is Stage.DEPLOYED  # a person insists: another parachute
-    if turn.state.deploy_rule:
+    if turn.deploying.deploy_rule:
         _join_deploy(turn, rule, reasons)
         return
     if deploy_reached(turn, Outcome.CONFIRMED) and not again:
@@ -55,12 +55,12 @@ def order_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
         text = f"the canopy does not carry, and no other is left: {'; '.join(reasons)}"
         turn.alarm(text)
         alarm_at = turn.now + turn.config.alarm_interval
-        turn.state = replace(turn.state, canopy_fails=True, alarm_at=alarm_at)
+        turn.alarming = replace(turn.alarming, canopy_fails=True, alarm_at=alarm_at)
         return
     if turn.state.stage in ON_GROUND or again:
         note_released(turn)
     end_kill(turn)
-    kill, since = turn.state.kill, turn.now
+    kill, since = turn.killing.kill, turn.now
     if turn.state.stage is Stage.KILLING and _kill_under_way(turn):
         assert kill is not None
         since = kill.decided_at
@@ -73,8 +73,8 @@ def order_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
         _to_killing(turn, "; ".join(reasons))
         fire(turn, Action.KILL, rule, reasons)
     still_in = tuple(r for r in turn.config.ladder if not out_already(turn.state, r))
-    turn.state = replace(
-        turn.state,
+    turn.deploying = replace(
+        turn.deploying,
         deploy_rule=rule,
         deploy_reasons=reasons,
         deploy_due=since + turn.config.kill_to_deploy_delay,
@@ -86,9 +86,9 @@ def order_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
 
 def _join_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
     """A rule's deploy that a person wants as well is theirs: no height holds it back."""
-    if rule == OPERATOR and turn.state.deploy_rule != OPERATOR:
-        both = (*turn.state.deploy_reasons, *reasons)
-        turn.state = replace(turn.state, deploy_rule=rule, deploy_reasons=both)
+    if rule == OPERATOR and turn.deploying.deploy_rule != OPERATOR:
+        both = (*turn.deploying.deploy_reasons, *reasons)
+        turn.deploying = replace(turn.deploying, deploy_rule=rule, deploy_reasons=both)
 
 
 def _to_killing(turn: Turn, why: str) -> None:
@@ -98,10 +98,10 @@ def _to_killing(turn: Turn, why: str) -> None:
                 turn.config, turn.state, turn.now
             )
             sinking = -readings.measured(turn.config, turn.state, "vertical_speed", turn.now)
-            turn.state = replace(
-                turn.state,
+            turn.killing = replace(
+                turn.killing,
                 kill_only=False,
-                killed_in_flight=turn.state.airborne,
+                killed_in_flight=turn.flight.airborne,
                 killed_standing=stood,
                 killed_at=turn.now,
                 killed_height=readings.measured(turn.config, turn.state, "height", turn.now),
@@ -112,7 +112,7 @@ def _to_killing(turn: Turn, why: str) -> None:
 
 def _kill_under_way(turn: Turn) -> bool:
     """A kill is on its way and may still be confirmed."""
-    kill = turn.state.kill
+    kill = turn.killing.kill
     return kill is not None and not kill.confirmed and not kill_failed(turn, kill)
 
 
@@ -122,7 +122,7 @@ def _kill_joined(turn: Turn, token: int) -> bool:
     A person who asks after the confirmation sees motors that turn, and is obeyed again. A
     device repeats itself; that must not become a new decision each time.
     """
-    kill = turn.state.kill
+    kill = turn.killing.kill
     if token or kill is None or _kill_under_way(turn):
         return _kill_under_way(turn)
     if kill.confirmed and armed_since(turn, kill):
@@ -133,12 +133,12 @@ def _kill_joined(turn: Turn, token: int) -> bool:
 
 def armed_since(turn: Turn, kill: Pending) -> bool:
     """The vehicle says, and said after this kill had its time, that it is armed (again)."""
-    said_at = turn.state.vehicle_received - turn.state.vehicle.armed_age
+    said_at = turn.heard.vehicle_received - turn.heard.vehicle.armed_age
     said = flight.armed(turn.config, turn.state, turn.now)
     return said is Armed.ARMED and said_at > kill.decided_at + _KILL_SETTLES
 
 
 def note_released(turn: Turn) -> None:
     """What is released now was so before the flight and says nothing of what happens in it."""
-    before = turn.state.released_before | turn.state.released(turn.config)
-    turn.state = replace(turn.state, released_before=before)
+    before = turn.flight.released_before | turn.state.released(turn.config)
+    turn.flight = replace(turn.flight, released_before=before)

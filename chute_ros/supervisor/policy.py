@@ -82,8 +82,8 @@ def rests_until(config: SupervisorConfig, state: State, now: float) -> float:
     limits = config.profile.limits
     turns = [state.measured(name).turns_at(limits[name], after) for name in limits]
     # What it says of itself is young enough until then.
-    said = state.vehicle_received + config.vehicle_state_age
-    turns += [turn for turn in (said, said - state.vehicle.armed_age) if turn >= after]
+    said = state.heard.vehicle_received + config.vehicle_state_age
+    turns += [turn for turn in (said, said - state.heard.vehicle.armed_age) if turn >= after]
     return min(turns) - _ROUNDING
 
 
@@ -96,8 +96,9 @@ def _as_before(rule: Rule, evidence: RuleEvidence) -> bool:
 
 def count_rules(turn: Turn, passed: float) -> None:
     """Bring every counter up to now, before anything new is taken in."""
+    known = turn.state.rules
     counted = {
-        rule.name: turn.state.rule(rule.name).counted(rule, passed)
+        rule.name: known.get(rule.name, _NOTHING).counted(rule, passed)
         for rule in turn.config.profile.rules
     }
     _keep(turn, counted)
@@ -106,15 +107,17 @@ def count_rules(turn: Turn, passed: float) -> None:
 def check_rules(turn: Turn) -> None:
     """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
     fulfilled: list[Judged] = []
-    stage, rules = turn.state.stage, dict(turn.state.rules)
+    stage, known = turn.state.stage, turn.state.rules
+    rules = dict(known)
     rests = _vehicle_rests(turn)
     for rule in turn.config.profile.rules:
+        before = known.get(rule.name, _NOTHING)
         if stage not in rule.states:
             # What was counted in another state says nothing about the next time.
-            latched = turn.state.rule(rule.name).latched and rule.clears is Clears.NEVER
+            latched = before.latched and rule.clears is Clears.NEVER
             rules[rule.name] = _LATCHED if latched else _NOTHING
             continue
-        if rests and _as_before(rule, turn.state.rule(rule.name)):
+        if rests and _as_before(rule, before):
             continue
         judged = judge(turn.config, turn.state, rule, turn.now)
         rules[rule.name] = _cleared(turn, rule, judged.evidence)
@@ -132,17 +135,17 @@ def _vehicle_rests(turn: Turn) -> bool:
     """Of the vehicle the same is known as at the last look: most updates are heartbeats."""
     state, before = turn.state, turn.before
     if (
-        state.measurements is before.measurements
-        and state.heights is before.heights
-        and state.vehicle is before.vehicle
-        and state.disputed == before.disputed
-        and state.vehicle_received == before.vehicle_received
-        and state.rebooted == before.rebooted
-        and turn.now < before.vehicle_rests_until
+        state.heard.measurements is before.heard.measurements
+        and state.heard.heights is before.heard.heights
+        and state.heard.vehicle is before.heard.vehicle
+        and state.heard.disputed == before.heard.disputed
+        and state.heard.vehicle_received == before.heard.vehicle_received
+        and state.flight.rebooted == before.flight.rebooted
+        and turn.now < before.own.vehicle_rests_until
     ):
         return True
     until = rests_until(turn.config, state, turn.now)
-    turn.state = replace(state, vehicle_rests_until=until)
+    turn.own = replace(turn.own, vehicle_rests_until=until)
     return False
 
 
@@ -167,7 +170,7 @@ def _falls_on(turn: Turn) -> bool:
 
 def _act(turn: Turn, judged: Judged) -> None:
     rule, reasons = judged.rule, judged.reasons()
-    if not turn.state.leading or turn.state.mode is i.Mode.INHIBITED:
+    if not turn.own.leading or turn.state.mode is i.Mode.INHIBITED:
         return
     if turn.state.stage not in rule.states:
         return  # a graver one has just moved it on

@@ -97,9 +97,9 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):
         reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
     reasons += _measured_problems(config, state, now)
-    if now - state.vehicle_received <= config.vehicle_state_age:
-        reasons += [f"vehicle: {fault}" for fault in state.vehicle.faults]
-        unable = _UNABLE.get(state.vehicle.system_status)
+    if now - state.heard.vehicle_received <= config.vehicle_state_age:
+        reasons += [f"vehicle: {fault}" for fault in state.heard.vehicle.faults]
+        unable = _UNABLE.get(state.heard.vehicle.system_status)
         reasons += [unable] if unable else []
     return tuple(reasons)
 
@@ -107,15 +107,16 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
 def _measured_problems(config: SupervisorConfig, state: State, now: float) -> list[str]:
     """What is measured of a vehicle that stands, and cannot be."""
     used = {name for rule in config.profile.rules for name in rule.measured}
-    wrong = [f"{name} cannot be used: {why}" for name, why in state.unfit.items() if name in used]
+    unfit = state.heard.unfit
+    wrong = [f"{name} cannot be used: {why}" for name, why in unfit.items() if name in used]
     wrong += [
-        f"{name} is contradicted: {state.denied[name]}"
-        for name, since in state.denied_since.items()
-        if now >= since + CONTRADICTED_FOR and name in used and name not in state.unfit
+        f"{name} is contradicted: {state.heard.denied[name]}"
+        for name, since in state.heard.denied_since.items()
+        if now >= since + CONTRADICTED_FOR and name in used and name not in unfit
     ]
     return wrong + [
         f"{part} is told otherwise by another source, or has jumped"
-        for part in sorted(state.disputed)
+        for part in sorted(state.heard.disputed)
     ]
 
 
@@ -154,7 +155,7 @@ def _rung_problem(rung: Rung, evidence: LinkEvidence) -> str:
 
 def _vehicle_problem(config: SupervisorConfig, state: State, now: float) -> str:
     """Without vehicle/state nobody can tell flight from ground; empty: it is there."""
-    age = state.vehicle.armed_age + now - state.vehicle_received
+    age = state.heard.vehicle.armed_age + now - state.heard.vehicle_received
     if math.isnan(age):
         return "vehicle/state: whether the motors are armed was never told"
     if age > config.vehicle_state_age:

@@ -35,12 +35,12 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
     if name == CLIMB_RATE:
         rate = pressure_rate(config, state, now)
         return (rate, "") if not math.isnan(rate) else _estimated_rate(config, state, now)
-    if name == HEIGHT and state.rebooted:
+    if name == HEIGHT and state.flight.rebooted:
         return math.nan, _HEIGHT_LOST
     if name == VERTICAL_ACCELERATION:
         return _vertical_acceleration(config, state, now)
     known = state.measured(name)
-    why = state.unfit.get(name) or known.unusable(config.profile.limits[name], now)
+    why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
         return known.value, ""
     if name == VERTICAL_SPEED:
@@ -59,7 +59,7 @@ def doubt(state: State, name: str, value: float, now: float) -> str:
     what was read of it, which may be what the heights tell in its place."""
     if value != state.measured(name).value:
         return ""
-    if PARTS.get(name, name) in state.disputed:
+    if PARTS.get(name, name) in state.heard.disputed:
         return "another source told otherwise"
     return state.measured(name).doubt(name, now)
 
@@ -83,18 +83,19 @@ def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
     """By how much, and from when to when, the barometer's height changed in the last second."""
     if math.isnan(pressure_rate(config, state, now)):
         return NOT_TOLD
-    (since, before), (until, after) = state.pressure_heights[0], state.pressure_heights[-1]
+    heights = state.heard.pressure_heights
+    (since, before), (until, after) = heights[0], heights[-1]
     return Rise((after - before) / (until - since), since, until)
 
 
 def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
     """By how much the barometer tells less than before it was last silent."""
     known = state.measured(PRESSURE_ALTITUDE)
-    passed = known.measured_at - state.pressure_before[0]
+    passed = known.measured_at - state.heard.pressure_before[0]
     told = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
     if known.doubt(PRESSURE_ALTITUDE, now) or not passed <= _DROP_WITHIN:
         return NO_DROP
-    return Drop(state.pressure_before[1] - told, passed)
+    return Drop(state.heard.pressure_before[1] - told, passed)
 
 
 def pressure_height(config: SupervisorConfig, state: State, now: float) -> float:
@@ -103,7 +104,7 @@ def pressure_height(config: SupervisorConfig, state: State, now: float) -> float
     if known.has_jumped(now):
         return math.nan
     usable = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
-    return usable - state.ground_pressure_altitude
+    return usable - state.flight.ground_pressure_altitude
 
 
 def rate_count(config: SupervisorConfig, state: State, now: float) -> int:
@@ -113,7 +114,9 @@ def rate_count(config: SupervisorConfig, state: State, now: float) -> int:
 
 
 def _estimated_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
-    return (math.nan, _HEIGHT_LOST) if state.rebooted else _rate_of(config, state, HEIGHT, now)
+    if state.flight.rebooted:
+        return math.nan, _HEIGHT_LOST
+    return _rate_of(config, state, HEIGHT, now)
 
 
 def _vertical_acceleration(
@@ -123,8 +126,8 @@ def _vertical_acceleration(
     known = state.measured(VERTICAL_SPEED)
     if why := known.unusable(config.profile.limits[VERTICAL_SPEED], now):
         return math.nan, why
-    newest = state.motion[-1][0] if state.motion else math.nan
-    told = [(one[0], one[1]) for one in state.motion if newest - one[0] <= 1.0]
+    newest = state.heard.motion[-1][0] if state.heard.motion else math.nan
+    told = [(one[0], one[1]) for one in state.heard.motion if newest - one[0] <= 1.0]
     told = [one for one in told if not math.isnan(one[1])]
     if not told or told[-1][0] - told[0][0] < _CLIMB_OVER:
         return math.nan, "too few vertical speeds that can be used"
@@ -132,7 +135,7 @@ def _vertical_acceleration(
 
 
 def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
-    heights = state.heights if name == HEIGHT else state.pressure_heights
+    heights = state.heard.heights if name == HEIGHT else state.heard.pressure_heights
     height = state.measured(name)
     if height.unusable(config.profile.limits[name], now) or not _enough(
         heights, height.measured_at

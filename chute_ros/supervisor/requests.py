@@ -44,7 +44,7 @@ def arm_done(turn: Turn, one: i.ArmDone) -> None:
     if one.success and listed(turn.state.stage, stimulus):
         turn.move(stimulus)
     if one.success:
-        turn.state = replace(turn.state, armed_by_us=one.arm)
+        turn.flight = replace(turn.flight, armed_by_us=one.arm)
     elif not one.token:
         turn.alarm(f"the parachutes are not disarmed after the flight: {one.message}")
     turn.finish(one.token, one.success, one.success, one.message)
@@ -56,7 +56,7 @@ def kill_request(turn: Turn, one: i.KillRequest) -> None:
     if not one.token:
         _device_asks(turn, one)
         return
-    if not turn.state.leading:
+    if not turn.own.leading:
         turn.finish(one.token, False, False, f"refused: {i.CALL_AGAIN}")
         return
     order_kill(turn, one.by, (reason,), one.token, one.kill_only)
@@ -103,8 +103,8 @@ def deploy_request(turn: Turn, one: i.DeployRequest) -> None:
         order_deploy(turn, OPERATOR, (reason,))
         _nothing_sent(turn, one.token)
     else:
-        tokens = (*turn.state.deploy_tokens, one.token)
-        turn.state = replace(turn.state, deploy_tokens=tokens)
+        tokens = (*turn.own.deploy_tokens, one.token)
+        turn.own = replace(turn.own, deploy_tokens=tokens)
         order_deploy(turn, OPERATOR, (reason,))
 
 
@@ -116,7 +116,7 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
         in_air = False
     if in_air or stage is Stage.IN_FLIGHT:
         turn.finish(one.token, False, False, "refused: the vehicle is in the air")
-    elif in_air is None and turn.state.deploy_rule:
+    elif in_air is None and turn.deploying.deploy_rule:
         text = "refused: a deploy is under way and nothing fresh says that it is on the ground"
         turn.finish(one.token, False, False, text)
     elif not listed(stage, Stimulus.RESET):
@@ -128,21 +128,15 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
             turn.state,
             started_at=turn.now,
             block=None,
-            kill=None,
-            deploys=(),
-            flown=False,
-            airborne=False,
-            killed_in_flight=False,
-            rebooted=False,
             rules=MappingProxyType({}),
             asks=MappingProxyType({}),
-            alarms=(),
-            alarm_at=math.nan,
-            canopy_fails=False,
-            kill_only=False,
             # A device that still wants it asks again; one that was exchanged cannot.
             device_blocks=MappingProxyType({}),
         )
+        turn.killing = replace(turn.killing, kill=None, killed_in_flight=False, kill_only=False)
+        turn.deploying = replace(turn.deploying, deploys=())
+        turn.flight = replace(turn.flight, flown=False, airborne=False, rebooted=False)
+        turn.alarming = replace(turn.alarming, alarms=(), alarm_at=math.nan, canopy_fails=False)
         note_released(turn)
         turn.finish(one.token, True, True, "back to the start")
 
@@ -159,7 +153,8 @@ def mode_request(turn: Turn, one: i.ModeRequest) -> None:
         return
     if before is i.Mode.ACTIVE:
         give_up_waiting(turn, f"mode changed to {one.mode.name}")
-        turn.state = replace(turn.state, kill=None, deploys=())
+        turn.killing = replace(turn.killing, kill=None)
+        turn.deploying = replace(turn.deploying, deploys=())
         if stage is Stage.DEPLOYING:
             # What is judged anew must find a stage in which the rules live.
             turn.move(Stimulus.MODE_CHANGED)
@@ -186,7 +181,7 @@ def _against_disarming(turn: Turn) -> str:
     """Why the parachute is not disarmed; empty: it is on the ground, no deploy on its way."""
     stage = turn.state.stage
     down = flight.in_air(turn.config, turn.state, turn.now) is False
-    if stage in ON_GROUND or (down and not turn.state.deploy_rule):
+    if stage in ON_GROUND or (down and not turn.deploying.deploy_rule):
         return ""
     return f"the vehicle is {stage.name}: not disarmed in flight"
 

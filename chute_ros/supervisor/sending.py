@@ -17,21 +17,21 @@ Slot = Literal["block", "kill"] | int
 
 def slots(turn: Turn) -> tuple[Slot, ...]:
     """Every decision that may be on its way."""
-    return ("block", "kill", *range(len(turn.state.deploys)))
+    return ("block", "kill", *range(len(turn.deploying.deploys)))
 
 
 def fire(turn: Turn, action: Action, rule: str, reasons: tuple[str, ...]) -> None:
     """The only place from which a kill or a deploy leaves. Default is deny."""
     state = turn.state
-    if not state.leading or state.mode is i.Mode.INHIBITED:
+    if not state.own.leading or state.mode is i.Mode.INHIBITED:
         return
     if state.mode is i.Mode.SHADOW:
         only_say(turn, action, rule, reasons)
     elif action is Action.KILL:
         decide(turn, "kill", action, rule, reasons, turn.config.kill_links)
-    elif state.stage is Stage.DEPLOYING and state.kill is not None:
-        step = len(state.deploys)
-        if step < len(turn.ladder) and not any(d.confirmed for d in state.deploys):
+    elif state.stage is Stage.DEPLOYING and state.killing.kill is not None:
+        step = len(state.deploying.deploys)
+        if step < len(turn.ladder) and not any(d.confirmed for d in state.deploying.deploys):
             rung = turn.ladder[step]
             decide(turn, step, action, rule, reasons, (rung.link,), rung.device)
 
@@ -85,14 +85,14 @@ def wanted(turn: Turn, slot: Slot) -> bool:
     stage = turn.state.stage
     if slot == "block":
         under_way = stage is Stage.KILLING and (
-            turn.state.killed_in_flight or bool(turn.state.deploy_rule)
+            turn.killing.killed_in_flight or bool(turn.deploying.deploy_rule)
         )
         return stage is not Stage.DEPLOYING and not under_way
     if slot == "kill":
-        if turn.state.deploy_rule or stage is Stage.DEPLOYED:
+        if turn.deploying.deploy_rule or stage is Stage.DEPLOYED:
             return stage in (Stage.KILLING, Stage.DEPLOYING, Stage.DEPLOYED)
         # One that failed long ago is not what a node that is back must do.
-        kill = turn.state.kill
+        kill = turn.killing.kill
         young = kill is not None and kill_can_help(turn, kill)
         return young and stage in (Stage.KILLING, Stage.DEPLOYING, Stage.FAULT)
     return stage is Stage.DEPLOYING
@@ -101,7 +101,7 @@ def wanted(turn: Turn, slot: Slot) -> bool:
 def renew(turn: Turn, slot: Slot, why: str) -> None:
     """Decide again, under a new number, what is still to be carried out."""
     pending = pending_in(turn, slot)
-    if pending is None or not wanted(turn, slot) or not turn.state.leading:
+    if pending is None or not wanted(turn, slot) or not turn.own.leading:
         return
     if pending.confirmed and slot != "block":
         return
@@ -124,7 +124,7 @@ def renew_missing(turn: Turn, slot: Slot, why: str) -> None:
     """The same under a new number, to those that have not reported; what is known stays."""
     pending = pending_in(turn, slot)
     assert pending is not None
-    if not turn.state.leading:
+    if not turn.own.leading:
         return
     new = _under_new_number(turn, slot, pending, pending.unreported(), why)
     earlier = pending.earlier | {pending.number}
@@ -186,7 +186,7 @@ def pending_in(turn: Turn, slot: Slot) -> Pending | None:
     """The decision in this slot."""
     if slot == "block":
         return turn.state.block
-    return turn.state.kill if slot == "kill" else turn.state.deploys[slot]
+    return turn.killing.kill if slot == "kill" else turn.deploying.deploys[slot]
 
 
 def put(turn: Turn, slot: Slot, pending: Pending) -> None:
@@ -194,10 +194,12 @@ def put(turn: Turn, slot: Slot, pending: Pending) -> None:
     if slot == "block":
         turn.state = replace(turn.state, block=pending)
     elif slot == "kill":
-        turn.state = replace(turn.state, kill=pending)
+        turn.killing = replace(turn.killing, kill=pending)
     else:
-        deploys = turn.state.deploys
-        turn.state = replace(turn.state, deploys=(*deploys[:slot], pending, *deploys[slot + 1 :]))
+        deploys = turn.deploying.deploys
+        turn.deploying = replace(
+            turn.deploying, deploys=(*deploys[:slot], pending, *deploys[slot + 1 :])
+        )
 
 
 def kill_failed(turn: Turn, kill: Pending) -> bool:

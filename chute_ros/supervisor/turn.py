@@ -2,19 +2,49 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+from typing import Any, TypeVar, cast
+
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import TRANSITIONS, Stimulus
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import (
+    Alarms,
+    DeployUnderWay,
+    HeardHere,
+    Killing,
+    Own,
+    State,
+    ThisFlight,
+)
 from chute_ros.transitions import after
 
+T = TypeVar("T")
 #: Alarms that are remembered: a device that repeats itself must not grow us.
 _MOST_ALARMS = 16
 
 
+def _group(kind: type[T], name: str) -> T:
+    """A group of the turn's state, to be read and replaced under its name."""
+
+    def put(turn: Turn, value: T) -> None:
+        changed: dict[str, Any] = {name: value}
+        turn.state = replace(turn.state, **changed)
+
+    # attrgetter calls no Python: it is read all the time.
+    return cast(T, property(attrgetter(f"state.{name}"), put))
+
+
 class Turn:
     """Carries state from part to part of an update and collects its outputs."""
+
+    killing = _group(Killing, "killing")
+    deploying = _group(DeployUnderWay, "deploying")
+    flight = _group(ThisFlight, "flight")
+    alarming = _group(Alarms, "alarming")
+    heard = _group(HeardHere, "heard")
+    own = _group(Own, "own")
 
     def __init__(self, config: SupervisorConfig, state: State, now: float) -> None:
         self.config, self.state, self.now = config, state, now
@@ -47,8 +77,13 @@ class Turn:
 
     def alarm(self, text: str) -> None:
         """Something that stays until a reset, or until what it tells is over."""
-        if text not in self.state.alarms:
-            self.state = replace(self.state, alarms=(*self.state.alarms, text)[-_MOST_ALARMS:])
+        if text not in self.state.alarming.alarms:
+            self.state = replace(
+                self.state,
+                alarming=replace(
+                    self.state.alarming, alarms=(*self.state.alarming.alarms, text)[-_MOST_ALARMS:]
+                ),
+            )
         self.warn(text)
 
     def finish(self, token: int, success: bool, accepted: bool, message: str) -> None:

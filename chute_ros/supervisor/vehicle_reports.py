@@ -45,7 +45,7 @@ def take_vehicle(turn: Turn, one: i.VehicleReport) -> None:
     new = one.state
     _note_home(turn, new)
     state, limits = turn.state, turn.config.profile.limits
-    samples = samples_of(new, turn.now, state.home, state.home_altitude)
+    samples = samples_of(new, turn.now, state.flight.home, state.flight.home_altitude)
     before = {
         # What nobody tells just now has not changed its source.
         name: state.measured(name).told_by(one.told_by.get(readings.PARTS.get(name, name), ""))
@@ -56,14 +56,14 @@ def take_vehicle(turn: Turn, one: i.VehicleReport) -> None:
     measurements = {
         name: before[name].with_sample(sample, limits[name]) for name, sample in samples.items()
     }
-    was_disarmed = state.vehicle.armed is Armed.DISARMED
+    was_disarmed = state.heard.vehicle.armed is Armed.DISARMED
     differ = new.acceleration_spread > _FORCES_DIFFER
-    turn.state = replace(
-        state,
+    turn.heard = replace(
+        turn.heard,
         vehicle=new,
         vehicle_received=turn.now,
         disputed=one.disputed | {ACCELERATION} if differ else one.disputed,
-        measurements=MappingProxyType({**state.measurements, **measurements}),
+        measurements=MappingProxyType({**state.heard.measurements, **measurements}),
     )
     _note_heights_told(turn)
     _note_contradictions(turn)
@@ -72,58 +72,55 @@ def take_vehicle(turn: Turn, one: i.VehicleReport) -> None:
     _note_faults(turn, new.faults)
     if was_disarmed and new.armed is Armed.ARMED:
         height = readings.measured(turn.config, turn.state, "height", turn.now)
-        turn.state = replace(turn.state, armed_height=0.0 if math.isnan(height) else height)
+        turn.flight = replace(turn.flight, armed_height=0.0 if math.isnan(height) else height)
 
 
 def _note_height_of_kill(turn: Turn) -> None:
     """Height and speed, where they were not known as it was killed: it has fallen since, so
     that no more is counted on than is left."""
     state = turn.state
-    known = not math.isnan(state.killed_height + state.killed_sinking)
-    if known or state.stage is not Stage.KILLING or not state.killed_in_flight:
+    known = not math.isnan(state.killing.killed_height + state.killing.killed_sinking)
+    if known or state.stage is not Stage.KILLING or not state.killing.killed_in_flight:
         return
     height = readings.measured(turn.config, state, HEIGHT, turn.now)
     sinking = -readings.measured(turn.config, state, VERTICAL_SPEED, turn.now)
     heard = not math.isnan(height + sinking)
-    if heard and turn.now <= state.killed_at + _HEARD_AFTER_KILL:
+    if heard and turn.now <= state.killing.killed_at + _HEARD_AFTER_KILL:
         sinking = max(sinking, 0.0)
-        turn.state = replace(state, killed_height=height, killed_sinking=sinking)
+        turn.killing = replace(turn.killing, killed_height=height, killed_sinking=sinking)
 
 
 def _note_home(turn: Turn, new: VehicleState) -> None:
     """What heights are above, as long as it has not taken off: an autopilot that moves its
     home in flight, or sets its height to zero, moves nothing here."""
-    state = replace(turn.state, vehicle=new, vehicle_received=turn.now)
-    if state.airborne and not math.isnan(state.home_altitude):
+    state = replace(turn.state, heard=replace(turn.heard, vehicle=new, vehicle_received=turn.now))
+    if state.flight.airborne and not math.isnan(state.flight.home_altitude):
         return
     home_altitude = new.altitude - new.height
     if not math.isnan(home_altitude):
-        turn.state = replace(turn.state, home_altitude=home_altitude)
+        turn.flight = replace(turn.flight, home_altitude=home_altitude)
     here = pressure_altitude(new.pressure)
-    if state.airborne or flight.says_down(turn.config, state, turn.now) is not True:
+    if state.flight.airborne or flight.says_down(turn.config, state, turn.now) is not True:
         return
-    before = state.ground_pressure_altitude
+    before = state.flight.ground_pressure_altitude
     still = flight.armed(turn.config, state, turn.now) is not Armed.ARMED
     if not math.isnan(here) and (still or math.isnan(before)):
         ground = here if math.isnan(before) else before + _OF_NEWEST * (here - before)
-        turn.state = replace(turn.state, ground_pressure_altitude=ground)
+        turn.flight = replace(turn.flight, ground_pressure_altitude=ground)
 
 
 def _note_heights_told(turn: Turn) -> None:
     """Keep the heights of the last second, at most ten of them, all since one was doubted:
     what is left of noise without its jumps may look like a fall."""
-    heights = _kept(turn, HEIGHT, turn.state.heights)
-    pressure_heights = _kept(turn, PRESSURE_ALTITUDE, turn.state.pressure_heights)
-    if heights is turn.state.heights and pressure_heights is turn.state.pressure_heights:
+    heights = _kept(turn, HEIGHT, turn.heard.heights)
+    pressure_heights = _kept(turn, PRESSURE_ALTITUDE, turn.heard.pressure_heights)
+    if heights is turn.heard.heights and pressure_heights is turn.heard.pressure_heights:
         return
-    before, known = turn.state.pressure_before, turn.state.pressure_heights
+    before, known = turn.heard.pressure_before, turn.heard.pressure_heights
     if known and pressure_heights[-1][0] - known[-1][0] > _SILENCE:
         before = known[-1]
-    turn.state = replace(
-        turn.state,
-        heights=heights,
-        pressure_heights=pressure_heights,
-        pressure_before=before,
+    turn.heard = replace(
+        turn.heard, heights=heights, pressure_heights=pressure_heights, pressure_before=before
     )
 
 
@@ -148,13 +145,13 @@ def _note_contradictions(turn: Turn) -> None:
     state, now = turn.state, turn.now
 
     def certain(name: str) -> float:
-        doubted = name in state.disputed or state.measured(name).doubt(name, now)
+        doubted = name in state.heard.disputed or state.measured(name).doubt(name, now)
         return math.nan if doubted else readings.measured(turn.config, state, name, now)
 
     cosine = math.cos(certain(TILT) / DEGREES)
     moment = (now, certain(VERTICAL_SPEED), certain(ACCELERATION), cosine)
-    motion = noted(state.motion, moment)
-    if motion is state.motion:
+    motion = noted(state.heard.motion, moment)
+    if motion is state.heard.motion:
         return
     denied = denials(
         motion,
@@ -167,20 +164,20 @@ def _note_contradictions(turn: Turn) -> None:
     )
     # An estimator that is wrong follows its command where the vehicle does not.
     climb_beyond = beyond + readings.measured(turn.config, state, VERTICAL_SPEED, now) - rate
-    since = {name: state.denied_since.get(name, now) for name in denied}
+    since = {name: state.heard.denied_since.get(name, now) for name in denied}
     # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
-    off = state.vehicle.armed is Armed.DISARMED
+    off = state.heard.vehicle.armed is Armed.DISARMED
     told = {} if off else commanded(tilt, error, beyond, climb_beyond)
-    turn.state = replace(
-        state,
+    turn.heard = replace(
+        turn.heard,
         motion=motion,
         denied=MappingProxyType(dict(denied)),
         denied_since=MappingProxyType(since),
         commanded=MappingProxyType(dict(told)),
     )
-    last = state.motion[-1][0] if state.motion else now
+    last = state.heard.motion[-1][0] if state.heard.motion else now
     for name, begun in since.items():
-        if state.airborne and last < begun + CONTRADICTED_FOR <= now:
+        if state.flight.airborne and last < begun + CONTRADICTED_FOR <= now:
             turn.warn(f"{name} is contradicted: {denied[name]}")
     _note_fitness(turn)
 
@@ -189,12 +186,14 @@ def _note_fitness(turn: Turn) -> None:
     """An accelerometer that tells on the ground what it cannot feel there, or without any
     speed of a fall, is not used until it tells on the ground what it must."""
     state, now = turn.state, turn.now
-    unfit = dict(state.unfit)
-    begun = state.denied_since.get(ACCELERATION, math.nan)
+    unfit = dict(state.heard.unfit)
+    begun = state.heard.denied_since.get(ACCELERATION, math.nan)
     if now >= begun + _NEVER_FALLS_FOR:
-        unfit.setdefault(ACCELERATION, f"it tells of a fall, and {state.denied[ACCELERATION]}")
+        unfit.setdefault(
+            ACCELERATION, f"it tells of a fall, and {turn.heard.denied[ACCELERATION]}"
+        )
     since = math.nan
-    stands = not state.airborne and flight.says_down(turn.config, state, now) is True
+    stands = not state.flight.airborne and flight.says_down(turn.config, state, now) is True
     speeds = (
         readings.measured(turn.config, state, name, now) for name in (VERTICAL_SPEED, CLIMB_RATE)
     )
@@ -205,7 +204,7 @@ def _note_fitness(turn: Turn) -> None:
         least, most = _AT_REST
         fits = least <= force <= most
         if fits == (ACCELERATION in unfit):
-            since = now if math.isnan(state.fitness_since) else state.fitness_since
+            since = now if math.isnan(state.heard.fitness_since) else state.heard.fitness_since
             if now >= since + _FITNESS_TAKES:
                 unfit.pop(ACCELERATION, None)
                 if not fits:
@@ -213,31 +212,32 @@ def _note_fitness(turn: Turn) -> None:
                         f"it tells {force:.1f} m/s^2 while the vehicle stands (need {least:g} "
                         f"to {most:g}; 0 is told by a driver that takes gravity out)"
                     )
-    if unfit != state.unfit or since != state.fitness_since:
-        turn.state = replace(state, unfit=MappingProxyType(unfit), fitness_since=since)
+    if unfit != state.heard.unfit or since != state.heard.fitness_since:
+        turn.heard = replace(turn.heard, unfit=MappingProxyType(unfit), fitness_since=since)
 
 
 def _note_faults(turn: Turn, faults: tuple[str, ...]) -> None:
     """In flight what forbids a take-off is an alarm, each once as long as it lasts."""
-    told = set(map(kind, turn.state.faults_told))
+    told = set(map(kind, turn.heard.faults_told))
     new = [one for one in faults if kind(one) not in told]
-    if turn.state.airborne:
+    if turn.flight.airborne:
         turn.outputs += [i.Say(f"vehicle: {one}", alarm=True) for one in new]
-    if faults != turn.state.faults_told:
-        turn.state = replace(turn.state, faults_told=faults if turn.state.airborne else ())
+    if faults != turn.heard.faults_told:
+        turn.heard = replace(turn.heard, faults_told=faults if turn.flight.airborne else ())
 
 
 def _note_reboots(turn: Turn, new: VehicleState) -> None:
     """Restarts on the ground do not count; a node that counts from 0 again has restarted."""
     state = turn.state
-    before = min(state.reboots_before, new.reboot_count)
-    if not state.airborne and not flight.in_air(turn.config, state, turn.now):
+    before = min(state.flight.reboots_before, new.reboot_count)
+    if not state.flight.airborne and not flight.in_air(turn.config, state, turn.now):
         before = new.reboot_count
     again = new.rebooted_in_flight and new.reboot_count > before
-    if again and state.airborne and not state.rebooted:
+    if again and state.flight.airborne and not state.flight.rebooted:
         turn.warn("the autopilot started anew in flight")
-    rebooted = state.rebooted or (again and state.airborne)
-    if (before, rebooted) != (state.reboots_before, state.rebooted):
+    rebooted = state.flight.rebooted or (again and state.flight.airborne)
+    if (before, rebooted) != (state.flight.reboots_before, state.flight.rebooted):
         # Heights from before it may be above another ground.
-        heights = state.heights if rebooted == state.rebooted else ()
-        turn.state = replace(state, reboots_before=before, rebooted=rebooted, heights=heights)
+        heights = state.heard.heights if rebooted == state.flight.rebooted else ()
+        turn.flight = replace(turn.flight, reboots_before=before, rebooted=rebooted)
+        turn.heard = replace(turn.heard, heights=heights)

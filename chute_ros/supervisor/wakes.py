@@ -17,31 +17,31 @@ from chute_ros.supervisor.state import State
 def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
     """When update has something to decide without any input, later than now; infinity: never."""
     deadlines: list[float] = []
-    for link, evidence in state.links.items():
+    for link, evidence in state.heard.links.items():
         deadlines += evidence.deadlines(config.limits(link))
     if state.stage in (Stage.STARTUP, Stage.READY, Stage.ARMED, Stage.LANDED):
-        since = state.vehicle_received - state.vehicle.armed_age
+        since = state.heard.vehicle_received - state.heard.vehicle.armed_age
         # Just after the limit, which still counts as young enough.
         deadlines.append(math.nextafter(since + config.vehicle_state_age, math.inf) + JUST_AFTER)
     if state.stage is Stage.ARMED:
         deadlines.append(state.stage_since + ARMED_SHOWS)
     if state.stage is Stage.STARTUP:
         deadlines += [state.started_at + config.limits(one).startup_grace for one in config.links]
-    if state.stage is Stage.DEPLOYED and state.deploy_tokens:
+    if state.stage is Stage.DEPLOYED and state.own.deploy_tokens:
         deadlines.append(state.stage_since + config.report_wait)
-    for pending in (state.block, state.kill, *state.deploys):
+    for pending in (state.block, state.killing.kill, *state.deploying.deploys):
         if pending is not None and pending.unreported():
             deadlines.append(pending.resend_at(config))
-    if state.kill is not None:
-        deadlines.append(state.kill.decided_at + config.kill_timeout)
-    if state.stage is Stage.KILLING and state.deploy_rule:
+    if state.killing.kill is not None:
+        deadlines.append(state.killing.kill.decided_at + config.kill_timeout)
+    if state.stage is Stage.KILLING and state.deploying.deploy_rule:
         deadlines.append(release_due(config, state, now))
     if state.deploy is not None:
         deadlines.append(step_deadline(config, state, state.deploy))
-    deadlines.append(state.alarm_at)
+    deadlines.append(state.alarming.alarm_at)
     if state.stage is Stage.FAULT:
         deadlines.append(state.stage_since + config.deploy_timeout)
-    if state.airborne:
+    if state.flight.airborne:
         deadlines.append(flight.landed_at(config, state))
         if state.stage is Stage.KILLING:
             deadlines.append(flight.down_after_kill_at(config, state))

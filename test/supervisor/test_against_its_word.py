@@ -255,7 +255,7 @@ def test_what_goes_wrong_again_and_again_does_not_grow_it() -> None:
         t += 0.25
         story.at(t, story.heartbeat(), i.KillRequest(0, "mavlink_parachute 1/161", "x"))
         story.at(t + 0.01, story.report(K, Outcome.FAILED, detail=f"no answer for {t:.2f} s"))
-    assert len(story.state.alarms) <= 16
+    assert len(story.state.alarming.alarms) <= 16
 
 
 def test_what_was_said_in_one_flight_is_said_in_the_next_as_well() -> None:

@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
+from story import changed
 from told import Told, told
 
 from chute_ros.model import LinkState, ParachuteState, ParachuteStatus, VehicleState
@@ -17,7 +18,7 @@ from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, Link
 from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.profile_lines import ALL, ANY
 from chute_ros.supervisor.rules import Profile
-from chute_ros.supervisor.state import ASK_LASTS, Ask, State
+from chute_ros.supervisor.state import ASK_LASTS, Ask, HeardHere, State
 
 LINKS = ("a", "b")
 PATIENT = LinkLimits(stale_after=50.0, lost_after=100.0)
@@ -27,7 +28,7 @@ SILENT = (LinkJudgement.STALE, LinkJudgement.LOST)
 
 
 def state(**known: Any) -> State:
-    return State(epoch=7, started_at=0.0, **known)
+    return changed(State(epoch=7, started_at=0.0), **known)
 
 
 def links(**evidence: LinkEvidence) -> MappingProxyType[str, LinkEvidence]:
@@ -60,7 +61,7 @@ def test_each_link_is_judged_by_its_own_limits() -> None:
 
 
 def test_one_that_is_still_starting_does_not_hide_the_next() -> None:
-    known = State(epoch=7, started_at=NOW - 1.0, links=links(b=heard(5.0)))
+    known = State(epoch=7, started_at=NOW - 1.0, heard=HeardHere(links=links(b=heard(5.0))))
     found = told(CONFIG, known, LinkCondition(ANY, SILENT), NOW)
     assert found.holds is True
     assert found.text.startswith("link a is still starting, b is LOST")

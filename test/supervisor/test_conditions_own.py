@@ -53,7 +53,7 @@ def test_every_fact_of_the_autopilot_is_found_and_waited_for(fact: AutopilotFact
     story, one = Story().flying(), AutopilotCondition(fact)
     now = START + story.t
     assert one.find(story.config, story.state, now).text
-    received = story.state.vehicle_received + story.config.vehicle_state_age + JUST_AFTER
+    received = story.state.heard.vehicle_received + story.config.vehicle_state_age + JUST_AFTER
     assert received in one.deadlines(story.config, story.state, None, False, now)
 
 

@@ -302,7 +302,10 @@ def test_a_rule_is_not_acted_on_by_one_that_follows_or_is_inhibited() -> None:
 def test_the_links_that_a_deploy_needs_are_no_reason_against_it() -> None:
     story = Story(SupervisorConfig()).flying()
     story.at(30.0)
-    assert story.state.links[LINK].judged(story.config.limits(LINK), 1030.0) is LinkJudgement.LOST
+    assert (
+        story.state.heard.links[LINK].judged(story.config.limits(LINK), 1030.0)
+        is LinkJudgement.LOST
+    )
     assert asked(story) == ""
     story.at(31.0)
     assert story.fired() == ["KILL", "DEPLOY"]

@@ -196,4 +196,4 @@ def test_a_kill_after_a_failed_test_on_the_ground_is_none_in_flight() -> None:
     story.at(0.5, story.report(K, Outcome.CONFIRMED))
     assert story.answer(6).success
     assert story.state.stage is Stage.FAULT
-    assert not story.state.killed_in_flight
+    assert not story.state.killing.killed_in_flight

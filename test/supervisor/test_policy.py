@@ -187,7 +187,7 @@ def test_in_shadow_the_whole_logic_runs_and_nothing_is_sent() -> None:
     assert all("counter 0.30 s of 0.3 s" in d.reasons for d in decisions)
     assert [d.targets for d in decisions] == [(LINK,), (LINK,)]
     assert story.state.stage is Stage.IN_FLIGHT
-    assert (story.state.kill, story.state.deploys) == (None, ())
+    assert (story.state.killing.kill, story.state.deploying.deploys) == (None, ())
 
 
 def test_what_was_only_said_in_shadow_is_done_when_active() -> None:

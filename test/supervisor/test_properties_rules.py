@@ -201,7 +201,7 @@ def test_on_the_ground_and_disarmed_no_rule_of_any_profile_deploys(
             one = (one[0], {**one[1], **down}, one[2])
         run(watch, [one])
         assert watch.state.stage not in (Stage.IN_FLIGHT, Stage.DEPLOYING)
-        assert watch.state.deploys == ()
+        assert watch.state.deploying.deploys == ()
 
 
 SILENT = st.one_of(
@@ -246,8 +246,8 @@ def test_a_lost_heartbeat_alone_never_deploys_whatever_the_profile(
     watch = begun(config, flying=True)
     for one in goes:
         run(watch, [one])
-        assert watch.state.kill is None
-        assert watch.state.deploys == ()
+        assert watch.state.killing.kill is None
+        assert watch.state.deploying.deploys == ()
 
 
 @settings(max_examples=30)

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import FLYING, LINK, STANDING, START, Story, parachute
+from story import FLYING, LINK, STANDING, START, Story, changed, parachute
 
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
@@ -36,7 +36,7 @@ TWO = SupervisorConfig(
 
 
 def steps(config: SupervisorConfig = TWO, now: float = 100.0, **known: Any) -> Turn:
-    return Turn(config, State(epoch=7, started_at=0.0, **known), now)
+    return Turn(config, changed(State(epoch=7, started_at=0.0), **known), now)
 
 
 def decided(number: int, action: Action, *targets: str, **known: Any) -> Pending:
@@ -80,7 +80,7 @@ def test_a_shadow_names_all_that_it_would_have_sent() -> None:
         i.Decide(Decision(7, 4, K, "tested", ("why",), BOTH, True)),
         i.Decide(Decision(7, 5, D, "tested", ("why",), (UPF,), True, "1/162")),
     ]
-    assert (one.state.kill, one.state.deploys) == (None, ())
+    assert (one.state.killing.kill, one.state.deploying.deploys) == (None, ())
 
 
 def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
@@ -88,9 +88,9 @@ def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
     fire(one, D, "tested", ("why",))
     decision = Decision(7, 4, D, "tested", ("why",), (UPF,), False, "1/162")
     assert one.outputs == [i.Decide(decision)]
-    assert one.state.deploys == (Pending(decision, (UPF,), 100.0, 100.0),)
+    assert one.state.deploying.deploys == (Pending(decision, (UPF,), 100.0, 100.0),)
     fire(one, D, "tested", ("not yet",))
-    assert [d.decision.targets for d in one.state.deploys] == [(UPF,), (LINK,)]
+    assert [d.decision.targets for d in one.state.deploying.deploys] == [(UPF,), (LINK,)]
 
 
 @pytest.mark.parametrize(
@@ -115,7 +115,7 @@ def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device() -> None:
     fire(one, K, "tested", ("why",))
     decision = Decision(7, 4, K, "tested", ("why",), BOTH, False, "")
     assert one.outputs == [i.Decide(decision)]
-    assert one.state.kill == Pending(decision, BOTH, 100.0, 100.0)
+    assert one.state.killing.kill == Pending(decision, BOTH, 100.0, 100.0)
 
 
 def test_no_kill_leaves_from_one_that_follows() -> None:
@@ -161,7 +161,7 @@ def test_what_is_decided_anew_keeps_its_order_and_its_limits() -> None:
         Decision(7, number, K, "tested", ("why", "it restarted"), BOTH, False, "1/162")
         for number in (4, 5)
     ]
-    assert one.state.kill == Pending(decisions[1], BOTH, 90.0, 100.0, given_up=True)
+    assert one.state.killing.kill == Pending(decisions[1], BOTH, 90.0, 100.0, given_up=True)
 
 
 @pytest.mark.parametrize(
@@ -198,8 +198,8 @@ def test_of_the_deploy_only_what_was_not_begun_is_decided_anew() -> None:
         (LINK,),
         ("why", "another took over"),
     )
-    assert one.state.deploys[0] == deploys[0]
-    assert one.state.deploys[1].decision == output.decision
+    assert one.state.deploying.deploys[0] == deploys[0]
+    assert one.state.deploying.deploys[1].decision == output.decision
 
 
 def test_a_flight_block_is_decided_anew_also_where_it_was_begun() -> None:
@@ -217,7 +217,7 @@ def test_those_that_have_not_reported_get_a_new_number_and_the_rest_stays() -> N
     reasons = ("why", "it saw a newer one first")
     decision = Decision(7, 4, K, "tested", reasons, (UPF,), False, "1/162")
     assert one.outputs == [i.Decide(decision)]
-    assert one.state.kill == Pending(
+    assert one.state.killing.kill == Pending(
         decision, BOTH, 90.0, 100.0, told, ("a: told",), frozenset({(7, 0), (7, 1)})
     )
     follows = steps(stage=Stage.KILLING, kill=kill, leading=False)
@@ -230,7 +230,7 @@ def test_what_is_sent_again_is_the_same() -> None:
     one = steps(kill=kill)
     send_again(one, "kill")
     assert one.outputs == [i.Decide(kill.decision, again=True)]
-    assert one.state.kill == replace(kill, sent_at=100.0)
+    assert one.state.killing.kill == replace(kill, sent_at=100.0)
 
 
 def test_each_step_of_the_ladder_has_its_own_place() -> None:
@@ -239,9 +239,9 @@ def test_each_step_of_the_ladder_has_its_own_place() -> None:
     assert sending.slots(one) == ("block", "kill", 0, 1, 2)
     changed = replace(second, sent_at=95.0)
     put(one, 1, changed)
-    assert one.state.deploys == (first, changed, third)
+    assert one.state.deploying.deploys == (first, changed, third)
     put(one, 3, first)
-    assert one.state.deploys == (first, changed, third, first)
+    assert one.state.deploying.deploys == (first, changed, third, first)
     assert [pending_in(one, slot) for slot in (0, 1, 2)] == [first, changed, third]
 
 
@@ -259,8 +259,8 @@ def test_an_alarm_is_kept_once_and_the_newest_are_kept() -> None:
         one.alarm(f"alarm {number}")
         one.alarm("alarm 0")
     assert one.outputs[:2] == [i.Say("alarm 0", alarm=True)] * 2
-    assert one.state.alarms[-1] == "alarm 19"
-    assert len(one.state.alarms) == 16
+    assert one.state.alarming.alarms[-1] == "alarm 19"
+    assert len(one.state.alarming.alarms) == 16
 
 
 def test_who_waits_for_nothing_is_not_answered() -> None:
@@ -300,7 +300,7 @@ def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_o
         i.Finish(6, False, False, words),
         i.Say(f"the motors may still turn, no kill confirmed: {words}", alarm=True),
     ]
-    assert one.state.kill_tokens == ()
+    assert one.state.own.kill_tokens == ()
 
 
 def test_a_kill_that_is_confirmed_answers_with_the_words_of_the_links() -> None:
@@ -308,7 +308,7 @@ def test_a_kill_that_is_confirmed_answers_with_the_words_of_the_links() -> None:
     one = steps(kill=decided(1, K, outcomes=told, details=("a: off",)), kill_tokens=(5,))
     end_kill(one)
     assert one.outputs == [i.Finish(5, True, True, "a: off")]
-    assert one.state.kill_tokens == ()
+    assert one.state.own.kill_tokens == ()
 
 
 def test_a_kill_that_was_taken_and_failed_says_that_it_was_taken() -> None:
@@ -323,7 +323,7 @@ def test_a_kill_that_is_under_way_is_not_answered() -> None:
     end_kill(one)
     end_kill(steps())
     assert one.outputs == []
-    assert one.state.kill_tokens == (5,)
+    assert one.state.own.kill_tokens == (5,)
 
 
 # -- nobody waits any more -----------------------------------------------------------------------
@@ -340,16 +340,19 @@ def test_one_that_steps_down_answers_and_what_was_ordered_stays() -> None:
     one = steps(**WAITING)
     answer_all(one, "another decides")
     assert one.outputs == [i.Finish(n, False, False, "another decides") for n in (5, 6)]
-    assert (one.state.kill_tokens, one.state.deploy_tokens) == ((), ())
-    assert (one.state.deploy_rule, one.state.deploy_reasons) == ("tested", ("why",))
+    assert (one.state.own.kill_tokens, one.state.own.deploy_tokens) == ((), ())
+    assert (one.state.deploying.deploy_rule, one.state.deploying.deploy_reasons) == (
+        "tested",
+        ("why",),
+    )
 
 
 def test_one_that_gives_up_answers_and_pursues_nothing() -> None:
     one = steps(**WAITING)
     give_up_waiting(one, "reset")
     assert one.outputs == [i.Finish(n, False, False, "reset") for n in (5, 6)]
-    assert (one.state.kill_tokens, one.state.deploy_tokens) == ((), ())
-    assert (one.state.deploy_rule, one.state.deploy_reasons) == ("", ())
+    assert (one.state.own.kill_tokens, one.state.own.deploy_tokens) == ((), ())
+    assert (one.state.deploying.deploy_rule, one.state.deploying.deploy_reasons) == ("", ())
 
 
 def test_a_link_that_is_heard_leaves_the_others_as_they_are() -> None:

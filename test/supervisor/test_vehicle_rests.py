@@ -31,10 +31,13 @@ class Compared(Story):
     """Each update is made once more by one that looks at all, and must come to the same."""
 
     def _update(self, inputs: tuple[i.Input, ...], t: float) -> list[i.Output]:
-        before = replace(self.state, vehicle_rests_until=-math.inf)
+        before = replace(self.state, own=replace(self.state.own, vehicle_rests_until=-math.inf))
         outputs = super()._update(inputs, t)
         state, all_outputs = update(self.config, before, inputs, START + t)
-        rested = replace(self.state, vehicle_rests_until=state.vehicle_rests_until)
+        rested = replace(
+            self.state,
+            own=replace(self.state.own, vehicle_rests_until=state.own.vehicle_rests_until),
+        )
         assert repr(rested) == repr(state)
         assert repr(tuple(outputs)) == repr(all_outputs)
         return outputs

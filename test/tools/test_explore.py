@@ -61,7 +61,7 @@ def test_a_deploy_that_does_not_wait_is_found(monkeypatch: pytest.MonkeyPatch) -
 
     def at_once(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
         ordered(turn, rule, reasons)
-        turn.state = replace(turn.state, deploy_due=turn.now)
+        turn.deploying = replace(turn.deploying, deploy_due=turn.now)
 
     for module in (deploying, policy, requests):
         monkeypatch.setattr(module, "order_deploy", at_once)
@@ -96,7 +96,8 @@ def test_what_raises_and_what_leaves_in_shadow_is_found(monkeypatch: pytest.Monk
 
 def test_every_field_of_a_state_decides_or_is_named_as_one_that_does_not() -> None:
     text = Path(explore_key.__file__).read_text()
-    kinds = (State, Pending, RuleEvidence, LinkEvidence, Measured)
+    groups = [type(one) for one in vars(State(1, 0.0)).values() if dataclasses.is_dataclass(one)]
+    kinds = (State, *groups, Pending, RuleEvidence, LinkEvidence, Measured)
     names = [field.name for kind in kinds for field in dataclasses.fields(kind)]
     used = {name for name in names if f".{name}" in text}
     used |= {"measurements"} if ".measured(" in text else set()

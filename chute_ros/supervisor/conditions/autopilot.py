@@ -80,22 +80,24 @@ class AutopilotCondition(Condition):
         self, config: SupervisorConfig, state: State, holds: bool | None, doubts: bool, now: float
     ) -> Iterable[float]:
         """When what it says is too old, and when what tells of a fall is."""
-        yield state.vehicle_received + config.vehicle_state_age + JUST_AFTER
+        told = [state.heard.vehicle_received + config.vehicle_state_age]
         if self.fact is AutopilotFact.KILLED_ALOFT:
-            for name in (one for sign in FALL_SIGNS for one in known_by(sign)):
-                yield state.measured(name).turns_at(config.profile.limits[name], now) + JUST_AFTER
+            names = [name for sign in FALL_SIGNS for name in known_by(sign)]
+            limits = config.profile.limits
+            told += [state.measured(name).turns_at(limits[name], now) for name in names]
+        return [one + JUST_AFTER for one in told]
 
 
 def _rebooted(config: SupervisorConfig, state: State, now: float) -> Finding:
-    rebooted = state.rebooted
+    rebooted = state.flight.rebooted
     return Finding(rebooted, lambda: f"autopilot restarts in flight {int(rebooted)}")
 
 
 def _lost(config: SupervisorConfig, state: State, now: float) -> Finding:
-    silence, limit = now - state.vehicle_received, config.vehicle_state_age
+    silence, limit = now - state.heard.vehicle_received, config.vehicle_state_age
     if math.isnan(silence):
         return Finding(None, lambda: "autopilot never heard")
-    link = state.vehicle.link_state
+    link = state.heard.vehicle.link_state
     return Finding(
         silence > limit or link is LinkState.LOST,
         lambda: (
@@ -111,22 +113,22 @@ def _killed_aloft(config: SupervisorConfig, state: State, now: float) -> Finding
     return Finding(
         left >= minimum and silent,
         lambda: (
-            f"killed aloft {now - state.killed_at:.2f} s ago, at least {left:.1f} m are left "
-            f"(minimum {minimum:g} m), and {'nothing' if silent else 'something'} tells "
+            f"killed aloft {now - state.killing.killed_at:.2f} s ago, at least {left:.1f} m are "
+            f"left (minimum {minimum:g} m), and {'nothing' if silent else 'something'} tells "
             "whether it falls"
         ),
     )
 
 
 def _motors_stopped(config: SupervisorConfig, state: State, now: float) -> Finding:
-    kill, minimum = state.kill, config.profile.minimum_height
-    ours = state.stage is Stage.KILLING and state.killed_in_flight and not state.killed_standing
-    stopped = ours and kill is not None and kill.confirmed
+    known, minimum = state.killing, config.profile.minimum_height
+    ours = state.stage is Stage.KILLING and known.killed_in_flight and not known.killed_standing
+    stopped = ours and known.kill is not None and known.kill.confirmed
     return Finding(
-        stopped and state.killed_height >= minimum,
+        stopped and known.killed_height >= minimum,
         lambda: (
             "its motors were stopped in flight, as its own state confirms, at "
-            f"{state.killed_height:.1f} m (minimum {minimum:g} m)"
+            f"{known.killed_height:.1f} m (minimum {minimum:g} m)"
         ),
     )
 
@@ -137,8 +139,8 @@ def _disarmed(config: SupervisorConfig, state: State, now: float) -> Finding:
 
 
 def _emergency(config: SupervisorConfig, state: State, now: float) -> Finding:
-    status = state.vehicle.system_status
-    if now - state.vehicle_received > config.vehicle_state_age:
+    status = state.heard.vehicle.system_status
+    if now - state.heard.vehicle_received > config.vehicle_state_age:
         return Finding(None, lambda: "autopilot's own state is old")
     return Finding(status in _EMERGENCY, lambda: f"autopilot's own state is {status} (6 or 8)")
 

@@ -71,7 +71,7 @@ class DeviceCondition(Condition):
             for name in names
             for device, status in state.evidence(name).devices.items()
             if status.state is ParachuteState.ABNORMAL
-            and state.links[name].is_heard(config.limits(name), now)
+            and state.heard.links[name].is_heard(config.limits(name), now)
         ]
         return Finding(bool(wrong), lambda: "; ".join(wrong) or "no device is ABNORMAL")
 

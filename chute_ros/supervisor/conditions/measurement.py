@@ -93,6 +93,10 @@ class MeasurementCondition(Condition):
         """Those that it is derived from, or itself."""
         return DERIVED.get(self.measurement, (self.measurement,))
 
+    @cached_property
+    def _known_by(self) -> tuple[str, ...]:
+        return known_by(self.measurement)
+
     @property
     def is_silence(self) -> bool:
         """Where it is unknown it may be."""
@@ -187,7 +191,7 @@ class MeasurementCondition(Condition):
         holds = self.holds_at(value)
         denied = self._denied(config, state, now) if holds else ""
         if holds and self.unless_dived:
-            denied = denied or state.commanded.get(DIVE, "")
+            denied = denied or state.heard.commanded.get(DIVE, "")
 
         def told() -> str:
             weaker = f"; in doubt: {doubt}" if doubt else ""
@@ -201,7 +205,7 @@ class MeasurementCondition(Condition):
     def _denied(self, config: SupervisorConfig, state: State, now: float) -> str:
         """Why what this claims of a fall is not so, by other origins; empty: none denies it."""
         name = self.measurement
-        if not (state.denied or state.commanded) or name not in _CLAIMS:
+        if not (state.heard.denied or state.heard.commanded) or name not in _CLAIMS:
             return ""
         below = not math.isnan(self.below)
         claims_a_fall = below if name in _CLAIMED_BELOW else not math.isnan(self.above)
@@ -211,20 +215,19 @@ class MeasurementCondition(Condition):
         if not claims_a_fall:
             return ""
         claim = _CLAIMS[name]
-        denied = "" if by_barometer else state.denied.get(claim, "")
-        return denied or state.commanded.get(name if name == CLIMB_RATE else claim, "")
+        denied = "" if by_barometer else state.heard.denied.get(claim, "")
+        return denied or state.heard.commanded.get(name if name == CLIMB_RATE else claim, "")
 
     def deadlines(
         self, config: SupervisorConfig, state: State, holds: bool | None, doubts: bool, now: float
     ) -> Iterable[float]:
         """When it is too old to hold, and, where that lets it hold, known or doubted no more."""
         limits = config.profile.limits
-        names = self.measured if doubts else ()
-        for name in known_by(self.measurement) if self.if_unknown else names:
+        turning = self._known_by if self.if_unknown else self.measured if doubts else ()
+        for name in turning:
             yield state.measured(name).turns_at(limits[name], now) + JUST_AFTER
-        if holds:
-            for name in self.measured:
-                yield state.measured(name).measured_at + limits[name].max_age + JUST_AFTER
+        for name in self.measured if holds else ():
+            yield state.measured(name).measured_at + limits[name].max_age + JUST_AFTER
 
 
 def _until(lines: ProfileLines, what: str, where: Where, limits: dict[str, float]) -> float:
