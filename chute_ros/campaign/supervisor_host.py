@@ -134,7 +134,7 @@ class SupervisorHost:
         """Who leads, above all."""
         self.said.append((self._ros.world.now, notice.text))
 
-    def say(self, said: i.Say) -> None:
+    def say(self, said: i.LogMessage) -> None:
         """To the judge."""
         told = (self._ros.world.now, said.text)
         self.said.append(told)

@@ -169,7 +169,7 @@ class SafetySupervisorNode(SuiteNode):
         """At the level that it deserves."""
         log_notice(self.get_logger(), notice)
 
-    def say(self, said: inputs.Say) -> None:
+    def say(self, said: inputs.LogMessage) -> None:
         """What the core tells a person."""
         log = self.get_logger()
         log.error(said.text) if said.alarm else log.info(said.text)

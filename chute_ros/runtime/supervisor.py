@@ -67,7 +67,7 @@ class SupervisorShell(LeaseShell, ArmCaller, Protocol):
     def keep(self, state: State) -> None:
         """This is what a start anew goes on with."""
 
-    def say(self, said: inputs.Say) -> None:
+    def say(self, said: inputs.LogMessage) -> None:
         """What the core tells a person."""
 
     def offer(self, offered: bool) -> None:
@@ -210,7 +210,7 @@ class SupervisorRuntime:
                 self._arming.begin(output, now)
             elif isinstance(output, inputs.Refused):
                 self.lease.refused(output.newest_epoch, now)
-            elif isinstance(output, inputs.Say):
+            elif isinstance(output, inputs.LogMessage):
                 self.afterwards.tell(partial(self._shell.say, output))
 
     def _finish(self, output: inputs.Finish) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.machine import Event, Stage, listed
 from chute_ros.supervisor.preflight import block_reasons, not_seen
 from chute_ros.supervisor.sending import decide, kill_failed, worth_sending
 from chute_ros.supervisor.turn import Turn
 
 #: What the health of the links can do; in flight nothing.
-_OF_LINKS = (Stimulus.LINKS_UNHEALTHY, Stimulus.LINKS_HEALTHY)
+_OF_LINKS = (Event.LINKS_UNHEALTHY, Event.LINKS_HEALTHY)
 #: Once `safety/arm` has armed the parachutes, their own status says so within this time, s.
 ARMED_SHOWS = 2.0
 
@@ -29,21 +29,21 @@ def check_armed(turn: Turn) -> None:
     if said and not any(said):
         text = "no parachute says any more that it is armed"
         turn.warn(text)
-        turn.move(Stimulus.DISARMED, text)
+        turn.move(Event.DISARMED, text)
 
 
 def check_links(turn: Turn) -> None:
     stage = turn.state.stage
-    if not any(listed(stage, stimulus) for stimulus in _OF_LINKS):
+    if not any(listed(stage, event) for event in _OF_LINKS):
         return
     reasons = block_reasons(turn.config, turn.state, turn.now)
     grace = max(turn.config.limits(link).startup_grace for link in turn.config.links)
     starting = turn.now < turn.state.started_at + grace
     if stage is Stage.STARTUP and reasons and starting:
         return
-    stimulus = Stimulus.LINKS_UNHEALTHY if reasons else Stimulus.LINKS_HEALTHY
-    if listed(stage, stimulus):
-        turn.move(stimulus, "; ".join(reasons))
+    event = Event.LINKS_UNHEALTHY if reasons else Event.LINKS_HEALTHY
+    if listed(stage, event):
+        turn.move(event, "; ".join(reasons))
         if not reasons and (text := not_seen(turn.config, turn.state)):
             turn.log(f"not seen in flight: {text}")
 

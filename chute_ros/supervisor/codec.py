@@ -40,8 +40,9 @@ _SIZED = (str, tuple, frozenset, MappingProxyType)
 class Codec:
     """Reads and writes the classes that it was given, and those that their fields name."""
 
-    def __init__(self, *classes: type) -> None:
-        self._classes: dict[str, type] = {}
+    def __init__(self, *classes: type, once: Mapping[str, type] = MappingProxyType({})) -> None:
+        """once: names of former versions, which are still read."""
+        self._classes: dict[str, type] = dict(once)
         for one in classes:
             self._learn(one)
 

@@ -8,7 +8,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_details, deploy_reached, end_kill, finish_deploy
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.gate import OPERATOR, too_low
-from chute_ros.supervisor.machine import Stage, Stimulus, listed
+from chute_ros.supervisor.machine import Event, Stage, listed
 from chute_ros.supervisor.orders import order_deploy
 from chute_ros.supervisor.policy import put_off
 from chute_ros.supervisor.quick_replace import replace
@@ -40,9 +40,9 @@ def release_due(config: SupervisorConfig, state: State, now: float) -> float:
 def check_parachutes(turn: Turn) -> None:
     """One that says that it is released ends every deploy, whoever fired it."""
     out = sorted(turn.state.newly_released(turn.config, turn.now))
-    if out and listed(turn.state.stage, Stimulus.PARACHUTE_OPEN):
+    if out and listed(turn.state.stage, Event.PARACHUTE_OPEN):
         said = f"{', '.join(map(' '.join, out))} says deployed"
-        turn.move(Stimulus.PARACHUTE_OPEN, said)
+        turn.move(Event.PARACHUTE_OPEN, said)
 
 
 def check_kill(turn: Turn) -> None:
@@ -69,7 +69,7 @@ def check_kill(turn: Turn) -> None:
         waited = turn.now - kill.decided_at
         why = f"kill {'confirmed' if kill.confirmed else 'not confirmed'} after {waited:.2f} s"
         limit = _limit(turn, kill)
-        turn.move(Stimulus.DEPLOY_DUE, why)
+        turn.move(Event.DEPLOY_DUE, why)
         _fire(turn, f"{why} ({limit})")
 
 
@@ -89,7 +89,7 @@ def check_deploy(turn: Turn) -> None:
     confirmed = deploy_reached(turn, Outcome.CONFIRMED)
     # Also while somebody kills once more after the ladder's end.
     if confirmed and turn.state.stage in (Stage.KILLING, Stage.DEPLOYING, Stage.FAULT):
-        turn.move(Stimulus.PARACHUTE_OPEN, deploy_details(turn))
+        turn.move(Event.PARACHUTE_OPEN, deploy_details(turn))
     elif turn.state.stage is Stage.DEPLOYING and turn.deploying.deploys:
         _climb(turn)
     elif turn.state.stage is Stage.FAULT:
@@ -139,7 +139,7 @@ def _climb(turn: Turn) -> None:
             return
         if last:
             first = turn.deploying.deploys[0].decided_at
-            turn.move(Stimulus.DEPLOY_FAILED, text)
+            turn.move(Event.DEPLOY_FAILED, text)
             turn.alarm(f"no parachute confirmed within {turn.now - first:.1f} s: {text}")
             alarm_at = turn.now + turn.config.alarm_interval
             turn.alarming = replace(turn.alarming, alarm_at=alarm_at)

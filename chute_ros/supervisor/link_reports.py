@@ -10,7 +10,7 @@ from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.link_evidence import LinkEvidence
-from chute_ros.supervisor.machine import Stage, Stimulus
+from chute_ros.supervisor.machine import Event, Stage
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import pending_in, renew, slots
 from chute_ros.supervisor.turn import Turn
@@ -83,7 +83,7 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
             else:
                 # It may have erred when it said so; with nothing out, the rules must live.
                 turn.alarm(text)
-                turn.move(Stimulus.TAKEN_BACK, text)
+                turn.move(Event.TAKEN_BACK, text)
                 _unlatch_deploys(turn)
 
 

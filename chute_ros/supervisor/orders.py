@@ -8,7 +8,7 @@ from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_reached, end_kill
 from chute_ros.supervisor.gate import OPERATOR, out_already
-from chute_ros.supervisor.machine import ON_GROUND, Stage, Stimulus, listed
+from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import fire, kill_failed
 from chute_ros.supervisor.state import Pending
@@ -92,7 +92,7 @@ def _join_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
 
 
 def _to_killing(turn: Turn, why: str) -> None:
-    if listed(turn.state.stage, Stimulus.KILL):
+    if listed(turn.state.stage, Event.KILL):
         if turn.state.stage is not Stage.KILLING:
             stood = flight.down_undisputed(turn.config, turn.state, turn.now) or flight.disarmed(
                 turn.config, turn.state, turn.now
@@ -107,7 +107,7 @@ def _to_killing(turn: Turn, why: str) -> None:
                 killed_height=readings.measured(turn.config, turn.state, "height", turn.now),
                 killed_sinking=max(sinking, 0.0),
             )
-        turn.move(Stimulus.KILL, why)
+        turn.move(Event.KILL, why)
 
 
 def _kill_under_way(turn: Turn) -> bool:

@@ -23,6 +23,7 @@ CODEC = Codec(
     *CONDITIONS.values(),
     *typing.get_args(i.Input),
     *typing.get_args(i.Output),
+    once={"Say": i.LogMessage},
 )
 
 

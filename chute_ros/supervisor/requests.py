@@ -13,7 +13,7 @@ from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import give_up_waiting
 from chute_ros.supervisor.gate import OPERATOR, against_person
-from chute_ros.supervisor.machine import ON_GROUND, Stage, Stimulus, listed
+from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
 from chute_ros.supervisor.orders import note_released, order_deploy, order_kill
 from chute_ros.supervisor.preflight import arm_reasons
 from chute_ros.supervisor.quick_replace import replace
@@ -40,9 +40,9 @@ def arm_request(turn: Turn, one: i.ArmRequest) -> None:
 
 def arm_done(turn: Turn, one: i.ArmDone) -> None:
     """The device nodes have answered."""
-    stimulus = Stimulus.ARMED if one.arm else Stimulus.DISARMED
-    if one.success and listed(turn.state.stage, stimulus):
-        turn.move(stimulus)
+    event = Event.ARMED if one.arm else Event.DISARMED
+    if one.success and listed(turn.state.stage, event):
+        turn.move(event)
     if one.success:
         turn.flight = replace(turn.flight, armed_by_us=one.arm)
     elif not one.token:
@@ -119,11 +119,11 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
     elif in_air is None and turn.deploying.deploy_rule:
         text = "refused: a deploy is under way and nothing fresh says that it is on the ground"
         turn.finish(one.token, False, False, text)
-    elif not listed(stage, Stimulus.RESET):
+    elif not listed(stage, Event.RESET):
         turn.finish(one.token, False, False, f"refused: the vehicle is {stage.name}")
     else:
         give_up_waiting(turn, "reset by a person")
-        turn.move(Stimulus.RESET)
+        turn.move(Event.RESET)
         turn.state = replace(
             turn.state,
             started_at=turn.now,
@@ -157,7 +157,7 @@ def mode_request(turn: Turn, one: i.ModeRequest) -> None:
         turn.deploying = replace(turn.deploying, deploys=())
         if stage is Stage.DEPLOYING:
             # What is judged anew must find a stage in which the rules live.
-            turn.move(Stimulus.MODE_CHANGED)
+            turn.move(Event.MODE_CHANGED)
         block = turn.state.block
         if block is not None and (
             block.decision.action is Action.FLIGHT_BLOCK or block.unreported()

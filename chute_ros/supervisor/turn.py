@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast
 
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
-from chute_ros.supervisor.machine import TRANSITIONS, Stimulus
+from chute_ros.supervisor.machine import TRANSITIONS, Event
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.state import (
     Alarms,
@@ -57,23 +57,23 @@ class Turn:
         """The steps of the deploy."""
         return self.state.ladder(self.config)
 
-    def move(self, stimulus: Stimulus, why: str = "") -> None:
+    def move(self, event: Event, why: str = "") -> None:
         """To the stage that the table names."""
         before = self.state.stage
-        stage = after(TRANSITIONS, before, stimulus)
+        stage = after(TRANSITIONS, before, event)
         if stage is before:
             return
         self.state = replace(self.state, stage=stage, stage_since=self.now)
-        text = f"{before.name} -> {stage.name}: {stimulus.value}"
+        text = f"{before.name} -> {stage.name}: {event.value}"
         self.log(f"{text} ({why})" if why else text)
 
     def log(self, text: str) -> None:
         """A line for the log."""
-        self.outputs.append(i.Say(text))
+        self.outputs.append(i.LogMessage(text))
 
     def warn(self, text: str) -> None:
         """An alarm of what happens now."""
-        self.outputs.append(i.Say(text, alarm=True))
+        self.outputs.append(i.LogMessage(text, alarm=True))
 
     def alarm(self, text: str) -> None:
         """Something that stays until a reset, or until what it tells is over."""

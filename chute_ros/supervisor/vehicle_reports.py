@@ -221,7 +221,7 @@ def _note_faults(turn: Turn, faults: tuple[str, ...]) -> None:
     told = set(map(kind, turn.heard.faults_told))
     new = [one for one in faults if kind(one) not in told]
     if turn.flight.airborne:
-        turn.outputs += [i.Say(f"vehicle: {one}", alarm=True) for one in new]
+        turn.outputs += [i.LogMessage(f"vehicle: {one}", alarm=True) for one in new]
     if faults != turn.heard.faults_told:
         turn.heard = replace(turn.heard, faults_told=faults if turn.flight.airborne else ())
 

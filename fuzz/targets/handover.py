@@ -16,7 +16,7 @@ from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.handover import followed, told
 from chute_ros.supervisor.lease import Claim
 from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
 from chute_ros.supervisor.wakes import next_deadline
 from chute_ros.tools.explore_steps import LINKS, Step, configuration, steps
 from chute_ros.tools.explorer import BEGINNINGS, Explorer
@@ -102,7 +102,7 @@ class Follower:
     what its program makes of a good one, by its first byte."""
 
     def __init__(self) -> None:
-        self._state = State(7, NOW, leading=False)
+        self._state = State(7, NOW, own=Own(leading=False))
         self._now = NOW
         self._number = 0
 

@@ -245,7 +245,7 @@ class Story:
 
     def said(self) -> str:
         """All lines of the log."""
-        return "\n".join(o.text for _, o in self.outputs if isinstance(o, i.Say))
+        return "\n".join(o.text for _, o in self.outputs if isinstance(o, i.LogMessage))
 
     def ready(self) -> Story:
         """Links healthy, standing on the ground; the devices that the ladder names are there."""
@@ -306,4 +306,4 @@ class Story:
 
     def alarms(self) -> list[str]:
         """What was said as an alarm."""
-        return [o.text for _, o in self.outputs if isinstance(o, i.Say) and o.alarm]
+        return [o.text for _, o in self.outputs if isinstance(o, i.LogMessage) and o.alarm]

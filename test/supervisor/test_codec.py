@@ -44,6 +44,12 @@ def test_the_fields_of_a_group_stand_in_the_state_as_they_did_before_it_had_grou
         CODEC.from_json('{"is":"State","epoch":7,"started_at":0.0,"flight":{}}')
 
 
+def test_a_line_for_the_log_is_read_under_its_former_name() -> None:
+    said = i.LogMessage("it falls", alarm=True)
+    assert CODEC.from_json('{"is":"Say","text":"it falls","alarm":true}') == said
+    assert CODEC.to_json(said) == '{"is":"LogMessage","text":"it falls","alarm":true}'
+
+
 def test_the_golden_lines() -> None:
     beat = i.LinkHeartbeat(LINK, LinkState.OK, True, 12, clock_difference=0.015)
     assert CODEC.to_json(beat) == (
@@ -141,7 +147,7 @@ def test_a_whole_record_does_not_rest_on_defaults() -> None:
 
 def test_every_output_comes_back() -> None:
     outputs = [output for _, output in told_story().outputs]
-    assert {type(output).__name__ for output in outputs} >= {"Decide", "Say"}
+    assert {type(output).__name__ for output in outputs} >= {"Decide", "LogMessage"}
     for output in outputs:
         assert there_and_back(output) == output
 

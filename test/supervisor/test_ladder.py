@@ -213,7 +213,7 @@ def alarm_times(story: Story) -> list[float]:
     return [
         t
         for t, o in story.outputs
-        if isinstance(o, i.Say) and o.alarm and "no parachute" in o.text
+        if isinstance(o, i.LogMessage) and o.alarm and "no parachute" in o.text
     ]
 
 

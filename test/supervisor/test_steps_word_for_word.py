@@ -12,7 +12,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor import sending
 from chute_ros.supervisor.answers import answer_all, deploy_details, end_kill, give_up_waiting
 from chute_ros.supervisor.config import Rung, SupervisorConfig
-from chute_ros.supervisor.machine import Stage, Stimulus
+from chute_ros.supervisor.machine import Event, Stage
 from chute_ros.supervisor.sending import (
     fire,
     kill_failed,
@@ -59,13 +59,13 @@ def reports(**outcomes: Outcome) -> MappingProxyType[str, frozenset[Outcome]]:
 
 def test_a_move_is_said_with_its_reason_and_without_one() -> None:
     one = steps()
-    one.move(Stimulus.LINKS_HEALTHY)
-    one.move(Stimulus.KILL, "smoke")
-    one.move(Stimulus.KILL, "smoke again")
+    one.move(Event.LINKS_HEALTHY)
+    one.move(Event.KILL, "smoke")
+    one.move(Event.KILL, "smoke again")
     assert (one.state.stage, one.state.stage_since) == (Stage.KILLING, 100.0)
     assert one.outputs == [
-        i.Say("STARTUP -> READY: every required link is healthy"),
-        i.Say("READY -> KILLING: a kill was decided (smoke)"),
+        i.LogMessage("STARTUP -> READY: every required link is healthy"),
+        i.LogMessage("READY -> KILLING: a kill was decided (smoke)"),
     ]
 
 
@@ -258,7 +258,7 @@ def test_an_alarm_is_kept_once_and_the_newest_are_kept() -> None:
     for number in range(20):
         one.alarm(f"alarm {number}")
         one.alarm("alarm 0")
-    assert one.outputs[:2] == [i.Say("alarm 0", alarm=True)] * 2
+    assert one.outputs[:2] == [i.LogMessage("alarm 0", alarm=True)] * 2
     assert one.state.alarming.alarms[-1] == "alarm 19"
     assert len(one.state.alarming.alarms) == 16
 
@@ -298,7 +298,7 @@ def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_o
     assert one.outputs == [
         i.Finish(5, False, False, words),
         i.Finish(6, False, False, words),
-        i.Say(f"the motors may still turn, no kill confirmed: {words}", alarm=True),
+        i.LogMessage(f"the motors may still turn, no kill confirmed: {words}", alarm=True),
     ]
     assert one.state.own.kill_tokens == ()
 
