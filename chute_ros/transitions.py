@@ -9,14 +9,12 @@ from typing import TypeVar
 from chute_ros.errors import TransitionError
 
 StateT = TypeVar("StateT", bound=enum.Enum)
-StimulusT = TypeVar("StimulusT", bound=enum.Enum)
+EventT = TypeVar("EventT", bound=enum.Enum)
 
 
-def after(
-    table: Mapping[tuple[StateT, StimulusT], StateT], state: StateT, stimulus: StimulusT
-) -> StateT:
+def after(table: Mapping[tuple[StateT, EventT], StateT], state: StateT, event: EventT) -> StateT:
     """The state that follows; TransitionError for a pair that the table does not list."""
     try:
-        return table[state, stimulus]
+        return table[state, event]
     except KeyError:
-        raise TransitionError(f"{state.name} cannot take '{stimulus.value}'") from None
+        raise TransitionError(f"{state.name} cannot take '{event.value}'") from None

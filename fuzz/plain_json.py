@@ -12,7 +12,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.codec import CLASS
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.resume import Left, written
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
 from fuzz.program import Program
 
 #: The clock of all that is made here, s.
@@ -65,7 +65,7 @@ def anything(p: Program, depth: int = 0) -> Any:
 @functools.cache
 def _left() -> str:
     """As a supervisor leaves it."""
-    state = dataclasses.replace(State(7, NOW - 100.0), updated_at=NOW - 5.0)
+    state = State(7, NOW - 100.0, own=Own(updated_at=NOW - 5.0))
     return written(Left(BOOT, SETTINGS, state))
 
 

@@ -34,10 +34,19 @@ from chute_ros.campaign.scenario_text import scenario_of
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.interrupts import at_ctrl_c
 from chute_ros.model import Action
-from chute_ros.supervisor import contradictions, counter, flight, measurements, reports
+from chute_ros.supervisor import (
+    contradictions,
+    counter,
+    flight,
+    measured,
+    readings,
+    samples,
+    vehicle_reports,
+)
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.rules import MeasurementCondition, Profile
+from chute_ros.supervisor.rules import Profile
 from chute_ros.tools.campaign_command import positive
 from chute_ros.tools.entry import INTERRUPTED
 
@@ -81,31 +90,31 @@ HEURISTICS: dict[str, tuple[Any, str, Any]] = {
     "flight: an estimator in a rush has not taken off": (flight, "_CALM_SPEED", math.inf),
     "flight: an estimator that leans has not taken off": (flight, "_CALM_TILT", math.inf),
     "flight: without a height it is high after a while": (flight, "HIGH_AFTER", 0.0),
-    "flight: the heights tell the speed where nothing else does": (flight, "climb_rate", _nan),
+    "flight: the heights tell the speed where nothing else does": (readings, "climb_rate", _nan),
     "flight: the kill is waited for less below low_height": (
         flight,
         "low_at",
         lambda *_: math.inf,
     ),
     "flight: a ground below home": (flight, "above_its_ground", _nan),
-    "measurements: a jump that was believed is doubted": (measurements, "JUMP_DOUBTED", 0.0),
+    "measurements: a jump that was believed is doubted": (measured, "JUMP_DOUBTED", 0.0),
     "measurements: what follows one that was not taken is doubted": (
-        measurements,
+        measured,
         "REJECTION_DOUBTED",
         0.0,
     ),
     "measurements: an acceleration of exactly 0 is doubted": (
-        measurements,
+        measured,
         "_FAILED_ACCELERATION",
         math.nan,
     ),
     "measurements: a doubt is of its source alone": (
-        measurements.Measured,
+        measured.Measured,
         "told_by",
         lambda self, source: self,
     ),
     "measurements: one that is lower than commanded sinks uncommanded": (
-        measurements,
+        samples,
         "_MISSES_TARGET",
         math.inf,
     ),
@@ -125,7 +134,7 @@ HEURISTICS: dict[str, tuple[Any, str, Any]] = {
         lambda _: True,
     ),
     "contradictions: what is commanded is no accident": (
-        reports,
+        vehicle_reports,
         "commanded",
         lambda *_: {},
     ),

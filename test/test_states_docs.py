@@ -3,7 +3,7 @@
 import xml.etree.ElementTree
 from pathlib import Path
 
-from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus
+from chute_ros.supervisor.machine import TRANSITIONS, Event, Stage
 from chute_ros.tools import state_diagram
 from chute_ros.tools.state_drawing import drawing
 
@@ -29,7 +29,7 @@ def test_a_dead_end_and_a_lost_stage_are_found() -> None:
     assert state_diagram.unreached(into) == {Stage.LANDED}
     out = {pair: after for pair, after in TRANSITIONS.items() if pair[0] is not Stage.KILLING}
     assert state_diagram.never_left(out) == {Stage.KILLING}
-    itself = {**out, (Stage.KILLING, Stimulus.KILL): Stage.KILLING}
+    itself = {**out, (Stage.KILLING, Event.KILL): Stage.KILLING}
     assert state_diagram.never_left(itself) == {Stage.KILLING}
 
 
@@ -39,4 +39,4 @@ def test_the_picture_has_every_stage_and_every_stimulus() -> None:
     for stage in Stage:
         assert stage.name in texts
     told = " ".join(texts)
-    assert [one.name for one in Stimulus if one.name not in told] == []
+    assert [one.name for one in Event if one.name not in told] == []

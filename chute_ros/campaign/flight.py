@@ -156,7 +156,7 @@ class Flight:
 
     def _is_believed(self) -> bool:
         leader = self.rig.leader
-        return leader is not None and (self.scenario.stands or leader.state.airborne)
+        return leader is not None and (self.scenario.stands or leader.state.flight.airborne)
 
     # -- the end ---------------------------------------------------------------------------------
 

@@ -90,7 +90,7 @@ class SupervisorHost:
             self._vehicle_sources,
             self.config.vehicle_state_age,
             self._vehicle_told,
-            LinkState.NEVER_SEEN if before is None else before.vehicle.link_state,
+            LinkState.NEVER_SEEN if before is None else before.heard.vehicle.link_state,
             now,
         )
 
@@ -134,7 +134,7 @@ class SupervisorHost:
         """Who leads, above all."""
         self.said.append((self._ros.world.now, notice.text))
 
-    def say(self, said: i.Say) -> None:
+    def say(self, said: i.LogMessage) -> None:
         """To the judge."""
         told = (self._ros.world.now, said.text)
         self.said.append(told)

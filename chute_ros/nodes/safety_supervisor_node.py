@@ -105,7 +105,7 @@ class SafetySupervisorNode(SuiteNode):
             self,
             self.values,
             lambda report, now: self._turn(report),
-            before=self.runtime.state.vehicle.link_state,
+            before=self.runtime.state.heard.vehicle.link_state,
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().warning(
@@ -169,7 +169,7 @@ class SafetySupervisorNode(SuiteNode):
         """At the level that it deserves."""
         log_notice(self.get_logger(), notice)
 
-    def say(self, said: inputs.Say) -> None:
+    def say(self, said: inputs.LogMessage) -> None:
         """A text of the core for a person."""
         log = self.get_logger()
         log.error(said.text) if said.alarm else log.info(said.text)

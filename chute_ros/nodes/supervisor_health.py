@@ -50,7 +50,7 @@ class Health:
         """For diagnostics."""
         state, lease = runtime.state, runtime.lease
         lost = sum(self._lost.values())
-        seen = (self._failures, lost, state.late_count)
+        seen = (self._failures, lost, state.own.late_count)
         self._shown = _SHOWN_FOR if seen != self._seen else max(0, self._shown - 1)
         own_fault = (seen[0], seen[2]) != (self._seen[0], self._seen[2])
         self._own_fault = bool(self._shown) and (self._own_fault or own_fault)
@@ -73,7 +73,7 @@ class Health:
             "rank": lease.config.rank,
             "hot standby": lease.config.standby,
             "newest heartbeat late by (s)": runtime.beat_late,
-            "updates late": state.late_count,
+            "updates late": state.own.late_count,
             "internal errors": self._failures,
             "newest internal error": self.newest,
             "leader received (s ago)": now - lease.lease.leader_heard,

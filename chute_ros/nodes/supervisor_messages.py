@@ -9,11 +9,11 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros.nodes import diagnostics, messages
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.flight import doubt, measured, unusable
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.readings import doubt, measured, unusable
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
 
@@ -38,7 +38,7 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         flight_blocked=blocked,
         block_reasons=list(reasons) if blocked else [],
         device_blocks=sorted(state.device_blocks),
-        alarms=list(state.alarms),
+        alarms=list(state.alarming.alarms),
     )
     message.header.stamp = stamp
     for link in config.links:
@@ -67,9 +67,9 @@ def decisions_task(
     """The same in diagnostics."""
     reasons = block_reasons(config, state, now)
     level = diagnostics.OK
-    if state.alarms or state.stage is Stage.FAULT:
+    if state.alarming.alarms or state.stage is Stage.FAULT:
         level = diagnostics.ERROR
-    elif reasons or state.disputed or state.mode is not Mode.ACTIVE:
+    elif reasons or state.heard.disputed or state.mode is not Mode.ACTIVE:
         level = diagnostics.WARN
     values: dict[str, object] = {
         "state": state.stage.name,
@@ -78,7 +78,7 @@ def decisions_task(
         "decisions": state.next_id - 1,
         "profile": config.profile.name,
         "device requested a kill": ", ".join(state.asks),
-        "sources contradict each other": ", ".join(sorted(state.disputed)),
+        "sources contradict each other": ", ".join(sorted(state.heard.disputed)),
     }
     for link in config.links:
         evidence = state.evidence(link)
@@ -126,10 +126,10 @@ def _text(state: State, reasons: tuple[str, ...]) -> str:
 def _stage_text(state: State, reasons: tuple[str, ...]) -> str:
     if state.stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
         return f"{state.stage.name}: {'; '.join(reasons)}"
-    if state.alarms:
-        return f"{state.stage.name}: {state.alarms[-1]}"
-    if state.disputed:
-        parts = ", ".join(sorted(state.disputed))
+    if state.alarming.alarms:
+        return f"{state.stage.name}: {state.alarming.alarms[-1]}"
+    if state.heard.disputed:
+        parts = ", ".join(sorted(state.heard.disputed))
         return (
             f"{state.stage.name}: {parts} in doubt, as the vehicle's sources contradict each other"
         )

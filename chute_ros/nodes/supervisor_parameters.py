@@ -17,7 +17,6 @@ from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.lease import LeaseConfig
 from chute_ros.supervisor.link_evidence import LinkLimits
-from chute_ros.supervisor.rules import AutopilotFact, is_silence
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,8 @@ def blind_rules(config: SupervisorConfig, sources: Sequence[str]) -> list[str]:
     return [
         rule.name
         for rule in config.profile.rules
-        if rule.asks(AutopilotFact.LOST)
-        and sum(one.weight for one in rule.conditions if is_silence(one)) < rule.needed
+        if rule.misses_the_autopilot
+        and sum(one.weight for one in rule.conditions if one.is_silence) < rule.needed
     ]
 
 

@@ -11,7 +11,7 @@ from chute_ros.runtime.topics import LeaseClaim
 from chute_ros.supervisor import handover
 from chute_ros.supervisor.epochs import RANKS
 from chute_ros.supervisor.lease import Claim, Event, Lease, LeaseConfig, Role
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND
 from chute_ros.supervisor.state import State
 
 #: One that lives claims ten times a second; a single claim may be anybody's.
@@ -145,7 +145,7 @@ class LeaseKeeper:
 
     def _own(self, now: float) -> Claim:
         state = self._owner.state
-        empty = not self._experienced and not state.flown and state.stage in ON_GROUND
+        empty = not self._experienced and not state.flight.flown and state.stage in ON_GROUND
         name, rank = self.config.name, self.config.rank
         return Claim(name, rank, state.epoch, self.leading, empty, self._owner.links_heard(now))
 

@@ -25,10 +25,11 @@ from chute_ros.runtime.supervisor_inputs import input_of
 from chute_ros.runtime.topics import DeviceBeat, LeaseClaim, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.epochs import epoch_above
 from chute_ros.supervisor.lease import Event, LeaseConfig
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
+from chute_ros.supervisor.wakes import next_deadline
 
 HEARTBEAT_INTERVAL = 0.1  # s
 STATE_INTERVAL = 1.0  # s, at the latest
@@ -66,7 +67,7 @@ class SupervisorShell(LeaseShell, ArmCaller, Protocol):
     def keep(self, state: State) -> None:
         """This is what a start anew goes on with."""
 
-    def say(self, said: inputs.Say) -> None:
+    def say(self, said: inputs.LogMessage) -> None:
         """A text of the core for a person."""
 
     def offer(self, offered: bool) -> None:
@@ -89,7 +90,7 @@ class SupervisorRuntime:
     ) -> None:
         self.config, self._shell = config, shell
         epoch = epoch_above(start.epoch, lease.rank)
-        self.state = State(epoch, now, mode=start.mode, leading=not lease.standby)
+        self.state = State(epoch, now, mode=start.mode, own=Own(leading=not lease.standby))
         self._first: tuple[inputs.Input, ...] = ()
         if start.before is not None:
             self.state = start.before
@@ -209,7 +210,7 @@ class SupervisorRuntime:
                 self._arming.begin(output, now)
             elif isinstance(output, inputs.Refused):
                 self.lease.refused(output.newest_epoch, now)
-            elif isinstance(output, inputs.Say):
+            elif isinstance(output, inputs.LogMessage):
                 self.afterwards.tell(partial(self._shell.say, output))
 
     def _finish(self, output: inputs.Finish) -> None:
@@ -261,7 +262,7 @@ class SupervisorRuntime:
 
     def _changed(self) -> bool:
         before, now = self._published, self.state
-        told = attrgetter("stage", "mode", "next_id", "alarms", "device_blocks")
+        told = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
         return before is None or bool(told(before) != told(now))
 
     def _publish_state(self, now: float) -> None:

@@ -15,10 +15,12 @@ import types
 import typing
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 from chute_ros.errors import RecordError
 
+#: Metadata of a field whose own fields stand in the object that it is in.
+INLINE: Mapping[str, bool] = MappingProxyType({"inline": True})
 #: Under this name an object says which class it is.
 CLASS = "is"
 #: What a text raises that stands for nothing; OverflowError: no float holds its whole number.
@@ -38,8 +40,9 @@ _SIZED = (str, tuple, frozenset, MappingProxyType)
 class Codec:
     """Reads and writes the classes that it was given, and those that their fields name."""
 
-    def __init__(self, *classes: type) -> None:
-        self._classes: dict[str, type] = {}
+    def __init__(self, *classes: type, once: Mapping[str, type] = MappingProxyType({})) -> None:
+        """once: names of former versions, which are still read."""
+        self._classes: dict[str, type] = dict(once)
         for one in classes:
             self._learn(one)
 
@@ -62,12 +65,7 @@ class Codec:
         if isinstance(value, enum.Enum):
             return value.value
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
-            told: dict[str, Any] = {CLASS: type(value).__name__}
-            for field in _fields(type(value)):
-                one = getattr(value, field.name)
-                if whole or not _is_default(field, one):
-                    told[field.name] = self.plain(one, whole)
-            return told
+            return {CLASS: type(value).__name__, **self._told(value, whole)}
         if isinstance(value, Mapping):
             return [[self.plain(key, whole), self.plain(one, whole)] for key, one in value.items()]
         if isinstance(value, (set, frozenset)):
@@ -75,6 +73,16 @@ class Codec:
         if isinstance(value, (tuple, list)):
             return [self.plain(one, whole) for one in value]
         return value
+
+    def _told(self, value: object, whole: bool) -> dict[str, Any]:
+        told: dict[str, Any] = {}
+        for field in _fields(cast(type, type(value))):
+            one = getattr(value, field.name)
+            if field.metadata == INLINE:
+                told |= self._told(one, whole)
+            elif whole or not _is_default(field, one):
+                told[field.name] = self.plain(one, whole)
+        return told
 
     def value(self, plain: Any, kind: Any) -> Any:
         """The value of this type that plain stands for."""
@@ -115,11 +123,18 @@ class Codec:
         if name not in self._classes:
             raise RecordError(f"class {name} is not known: written by another version")
         kind = self._classes[name]
-        hints = _hints(kind)
-        unknown = sorted(set(plain) - set(hints) - {CLASS})
+        unknown = sorted(set(plain) - _names(kind) - {CLASS})
         if unknown:
             raise RecordError(f"{name} has no {', '.join(unknown)}: written by another version")
-        told = {key: self.value(one, hints[key]) for key, one in plain.items() if key != CLASS}
+        return self._made(kind, plain)
+
+    def _made(self, kind: type, plain: dict[str, Any]) -> Any:
+        hints, told = _hints(kind), {}
+        for field in _fields(kind):
+            if field.metadata == INLINE:
+                told[field.name] = self._made(hints[field.name], plain)
+            elif field.name in plain:
+                told[field.name] = self.value(plain[field.name], hints[field.name])
         return kind(**told)
 
     def _learn(self, kind: Any) -> None:
@@ -141,6 +156,14 @@ def _hints(kind: type) -> dict[str, Any]:
 @functools.cache
 def _fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
     return dataclasses.fields(kind)
+
+
+@functools.cache
+def _names(kind: type) -> frozenset[str]:
+    """The fields of an object of this class."""
+    inline = [_hints(kind)[field.name] for field in _fields(kind) if field.metadata == INLINE]
+    own = {field.name for field in _fields(kind) if field.metadata != INLINE}
+    return frozenset(own.union(*map(_names, inline)))
 
 
 @functools.cache

@@ -115,7 +115,7 @@ class RuleEvidence:
         enough = rule.needed - _WEIGHTS_ROUNDING
         rule_holds = True if weight >= enough else None if possible >= enough else False
         is_sure, shown_now, seen_now = sure >= enough, tuple(shown), tuple(now_seen)
-        kept = self._kept(rule, found, shown) if rule.has_until else ()
+        kept = self._kept(rule, found, shown) if rule.goes_on else ()
         same = rule_holds is self.holds and is_sure is self.sure and kept == self.kept
         if same and seen_now == self.seen and shown_now == self.shown:
             return self

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from chute_ros.supervisor import flight
-from chute_ros.supervisor.conditions import Finding
+from chute_ros.supervisor import flight, readings
+from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import BelowMinimum, Rule, is_silence
+from chute_ros.supervisor.rules import BelowMinimum, Rule
 from chute_ros.supervisor.state import State
 
 #: For so long after a kill in flight what tells of a vehicle that stands may be one that falls, s.
@@ -49,7 +49,7 @@ def against_rule(
     told = [
         finding
         for condition, finding in zip(rule.conditions, findings, strict=True)
-        if finding.holds and not is_silence(condition)
+        if finding.holds and not condition.is_silence
     ]
     wrong = against_any_rule(config, state, now)
     if not wrong and not told:
@@ -60,12 +60,12 @@ def against_rule(
 def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
     """Why no rule may deploy now; empty: one may."""
     in_flight = state.stage is Stage.IN_FLIGHT or (
-        state.stage is Stage.KILLING and state.killed_in_flight
+        state.stage is Stage.KILLING and state.killing.killed_in_flight
     )
     # Under a canopy that does not carry the next one may be released.
-    if not in_flight and not (state.stage is Stage.DEPLOYED and state.airborne):
+    if not in_flight and not (state.stage is Stage.DEPLOYED and state.flight.airborne):
         return f"the vehicle is {state.stage.name}, not in flight"
-    if state.kill_only and state.stage is Stage.KILLING:
+    if state.killing.kill_only and state.stage is Stage.KILLING:
         return "a person asked for the kill alone; safety/deploy releases"
     killed = _killed(state, now)
     if flight.down_undisputed(config, state, now) and not killed:
@@ -81,7 +81,8 @@ def out_already(state: State, rung: Rung) -> bool:
     """The parachutes that this step of the ladder can release all say that they are released, or
     its node has reported that it is."""
     step = ((rung.link,), rung.device)
-    if any(d.confirmed and (d.decision.targets, d.decision.device) == step for d in state.deploys):
+    confirmed = [deploy.decision for deploy in state.deploying.deploys if deploy.confirmed]
+    if any((decision.targets, decision.device) == step for decision in confirmed):
         return True
     devices = state.evidence(rung.link).devices
     meant = [s for name, s in devices.items() if rung.device in ("", TRIGGER, name)]
@@ -95,11 +96,11 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.below_minimum is BelowMinimum.DEPLOY:
         return ""
     minimum = profile.minimum_height
-    height = flight.measured(config, state, "height", now)
+    height = readings.measured(config, state, "height", now)
     known = state.measured("height")
     if known.has_jumped(now) and known.value < known.before_jump:
         height = math.nan  # it has jumped down: that it is low may be as wrong as before
-    by_pressure = flight.pressure_height(config, state, now)
+    by_pressure = readings.pressure_height(config, state, now)
     # Far below the take-off it says nothing of the ground beneath: unknown, as no height is.
     low = -minimum <= height < minimum
     low = low and not flight.above_its_ground(state, height) >= minimum
@@ -108,7 +109,7 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
         height, low = by_pressure, -minimum <= by_pressure < minimum
     if low:
         return f"height {height:.1f} m is below the minimum {minimum:g} m"
-    if profile.minimum_height > 0.0 and not state.was_high:
+    if profile.minimum_height > 0.0 and not state.flight.was_high:
         return f"it was never seen at the minimum height, {profile.minimum_height:g} m"
     return ""
 
@@ -116,5 +117,6 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
 def _killed(state: State, now: float) -> bool:
     """Our own kill was decided in flight, and not long ago: motors that are off since then are
     its effect."""
-    in_flight = state.killed_in_flight and not state.killed_standing
-    return in_flight and state.stage is Stage.KILLING and now < state.killed_at + _FALLS_AT_MOST
+    kill = state.killing
+    in_flight = kill.killed_in_flight and not kill.killed_standing
+    return in_flight and state.stage is Stage.KILLING and now < kill.killed_at + _FALLS_AT_MOST

@@ -1,19 +1,24 @@
 """What a leading supervisor tells those that follow, so that one can go on where it stopped.
 
-Links and measurements are not in it: each supervisor hears them itself. What is in it is what was
-decided and what became of it.
+What each supervisor hears itself is not in it. What is in it is what was decided and what became
+of it, with each Time moved to the clock of the one that is told.
 """
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Mapping
+from dataclasses import is_dataclass
 from types import MappingProxyType
+from typing import Any, TypeVar, cast, get_args, get_type_hints
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
 from chute_ros.supervisor.epochs import LARGEST_EPOCH
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.state import HeardHere, Own, State, Time
 
+T = TypeVar("T")
 _CODEC = Codec(State)
 #: An id of chute_msgs/SafetyDecision has 64 bits; who goes on from here must have ids left.
 _LARGEST_ID = 2**63
@@ -21,52 +26,7 @@ _LARGEST_ID = 2**63
 
 def told(state: State, now: float) -> str:
     """The state for those that follow, as JSON, with its times as ages at now (monotonic s)."""
-    kept = State(
-        epoch=state.epoch,
-        started_at=state.started_at,
-        stage=state.stage,
-        stage_since=state.stage_since,
-        mode=state.mode,
-        next_id=state.next_id,
-        rules=state.rules,
-        asks=state.asks,
-        block=state.block,
-        kill=state.kill,
-        deploys=state.deploys,
-        deploy_rule=state.deploy_rule,
-        deploy_reasons=state.deploy_reasons,
-        deploy_ladder=state.deploy_ladder,
-        deploy_due=state.deploy_due,
-        flown=state.flown,
-        airborne=state.airborne,
-        killed_in_flight=state.killed_in_flight,
-        killed_at=state.killed_at,
-        killed_height=state.killed_height,
-        killed_sinking=state.killed_sinking,
-        killed_standing=state.killed_standing,
-        landed_at=state.landed_at,
-        kill_only=state.kill_only,
-        home_altitude=state.home_altitude,
-        ground_pressure_altitude=state.ground_pressure_altitude,
-        was_high=state.was_high,
-        up_for=state.up_for,
-        armed_by_us=state.armed_by_us,
-        airborne_since=state.airborne_since,
-        down_since=state.down_since,
-        rebooted=state.rebooted,
-        reboots_before=state.reboots_before,
-        armed_height=state.armed_height,
-        took_off_height=state.took_off_height,
-        newest=state.newest,
-        home=state.home,
-        released_before=state.released_before,
-        device_blocks=state.device_blocks,
-        block_refused=state.block_refused,
-        alarms=state.alarms,
-        alarm_at=state.alarm_at,
-        canopy_fails=state.canopy_fails,
-    )
-    return _CODEC.to_json(_moved(kept, -now))
+    return _CODEC.to_json(_moved(replace(state, heard=HeardHere(), own=Own()), -now))
 
 
 def followed(state: State, text: str, now: float) -> State:
@@ -76,34 +36,14 @@ def followed(state: State, text: str, now: float) -> State:
     if not isinstance(leader, State):
         raise RecordError(f"not a state: {text[:80]!r}")
     check_numbers(leader)
-    return replace(
-        _moved(leader, now),
-        leading=False,
-        updated_at=state.updated_at,
-        late_count=state.late_count,
-        links=state.links,
-        vehicle=state.vehicle,
-        vehicle_received=state.vehicle_received,
-        disputed=state.disputed,
-        measurements=state.measurements,
-        heights=state.heights,
-        pressure_heights=state.pressure_heights,
-        pressure_before=state.pressure_before,
-        motion=state.motion,
-        denied=state.denied,
-        denied_since=state.denied_since,
-        commanded=state.commanded,
-        unfit=state.unfit,
-        fitness_since=state.fitness_since,
-        still_since=state.still_since,
-        at_ground_since=state.at_ground_since,
-        faults_told=state.faults_told,
-    )
+    own = Own(leading=False, updated_at=state.own.updated_at, late_count=state.own.late_count)
+    return replace(_moved(leader, now), heard=state.heard, own=own)
 
 
 def check_numbers(state: State) -> None:
     """RecordError for numbers under which nothing can be decided nor told."""
-    pending = [one for one in (state.block, state.kill, *state.deploys) if one is not None]
+    slots = (state.block, state.killing.kill, *state.deploying.deploys)
+    pending = [one for one in slots if one is not None]
     numbers = [(state.epoch, state.next_id), *(one.number for one in pending)]
     if state.newest is not None:
         numbers.append((state.newest.epoch, state.newest.id))
@@ -112,24 +52,28 @@ def check_numbers(state: State) -> None:
             raise RecordError(f"no decision has the number {epoch}.{number}")
 
 
-def _moved(state: State, by: float) -> State:
-    """Every time moved by so many s."""
-    return replace(
-        state,
-        started_at=state.started_at + by,
-        stage_since=state.stage_since + by,
-        asks=MappingProxyType({w: replace(a, at=a.at + by) for w, a in state.asks.items()}),
-        block=state.block and _moved_pending(state.block, by),
-        kill=state.kill and _moved_pending(state.kill, by),
-        deploys=tuple(_moved_pending(deploy, by) for deploy in state.deploys),
-        deploy_due=state.deploy_due + by,
-        killed_at=state.killed_at + by,
-        down_since=state.down_since + by,
-        landed_at=state.landed_at + by,
-        airborne_since=state.airborne_since + by,
-        alarm_at=state.alarm_at + by,
-    )
+def _moved(value: T, by: float) -> T:
+    """value with every Time in it moved by so many s."""
+    told: Any = value
+    if isinstance(told, tuple):
+        told = tuple(_moved(one, by) for one in told)
+    elif isinstance(told, Mapping):
+        told = MappingProxyType({key: _moved(one, by) for key, one in told.items()})
+    elif is_dataclass(told) and (moving := _moving(cast(type, type(told)))):
+        known = ((name, is_time, getattr(told, name)) for name, is_time in moving)
+        changes = {name: one + by if is_time else _moved(one, by) for name, is_time, one in known}
+        told = replace(cast(Any, told), **changes)
+    return cast(T, told)
 
 
-def _moved_pending(pending: Pending, by: float) -> Pending:
-    return replace(pending, decided_at=pending.decided_at + by, sent_at=pending.sent_at + by)
+@functools.cache
+def _moving(kind: type) -> tuple[tuple[str, bool], ...]:
+    """The fields of a class that are a Time, or (False) hold one."""
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple((name, hint == Time) for name, hint in hints.items() if _has_time(hint))
+
+
+def _has_time(hint: Any) -> bool:
+    if hint == Time or (isinstance(hint, type) and is_dataclass(hint) and _moving(hint)):
+        return True
+    return any(map(_has_time, get_args(hint)))

@@ -199,7 +199,7 @@ class Finish:
 
 
 @dataclass(frozen=True)
-class Say:
+class LogMessage:
     """One line for the log."""
 
     text: str
@@ -213,4 +213,4 @@ class Refused:
     newest_epoch: int
 
 
-Output = Decide | ArmDevices | Finish | Say | Refused
+Output = Decide | ArmDevices | Finish | LogMessage | Refused

@@ -24,7 +24,10 @@ class Stage(enum.IntEnum):
     FAULT = 9
 
 
-class Stimulus(enum.Enum):
+ON_GROUND = (Stage.STARTUP, Stage.BLOCKED, Stage.READY, Stage.ARMED, Stage.LANDED)
+
+
+class Event(enum.Enum):
     """What can move the vehicle from one stage to another."""
 
     LINKS_HEALTHY = "every required link is healthy"
@@ -43,9 +46,9 @@ class Stimulus(enum.Enum):
     RESET = "a person asked for the start"
 
 
-_S, _E = Stage, Stimulus
+_S, _E = Stage, Event
 
-TRANSITIONS: dict[tuple[Stage, Stimulus], Stage] = {
+TRANSITIONS: dict[tuple[Stage, Event], Stage] = {
     (_S.STARTUP, _E.LINKS_HEALTHY): _S.READY,
     (_S.STARTUP, _E.LINKS_UNHEALTHY): _S.BLOCKED,
     (_S.STARTUP, _E.TAKEN_OFF): _S.IN_FLIGHT,
@@ -90,6 +93,6 @@ TRANSITIONS: dict[tuple[Stage, Stimulus], Stage] = {
 }
 
 
-def listed(stage: Stage, stimulus: Stimulus) -> bool:
+def listed(stage: Stage, event: Event) -> bool:
     """Does the table list this pair?"""
-    return (stage, stimulus) in TRANSITIONS
+    return (stage, event) in TRANSITIONS

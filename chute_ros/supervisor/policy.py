@@ -9,15 +9,16 @@ from typing import NamedTuple
 from chute_ros.model import Action
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.conditions import Finding, find
+from chute_ros.supervisor.conditions.base import JUST_AFTER, Finding
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import Look, RuleEvidence
 from chute_ros.supervisor.gate import against_any_rule, against_rule, too_low
 from chute_ros.supervisor.kinds import kind
+from chute_ros.supervisor.orders import order_deploy, order_kill
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.reports import Reports
 from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.turn import Turn
 
 #: Two floats that tell the same time may differ by this, s.
 _ROUNDING = 1e-6
@@ -42,7 +43,7 @@ class Judged(NamedTuple):
 def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Judged:
     """Look at one rule's conditions. Its counter must have been brought up to now before."""
     before = state.rule(rule.name)
-    findings = tuple([find(config, state, condition, now) for condition in rule.conditions])
+    findings = tuple([condition.find(config, state, now) for condition in rule.conditions])
     if len(before.kept) == len(findings):  # otherwise none is kept, or it is another rule's
         findings = tuple(
             one._replace(holds=True) if left > 0.0 and one.lingers else one
@@ -64,24 +65,14 @@ def judge(config: SupervisorConfig, state: State, rule: Rule, now: float) -> Jud
 
 
 def rule_deadlines(config: SupervisorConfig, state: State, now: float) -> Sequence[float]:
-    """When a rule's counter is full or empty, or what it rests on too old."""
+    """When a rule's counter is full or empty, or time alone has changed what it rests on."""
     deadlines = []
     for rule in config.profile.rules:
-        if state.stage not in rule.states:
-            continue
-        evidence = state.rule(rule.name)
-        deadlines.append(evidence.deadline(rule, now))
-        if rule.asks_the_autopilot:
-            deadlines.append(state.vehicle_received + config.vehicle_state_age)
-        deadlines += [
-            state.measured(name).turns_at(config.profile.limits[name], now)
-            for name in rule.turned_by_time
-        ]
-        if evidence.holds:
-            deadlines += [
-                state.measured(name).measured_at + config.profile.limits[name].max_age
-                for name in rule.measured
-            ]
+        if state.stage in rule.states:
+            evidence, doubts = state.rule(rule.name), rule.doubted != 1.0
+            deadlines.append(evidence.deadline(rule, now) + JUST_AFTER)
+            for one in rule.conditions:
+                deadlines += one.deadlines(config, state, evidence.holds, doubts, now)
     return deadlines
 
 
@@ -91,8 +82,8 @@ def rests_until(config: SupervisorConfig, state: State, now: float) -> float:
     limits = config.profile.limits
     turns = [state.measured(name).turns_at(limits[name], after) for name in limits]
     # What it says of itself is young enough until then.
-    said = state.vehicle_received + config.vehicle_state_age
-    turns += [turn for turn in (said, said - state.vehicle.armed_age) if turn >= after]
+    said = state.heard.vehicle_received + config.vehicle_state_age
+    turns += [turn for turn in (said, said - state.heard.vehicle.armed_age) if turn >= after]
     return min(turns) - _ROUNDING
 
 
@@ -103,128 +94,136 @@ def _as_before(rule: Rule, evidence: RuleEvidence) -> bool:
     return rule.rests_on_the_vehicle and looked_at and quiet
 
 
-class Policy(Reports):
-    """Counts and acts."""
+def count_rules(turn: Turn, passed: float) -> None:
+    """Bring every counter up to now, before anything new is taken in."""
+    known = turn.state.rules
+    counted = {
+        rule.name: known.get(rule.name, _NOTHING).counted(rule, passed)
+        for rule in turn.config.profile.rules
+    }
+    _keep(turn, counted)
 
-    def count_rules(self, passed: float) -> None:
-        """Bring every counter up to now, before anything new is taken in."""
-        counted = {
-            rule.name: self.state.rule(rule.name).counted(rule, passed)
-            for rule in self.config.profile.rules
-        }
-        self._keep(counted)
 
-    def look_at_rules(self) -> None:
-        """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
-        fulfilled: list[Judged] = []
-        stage, rules = self.state.stage, dict(self.state.rules)
-        rests = self._vehicle_rests()
-        for rule in self.config.profile.rules:
-            if stage not in rule.states:
-                # What was counted in another state says nothing about the next time.
-                latched = self.state.rule(rule.name).latched and rule.clears is Clears.NEVER
-                rules[rule.name] = _LATCHED if latched else _NOTHING
-                continue
-            if rests and _as_before(rule, self.state.rule(rule.name)):
-                continue
-            judged = judge(self.config, self.state, rule, self.now)
-            rules[rule.name] = self._cleared(rule, judged.evidence)
-            waits = rules[rule.name].put_off
-            due = self._falls_on() if waits else judged.evidence.fulfilled(rule)
-            if due and not rules[rule.name].latched:
-                fulfilled.append(judged)
-        self._keep(rules)
-        # A stable sort: of two that want the same, the one that the profile names first.
-        for judged in sorted(fulfilled, key=lambda one: -one.rule.action):
-            self._act(judged)
+def check_rules(turn: Turn) -> None:
+    """Judge every rule that lives in this state; act on the gravest that is fulfilled."""
+    fulfilled: list[Judged] = []
+    stage, known = turn.state.stage, turn.state.rules
+    rules = dict(known)
+    rests = _vehicle_rests(turn)
+    for rule in turn.config.profile.rules:
+        before = known.get(rule.name, _NOTHING)
+        if stage not in rule.states:
+            # What was counted in another state says nothing about the next time.
+            latched = before.latched and rule.clears is Clears.NEVER
+            rules[rule.name] = _LATCHED if latched else _NOTHING
+            continue
+        if rests and _as_before(rule, before):
+            continue
+        judged = judge(turn.config, turn.state, rule, turn.now)
+        rules[rule.name] = _cleared(turn, rule, judged.evidence)
+        waits = rules[rule.name].put_off
+        due = _falls_on(turn) if waits else judged.evidence.fulfilled(rule)
+        if due and not rules[rule.name].latched:
+            fulfilled.append(judged)
+    _keep(turn, rules)
+    # A stable sort: of two that want the same, the one that the profile names first.
+    for judged in sorted(fulfilled, key=lambda one: -one.rule.action):
+        _act(turn, judged)
 
-    def _vehicle_rests(self) -> bool:
-        """Of the vehicle the same is known as at the last look: most updates are heartbeats."""
-        state, before = self.state, self.before
-        if (
-            state.measurements is before.measurements
-            and state.heights is before.heights
-            and state.vehicle is before.vehicle
-            and state.disputed == before.disputed
-            and state.vehicle_received == before.vehicle_received
-            and state.rebooted == before.rebooted
-            and self.now < before.vehicle_rests_until
-        ):
-            return True
-        until = rests_until(self.config, state, self.now)
-        self.state = replace(state, vehicle_rests_until=until)
-        return False
 
-    def _cleared(self, rule: Rule, evidence: RuleEvidence) -> RuleEvidence:
-        if not evidence.latched:
-            return evidence
-        by_itself = rule.clears is Clears.BY_ITSELF and evidence.cleared()
-        disarmed = rule.clears is Clears.ON_DISARM and flight.disarmed(
-            self.config, self.state, self.now
-        )
-        if by_itself or disarmed:
-            self.outputs.append(i.Say(f"rule '{rule.name}' has cleared"))
-            return replace(evidence, latched=False)
+def _vehicle_rests(turn: Turn) -> bool:
+    """Of the vehicle the same is known as at the last look: most updates are heartbeats."""
+    state, before = turn.state, turn.before
+    if (
+        state.heard.measurements is before.heard.measurements
+        and state.heard.heights is before.heard.heights
+        and state.heard.vehicle is before.heard.vehicle
+        and state.heard.disputed == before.heard.disputed
+        and state.heard.vehicle_received == before.heard.vehicle_received
+        and state.flight.rebooted == before.flight.rebooted
+        and turn.now < before.own.vehicle_rests_until
+    ):
+        return True
+    until = rests_until(turn.config, state, turn.now)
+    turn.own = replace(turn.own, vehicle_rests_until=until)
+    return False
+
+
+def _cleared(turn: Turn, rule: Rule, evidence: RuleEvidence) -> RuleEvidence:
+    if not evidence.latched:
         return evidence
+    by_itself = rule.clears is Clears.BY_ITSELF and evidence.cleared()
+    disarmed = rule.clears is Clears.ON_DISARM and flight.disarmed(
+        turn.config, turn.state, turn.now
+    )
+    if by_itself or disarmed:
+        turn.log(f"rule '{rule.name}' has cleared")
+        return replace(evidence, latched=False)
+    return evidence
 
-    def _falls_on(self) -> bool:
-        """It moves as nothing on the ground does, and nobody has seen it come down."""
-        moves = flight.moving(self.config, self.state, self.now)
-        return bool(moves) and flight.in_air(self.config, self.state, self.now) is not False
 
-    def _act(self, judged: Judged) -> None:
-        rule, reasons = judged.rule, judged.reasons()
-        if not self.state.leading or self.state.mode is i.Mode.INHIBITED:
-            return
-        if self.state.stage not in rule.states:
-            return  # a graver one has just moved it on
-        if rule.action is Action.DEPLOY:
-            self._act_on_deploy(judged)
-            return
-        evidence = self.state.rule(rule.name)
-        self._remember(rule, replace(evidence, latched=True, denied=""))
-        if rule.action is Action.KILL:
-            self.order_kill(rule.name, reasons)
-        else:
-            text = f"rule '{rule.name}': {rule.says or '; '.join(reasons)}"
-            self.outputs.append(i.Say(f"{text} ({'; '.join(reasons)})", alarm=True))
+def _falls_on(turn: Turn) -> bool:
+    """It moves as nothing on the ground does, and nobody has seen it come down."""
+    moves = flight.moving(turn.config, turn.state, turn.now)
+    return bool(moves) and flight.in_air(turn.config, turn.state, turn.now) is not False
 
-    def _act_on_deploy(self, judged: Judged) -> None:
-        rule, reasons, evidence = judged.rule, judged.reasons(), self.state.rule(judged.rule.name)
-        if evidence.put_off:
-            denied = against_any_rule(self.config, self.state, self.now)
-            moves = flight.moving(self.config, self.state, self.now)
-            reasons = (*reasons, f"put off as it was too low, and it still falls: {moves}")
-        else:
-            denied = against_rule(self.config, self.state, rule, judged.findings, self.now)
-        lowered = too_low(self.config, self.state, self.now)
-        if self.config.profile.below_minimum is BelowMinimum.NOTHING:
-            denied = denied or lowered
-        if denied:
-            self._deny(rule, denied, reasons)
-        elif not lowered:
-            self._remember(rule, replace(evidence, latched=True, put_off=False, denied=""))
-            self.order_deploy(rule.name, reasons)
-        elif not evidence.put_off:
-            self.put_off(rule.name)
-            self.order_kill(rule.name, (*reasons, f"no deploy: {lowered}"))
 
-    def put_off(self, name: str) -> None:
-        """The deploy of this rule waits until the vehicle is not too low any more."""
-        evidence = replace(self.state.rule(name), put_off=True, latched=False, denied="")
-        self._keep({**self.state.rules, name: evidence})
+def _act(turn: Turn, judged: Judged) -> None:
+    rule, reasons = judged.rule, judged.reasons()
+    if not turn.own.leading or turn.state.mode is i.Mode.INHIBITED:
+        return
+    if turn.state.stage not in rule.states:
+        return  # a graver one has just moved it on
+    if rule.action is Action.DEPLOY:
+        _act_on_deploy(turn, judged)
+        return
+    evidence = turn.state.rule(rule.name)
+    _remember(turn, rule, replace(evidence, latched=True, denied=""))
+    if rule.action is Action.KILL:
+        order_kill(turn, rule.name, reasons)
+    else:
+        text = f"rule '{rule.name}': {rule.says or '; '.join(reasons)}"
+        turn.warn(f"{text} ({'; '.join(reasons)})")
 
-    def _deny(self, rule: Rule, why: str, reasons: tuple[str, ...]) -> None:
-        evidence = self.state.rule(rule.name)
-        if kind(evidence.denied) != kind(why):
-            self.outputs.append(
-                i.Say(f"rule '{rule.name}' wants a deploy ({'; '.join(reasons)}): denied, {why}")
-            )
-        self._remember(rule, replace(evidence, denied=why))
 
-    def _remember(self, rule: Rule, evidence: RuleEvidence) -> None:
-        self._keep({**self.state.rules, rule.name: evidence})
+def _act_on_deploy(turn: Turn, judged: Judged) -> None:
+    rule, reasons, evidence = judged.rule, judged.reasons(), turn.state.rule(judged.rule.name)
+    if evidence.put_off:
+        denied = against_any_rule(turn.config, turn.state, turn.now)
+        moves = flight.moving(turn.config, turn.state, turn.now)
+        reasons = (*reasons, f"put off as it was too low, and it still falls: {moves}")
+    else:
+        denied = against_rule(turn.config, turn.state, rule, judged.findings, turn.now)
+    lowered = too_low(turn.config, turn.state, turn.now)
+    if turn.config.profile.below_minimum is BelowMinimum.NOTHING:
+        denied = denied or lowered
+    if denied:
+        _deny(turn, rule, denied, reasons)
+    elif not lowered:
+        _remember(turn, rule, replace(evidence, latched=True, put_off=False, denied=""))
+        order_deploy(turn, rule.name, reasons)
+    elif not evidence.put_off:
+        put_off(turn, rule.name)
+        order_kill(turn, rule.name, (*reasons, f"no deploy: {lowered}"))
 
-    def _keep(self, rules: dict[str, RuleEvidence]) -> None:
-        if rules != self.state.rules:
-            self.state = replace(self.state, rules=MappingProxyType(rules))
+
+def put_off(turn: Turn, name: str) -> None:
+    """The deploy of this rule waits until the vehicle is not too low any more."""
+    evidence = replace(turn.state.rule(name), put_off=True, latched=False, denied="")
+    _keep(turn, {**turn.state.rules, name: evidence})
+
+
+def _deny(turn: Turn, rule: Rule, why: str, reasons: tuple[str, ...]) -> None:
+    evidence = turn.state.rule(rule.name)
+    if kind(evidence.denied) != kind(why):
+        turn.log(f"rule '{rule.name}' wants a deploy ({'; '.join(reasons)}): denied, {why}")
+    _remember(turn, rule, replace(evidence, denied=why))
+
+
+def _remember(turn: Turn, rule: Rule, evidence: RuleEvidence) -> None:
+    _keep(turn, {**turn.state.rules, rule.name: evidence})
+
+
+def _keep(turn: Turn, rules: dict[str, RuleEvidence]) -> None:
+    if rules != turn.state.rules:
+        turn.state = replace(turn.state, rules=MappingProxyType(rules))

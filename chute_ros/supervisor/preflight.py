@@ -14,7 +14,7 @@ from chute_ros.model import (
     TriggerFlags,
     flag_names,
 )
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
@@ -112,9 +112,9 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):
         reasons.append(f"the vehicle is {state.stage.name}: needs a reset on the ground")
     reasons += _measured_problems(config, state, now)
-    if now - state.vehicle_received <= config.vehicle_state_age:
-        reasons += [f"vehicle: {fault}" for fault in state.vehicle.faults]
-        unable = _UNABLE.get(state.vehicle.system_status)
+    if now - state.heard.vehicle_received <= config.vehicle_state_age:
+        reasons += [f"vehicle: {fault}" for fault in state.heard.vehicle.faults]
+        unable = _UNABLE.get(state.heard.vehicle.system_status)
         reasons += [unable] if unable else []
     return tuple(reasons)
 
@@ -122,15 +122,16 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
 def _measured_problems(config: SupervisorConfig, state: State, now: float) -> list[str]:
     """What is measured of a vehicle that stands, and cannot be."""
     used = {name for rule in config.profile.rules for name in rule.measured}
-    wrong = [f"{name} cannot be used: {why}" for name, why in state.unfit.items() if name in used]
+    unfit = state.heard.unfit
+    wrong = [f"{name} cannot be used: {why}" for name, why in unfit.items() if name in used]
     wrong += [
-        f"{name} is contradicted: {state.denied[name]}"
-        for name, since in state.denied_since.items()
-        if now >= since + CONTRADICTED_FOR and name in used and name not in state.unfit
+        f"{name} is contradicted: {state.heard.denied[name]}"
+        for name, since in state.heard.denied_since.items()
+        if now >= since + CONTRADICTED_FOR and name in used and name not in unfit
     ]
     return wrong + [
         f"{part} is in doubt: another source differs, or it has jumped"
-        for part in sorted(state.disputed)
+        for part in sorted(state.heard.disputed)
     ]
 
 
@@ -170,7 +171,7 @@ def _rung_problem(rung: Rung, evidence: LinkEvidence) -> str:
 
 def _vehicle_problem(config: SupervisorConfig, state: State, now: float) -> str:
     """Without vehicle/state nobody can tell flight from ground; empty: it is there."""
-    age = state.vehicle.armed_age + now - state.vehicle_received
+    age = state.heard.vehicle.armed_age + now - state.heard.vehicle_received
     if math.isnan(age):
         return "vehicle/state: armed or disarmed was never reported"
     if age > config.vehicle_state_age:
@@ -254,7 +255,7 @@ def _battery(config: SupervisorConfig, state: State, now: float) -> list[str]:
         ("battery_remaining", limits.min_battery_remaining, ""),
         ("battery_voltage", limits.min_battery_voltage, " V"),
     ):
-        value = flight.measured(config, state, name, now)
+        value = readings.measured(config, state, name, now)
         if value < least:
             told.append(f"{name} {value:.2f}{unit} (need {least:g}{unit})")
     return told

@@ -6,13 +6,15 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
-from chute_ros.supervisor.measurements import (
-    CLIMB_RATE,
-    STANDARD_LIMITS,
-    VERTICAL_SPEED,
-    Limits,
+from chute_ros.supervisor.conditions.base import Condition
+from chute_ros.supervisor.conditions.measurement import (
+    ALWAYS,
+    NEVER,
+    MeasurementCondition,
+    range_of,
 )
-from chute_ros.supervisor.rules import Condition, MeasurementCondition, Rule
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+from chute_ros.supervisor.rules import Rule
 
 #: No vehicle has a height below which nothing is released, or that is low, of more than this, m.
 HIGHEST_MINIMUM = 1000.0
@@ -31,7 +33,6 @@ WIDEST = 20.0
 OLDEST = 10.0
 #: Longer is as good as for ever, which is 0, s.
 LONGEST_STUCK = 600.0
-_NEVER, _ALWAYS = "can never hold", "always holds"
 _ROUNDING = 1e-9
 
 
@@ -45,26 +46,6 @@ def bounds(name: str, key: str) -> tuple[float, float]:
     return 0.0, highest.get(key, WIDEST * float(getattr(standard, key)))
 
 
-def range_of(name: str, limits: Mapping[str, Limits]) -> Limits | None:
-    """What a measurement, or CLIMB_RATE, may be; None: it has no limits."""
-    return limits.get(VERTICAL_SPEED if name == CLIMB_RATE else name)
-
-
-def condition_problem(one: MeasurementCondition, limits: Mapping[str, Limits]) -> str:
-    """Why this limit makes no sense, in words; empty: it does."""
-    known = range_of(one.measurement, limits)
-    if known is None:
-        return ""
-    told = f"{one.measurement} is {known.minimum:g} to {known.maximum:g}"
-    if one.above >= known.maximum or one.below <= known.minimum:
-        return f"{_NEVER}: {told}"
-    if one.above < known.minimum or one.below > known.maximum:
-        return f"{_ALWAYS}: {told}"
-    if not (math.isnan(one.until) or known.minimum <= one.until <= known.maximum):
-        return f"has an until that is never reached: {told}"
-    return ""
-
-
 def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:
     """Why its conditions together make no sense, in words; empty: they do."""
     least = most = 0.0
@@ -72,9 +53,9 @@ def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:
         least, most = least + min(known), most + max(*known, unknown)
     needed = rule.needed - _ROUNDING
     if most < needed:
-        return f"{_NEVER}: {most:g} at most of needed {rule.needed:g} can be true at once"
+        return f"{NEVER}: {most:g} at most of needed {rule.needed:g} can be true at once"
     if least >= needed:
-        return f"{_ALWAYS}: its limits leave no value out"
+        return f"{ALWAYS}: its limits leave no value out"
     return ""
 
 
@@ -99,8 +80,4 @@ def _sums(
         between = [(low + high) / 2 for low, high in pairwise(inner)]
         values = [*inner, *between] if known else [*inner, *between, -math.inf, math.inf]
         unknown = sum(one.weight for one in those if one.if_unknown)
-        yield [sum(c.weight for c in those if _is(c, value)) for value in values], unknown
-
-
-def _is(one: MeasurementCondition, value: float) -> bool:
-    return not (value <= one.above or value >= one.below)
+        yield [sum(c.weight for c in those if c.holds_at(value)) for value in values], unknown

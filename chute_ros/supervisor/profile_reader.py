@@ -5,19 +5,19 @@ The form of the file is described in docs/reference/rules.md.
 
 from __future__ import annotations
 
-import enum
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 from chute_ros.errors import ParameterError, ProfileError
 from chute_ros.model import Action
+from chute_ros.supervisor.conditions import CONDITIONS
+from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.gate import OPERATOR
-from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import DERIVED, STANDARD_LIMITS, Limits
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
 from chute_ros.supervisor.profile_limits import (
     FASTEST_STANDING,
     HIGHEST_MINIMUM,
@@ -26,28 +26,12 @@ from chute_ros.supervisor.profile_limits import (
     LONGEST_WARNING,
     MOST_SAMPLES,
     bounds,
-    condition_problem,
     rule_problem,
 )
-from chute_ros.supervisor.rules import (
-    ALL,
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    Condition,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    Profile,
-    Rule,
-    is_silence,
-)
-from chute_ros.supervisor.yaml_lines import LineReader, Where, compose
+from chute_ros.supervisor.profile_lines import ProfileLines
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Profile, Rule
+from chute_ros.supervisor.yaml_lines import Where, compose
 
-_Kind = TypeVar("_Kind", bound=enum.Enum)
 #: What a rule may want. ALARM: it is only said.
 _ACTIONS = {
     "ALARM": Action.NONE,
@@ -59,26 +43,10 @@ _RULE_KEYS = (
     *("says", "source", "states", "conditions", "needed", "for", "leak", "samples"),
     *("doubted", "action", "clears"),
 )
-_CONDITION_KEYS = ("measurement", "link", "autopilot", "device")
-_LIMIT_KEYS = ("above", "below", "until", "if_unknown", "unless_dived")
 _PROFILE_KEYS = (
     *("profile", "minimum_height", "below_minimum", "low_height", "moving_speed"),
     *("landed_hold", "measurements", "rules"),
 )
-
-
-class _ProfileLines(LineReader):
-    """links: the names of those that are followed."""
-
-    def __init__(self, name: str, links: Sequence[str]) -> None:
-        super().__init__(name)
-        self._links = links
-        #: Of the measurements of this profile.
-        self.limits: Mapping[str, Limits] = STANDARD_LIMITS
-
-    def link(self, where: Where, what: str, besides: tuple[str, ...]) -> str:
-        """The name of a link that the supervisor follows."""
-        return self.choice(where, what, (*besides, *self._links))
 
 
 def read_profile(text: str, name: str, links: Sequence[str]) -> Profile:
@@ -86,14 +54,14 @@ def read_profile(text: str, name: str, links: Sequence[str]) -> Profile:
 
     ProfileError lists every mistake with its line and the fix.
     """
-    reader = _ProfileLines(name, links)
+    reader = ProfileLines(name, links)
     profile = _profile(reader, compose(text, name))
     if reader.mistakes:
         raise ProfileError("\n".join(reader.mistakes))
     return profile
 
 
-def _profile(reader: _ProfileLines, where: Where) -> Profile:
+def _profile(reader: ProfileLines, where: Where) -> Profile:
     entries = reader.mapping(where, _PROFILE_KEYS, "a profile")
     for key in ("profile", "rules"):
         if key not in entries:
@@ -131,7 +99,7 @@ def _profile(reader: _ProfileLines, where: Where) -> Profile:
     return replace(profile, rules=tuple(rules))
 
 
-def _limits(reader: _ProfileLines, where: Where) -> MappingProxyType[str, Limits]:
+def _limits(reader: ProfileLines, where: Where) -> MappingProxyType[str, Limits]:
     limits = dict(STANDARD_LIMITS)
     names = [field.name for field in fields(Limits)]
     for name, one in reader.mapping(where, STANDARD_LIMITS, "measurements").items():
@@ -146,7 +114,7 @@ def _limits(reader: _ProfileLines, where: Where) -> MappingProxyType[str, Limits
     return MappingProxyType(limits)
 
 
-def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
+def _rule(reader: ProfileLines, name: str, where: Where) -> Rule:
     what, before = f"rule '{name}'", len(reader.mistakes)
     entries = reader.mapping(where, _RULE_KEYS, what)
     if name == OPERATOR:
@@ -196,7 +164,7 @@ def _rule(reader: _ProfileLines, name: str, where: Where) -> Rule:
     return rule
 
 
-def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: Rule) -> Rule:
+def _timing(reader: ProfileLines, what: str, entries: dict[str, Where], rule: Rule) -> Rule:
     ends_flights = rule.action in (Action.KILL, Action.DEPLOY)
     longest = LONGEST_HOLD if ends_flights else LONGEST_WARNING
     least = LEAST_LEAK if ends_flights else 0.0
@@ -205,7 +173,7 @@ def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: R
         "leak": lambda w: {"leak": reader.number(w, f"leak of {what}", least, 100.0)},
         "samples": lambda w: {"samples": int(_whole(reader, w, f"samples of {what}"))},
         "doubted": lambda w: {"doubted": reader.number(w, f"doubted of {what}", 0.0, 1.0)},
-        "clears": lambda w: {"clears": _member(reader, w, f"clears of {what}", Clears)},
+        "clears": lambda w: {"clears": reader.member(w, f"clears of {what}", Clears)},
         "says": lambda w: {"says": reader.text(w, f"says of {what}")},
         "source": lambda w: {"source": reader.text(w, f"source of {what}")},
     }
@@ -215,113 +183,42 @@ def _timing(reader: _ProfileLines, what: str, entries: dict[str, Where], rule: R
     return rule
 
 
-def _whole(reader: _ProfileLines, where: Where, what: str) -> float:
+def _whole(reader: ProfileLines, where: Where, what: str) -> float:
     value = reader.number(where, what, 1, MOST_SAMPLES)
     if not math.isnan(value) and value != int(value):
         reader.wrong(where.line, f"{what} is {value:g}: need a whole number")
     return 1.0 if math.isnan(value) else value
 
 
-def _member(reader: _ProfileLines, where: Where, what: str, kind: type[_Kind]) -> _Kind:
-    return kind(reader.choice(where, what, [one.value for one in kind]))
-
-
-def _condition(reader: _ProfileLines, what: str, where: Where) -> Condition | None:
+def _condition(reader: ProfileLines, what: str, where: Where) -> Condition | None:
+    options = [option for kind in CONDITIONS.values() for option in kind.options]
     entries = reader.mapping(
-        where,
-        (*_CONDITION_KEYS, *_LIMIT_KEYS, "is", "counted", "weight"),
-        f"a condition of {what}",
+        where, (*CONDITIONS, *options, "counted", "weight"), f"a condition of {what}"
     )
-    kinds = [key for key in _CONDITION_KEYS if key in entries]
-    if "counted" in entries and kinds != ["autopilot"]:
+    keys = [key for key in CONDITIONS if key in entries]
+    fitting = [
+        one for one in map(CONDITIONS.get, keys) if one and {*keys} <= {one.key, *one.borrowed}
+    ]
+    kind = fitting[0] if fitting else None
+    if "counted" in entries and not (kind and kind.may_go_uncounted):
         reader.wrong(entries["counted"].line, "counted belongs to the autopilot: remove it here")
     weight = 1.0
     if "weight" in entries:
         weight = reader.number(entries["weight"], f"weight in {what}", 1e-6, 1e6)
-    if "measurement" in kinds and len(kinds) == 1:
-        return _measurement(reader, what, where, entries, weight)
-    if not kinds or (len(kinds) > 1 and set(kinds) != {"device", "link"}):
-        text = f"a condition of {what} needs one of {', '.join(_CONDITION_KEYS)}"
-        reader.wrong(where.line, f"{text}; it has {', '.join(kinds) or 'none'}")
+    if kind is None:
+        text = f"a condition of {what} needs one of {', '.join(CONDITIONS)}"
+        reader.wrong(where.line, f"{text}; it has {', '.join(keys) or 'none'}")
         return None
-    for key in _LIMIT_KEYS:
-        if key in entries:
-            reader.wrong(entries[key].line, f"{key} belongs to a measurement: remove it here")
-    if "is" in entries and kinds != ["link"]:
-        reader.wrong(entries["is"].line, "`is` belongs to a link: remove it here")
-    if "autopilot" in kinds:
-        fact = _member(reader, entries["autopilot"], f"autopilot in {what}", AutopilotFact)
-        counted = True
-        if "counted" in entries:
-            counted = reader.truth(entries["counted"], f"counted of {fact.value} in {what}")
-        return AutopilotCondition(fact, weight, counted)
-    if "device" in kinds:
-        device = _member(reader, entries["device"], f"device in {what}", DeviceFact)
-        link = ANY
-        if "link" in entries:
-            link = reader.link(entries["link"], f"link in {what}", (ANY,))
-        return DeviceCondition(device, link, weight)
-    link = reader.link(entries["link"], f"link in {what}", (ANY, ALL))
-    if "is" not in entries:
-        text = f"a condition of {what} on a link needs `is`"
-        reader.wrong(where.line, f"{text}: one or more of {', '.join(LinkJudgement.__members__)}")
-        return None
-    judged = [
-        LinkJudgement[reader.choice(one, f"is in {what}", LinkJudgement.__members__)]
-        for one in reader.many(entries["is"], f"is in {what}")
-    ]
-    return LinkCondition(link, tuple(judged), weight)
+    for owner in CONDITIONS.values():
+        for option, belongs in owner.options.items():
+            if option in entries and owner is not kind and option not in kind.borrowed:
+                reader.wrong(entries[option].line, f"{belongs}: remove it here")
+    return kind.parse(reader, what, where, entries, weight)
 
 
-def _measurement(
-    reader: _ProfileLines, what: str, where: Where, entries: dict[str, Where], weight: float
-) -> MeasurementCondition:
-    known = (*STANDARD_LIMITS, *DERIVED)
-    name = reader.choice(entries["measurement"], f"measurement in {what}", known)
-    if "is" in entries:
-        reader.wrong(entries["is"].line, "`is` belongs to a link: use above or below")
-    if "above" not in entries and "below" not in entries:
-        reader.wrong(where.line, f"{name} in {what} has no limit: add above or below")
-    limits: dict[str, float] = {
-        key: reader.number(entries[key], f"{key} of {name} in {what}")
-        for key in ("above", "below")
-        if key in entries
-    }
-    if len(limits) == 2 and not limits["above"] < limits["below"]:
-        reader.wrong(where.line, f"{name} in {what} can never be: above must be less than below")
-    said = {
-        key: reader.truth(entries[key], f"{key} of {name} in {what}")
-        for key in ("if_unknown", "unless_dived")
-        if key in entries
-    }
-    if "until" in entries:
-        limits["until"] = _until(reader, f"until of {name} in {what}", entries["until"], limits)
-    condition = MeasurementCondition(
-        name,
-        weight=weight,
-        if_unknown=said.get("if_unknown", False),
-        unless_dived=said.get("unless_dived", False),
-        **limits,
-    )
-    if problem := condition_problem(condition, reader.limits):
-        reader.wrong(where.line, f"{name} in {what} {problem}")
-    return condition
-
-
-def _until(reader: _ProfileLines, what: str, where: Where, limits: dict[str, float]) -> float:
-    """The limit that ends what another limit began: on its other side."""
-    until = reader.number(where, what)
-    if len(limits) == 2:
-        reader.wrong(where.line, f"{what} belongs to one limit: remove above, below or it")
-    elif not limits.get("above", math.inf) > until > limits.get("below", -math.inf):
-        text = "less than above" if "above" in limits else "more than below"
-        reader.wrong(where.line, f"{what} is {until:g}: need {text}")
-    return until
-
-
-def _check_deploy(reader: _ProfileLines, what: str, line: int, rule: Rule) -> None:
+def _check_deploy(reader: ProfileLines, what: str, line: int, rule: Rule) -> None:
     """What the gate would never let through is a mistake of the profile."""
-    silence = sum(condition.weight for condition in rule.conditions if is_silence(condition))
+    silence = sum(condition.weight for condition in rule.conditions if condition.is_silence)
     if silence >= rule.needed - 1e-9:
         text = f"{what} would deploy on silence alone, which is never done"
         reader.wrong(line, f"{text}: raise needed above {silence:g}, or add a measurement")

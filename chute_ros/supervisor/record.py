@@ -12,11 +12,19 @@ from dataclasses import dataclass
 
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.codec import Codec
+from chute_ros.supervisor.conditions import CONDITIONS
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.state import State
 
-CODEC = Codec(SupervisorConfig, State, *typing.get_args(i.Input), *typing.get_args(i.Output))
+CODEC = Codec(
+    SupervisorConfig,
+    State,
+    *CONDITIONS.values(),
+    *typing.get_args(i.Input),
+    *typing.get_args(i.Output),
+    once={"Say": i.LogMessage},
+)
 
 
 @dataclass(frozen=True)

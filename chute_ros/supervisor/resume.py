@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
 from chute_ros.supervisor.handover import check_numbers
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND
 from chute_ros.supervisor.state import State
 
 
@@ -30,7 +30,7 @@ _CODEC = Codec(Left)
 
 def worth_leaving(state: State) -> bool:
     """On the ground with nothing under way a start anew is as good, and clears alarms."""
-    return state.airborne or state.stage not in ON_GROUND
+    return state.flight.airborne or state.stage not in ON_GROUND
 
 
 def written(left: Left) -> str:
@@ -48,9 +48,11 @@ def resumed(text: str, boot: str, settings: str, within: float, now: float) -> S
         raise RecordError("the computer has started anew since")
     if left.settings != settings:
         raise RecordError("the parameters or the profile have changed since")
-    age = now - left.state.updated_at
+    age = now - left.state.own.updated_at
     if not 0.0 <= age <= within:
         raise RecordError(f"it is {age:.1f} s old (limit {within:g} s)")
     check_numbers(left.state)
     # Who waited for an outcome waits no more.
-    return replace(left.state, leading=False, kill_tokens=(), deploy_tokens=())
+    return replace(
+        left.state, own=replace(left.state.own, leading=False, kill_tokens=(), deploy_tokens=())
+    )

@@ -6,15 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Annotated
 
 from chute_ros.model import Action, Decision, Outcome, VehicleState
+from chute_ros.supervisor.codec import INLINE
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 
+#: Monotonic s of this host: another one that it is told has a clock of its own.
+Time = Annotated[float, "of this host"]
 #: Forward, and not.
 _STEPS = frozenset({Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED})
 _NOT_NOW = frozenset({Outcome.FAILED, Outcome.REFUSED})
@@ -33,9 +37,14 @@ ASK_LASTS = 1.0
 class Ask:
     """A device asked for a kill at this monotonic time, s."""
 
-    at: float
+    at: Time
     link: str
     reason: str
+
+    @property
+    def ends_at(self) -> float:
+        """Until when it is taken to want it, monotonic s."""
+        return self.at + ASK_LASTS
 
 
 @dataclass(frozen=True)
@@ -45,8 +54,8 @@ class Pending:
     decision: Decision
     #: All that shall carry it out; a decision made again may name only those still missing.
     targets: tuple[str, ...]
-    decided_at: float
-    sent_at: float
+    decided_at: Time
+    sent_at: Time
     outcomes: Mapping[str, frozenset[Outcome]] = field(
         default_factory=lambda: MappingProxyType({})
     )
@@ -107,22 +116,90 @@ class Pending:
 
 
 @dataclass(frozen=True)
-class State:
-    """The supervisor's memory. Times are monotonic s; NaN: has not happened."""
+class Killing:
+    """The kill that is under way, or was the last."""
 
-    epoch: int
-    started_at: float
-    stage: Stage = Stage.STARTUP
-    stage_since: float = math.nan
-    mode: Mode = Mode.ACTIVE
-    #: It holds the lease: what it decides is sent. One that follows only looks on.
-    leading: bool = True
-    next_id: int = 1
-    #: What was decided last, also where that was only said.
-    newest: Decision | None = None
-    updated_at: float = math.nan
-    #: Updates that came later than their deadline allows.
-    late_count: int = 0
+    kill: Pending | None = None
+    #: The kill that is under way, or was the last, was decided in flight.
+    killed_in_flight: bool = False
+    #: When that was, the height then, m, and how fast it sank, m/s.
+    killed_at: Time = math.nan
+    killed_height: float = math.nan
+    killed_sinking: float = math.nan
+    #: A person asked for the kill under way alone: no deploy follows it by itself.
+    kill_only: bool = False
+    #: It said before that kill that it stands, or is disarmed: that is not the kill's effect.
+    killed_standing: bool = False
+
+
+@dataclass(frozen=True)
+class DeployUnderWay:
+    """The deploy: what was begun of it, and what is to follow the kill."""
+
+    #: One for each step of the ladder that was begun.
+    deploys: tuple[Pending, ...] = ()
+    #: Rule and reasons of the deploy that follows the kill; empty: none does.
+    deploy_rule: str = ""
+    deploy_reasons: tuple[str, ...] = ()
+    #: The steps that it has; empty: those of the configuration.
+    deploy_ladder: tuple[Rung, ...] = ()
+    #: When it leaves at the latest. A kill that is decided again does not put it off.
+    deploy_due: Time = math.nan
+
+
+@dataclass(frozen=True)
+class ThisFlight:
+    """This flight, and what the ground was before it."""
+
+    #: It was in the air since the start or the reset.
+    flown: bool = False
+    #: It took off and has not landed since, or was not seen to.
+    airborne: bool = False
+    #: When it took off.
+    airborne_since: Time = math.nan
+    #: Since when the vehicle says that it stands and nothing contradicts it.
+    down_since: Time = math.nan
+    #: When it last landed.
+    landed_at: Time = math.nan
+    #: Seen high enough for a deploy since the take-off.
+    was_high: bool = False
+    #: Seen off the ground since the take-off, for so long, s.
+    up_for: float = 0.0
+    #: The autopilot started anew since the take-off.
+    rebooted: bool = False
+    #: Restarts of the autopilot that had been counted on the ground.
+    reboots_before: int = 0
+    #: Height when it was armed, m; 0: not seen.
+    armed_height: float = 0.0
+    #: Height when it was last seen to take off, m; NaN: not known.
+    took_off_height: float = math.nan
+    #: Degrees; where it took off.
+    home: tuple[float, float] | None = None
+    #: Altitudes of what heights are above, m above mean sea level and in the standard atmosphere:
+    #: as they were on the ground before this flight.
+    home_altitude: float = math.nan
+    ground_pressure_altitude: float = math.nan
+    #: (link, device) that were released before the flight: they say nothing of what happens in it.
+    released_before: frozenset[tuple[str, str]] = frozenset()
+    #: `safety/arm` has armed the parachutes: after the flight they are disarmed again.
+    armed_by_us: bool = False
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """What a person is told until a reset."""
+
+    alarms: tuple[str, ...] = ()
+    #: When the alarm that does not stop is said next.
+    alarm_at: Time = math.nan
+    #: A canopy is out, does not carry, and no other parachute is left: the alarm does not stop.
+    canopy_fails: bool = False
+
+
+@dataclass(frozen=True)
+class HeardHere:
+    """What a supervisor hears itself."""
+
     links: Mapping[str, LinkEvidence] = field(default_factory=lambda: MappingProxyType({}))
     vehicle: VehicleState = field(default=VehicleState())
     vehicle_received: float = math.nan
@@ -146,83 +223,58 @@ class State:
     unfit: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     #: Since when an accelerometer on the ground tells otherwise of its fitness, monotonic s.
     fitness_since: float = math.nan
-    #: Altitudes of what heights are above, m above mean sea level and in the standard atmosphere:
-    #: as they were on the ground before this flight.
-    home_altitude: float = math.nan
-    ground_pressure_altitude: float = math.nan
-    rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
-    #: Until then time alone changes nothing of what is known of the vehicle, monotonic s;
-    #: -infinity: nobody has looked.
-    vehicle_rests_until: float = -math.inf
-    #: "link device" -> its newest wish for a kill.
-    asks: Mapping[str, Ask] = field(default_factory=lambda: MappingProxyType({}))
-    block: Pending | None = None
-    kill: Pending | None = None
-    #: One for each step of the ladder that was begun.
-    deploys: tuple[Pending, ...] = ()
-    #: Rule and reasons of the deploy that follows the kill; empty: none does.
-    deploy_rule: str = ""
-    deploy_reasons: tuple[str, ...] = ()
-    #: The steps that it has; empty: those of the configuration.
-    deploy_ladder: tuple[Rung, ...] = ()
-    #: When it leaves at the latest. A kill that is decided again does not put it off.
-    deploy_due: float = math.nan
-    #: It was in the air since the start or the reset.
-    flown: bool = False
-    #: It took off and has not landed since, or was not seen to.
-    airborne: bool = False
-    #: The kill that is under way, or was the last, was decided in flight.
-    killed_in_flight: bool = False
-    #: When that was, the height then, m, and how fast it sank, m/s.
-    killed_at: float = math.nan
-    killed_height: float = math.nan
-    killed_sinking: float = math.nan
-    #: Since when the vehicle says that it stands and nothing contradicts it.
-    down_since: float = math.nan
-    #: A person asked for the kill under way alone: no deploy follows it by itself.
-    kill_only: bool = False
-    #: It said before that kill that it stands, or is disarmed: that is not the kill's effect.
-    killed_standing: bool = False
-    #: When it last landed.
-    landed_at: float = math.nan
-    #: Seen high enough for a deploy since the take-off.
-    was_high: bool = False
-    #: Seen off the ground since the take-off, for so long, s.
-    up_for: float = 0.0
     #: By the barometer on the height of its take-off, and not moving, since, monotonic s.
     at_ground_since: float = math.nan
-    #: When it took off.
-    airborne_since: float = math.nan
-    #: The autopilot started anew since the take-off.
-    rebooted: bool = False
-    #: Restarts of the autopilot that had been counted on the ground.
-    reboots_before: int = 0
-    #: Height when it was armed, m; 0: not seen.
-    armed_height: float = 0.0
-    #: Height when it was last seen to take off, m; NaN: not known.
-    took_off_height: float = math.nan
-    #: Degrees; where it took off.
-    home: tuple[float, float] | None = None
-    #: (link, device) that were released before the flight: they say nothing of what happens in it.
-    released_before: frozenset[tuple[str, str]] = frozenset()
-    #: "link device" of those that asked to block flight and have not released it -> why.
-    device_blocks: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    #: It was said that no more of them are remembered.
-    block_refused: bool = False
-    #: `safety/arm` has armed the parachutes: after the flight they are disarmed again.
-    armed_by_us: bool = False
     #: Nothing has moved since, whatever the autopilot says of being in the air, monotonic s.
     still_since: float = math.nan
     #: Why the vehicle must not fly, as last raised as an alarm in flight.
     faults_told: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Own:
+    """What concerns this supervisor alone."""
+
+    #: It holds the lease: what it decides is sent. One that follows only looks on.
+    leading: bool = True
+    updated_at: float = math.nan
+    #: Updates that came later than their deadline allows.
+    late_count: int = 0
+    #: Until then time alone changes nothing of what is known of the vehicle, monotonic s;
+    #: -infinity: nobody has looked.
+    vehicle_rests_until: float = -math.inf
     #: Who waits for the outcome.
     kill_tokens: tuple[int, ...] = ()
     deploy_tokens: tuple[int, ...] = ()
-    alarms: tuple[str, ...] = ()
-    #: When the alarm that does not stop is said next.
-    alarm_at: float = math.nan
-    #: A canopy is out, does not carry, and no other parachute is left: the alarm does not stop.
-    canopy_fails: bool = False
+
+
+@dataclass(frozen=True)
+class State:
+    """The supervisor's memory. Times are monotonic s; NaN: has not happened. Those that
+    follow share all but heard and own."""
+
+    epoch: int
+    started_at: Time
+    stage: Stage = Stage.STARTUP
+    stage_since: Time = math.nan
+    mode: Mode = Mode.ACTIVE
+    next_id: int = 1
+    #: What was decided last, also where that was only said.
+    newest: Decision | None = None
+    rules: Mapping[str, RuleEvidence] = field(default_factory=lambda: MappingProxyType({}))
+    #: "link device" -> its newest wish for a kill.
+    asks: Mapping[str, Ask] = field(default_factory=lambda: MappingProxyType({}))
+    block: Pending | None = None
+    #: "link device" of those that asked to block flight and have not released it -> why.
+    device_blocks: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    #: It was said that no more of them are remembered.
+    block_refused: bool = False
+    killing: Killing = field(default=Killing(), metadata=INLINE)
+    deploying: DeployUnderWay = field(default=DeployUnderWay(), metadata=INLINE)
+    flight: ThisFlight = field(default=ThisFlight(), metadata=INLINE)
+    alarming: Alarms = field(default=Alarms(), metadata=INLINE)
+    heard: HeardHere = field(default=HeardHere(), metadata=INLINE)
+    own: Own = field(default=Own(), metadata=INLINE)
 
     @property
     def flight_blocked(self) -> bool:
@@ -233,19 +285,19 @@ class State:
     @property
     def deploy(self) -> Pending | None:
         """The newest step of the ladder."""
-        return self.deploys[-1] if self.deploys else None
+        return self.deploying.deploys[-1] if self.deploying.deploys else None
 
     def ladder(self, config: SupervisorConfig) -> tuple[Rung, ...]:
         """The steps of the deploy, without those whose parachutes were out when it was ordered."""
-        return self.deploy_ladder or config.ladder
+        return self.deploying.deploy_ladder or config.ladder
 
     def measured(self, name: str) -> Measured:
         """What is known of a measurement."""
-        return self.measurements.get(name, _NEVER_MEASURED)
+        return self.heard.measurements.get(name, _NEVER_MEASURED)
 
     def evidence(self, link: str) -> LinkEvidence:
         """What is known of a link."""
-        return self.links.get(link, _NEVER_HEARD)
+        return self.heard.links.get(link, _NEVER_HEARD)
 
     def links_heard(self, config: SupervisorConfig, now: float) -> int:
         """How many links have a node that is not silent; the vehicle counts as one more."""
@@ -253,11 +305,11 @@ class State:
             not self.evidence(link).silent(config.limits(link).lost_after, now)
             for link in config.links
         ]
-        return sum(links) + (now - self.vehicle_received <= config.vehicle_state_age)
+        return sum(links) + (now - self.heard.vehicle_received <= config.vehicle_state_age)
 
     def newest_heartbeat(self) -> float:
         """When any link was last heard, monotonic s; NaN: none ever was."""
-        heard = (one.heard for one in self.links.values())
+        heard = (one.heard for one in self.heard.links.values())
         return max((one for one in heard if not math.isnan(one)), default=math.nan)
 
     def rule(self, name: str) -> RuleEvidence:
@@ -276,7 +328,7 @@ class State:
         """Those that were not before the flight, on links that are heard."""
         return frozenset(
             (link, device)
-            for link, device in self.released(config) - self.released_before
+            for link, device in self.released(config) - self.flight.released_before
             if self.evidence(link).is_heard(config.limits(link), now)
             or now < self.evidence(link).released_at + config.limits(link).lost_after
         )

@@ -12,12 +12,13 @@ from collections.abc import Hashable
 
 from chute_ros.model import Action
 from chute_ros.supervisor import flight
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
-from chute_ros.supervisor.rules import MeasurementCondition, Rule
+from chute_ros.supervisor.measured import JUMP_DOUBTED, REJECTION_DOUBTED
+from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import ASK_LASTS, Pending, State
 
 #: Fields that do not decide: texts, counts for people, what only times a repetition, and what is
@@ -72,7 +73,7 @@ _LONG_AGO = 1e9
 
 def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
     """Equal for two states that decide the same from now on."""
-    slots = (state.block, state.kill, *state.deploys)
+    slots = (state.block, state.killing.kill, *state.deploying.deploys)
     grace = max(config.limits(link).startup_grace for link in config.links)
     return (
         state.stage,
@@ -89,29 +90,35 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         tuple(_pending(config, state, pending, now) for pending in slots),
         # Which was decided after which.
         tuple(sorted(range(len(slots)), key=lambda n: _number(slots[n]))),
-        bool(state.deploy_rule),
-        round(state.deploy_due - now, 3) if state.deploy_due > now else 0.0,
-        tuple((rung.link, rung.device) for rung in state.deploy_ladder),
-        (state.flown, state.airborne, state.killed_in_flight, state.rebooted),
-        state.was_high or _since(state.airborne_since, now, flight.HIGH_AFTER),
+        bool(state.deploying.deploy_rule),
+        round(state.deploying.deploy_due - now, 3) if state.deploying.deploy_due > now else 0.0,
+        tuple((rung.link, rung.device) for rung in state.deploying.deploy_ladder),
+        (state.flight.flown, state.flight.airborne, state.flight.rebooted),
+        state.killing.killed_in_flight,
+        state.flight.was_high or _since(state.flight.airborne_since, now, flight.HIGH_AFTER),
         # No story here lasts as long as a landing counts.
-        math.isnan(state.landed_at),
-        state.reboots_before,
-        state.killed_standing,
+        math.isnan(state.flight.landed_at),
+        state.flight.reboots_before,
+        state.killing.killed_standing,
         _left(flight.height_since_kill(config, state, now), config.profile.minimum_height),
-        _known(state.killed_sinking),
+        _known(state.killing.killed_sinking),
         _until(flight.low_at(config, state, True, now), now),
-        state.deploy_rule == OPERATOR,
-        bool(state.deploys) and state.deploys[0].decision.rule == OPERATOR,
-        _since(state.down_since, now, flight.down_after_kill_at(config, state) - state.down_since),
-        round(state.armed_height, 3),
-        _known(state.took_off_height),
-        tuple(sorted(state.released_before)),
+        state.deploying.deploy_rule == OPERATOR,
+        bool(state.deploying.deploys) and state.deploying.deploys[0].decision.rule == OPERATOR,
+        _since(
+            state.flight.down_since,
+            now,
+            flight.down_after_kill_at(config, state) - state.flight.down_since,
+        ),
+        round(state.flight.armed_height, 3),
+        _known(state.flight.took_off_height),
+        tuple(sorted(state.flight.released_before)),
         tuple(sorted(state.device_blocks)),
-        (len(state.kill_tokens) > 0, len(state.deploy_tokens) > 0),
-        (bool(state.alarms), math.isnan(state.alarm_at), state.canopy_fails, state.kill_only),
-        round(state.up_for, 3),
-        _since(state.still_since, now, flight.STILL_FOR),
+        (len(state.own.kill_tokens) > 0, len(state.own.deploy_tokens) > 0),
+        (bool(state.alarming.alarms), math.isnan(state.alarming.alarm_at)),
+        (state.alarming.canopy_fails, state.killing.kill_only),
+        round(state.flight.up_for, 3),
+        _since(state.heard.still_since, now, flight.STILL_FOR),
     )
 
 
@@ -140,7 +147,7 @@ def _since(when: float, now: float, limit: float) -> float:
 def _stage_since(config: SupervisorConfig, state: State, now: float) -> float:
     if state.stage is Stage.FAULT:
         return _since(state.stage_since, now, config.deploy_timeout)
-    waited_for = state.stage is Stage.DEPLOYED and state.deploy_tokens
+    waited_for = state.stage is Stage.DEPLOYED and state.own.deploy_tokens
     return _since(state.stage_since, now, config.report_wait) if waited_for else 0.0
 
 
@@ -158,15 +165,15 @@ def _link(config: SupervisorConfig, state: State, link: str, now: float) -> Hash
 
 
 def _vehicle(config: SupervisorConfig, state: State, now: float) -> Hashable:
-    vehicle = state.vehicle
+    vehicle = state.heard.vehicle
     return (
-        _since(state.vehicle_received, now, config.vehicle_state_age),
+        _since(state.heard.vehicle_received, now, config.vehicle_state_age),
         vehicle.armed,
         vehicle.landed_state,
         vehicle.link_state,
         vehicle.system_status,
         vehicle.reboot_count,
-        state.disputed,
+        state.heard.disputed,
     )
 
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.state import State
 
 _EPSILON = 1e-6
@@ -140,7 +139,7 @@ class Properties:
     ) -> bool:
         said = any(isinstance(o, i.ParachuteReport) and not o.status.deployed for o in inputs)
         ordered = bool(memory.deploy_numbers)
-        return said and not ordered and before.airborne and after.stage is Stage.IN_FLIGHT
+        return said and not ordered and before.flight.airborne and after.stage is Stage.IN_FLIGHT
 
     def _expect(self, name: str, holds: bool, what: str) -> None:
         self.exercised[name] += 1
@@ -161,7 +160,7 @@ class Properties:
         """Who was not heard as it was killed may tell its height in the second after it."""
         if not now <= memory.first_killed_at + 1.0 or math.isnan(memory.kill_height):
             return memory
-        told = after.vehicle
+        told = after.heard.vehicle
         if not told.height > memory.kill_height:
             return memory
         return replace(
@@ -175,13 +174,13 @@ class Properties:
         inputs: tuple[i.Input, ...],
         outputs: tuple[i.Output, ...],
     ) -> None:
-        waiting = [*before.kill_tokens, *before.deploy_tokens]
+        waiting = [*before.own.kill_tokens, *before.own.deploy_tokens]
         waiting += [token for one in inputs if (token := getattr(one, "token", 0))]
         for output in outputs:
             if isinstance(output, i.Finish):
                 self._expect("one answer", output.token in waiting, f"request {output.token}")
                 waiting.remove(output.token)
-        left = [*after.kill_tokens, *after.deploy_tokens]
+        left = [*after.own.kill_tokens, *after.own.deploy_tokens]
         self._expect("one answer", set(left) <= set(waiting), f"{left} wait of {waiting}")
 
     def _orders(
@@ -194,30 +193,31 @@ class Properties:
     ) -> None:
         """A rule wants a deploy: it was ordered in this update, or in SHADOW said."""
         rules = {rule.name for rule in self.config.profile.rules}
-        ordered = after.deploy_rule in rules and before.deploy_rule != after.deploy_rule
+        rule = after.deploying.deploy_rule
+        ordered = rule in rules and before.deploying.deploy_rule != rule
         said = any(
             output.decision.action is Action.DEPLOY and output.decision.rule in rules
             for output in outputs
             if isinstance(output, i.Decide) and output.decision.shadow
         )
         # Motors that were off before the kill are not its effect.
-        killed = before.stage is Stage.KILLING and before.killed_in_flight
+        killed = before.stage is Stage.KILLING and before.killing.killed_in_flight
         killed = killed and not memory.kill_standing
         stands = self._stands(after, now) and not killed
         falls = self._sign_of_a_fall(after, now)
         if ordered or said:
-            told = f"rule {after.deploy_rule!r} from {before.stage.name}"
+            told = f"rule {after.deploying.deploy_rule!r} from {before.stage.name}"
             # One that has just taken off is told to be in the air in this very update.
             ground = before.stage in ON_GROUND and not self._says_in_air(after)
             self._expect("ground", not ground and not stands, told)
             aloft = memory.height_left(now) + _EPSILON >= self.config.profile.minimum_height
-            kill = before.kill
+            kill = before.killing.kill
             stopped = before.stage is Stage.KILLING and kill is not None and kill.confirmed
-            stopped |= after.kill is not None and after.kill.confirmed
+            stopped |= after.killing.kill is not None and after.killing.kill.confirmed
             self._expect("silence", falls or aloft or (stopped and killed), told)
         elif stands and falls:
             self.exercised["ground"] += 1
-        elif before.airborne and not falls and now - after.vehicle_received > 1.0:
+        elif before.flight.airborne and not falls and now - after.heard.vehicle_received > 1.0:
             self.exercised["silence"] += 1
 
     def _at_once(
@@ -286,10 +286,10 @@ class Properties:
             and decision.rule == known.rule
             and decision.reasons[: len(known.reasons)] == known.reasons
         )
-        if again or before.deploy_rule:
+        if again or before.deploying.deploy_rule:
             # The delay goes on counting from the first.
             return replace(memory, kill_numbers=memory.kill_numbers | {number})
-        told, stands = after.vehicle, self._stands(after, now)
+        told, stands = after.heard.vehicle, self._stands(after, now)
         new = Memory(
             decision,
             now,
@@ -307,7 +307,7 @@ class Properties:
         return replace(
             new,
             kill_standing=stands,
-            kill_height=told.height if after.airborne and not stands else math.nan,
+            kill_height=told.height if after.flight.airborne and not stands else math.nan,
             kill_sinking=max(-told.vertical_speed, 0.0),
             first_killed_at=now,
         )
@@ -319,26 +319,28 @@ class Properties:
         sinking = 0.0 if math.isnan(speed) else max(-speed, 0.0)
         fallen = sinking * passed + 9.81 / 2.0 * passed**2
         lowest = min(height.value, height.before_jump)
-        return state.airborne and lowest - fallen < self.config.profile.low_height + _EPSILON
+        low = self.config.profile.low_height + _EPSILON
+        return state.flight.airborne and lowest - fallen < low
 
     def _stands(self, state: State, now: float) -> bool:
         """What was told last says that it stands or is disarmed, and no number contradicts."""
-        told = state.vehicle
-        if not now - state.vehicle_received <= self.config.vehicle_state_age:
+        told = state.heard.vehicle
+        if not now - state.heard.vehicle_received <= self.config.vehicle_state_age:
             return False
         moves = abs(told.vertical_speed) > self.config.profile.moving_speed
         moves = moves or told.acceleration < 4.9
         # An autopilot that started anew in the air says disarmed, whatever the motors do.
-        off = told.armed is Armed.DISARMED and not (state.airborne and state.rebooted)
+        rebooted = state.flight.airborne and state.flight.rebooted
+        off = told.armed is Armed.DISARMED and not rebooted
         down = told.landed_state is LandedState.ON_GROUND or off
         return down and not moves
 
     def _says_in_air(self, state: State) -> bool:
-        return state.vehicle.landed_state is LandedState.IN_AIR
+        return state.heard.vehicle.landed_state is LandedState.IN_AIR
 
     def _sign_of_a_fall(self, state: State, now: float) -> bool:
-        told = state.vehicle
-        if not now - state.vehicle_received <= 1.0 + _EPSILON:
+        told = state.heard.vehicle
+        if not now - state.heard.vehicle_received <= 1.0 + _EPSILON:
             return False
         signs = (
             told.tilt > math.radians(45.0),

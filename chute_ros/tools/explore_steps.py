@@ -215,7 +215,7 @@ def _parachute(link: str, deployed: bool) -> Make:
 
 def _report(what: str, outcome: Outcome, link: str = "", newer: int = 0) -> Make:
     def make(state: State, _now: float, _number: int) -> tuple[i.Input, ...] | None:
-        pending: Pending | None = state.kill if what == "kill" else state.deploy
+        pending: Pending | None = state.killing.kill if what == "kill" else state.deploy
         # Of what was only said nobody reports anything.
         if pending is None or pending.decision.action is Action.NONE:
             return None

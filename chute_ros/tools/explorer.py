@@ -16,6 +16,7 @@ from pathlib import Path
 from chute_ros.supervisor import core
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 from chute_ros.tools.explore_key import canonical
 from chute_ros.tools.explore_properties import PROPERTIES, Memory, Properties, ViolationError
 from chute_ros.tools.explore_steps import (
@@ -136,7 +137,7 @@ class Explorer:
                 now = end
             elif step.silent:
                 # The node wakes at every deadline; here it is as late as it may be.
-                wake = core.next_deadline(self.config, state, now)
+                wake = next_deadline(self.config, state, now)
                 now = min(max(wake, now + TICK_OF_MANY), end)
             else:
                 now = min(now + TICK_OF_MANY, end)

@@ -59,7 +59,7 @@ class FlightStory:
 
     decisions: list[Decided] = field(default_factory=list)
     requests: list[Asked] = field(default_factory=list)
-    said: list[tuple[float, i.Say]] = field(default_factory=list)
+    said: list[tuple[float, i.LogMessage]] = field(default_factory=list)
 
     @property
     def alarms(self) -> list[tuple[float, str]]:
@@ -128,7 +128,7 @@ def tell(recording: Recording) -> FlightStory:
                 answered = waiting.pop(output.token, None)
                 if answered is not None:
                     answered.answer = (at - answered.at, output)
-            elif isinstance(output, i.Say):
+            elif isinstance(output, i.LogMessage):
                 story.said.append((at, output))
     story.decisions += sorted(decided.values(), key=lambda one: one.at)
     return story

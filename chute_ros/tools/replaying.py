@@ -142,7 +142,7 @@ def told(output: i.Output | None) -> str:
             f"{decision.action.name}{shadow}{again} {decision.epoch}.{decision.id} by "
             f"'{decision.rule}' to {targets}"
         )
-    if isinstance(output, i.Say):
+    if isinstance(output, i.LogMessage):
         return f"{'alarm' if output.alarm else 'log'}: {output.text}"
     return CODEC.to_json(output)
 
@@ -156,7 +156,7 @@ def require_replayable(recorded: Iterable[RecordedTurn]) -> None:
 def _counts(output: i.Output | None) -> bool:
     if isinstance(output, i.Decide):
         return not output.again
-    return isinstance(output, i.Say) and output.alarm
+    return isinstance(output, i.LogMessage) and output.alarm
 
 
 def _essence(output: i.Output | None) -> object:

@@ -17,7 +17,7 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.state_drawing import drawing
 
 _State = TypeVar("_State", bound=enum.Enum)
-_Stimulus = TypeVar("_Stimulus", bound=enum.Enum)
+_Event = TypeVar("_Event", bound=enum.Enum)
 TEXT, PICTURE = Path("docs/reference/states.md"), Path("docs/reference/states.svg")
 #: Stages that are meant never to be left, or never to be reached from STARTUP: none is.
 MAY_BE_FINAL: frozenset[Stage] = frozenset()
@@ -27,7 +27,7 @@ _HEAD = """\
 # States
 
 Written by `make docs` from the tables in `chute_ros/supervisor/machine.py` and
-`chute_ros/supervisor/lease.py`. A pair of state and stimulus that a table does not list is an
+`chute_ros/supervisor/lease.py`. A pair of state and event that a table does not list is an
 error of the program: it raises `TransitionError`.
 
 ## The vehicle
@@ -48,8 +48,8 @@ def states_text() -> str:
     parts = [
         _HEAD,
         _mermaid(machine.TRANSITIONS, first=Stage.STARTUP.name),
-        _table(machine.Stage, machine.Stimulus, machine.TRANSITIONS),
-        _meanings(machine.Stimulus, "stimulus"),
+        _table(machine.Stage, machine.Event, machine.TRANSITIONS),
+        _meanings(machine.Event, "event"),
         _LEASE,
         _mermaid(lease.TRANSITIONS),
         _table(lease.Role, lease.Event, lease.TRANSITIONS),
@@ -58,7 +58,7 @@ def states_text() -> str:
     return "\n".join(parts)
 
 
-def unreached(transitions: Mapping[tuple[Stage, machine.Stimulus], Stage]) -> set[Stage]:
+def unreached(transitions: Mapping[tuple[Stage, machine.Event], Stage]) -> set[Stage]:
     """The stages to which nothing leads from STARTUP."""
     reached, new = {Stage.STARTUP}, {Stage.STARTUP}
     while new:
@@ -67,7 +67,7 @@ def unreached(transitions: Mapping[tuple[Stage, machine.Stimulus], Stage]) -> se
     return set(Stage) - reached
 
 
-def never_left(transitions: Mapping[tuple[Stage, machine.Stimulus], Stage]) -> set[Stage]:
+def never_left(transitions: Mapping[tuple[Stage, machine.Event], Stage]) -> set[Stage]:
     """The stages from which nothing leads to another."""
     return set(Stage) - {before for (before, _), after in transitions.items() if after != before}
 
@@ -86,34 +86,34 @@ def main() -> None:
             path.write_text(text)
 
 
-def _mermaid(transitions: Mapping[tuple[_State, _Stimulus], _State], first: str = "") -> str:
+def _mermaid(transitions: Mapping[tuple[_State, _Event], _State], first: str = "") -> str:
     lines = ["```mermaid", "stateDiagram-v2"]
     lines += [f"    [*] --> {first}"] if first else []
     lines += [
-        f"    {before.name} --> {after.name}: {stimulus.name}"
-        for (before, stimulus), after in transitions.items()
+        f"    {before.name} --> {after.name}: {event.name}"
+        for (before, event), after in transitions.items()
     ]
     return "\n".join([*lines, "```", ""])
 
 
 def _table(
     states: type[_State],
-    stimuli: type[_Stimulus],
-    transitions: Mapping[tuple[_State, _Stimulus], _State],
+    events: type[_Event],
+    transitions: Mapping[tuple[_State, _Event], _State],
 ) -> str:
-    """One row a stimulus, one column a state; a dash: the pair is not listed."""
+    """One row an event, one column a state; a dash: the pair is not listed."""
     names = [state.name for state in states]
     lines = [f"| | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
-    for stimulus in stimuli:
-        after = [transitions.get((state, stimulus)) for state in states]
+    for event in events:
+        after = [transitions.get((state, event)) for state in states]
         cells = [one.name if one is not None else "-" for one in after]
-        lines.append(f"| {stimulus.name} | {' | '.join(cells)} |")
+        lines.append(f"| {event.name} | {' | '.join(cells)} |")
     return "\n".join([*lines, ""])
 
 
-def _meanings(stimuli: type[_Stimulus], what: str) -> str:
+def _meanings(events: type[_Event], what: str) -> str:
     lines = [f"| {what} | meaning |", "|---|---|"]
-    lines += [f"| {one.name} | {one.value} |" for one in stimuli]
+    lines += [f"| {one.name} | {one.value} |" for one in events]
     return "\n".join([*lines, ""])
 
 

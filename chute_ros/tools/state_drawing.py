@@ -10,8 +10,7 @@ import itertools
 import math
 from xml.sax.saxutils import escape
 
-from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus
-from chute_ros.supervisor.orders import ON_GROUND
+from chute_ros.supervisor.machine import ON_GROUND, TRANSITIONS, Event, Stage
 
 Point = tuple[float, float]
 
@@ -81,12 +80,12 @@ def drawing() -> str:
     parts += [_arrow(_frame_path(after), names) for after, names in common.items()]
     inside: dict[Stage, list[str]] = {}
     between: dict[tuple[Stage, Stage], list[str]] = {}
-    for (before, stimulus), after in TRANSITIONS.items():
-        if stimulus is Stimulus.RESET or before is after:
+    for (before, event), after in TRANSITIONS.items():
+        if event is Event.RESET or before is after:
             where = "stays" if before is after else f"to {after.name}"
-            inside.setdefault(before, []).append(f"{stimulus.name}: {where}")
-        elif not (before in ON_GROUND and stimulus.name in common.get(after, [])):
-            between.setdefault((before, after), []).append(stimulus.name)
+            inside.setdefault(before, []).append(f"{event.name}: {where}")
+        elif not (before in ON_GROUND and event.name in common.get(after, [])):
+            between.setdefault((before, after), []).append(event.name)
     for (before, after), names in between.items():
         # Of two that run side by side each has its label near its beginning.
         beside, along = (_APART / 2, 0.3) if (after, before) in between else (0.0, 0.5)
@@ -98,11 +97,11 @@ def drawing() -> str:
 def _common() -> dict[Stage, list[str]]:
     """Stage -> the stimuli that lead there from every stage on the ground."""
     found: dict[Stage, list[str]] = {}
-    for stimulus in Stimulus:
-        afters = {TRANSITIONS.get((stage, stimulus)) for stage in ON_GROUND}
+    for event in Event:
+        afters = {TRANSITIONS.get((stage, event)) for stage in ON_GROUND}
         after = afters.pop()
         if not afters and after is not None:
-            found.setdefault(after, []).append(stimulus.name)
+            found.setdefault(after, []).append(event.name)
     return found
 
 

@@ -16,7 +16,8 @@ from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
 from chute_ros.supervisor.handover import followed, told
 from chute_ros.supervisor.lease import Claim
 from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
+from chute_ros.supervisor.wakes import next_deadline
 from chute_ros.tools.explore_steps import LINKS, Step, configuration, steps
 from chute_ros.tools.explorer import BEGINNINGS, Explorer
 from fuzz.plain_json import NOW, changed
@@ -101,7 +102,7 @@ class Follower:
     what its program makes of a good one, by its first byte."""
 
     def __init__(self) -> None:
-        self._state = State(7, NOW, leading=False)
+        self._state = State(7, NOW, own=Own(leading=False))
         self._now = NOW
         self._number = 0
 
@@ -158,7 +159,7 @@ class Follower:
             raise WrongError(f"at {self._now!r} it wants to be woken at {self._deadline()!r}")
 
     def _deadline(self) -> float:
-        return core.next_deadline(_config(), self._state, self._now)
+        return next_deadline(_config(), self._state, self._now)
 
     def _wake_often(self) -> None:
         """At each of its deadlines, of which there are not many at once."""

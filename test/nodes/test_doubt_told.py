@@ -14,8 +14,8 @@ from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.state import HeardHere, State
 
 NOW = 100.0
 CONFIG = config_from({parameter.name: parameter.default for parameter in PARAMETERS})
@@ -29,11 +29,13 @@ def known(**doubts: float) -> State:
     return State(
         epoch=1,
         started_at=0.0,
-        links=MappingProxyType(dict.fromkeys(CONFIG.links, WELL)),
         stage=Stage.IN_FLIGHT,
-        vehicle=VehicleState(link_state=LinkState.OK, armed=Armed.ARMED, armed_age=0.0),
-        vehicle_received=NOW,
-        measurements=told,
+        heard=HeardHere(
+            links=MappingProxyType(dict.fromkeys(CONFIG.links, WELL)),
+            vehicle=VehicleState(link_state=LinkState.OK, armed=Armed.ARMED, armed_age=0.0),
+            vehicle_received=NOW,
+            measurements=told,
+        ),
     )
 
 
@@ -49,7 +51,7 @@ def test_a_measurement_in_doubt_says_why_beside_its_value() -> None:
 
 
 def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() -> None:
-    state = replace(known(), disputed=frozenset({"attitude"}))
+    state = replace(known(), heard=replace(known().heard, disputed=frozenset({"attitude"})))
     task = decisions_task("safety_supervisor", CONFIG, state, NOW)
     assert task.level == DiagnosticStatus.WARN
     text = "IN_FLIGHT: attitude in doubt, as the vehicle's sources contradict each other"

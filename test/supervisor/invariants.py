@@ -9,13 +9,14 @@ from dataclasses import replace
 from story import LINK, START
 
 from chute_ros.model import Action, Armed, LandedState, Outcome, VehicleState
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.rules import BelowMinimum
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 #: A reason that begins so tells only of silence, or of how far the deploy has got.
@@ -58,10 +59,10 @@ class Watch:
 
     def _looks_at_all_that_changes(self, before: State, inputs: tuple[i.Input, ...]) -> None:
         """A rule that is not looked at, as nothing has changed, would be what it was."""
-        looked_at = replace(before, vehicle_rests_until=-math.inf)
+        looked_at = replace(before, own=replace(before.own, vehicle_rests_until=-math.inf))
         state, outputs = update(self.config, looked_at, inputs, self.now)
-        until = state.vehicle_rests_until
-        same = replace(self.state, vehicle_rests_until=until)
+        until = state.own.vehicle_rests_until
+        same = replace(self.state, own=replace(self.state.own, vehicle_rests_until=until))
         assert (repr(same), repr(outputs)) == (repr(state), repr(self.outputs))
 
     def feed(self, *inputs: i.Input) -> tuple[i.Output, ...]:
@@ -85,12 +86,12 @@ class Watch:
         going_on = before.stage in (Stage.KILLING, Stage.DEPLOYING)
         if K in done and (math.isnan(self.killed_at) or not going_on):
             self.killed_at = self.now
-        ordered = self.state.deploy_rule and not before.deploy_rule
+        ordered = self.state.deploying.deploy_rule and not before.deploying.deploy_rule
         self._kill_first(before, done)
         self._confirmed_is_not_told_again(before, inputs, done)
         self._released_stays_released(before, inputs, done)
         self._no_delay(before, inputs, done)
-        if ordered and self.state.deploy_rule != "operator":
+        if ordered and self.state.deploying.deploy_rule != "operator":
             self._rule_may_deploy(before)
         return self.outputs
 
@@ -105,13 +106,13 @@ class Watch:
             assert not math.isnan(self.killed_at), "a deploy without a kill before it"
             if K in done and before.stage is not Stage.DEPLOYING:
                 assert done.index(K) < done.index(D)
-            kill = self.state.kill
+            kill = self.state.killing.kill
             assert kill is not None
             waited = self.now - self.killed_at + 1e-9
             delays = [self.config.kill_to_deploy_delay]
             delays += [self.config.low_kill_to_deploy_delay] if self._may_be_low() else []
             # One that had left before a kill was repeated has waited for the first.
-            left = before.stage is Stage.DEPLOYING and bool(before.deploys)
+            left = before.stage is Stage.DEPLOYING and bool(before.deploying.deploys)
             assert left or kill.confirmed or waited >= min(delays)
 
     def _may_be_low(self) -> bool:
@@ -120,7 +121,7 @@ class Watch:
         sinking = 0.0 if math.isnan(speed) else max(-speed, 0.0)
         lowest = min(height.value, height.before_jump)
         left = lowest - sinking * passed - 9.81 / 2.0 * passed**2
-        return self.state.airborne and left < self.config.profile.low_height + 1e-6
+        return self.state.flight.airborne and left < self.config.profile.low_height + 1e-6
 
     def _confirmed_is_not_told_again(
         self, before: State, inputs: Sequence[i.Input], done: list[Action]
@@ -129,9 +130,9 @@ class Watch:
         if any(isinstance(one, (i.ResetRequest, i.ModeRequest)) for one in inputs):
             return
         # A report is judged before what follows it; what confirmed is out from then on.
-        confirmed = any(deploy.confirmed for deploy in before.deploys)
+        confirmed = any(deploy.confirmed for deploy in before.deploying.deploys)
         assert not (confirmed and D in done), "told again although one has confirmed"
-        after = any(deploy.confirmed for deploy in self.state.deploys)
+        after = any(deploy.confirmed for deploy in self.state.deploying.deploys)
         assert not (after and D in done), "told in the update that heard the confirmation"
 
     def _released_stays_released(
@@ -142,7 +143,7 @@ class Watch:
         insists = any(isinstance(one, i.DeployRequest) and one.force for one in inputs)
         reset = any(isinstance(one, i.ResetRequest) for one in inputs)
         told = [one.status for one in inputs if isinstance(one, i.ParachuteReport)]
-        takes_back = not before.deploys and any(not status.deployed for status in told)
+        takes_back = not before.deploying.deploys and any(not status.deployed for status in told)
         rules = [one for one in self.config.profile.rules if Stage.DEPLOYED in one.states]
         fails = any(one.action is D and self.state.rule(one.name).latched for one in rules)
         if before.stage is Stage.DEPLOYED and not (reset or insists or takes_back or fails):
@@ -152,11 +153,15 @@ class Watch:
     def _no_delay(self, before: State, inputs: Sequence[i.Input], done: list[Action]) -> None:
         """What is fulfilled in flight kills within this update; what is due leaves within it."""
         after = self.state
-        if after.mode is not i.Mode.ACTIVE or not after.leading:
+        if after.mode is not i.Mode.ACTIVE or not after.own.leading:
             return
-        if after.stage is Stage.KILLING and after.deploy_rule and after.kill is not None:
-            assert not after.kill.confirmed, "confirmed, and the deploy has not left"
-            assert self.now < after.deploy_due, "due, and the deploy has not left"
+        if (
+            after.stage is Stage.KILLING
+            and after.deploying.deploy_rule
+            and after.killing.kill is not None
+        ):
+            assert not after.killing.kill.confirmed, "confirmed, and the deploy has not left"
+            assert self.now < after.deploying.deploy_due, "due, and the deploy has not left"
         changed = any(isinstance(one, i.ModeRequest) for one in inputs)
         for rule in self.config.profile.rules:
             evidence = after.rule(rule.name)
@@ -171,30 +176,32 @@ class Watch:
     def _rule_may_deploy(self, before: State) -> None:
         """Not on silence alone, not on the ground, not disarmed, not too low."""
         state, now = self.state, self.now
-        told = state.deploy_reasons
+        told = state.deploying.deploy_reasons
         assert any(not reason.startswith(_SILENCE) for reason in told), "silence alone deploys"
         profile = self.config.profile
-        height = flight.measured(self.config, state, "height", now)
+        height = readings.measured(self.config, state, "height", now)
         if profile.below_minimum is not BelowMinimum.DEPLOY:
             assert not height < profile.minimum_height, "below the minimum height"
-        assert before.airborne or state.airborne, "a rule deploys what is not in flight"
-        if before.stage is Stage.KILLING and before.killed_in_flight:
+        assert before.flight.airborne or state.flight.airborne, (
+            "a rule deploys what is not in flight"
+        )
+        if before.stage is Stage.KILLING and before.killing.killed_in_flight:
             return  # our own kill has switched the motors off
         if self.now - self.moved_at <= _MOVED_LATELY:
             return  # what says otherwise is contradicted
-        vehicle = state.vehicle
-        silence = now - state.vehicle_received
+        vehicle = state.heard.vehicle
+        silence = now - state.heard.vehicle_received
         limit = self.config.vehicle_state_age - 1e-9
         landed_is_fresh = max(vehicle.landed_state_age, 0.0) + silence < limit
         if landed_is_fresh:
             assert vehicle.landed_state is not LandedState.ON_GROUND, "deployed on the ground"
-        if max(vehicle.armed_age, 0.0) + silence < limit and not state.rebooted:
+        if max(vehicle.armed_age, 0.0) + silence < limit and not state.flight.rebooted:
             assert vehicle.armed is not Armed.DISARMED, "deployed although disarmed"
 
 
 def reports_of(watch: Watch, action: Action, outcome: Outcome, link: str = LINK) -> list[i.Input]:
     """What a node reports on the newest decision of this action, if there is one."""
-    pending = watch.state.kill if action is K else watch.state.deploy
+    pending = watch.state.killing.kill if action is K else watch.state.deploy
     if pending is None:
         return []
     number = pending.decision.epoch, pending.decision.id

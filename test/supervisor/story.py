@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,17 @@ from chute_ros.model import (
     VehicleState,
 )
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.codec import INLINE
+from chute_ros.supervisor.conditions.base import Condition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import TRIGGER, SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import Turn
-from chute_ros.supervisor.rules import Condition, MeasurementCondition, Profile, Rule
+from chute_ros.supervisor.rules import Profile, Rule
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 LINK = "mavlink_parachute"
 START = 1000.0
@@ -75,6 +79,18 @@ _AGES = {
 #: A real sensor is never the same to the last bit; so much a told value wanders.
 _NOISE = 1e-9
 PROFILES = Path(__file__).parents[2] / "config" / "profiles"
+
+
+def changed(state: State, **known: Any) -> State:
+    """state with these fields changed, each in the group that it is in."""
+    for name, value in known.items():
+        if name in vars(state):
+            state = replace(state, **{name: value})
+        else:
+            groups = [one.name for one in fields(state) if one.metadata == INLINE]
+            group = next(one for one in groups if hasattr(getattr(state, one), name))
+            state = replace(state, **{group: replace(getattr(state, group), **{name: value})})
+    return state
 
 
 def vehicle(age: float = 0.0, **told: Any) -> i.VehicleReport:
@@ -229,7 +245,7 @@ class Story:
 
     def said(self) -> str:
         """All lines of the log."""
-        return "\n".join(o.text for _, o in self.outputs if isinstance(o, i.Say))
+        return "\n".join(o.text for _, o in self.outputs if isinstance(o, i.LogMessage))
 
     def ready(self) -> Story:
         """Links healthy, standing on the ground; the devices that the ladder names are there."""
@@ -290,4 +306,4 @@ class Story:
 
     def alarms(self) -> list[str]:
         """What was said as an alarm."""
-        return [o.text for _, o in self.outputs if isinstance(o, i.Say) and o.alarm]
+        return [o.text for _, o in self.outputs if isinstance(o, i.LogMessage) and o.alarm]

@@ -26,7 +26,7 @@ def falls_for(story: Story, seconds: float, autopilot: bool = True) -> Story:
             ages: dict[str, Any] = {"armed_age": since, "landed_state_age": since}
             state = replace(told.state, link_state=LinkState.LOST, **ages)
             told = i.VehicleReport(state)
-        kill = story.state.kill
+        kill = story.state.killing.kill
         killed = story.state.stage is Stage.KILLING and kill is not None and not kill.confirmed
         reports = [story.report(K, Outcome.CONFIRMED)] if killed else []
         story.at(story.t + 0.05, story.heartbeat(), told, *reports)

@@ -12,9 +12,9 @@ from story import LINK, START, Story, falling, parachute, rule, shipped, vehicle
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import MeasurementCondition
 
 K, D = Action.KILL, Action.DEPLOY
 TILT = rule(MeasurementCondition("tilt_deg", above=60.0), hold=0.3, samples=3)
@@ -255,7 +255,7 @@ def test_what_goes_wrong_again_and_again_does_not_grow_it() -> None:
         t += 0.25
         story.at(t, story.heartbeat(), i.KillRequest(0, "mavlink_parachute 1/161", "x"))
         story.at(t + 0.01, story.report(K, Outcome.FAILED, detail=f"no answer for {t:.2f} s"))
-    assert len(story.state.alarms) <= 16
+    assert len(story.state.alarming.alarms) <= 16
 
 
 def test_what_was_said_in_one_flight_is_said_in_the_next_as_well() -> None:

@@ -10,8 +10,8 @@ from story import LINK, STANDING, START, Story, parachute
 
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 UPF = "upf_can"
 GONE = "no parachute says any more that it is armed"

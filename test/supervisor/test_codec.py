@@ -24,7 +24,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import State, ThisFlight
 
 
 def there_and_back(value: object) -> object:
@@ -33,6 +33,21 @@ def there_and_back(value: object) -> object:
 
 def bits(value: float) -> bytes:
     return struct.pack("<d", value)
+
+
+def test_the_fields_of_a_group_stand_in_the_state_as_they_did_before_it_had_groups() -> None:
+    text = '{"is":"State","epoch":7,"started_at":0.0,"mode":1,"airborne":true}'
+    state = State(7, 0.0, mode=i.Mode.SHADOW, flight=ThisFlight(airborne=True))
+    assert CODEC.from_json(text) == state
+    assert CODEC.to_json(state) == text
+    with pytest.raises(RecordError, match="State has no flight: written by another version"):
+        CODEC.from_json('{"is":"State","epoch":7,"started_at":0.0,"flight":{}}')
+
+
+def test_a_line_for_the_log_is_read_under_its_former_name() -> None:
+    said = i.LogMessage("it falls", alarm=True)
+    assert CODEC.from_json('{"is":"Say","text":"it falls","alarm":true}') == said
+    assert CODEC.to_json(said) == '{"is":"LogMessage","text":"it falls","alarm":true}'
 
 
 def test_the_golden_lines() -> None:
@@ -82,9 +97,9 @@ def test_not_a_number_stays_so_where_it_is_not_the_default() -> None:
 
 @given(st.floats())
 def test_any_number_comes_back_as_it_was(value: float) -> None:
-    told = there_and_back(State(epoch=1, started_at=value, armed_height=value))
+    told = there_and_back(State(epoch=1, started_at=value, flight=ThisFlight(armed_height=value)))
     assert isinstance(told, State)
-    for one in (told.started_at, told.armed_height):
+    for one in (told.started_at, told.flight.armed_height):
         assert bits(one) == bits(value) or (math.isnan(one) and math.isnan(value))
 
 
@@ -111,7 +126,7 @@ def told_story() -> Story:
     story.at(2.0, story.report(Action.KILL, Outcome.CONFIRMED))
     story.at(2.1, story.report(Action.DEPLOY, Outcome.ACCEPTED))
     assert story.state.stage is Stage.DEPLOYING
-    assert story.state.home
+    assert story.state.flight.home
     return story
 
 
@@ -132,7 +147,7 @@ def test_a_whole_record_does_not_rest_on_defaults() -> None:
 
 def test_every_output_comes_back() -> None:
     outputs = [output for _, output in told_story().outputs]
-    assert {type(output).__name__ for output in outputs} >= {"Decide", "Say"}
+    assert {type(output).__name__ for output in outputs} >= {"Decide", "LogMessage"}
     for output in outputs:
         assert there_and_back(output) == output
 

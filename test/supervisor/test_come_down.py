@@ -11,8 +11,8 @@ from story import DOWN, START, Story, shipped
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 BOTH_AIRCRAFT = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
@@ -66,17 +66,17 @@ def test_it_has_come_down_for_good_once_it_has_stood_for_ten_seconds(
     stands: float, in_flight: bool
 ) -> None:
     story = killed().fly(4.0, **STANDS)
-    story.fly(round(story.state.down_since - START + stands, 2), **STANDS)
-    assert story.state.killed_in_flight is in_flight
-    assert story.state.airborne is in_flight
+    story.fly(round(story.state.flight.down_since - START + stands, 2), **STANDS)
+    assert story.state.killing.killed_in_flight is in_flight
+    assert story.state.flight.airborne is in_flight
     if not in_flight:
-        assert not math.isnan(story.state.landed_at)
+        assert not math.isnan(story.state.flight.landed_at)
 
 
 def test_the_core_wakes_by_itself_when_it_has_come_down_for_good() -> None:
     story = killed().fly(4.0, **STANDS)
     due = flight.down_after_kill_at(story.config, story.state)
-    assert due == story.state.down_since + 10.0
+    assert due == story.state.flight.down_since + 10.0
     story.fly(round(due - START - 0.06, 2), **STANDS)
     assert next_deadline(story.config, story.state, START + story.t) <= due
 
@@ -92,9 +92,12 @@ def test_one_that_falls_on_while_its_speed_is_not_told_for_a_moment_is_deployed(
 
 def test_one_that_a_deploy_follows_has_not_come_down_for_it() -> None:
     story = killed().fly(5.0, **STANDS)
-    story.state = replace(story.state, deploy_rule="falling", deploy_due=START + 100.0)
+    story.state = replace(
+        story.state,
+        deploying=replace(story.state.deploying, deploy_rule="falling", deploy_due=START + 100.0),
+    )
     story.fly(20.0, **STANDS)
-    assert story.state.killed_in_flight
+    assert story.state.killing.killed_in_flight
 
 
 def test_a_battery_plugged_in_a_minute_after_the_crash_deploys_nothing() -> None:

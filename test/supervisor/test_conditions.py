@@ -8,20 +8,14 @@ from told import Told, told
 
 from chute_ros.model import Armed, LinkState, ParachuteState, ParachuteStatus
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.base import Condition
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
-from chute_ros.supervisor.rules import (
-    ALL,
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    Condition,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    is_silence,
-)
+from chute_ros.supervisor.profile_lines import ALL, ANY
 
 TWO = SupervisorConfig((LINK, "upf_can"), deploy_links=(LINK, "upf_can"))
 
@@ -224,7 +218,7 @@ def test_a_device_that_is_abnormal_says_why() -> None:
     ],
 )
 def test_what_tells_only_that_somebody_is_not_heard(condition: Condition, silence: bool) -> None:
-    assert is_silence(condition) is silence
+    assert condition.is_silence is silence
 
 
 # -- k of n with weights -------------------------------------------------------------------------

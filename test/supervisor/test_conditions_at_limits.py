@@ -5,24 +5,20 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
+from story import changed
 from told import Told, told
 
 from chute_ros.model import LinkState, ParachuteState, ParachuteStatus, VehicleState
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
-from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.rules import (
-    ALL,
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    Profile,
-)
-from chute_ros.supervisor.state import ASK_LASTS, Ask, State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.profile_lines import ALL, ANY
+from chute_ros.supervisor.rules import Profile
+from chute_ros.supervisor.state import ASK_LASTS, Ask, HeardHere, State
 
 LINKS = ("a", "b")
 PATIENT = LinkLimits(stale_after=50.0, lost_after=100.0)
@@ -32,7 +28,7 @@ SILENT = (LinkJudgement.STALE, LinkJudgement.LOST)
 
 
 def state(**known: Any) -> State:
-    return State(epoch=7, started_at=0.0, **known)
+    return changed(State(epoch=7, started_at=0.0), **known)
 
 
 def links(**evidence: LinkEvidence) -> MappingProxyType[str, LinkEvidence]:
@@ -65,7 +61,7 @@ def test_each_link_is_judged_by_its_own_limits() -> None:
 
 
 def test_one_that_is_still_starting_does_not_hide_the_next() -> None:
-    known = State(epoch=7, started_at=NOW - 1.0, links=links(b=heard(5.0)))
+    known = State(epoch=7, started_at=NOW - 1.0, heard=HeardHere(links=links(b=heard(5.0))))
     found = told(CONFIG, known, LinkCondition(ANY, SILENT), NOW)
     assert found.holds is True
     assert found.text.startswith("link a is still starting, b is LOST")

@@ -10,7 +10,8 @@ from chute_ros.model import Action, Armed, VehicleState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.steps import Steps
+from chute_ros.supervisor.sending import fire
+from chute_ros.supervisor.turn import Turn
 
 
 @pytest.mark.parametrize(
@@ -65,14 +66,14 @@ def test_an_unknown_height_says_nothing() -> None:
 
 def test_a_deploy_does_not_leave_before_its_kill_whoever_asks() -> None:
     story = Story().flying()
-    steps = Steps(story.config, story.state, START)
-    steps.fire(Action.DEPLOY, "mistake", ())
-    assert steps.outputs == []
+    turn = Turn(story.config, story.state, START)
+    fire(turn, Action.DEPLOY, "mistake", ())
+    assert turn.outputs == []
 
 
 def test_nothing_fires_in_another_mode() -> None:
     story = Story(mode=i.Mode.INHIBITED).flying()
-    steps = Steps(story.config, story.state, START)
-    steps.fire(Action.KILL, "mistake", ())
-    assert steps.outputs == []
+    turn = Turn(story.config, story.state, START)
+    fire(turn, Action.KILL, "mistake", ())
+    assert turn.outputs == []
     assert LINK in story.config.kill_links

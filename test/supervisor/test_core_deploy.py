@@ -317,10 +317,10 @@ def test_a_new_number_for_a_missing_node_does_not_forget_what_the_other_said() -
     assert len(story.decisions(K)) == 2
     # What the other still says of the first number counts.
     story.at(1.4, i.ActionReport(7, first.id, LINK, Outcome.FAILED, "late", 7))
-    assert story.state.kill is not None
-    assert story.state.kill.confirmed
-    assert Outcome.FAILED in story.state.kill.of(LINK)
-    assert story.state.kill.unreported() == ("upf_can",)
+    assert story.state.killing.kill is not None
+    assert story.state.killing.kill.confirmed
+    assert Outcome.FAILED in story.state.killing.kill.of(LINK)
+    assert story.state.killing.kill.unreported() == ("upf_can",)
     # A number that was never ours does not.
     story.at(1.5, i.ActionReport(7, 99, "upf_can", Outcome.SENT, "?", 7))
-    assert story.state.kill.unreported() == ("upf_can",)
+    assert story.state.killing.kill.unreported() == ("upf_can",)

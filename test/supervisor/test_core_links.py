@@ -98,7 +98,7 @@ def test_a_link_that_is_not_required_does_not_block() -> None:
 def test_a_link_that_is_not_ours_is_not_followed() -> None:
     story = Story().ready()
     story.at(0.0, story.heartbeat("stranger"), parachute("stranger", "9", True, ()))
-    assert set(story.state.links) == {LINK}
+    assert set(story.state.heard.links) == {LINK}
 
 
 def test_a_restarted_node_hears_of_the_block_again() -> None:

@@ -4,13 +4,13 @@ import math
 from dataclasses import replace
 
 import pytest
-from story import FLYING, LINK, STANDING, START, Story, parachute
+from story import FLYING, LINK, STANDING, START, Story, changed, parachute
 
 from chute_ros.model import Action, Armed, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 TWO = SupervisorConfig(deploy_links=(LINK, "upf_can"))
@@ -327,7 +327,7 @@ def test_the_same_alarm_is_kept_once_and_said_each_time() -> None:
         story.at(t, story.heartbeat(healthy=False), i.VehicleReport(STANDING))
         story.at(t + 0.1, i.VehicleReport(FLYING))
     assert len(story.alarms()) == 2
-    assert len(story.state.alarms) == 1
+    assert len(story.state.alarming.alarms) == 1
 
 
 # -- parachutes that were out before --------------------------------------------------------------
@@ -420,7 +420,7 @@ def test_without_a_vehicle_state_the_refusal_says_that_nothing_is_known() -> Non
 
 def test_a_reset_without_a_vehicle_state_does_not_stop_a_deploy_on_its_way() -> None:
     story = falling()
-    story.state = type(story.state)(**{**vars(story.state), "vehicle_received": math.nan})
+    story.state = changed(story.state, vehicle_received=math.nan)
     story.at(1.1, i.ResetRequest(2))
     assert "a deploy is under way" in story.answer(2).message
     story.at(2.0)
@@ -446,7 +446,7 @@ def test_shadow_says_that_it_would_have_stopped_the_motors_under_an_open_canopy(
     story = Story(mode=i.Mode.SHADOW).flying()
     story.at(1.0, out())
     assert [d.shadow for d in story.decisions(K)] == [True]
-    assert story.state.kill is None
+    assert story.state.killing.kill is None
 
 
 def test_shadow_names_the_device_that_asked() -> None:

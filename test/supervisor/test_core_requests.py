@@ -131,7 +131,7 @@ def test_a_reset_on_the_ground_begins_again_and_answers_who_waits() -> None:
     story.at(1.2, i.ResetRequest(2))
     assert story.answer(1).message == "reset by a person"
     assert story.answer(2).success
-    assert story.state.kill is None
+    assert story.state.killing.kill is None
     story.at(1.3, story.heartbeat())
     assert story.state.stage is Stage.READY
 

@@ -14,6 +14,7 @@ from story import (
     STANDING,
     START,
     Story,
+    changed,
     parachute,
     rule,
     with_rules,
@@ -22,13 +23,14 @@ from story import (
 from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import DeviceCondition, DeviceFact, Profile
+from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import Ask, Pending, State
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 BLOCK, RELEASE = Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE
@@ -48,7 +50,14 @@ SETTINGS = SupervisorConfig(
     report_wait=0.5,
     resend_interval=0.1,
     vehicle_state_age=2.5,
-    profile=Profile("tested", (rule(SINKS, hold=1.0),), landed_hold=5.0),
+    profile=Profile(
+        "tested",
+        (
+            rule(SINKS, hold=1.0),
+            rule(DeviceCondition(DeviceFact.ASKS_FOR_KILL), action=K, name="asked"),
+        ),
+        landed_hold=5.0,
+    ),
 )
 
 
@@ -96,7 +105,7 @@ def heard(at: float, **parts: float) -> MappingProxyType[str, LinkEvidence]:
     ],
 )
 def test_it_wakes_when_the_first_time_is_over(known: dict[str, Any], wakes: float) -> None:
-    state = replace(QUIET, **known)
+    state = changed(QUIET, **known)
     assert next_deadline(SETTINGS, state, NOW) == pytest.approx(wakes, abs=1e-9)
 
 
@@ -105,7 +114,12 @@ def test_it_wakes_when_the_first_time_is_over(known: dict[str, Any], wakes: floa
 )
 def test_on_the_ground_it_wakes_when_the_vehicle_state_is_just_too_old(stage: Stage) -> None:
     vehicle = replace(STANDING, armed_age=0.5)
-    state = replace(QUIET, stage=stage, vehicle=vehicle, vehicle_received=NOW, started_at=-99.0)
+    state = replace(
+        QUIET,
+        stage=stage,
+        started_at=-99.0,
+        heard=replace(QUIET.heard, vehicle=vehicle, vehicle_received=NOW),
+    )
     wakes = next_deadline(SETTINGS, state, NOW)
     if stage is Stage.BLOCKED:
         assert math.isinf(wakes), "it is blocked already"
@@ -138,25 +152,25 @@ def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_i
     """The first deadline is at 0.5: until then a heartbeat is young."""
     story = counting()
     story._update((), 0.8125)
-    assert {link: one.heard for link, one in story.state.links.items()} == {
+    assert {link: one.heard for link, one in story.state.heard.links.items()} == {
         LINK: START + 0.3125,
         UPF: START + 0.3125,
     }
     assert story.state.rule("tested").level == pytest.approx(0.5)
-    assert story.state.late_count == 1
+    assert story.state.own.late_count == 1
     assert story.alarms() == [
         "an update came 0.31 s late (limit 0.25 s): silence meanwhile does not count"
     ]
     story._update((), 4.0)
-    assert story.state.late_count == 2
+    assert story.state.own.late_count == 2
 
 
 def test_one_that_is_as_late_as_allowed_is_not_late() -> None:
     story = counting()
     story._update((), 0.75)
-    assert {one.heard for one in story.state.links.values()} == {START}
+    assert {one.heard for one in story.state.heard.links.values()} == {START}
     assert story.state.rule("tested").level == pytest.approx(0.75)
-    assert (story.state.late_count, story.alarms()) == (0, [])
+    assert (story.state.own.late_count, story.alarms()) == (0, [])
 
 
 # -- one that follows ----------------------------------------------------------------------------
@@ -176,7 +190,7 @@ CALL_AGAIN = "another supervisor decides, call again"
 )
 def test_one_that_follows_refuses_what_people_ask_in_these_words(one: i.Input) -> None:
     story = Story().flying()
-    story.state = replace(story.state, leading=False)
+    story.state = replace(story.state, own=replace(story.state.own, leading=False))
     story.at(0.1, one)
     assert story.answers(5) == [i.Finish(5, False, False, f"refused: {CALL_AGAIN}")]
 
@@ -187,13 +201,13 @@ def test_who_waits_at_one_that_steps_down_is_told_why() -> None:
     story.at(0.2, i.StepDown("it was stopped"))
     text = f"{CALL_AGAIN}: it was stopped"
     assert story.answers(5) == [i.Finish(5, False, False, text)]
-    assert story.state.leading is False
+    assert story.state.own.leading is False
 
 
 def test_what_is_decided_anew_after_a_takeover_says_so() -> None:
     story = Story().flying()
     story.at(0.1, i.KillRequest(5, "operator", "stop"))
-    story.state = replace(story.state, leading=False)
+    story.state = replace(story.state, own=replace(story.state.own, leading=False))
     story.at(0.2, i.TakeOver(9))
     kill = story.newest(K)
     assert (kill.epoch, kill.reasons) == (9, ("operator: stop", "another supervisor took over"))
@@ -202,11 +216,11 @@ def test_what_is_decided_anew_after_a_takeover_says_so() -> None:
 def test_one_that_follows_knows_since_when_it_is_down_and_what_its_rules_counted() -> None:
     """So that one that takes over need not begin to count."""
     story = Story(with_rules(rule(SINKS, hold=9.0))).flying()
-    story.state = replace(story.state, leading=False)
+    story.state = replace(story.state, own=replace(story.state.own, leading=False))
     story.fly(0.5, vertical_speed=-13.0)
     assert story.state.rule("tested").level == pytest.approx(0.45)
     story.at(0.6, story.told(vertical_speed=0.0, landed_state=LandedState.ON_GROUND))
-    assert story.state.down_since == START + 0.6
+    assert story.state.flight.down_since == START + 0.6
     assert story.state.stage is Stage.IN_FLIGHT
 
 
@@ -224,7 +238,7 @@ def test_taking_off_before_it_may_is_an_alarm_in_these_words(blocked: bool) -> N
     t = story.t + 1.0
     story.at(t, story.heartbeat(healthy=False), i.VehicleReport(FLYING))
     assert story.alarms() == [f"in the air although {before}"]
-    assert story.state.airborne_since == START + t
+    assert story.state.flight.airborne_since == START + t
 
 
 def test_taking_off_when_it_may_is_none() -> None:
@@ -245,13 +259,13 @@ def test_from_startup_flight_is_blocked_just_when_the_time_of_the_slowest_link_i
 def test_a_landing_is_noted_with_its_time_and_ends_what_belonged_to_the_flight() -> None:
     story = Story(with_rules()).flying()
     story.at(0.1, story.told(reboot_count=1, rebooted_in_flight=True))
-    assert story.state.rebooted
+    assert story.state.flight.rebooted
     told = {"landed_state": LandedState.ON_GROUND, "vertical_speed": 0.0}
     story.at(0.2, story.heartbeat(), story.told(reboot_count=1, **told))
     state = story.state
     assert state.stage is Stage.LANDED
-    assert (state.airborne, state.rebooted) == (False, False)
-    assert state.landed_at == pytest.approx(START + 0.2)
+    assert (state.flight.airborne, state.flight.rebooted) == (False, False)
+    assert state.flight.landed_at == pytest.approx(START + 0.2)
 
 
 def test_an_armed_vehicle_that_has_landed_stays_landed() -> None:
@@ -265,11 +279,11 @@ def test_since_when_it_stands_begins_anew_after_every_contradiction() -> None:
     story = Story(with_rules(profile={"landed_hold": 5.0})).flying()
     story.at(0.1, i.VehicleReport(IDLING))
     story.at(0.2, i.VehicleReport(IDLING))
-    assert story.state.down_since == START + 0.1
+    assert story.state.flight.down_since == START + 0.1
     story.at(0.3, i.VehicleReport(FLYING))
-    assert math.isnan(story.state.down_since)
+    assert math.isnan(story.state.flight.down_since)
     story.at(0.4, i.VehicleReport(IDLING))
-    assert story.state.down_since == START + 0.4
+    assert story.state.flight.down_since == START + 0.4
 
 
 @pytest.mark.parametrize(
@@ -289,13 +303,13 @@ def test_a_deploy_is_worth_it_from_the_minimum_height_or_some_time_after_the_tak
     story = Story(with_rules(profile={"minimum_height": 10.0})).flying()
     story.noise = -1  # none
     story.at(t, story.told(**told))
-    assert story.state.was_high is high
+    assert story.state.flight.was_high is high
 
 
 def test_one_that_was_high_stays_worth_it() -> None:
     story = Story(with_rules(profile={"minimum_height": 10.0})).fly(1.0, height=50.0)
     story.fly(3.0, height=5.0)
-    assert story.state.was_high
+    assert story.state.flight.was_high
 
 
 @pytest.mark.parametrize("secured", [False, True])
@@ -307,7 +321,7 @@ def test_one_that_was_high_has_to_be_so_again_after_the_next_take_off(secured: b
     assert story.state.stage is (Stage.READY if secured else Stage.LANDED)
     story.fly(4.0, height=5.0)
     assert story.state.stage is Stage.IN_FLIGHT
-    assert not story.state.was_high
+    assert not story.state.flight.was_high
 
 
 def test_on_the_ground_no_height_is_high() -> None:
@@ -315,7 +329,7 @@ def test_on_the_ground_no_height_is_high() -> None:
     story.at(
         0.1, story.told(height=50.0, armed=Armed.DISARMED, landed_state=LandedState.ON_GROUND)
     )
-    assert not story.state.was_high
+    assert not story.state.flight.was_high
 
 
 # -- taking off ----------------------------------------------------------------------------------
@@ -325,7 +339,7 @@ HERE, THERE = {"latitude": 48.0, "longitude": 11.0}, {"latitude": 48.5, "longitu
 
 def at_home(story: Story) -> tuple[float, float] | None:
     """Rounded, as what is told is noisy."""
-    home = story.state.home
+    home = story.state.flight.home
     return home and (round(home[0], 3), round(home[1], 3))
 
 
@@ -341,7 +355,7 @@ def test_home_is_where_it_took_off_and_anew_after_it_was_secured() -> None:
     story.at(3.05, story.heartbeat(), story.told(**THERE))
     assert story.state.stage is Stage.IN_FLIGHT
     assert at_home(story) == (48.5, 11.0)
-    told = story.state.measurements
+    told = story.state.heard.measurements
     assert "distance_from_home" not in told, "it was that from another place"
     assert "height" in told
 
@@ -360,7 +374,7 @@ def test_without_a_position_home_is_not_known() -> None:
     story = Story(with_rules()).ready()
     story.fly(0.5, latitude=math.nan, longitude=math.nan)
     assert story.state.stage is Stage.IN_FLIGHT
-    assert story.state.home is None
+    assert story.state.flight.home is None
 
 
 ALARM = rule(SINKS, action=Action.NONE, states=(Stage.IN_FLIGHT,))
@@ -424,7 +438,7 @@ def test_nor_does_it_after_a_kill_on_the_ground() -> None:
     story.at(0.1, i.KillRequest(5, "operator", "test"))
     story.at(0.2, parachute(deployed=True), i.VehicleReport(STANDING))
     assert story.state.stage is Stage.DEPLOYED
-    assert story.state.released_before == frozenset()
+    assert story.state.flight.released_before == frozenset()
 
 
 # -- flight is blocked and released --------------------------------------------------------------
@@ -522,7 +536,7 @@ def test_one_that_was_killed_on_the_ground_and_arms_again_is_followed_into_the_a
     story.at(2.0, i.VehicleReport(FLYING))
     assert story.state.stage is Stage.IN_FLIGHT
     assert story.alarms() == ["in the air although KILLING"]
-    assert not story.state.killed_in_flight
+    assert not story.state.killing.killed_in_flight
 
 
 @pytest.mark.parametrize("deploys", [False, True])
@@ -541,7 +555,7 @@ def test_one_that_was_killed_in_flight_does_not_take_off_again() -> None:
     story.at(0.3, story.report(K, Outcome.CONFIRMED))
     story.at(3.0, i.VehicleReport(FLYING))
     assert story.state.stage is Stage.KILLING
-    assert story.state.killed_in_flight
+    assert story.state.killing.killed_in_flight
 
 
 # -- what is sent again --------------------------------------------------------------------------

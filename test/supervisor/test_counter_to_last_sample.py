@@ -7,8 +7,9 @@ import pytest
 from story import SINKS, TILTS, rule
 
 from chute_ros.model import Action
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.counter import UNKNOWN_STANDS, Look, RuleEvidence
-from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, MeasurementCondition
 
 RULE = rule(SINKS, action=Action.DEPLOY, hold=2.0, leak=0.5, samples=3)
 LOST = AutopilotCondition(AutopilotFact.LOST, counted=False)

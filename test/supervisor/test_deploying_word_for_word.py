@@ -92,7 +92,7 @@ def test_a_rule_that_got_too_low_while_the_kill_was_awaited_says_so() -> None:
     low = "height 9.0 m is below the minimum 10 m"
     assert story.alarms() == [f"no deploy by rule 'tested' after the kill: {low}"]
     assert story.fired() == ["KILL"]
-    assert (story.state.deploy_rule, story.state.deploy_reasons) == ("", ())
+    assert (story.state.deploying.deploy_rule, story.state.deploying.deploy_reasons) == ("", ())
     story.at(60.0)
     assert story.fired() == ["KILL"], "and it is not pursued any more"
     assert len(story.alarms()) == 2

@@ -26,7 +26,7 @@ def test_some_late_heartbeats_in_a_row_are_no_clock_that_differs(late: int, begi
     beats(story, begin + late * 0.1, 0.4)
     beats(story, 10.0, 0.002)
     assert story.alarms() == []
-    assert story.state.alarms == ()
+    assert story.state.alarming.alarms == ()
 
 
 def test_a_first_heartbeat_that_is_late_is_none_either() -> None:
@@ -68,18 +68,21 @@ def test_a_clock_that_differs_shows_although_some_heartbeats_are_late() -> None:
 
 def test_the_alarm_is_over_when_the_clock_agrees_again() -> None:
     story = beats(Story(), 3.0, 5.0)
-    assert story.state.alarms == (TEXT,)
+    assert story.state.alarming.alarms == (TEXT,)
     beats(story, 5.5, 0.002)
-    assert story.state.alarms == ()
+    assert story.state.alarming.alarms == ()
     assert story.said().count(AGREES) == 1
     beats(story, 9.0, 5.0)
-    assert story.state.alarms == (TEXT,), "and comes again"
+    assert story.state.alarming.alarms == (TEXT,), "and comes again"
 
 
 def test_other_alarms_stay_when_it_is_over() -> None:
     story = beats(Story(), 3.0, 5.0)
-    story.state = replace(story.state, alarms=(*story.state.alarms, "another"))
-    assert beats(story, 5.5, 0.002).state.alarms == ("another",)
+    story.state = replace(
+        story.state,
+        alarming=replace(story.state.alarming, alarms=(*story.state.alarming.alarms, "another")),
+    )
+    assert beats(story, 5.5, 0.002).state.alarming.alarms == ("another",)
 
 
 def test_what_was_heard_before_a_long_silence_says_nothing() -> None:
@@ -97,6 +100,10 @@ def test_without_stamps_nothing_is_known() -> None:
 def test_one_that_follows_says_nothing_of_clocks_which_its_leader_tells() -> None:
     story = Story()
     for number in range(100):
-        story.state = replace(story.state, leading=False, alarms=(TEXT,) if number % 2 else ())
+        story.state = replace(
+            story.state,
+            own=replace(story.state.own, leading=False),
+            alarming=replace(story.state.alarming, alarms=(TEXT,) if number % 2 else ()),
+        )
         story.at(number / 10, replace(story.heartbeat(), clock_difference=5.0 * (number < 50)))
     assert story.said() == ""

@@ -9,10 +9,10 @@ import pytest
 from story import START, Story, shipped, vehicle
 
 from chute_ros.model import Action, LinkState, VehicleState
-from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor import readings
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import JUMP_DOUBTED, REJECTION_DOUBTED
+from chute_ros.supervisor.measured import JUMP_DOUBTED, REJECTION_DOUBTED
 
 LOST = {"link_state": LinkState.LOST}
 
@@ -23,7 +23,7 @@ def flying(profile: str = "multirotor") -> Story:
 
 def doubt(story: Story, name: str) -> str:
     value = story.state.measured(name).value
-    return flight.doubt(story.state, name, value, START + story.t)
+    return readings.doubt(story.state, name, value, START + story.t)
 
 
 def test_a_tilt_that_jumps_as_its_autopilot_is_lost_does_not_end_the_flight() -> None:

@@ -10,7 +10,8 @@ import pytest
 from story import START, Story, shipped
 
 from chute_ros.model import Action, LinkState
-from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits, Measured, Sample
+from chute_ros.supervisor.measured import Measured, Sample
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
 
 LOST = {"link_state": LinkState.LOST}
 #: A height that may change by 60 m/s and by 10 m besides.

@@ -10,17 +10,13 @@ from story import LINK, SINKS, Story, falling, parachute, rule, vehicle, with_ru
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    ANY,
-    DEVICE_RULES,
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    LinkCondition,
-)
+from chute_ros.supervisor.profile_lines import ANY
+from chute_ros.supervisor.rules import DEVICE_RULES, BelowMinimum
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"

@@ -194,7 +194,9 @@ def test_when_none_comes_out_the_alarm_does_not_stop() -> None:
     story = aloft(**LADDER).fall(2.0, 2000.0)
     story.at(60.0)
     assert story.state.stage is Stage.FAULT
-    said = [t for t, o in story.outputs if isinstance(o, i.Say) and "no parachute" in o.text]
+    said = [
+        t for t, o in story.outputs if isinstance(o, i.LogMessage) and "no parachute" in o.text
+    ]
     assert said[-1] > 58.0
     assert len(story.decisions(D)) == 3
 

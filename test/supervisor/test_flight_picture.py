@@ -7,11 +7,11 @@ import pytest
 from story import FLYING, STANDING, START, Story, rule, vehicle, with_rules
 
 from chute_ros.model import Armed, LandedState, VehicleState
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import MeasurementCondition
 
 GROUND, AIR = LandedState.ON_GROUND, LandedState.IN_AIR
 NOTHING = LandedState.UNKNOWN
@@ -146,25 +146,25 @@ def test_the_height_of_an_autopilot_that_started_anew_is_not_used() -> None:
     story = Story(landing()).flying()
     story.fly(0.5, height=80.0)
     now = START + story.t
-    assert flight.measured(story.config, story.state, "height", now) == pytest.approx(80.0)
+    assert readings.measured(story.config, story.state, "height", now) == pytest.approx(80.0)
     story.fly(1.0, height=0.0, reboot_count=1, rebooted_in_flight=True)
     now = START + story.t
-    assert math.isnan(flight.measured(story.config, story.state, "height", now))
-    assert "started anew" in flight.unusable(story.config, story.state, "height", now)
-    assert flight.unusable(story.config, story.state, "acceleration", now) == ""
+    assert math.isnan(readings.measured(story.config, story.state, "height", now))
+    assert "started anew" in readings.unusable(story.config, story.state, "height", now)
+    assert readings.unusable(story.config, story.state, "acceleration", now) == ""
 
 
 def test_a_restart_that_is_only_counted_is_none_in_flight() -> None:
     story = Story(landing()).flying()
     story.fly(0.2, reboot_count=1)
-    assert not story.state.rebooted
+    assert not story.state.flight.rebooted
 
 
 def test_the_height_at_which_it_was_armed_is_the_ground() -> None:
     story = Story()
     story.at(0.0, story.heartbeat(), vehicle(armed=Armed.DISARMED, height=30.0))
     story.at(0.1, story.heartbeat(), vehicle(armed=Armed.ARMED, height=30.5))
-    assert story.state.armed_height == 30.5
+    assert story.state.flight.armed_height == 30.5
     assert in_air(story) is False
     story.at(0.2, story.heartbeat(), vehicle(armed=Armed.ARMED, height=32.6))
     assert story.state.stage is Stage.IN_FLIGHT
@@ -174,7 +174,7 @@ def test_without_a_height_it_is_armed_on_the_ground() -> None:
     story = Story()
     story.at(0.0, i.VehicleReport(STANDING))
     story.at(0.1, vehicle(armed=Armed.ARMED))
-    assert story.state.armed_height == 0.0
+    assert story.state.flight.armed_height == 0.0
 
 
 def take_off_at(story: Story, latitude: float) -> None:
@@ -185,7 +185,7 @@ def take_off_at(story: Story, latitude: float) -> None:
 def test_home_is_where_it_took_off() -> None:
     story = Story(with_rules(rule(FAR)))
     take_off_at(story, 48.0)
-    assert story.state.home == pytest.approx((48.0, 11.0))
+    assert story.state.flight.home == pytest.approx((48.0, 11.0))
     story.fly(story.t + 0.5, latitude=48.0005)
     assert story.state.measured("distance_from_home").value == pytest.approx(55.6, abs=0.1)
 
@@ -201,7 +201,7 @@ def test_a_second_flight_from_another_place_has_another_home(reset: bool) -> Non
         assert story.answer(1).success
     take_off_at(story, 48.5)
     story.fly(story.t + 1.0, latitude=48.5)
-    assert story.state.home == pytest.approx((48.5, 11.0))
+    assert story.state.flight.home == pytest.approx((48.5, 11.0))
     assert story.fired() == []
 
 
@@ -212,14 +212,14 @@ def test_one_that_bounces_keeps_its_home() -> None:
     assert story.state.stage is Stage.LANDED
     story.fly(story.t + 0.2, latitude=48.01)
     assert story.state.stage is Stage.IN_FLIGHT
-    assert story.state.home == pytest.approx((48.0, 11.0))
+    assert story.state.flight.home == pytest.approx((48.0, 11.0))
 
 
 @pytest.mark.parametrize("latitude", [math.nan, math.inf, 91.0])
 def test_a_place_that_is_none_is_no_home(latitude: float) -> None:
     story = Story(with_rules(rule(FAR)))
     take_off_at(story, latitude)
-    assert story.state.home is None
+    assert story.state.flight.home is None
     story.fly(story.t + 0.5, latitude=latitude)
     assert story.fired() == []
 

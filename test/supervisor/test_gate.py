@@ -8,16 +8,13 @@ from story import LINK, SINKS, STANDING, TILTS, Story, rule, with_rules
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    LinkCondition,
-)
+from chute_ros.supervisor.profile_lines import ANY
+from chute_ros.supervisor.rules import BelowMinimum
 
 K, D = Action.KILL, Action.DEPLOY
 EVERYWHERE = tuple(Stage)
@@ -305,7 +302,10 @@ def test_a_rule_is_not_acted_on_by_one_that_follows_or_is_inhibited() -> None:
 def test_the_links_that_a_deploy_needs_are_no_reason_against_it() -> None:
     story = Story(SupervisorConfig()).flying()
     story.at(30.0)
-    assert story.state.links[LINK].judged(story.config.limits(LINK), 1030.0) is LinkJudgement.LOST
+    assert (
+        story.state.heard.links[LINK].judged(story.config.limits(LINK), 1030.0)
+        is LinkJudgement.LOST
+    )
     assert asked(story) == ""
     story.at(31.0)
     assert story.fired() == ["KILL", "DEPLOY"]

@@ -10,12 +10,13 @@ from story import DOWN, LINK, SINKS, Story, parachute, rule, shipped, with_rules
 
 from chute_ros.model import Action, Armed, Decision, LandedState, LinkState, Outcome
 from chute_ros.supervisor import gate
-from chute_ros.supervisor.conditions import Finding
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.rules import AutopilotCondition, AutopilotFact, BelowMinimum, Profile
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.rules import BelowMinimum, Profile
+from chute_ros.supervisor.state import HeardHere, Pending, State, ThisFlight
 
 HOLDS = Finding(True, lambda: "it sinks")
 RULE = rule(SINKS, name="sinks")
@@ -30,7 +31,7 @@ def flying(**told: Any) -> Story:
 
 
 def against(story: Story) -> str:
-    now = story.state.updated_at
+    now = story.state.own.updated_at
     return gate.against_rule(story.config, story.state, RULE, (HOLDS,), now)
 
 
@@ -41,7 +42,7 @@ def test_a_person_hears_why_once_a_parachute_is_out() -> None:
     story = flying()
     story.at(0.7, parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
-    now = story.state.updated_at
+    now = story.state.own.updated_at
     assert gate.against_person(story.config, story.state, False, now) == (
         "a parachute is out already; force releases the next of the ladder"
     )
@@ -86,13 +87,22 @@ def test_a_rule_hears_why(told: dict[str, Any], why: str) -> None:
 def test_a_rule_hears_that_it_has_come_down() -> None:
     story = flying()
     story.at(0.65, story.heartbeat())
-    now = story.state.updated_at
-    state = replace(story.state, stage=Stage.KILLING, killed_in_flight=True, killed_at=now)
+    now = story.state.own.updated_at
+    state = replace(
+        story.state,
+        stage=Stage.KILLING,
+        killing=replace(story.state.killing, killed_in_flight=True, killed_at=now),
+    )
     assert gate.against_rule(story.config, state, RULE, (HOLDS,), now) == ""
     down = flying(landed_state=LandedState.ON_GROUND).state
-    down = replace(down, stage=Stage.KILLING, killed_in_flight=True, down_since=900.0)
-    down = replace(down, killed_at=down.updated_at - 59.0)
-    assert gate.against_rule(story.config, down, RULE, (HOLDS,), down.updated_at) == (
+    down = replace(
+        down,
+        stage=Stage.KILLING,
+        killing=replace(down.killing, killed_in_flight=True),
+        flight=replace(down.flight, down_since=900.0),
+    )
+    down = replace(down, killing=replace(down.killing, killed_at=down.own.updated_at - 59.0))
+    assert gate.against_rule(story.config, down, RULE, (HOLDS,), down.own.updated_at) == (
         "the vehicle has come down"
     )
 
@@ -100,23 +110,31 @@ def test_a_rule_hears_that_it_has_come_down() -> None:
 def test_a_rule_hears_that_silence_is_not_enough() -> None:
     story = flying()
     silent = rule(AutopilotCondition(AutopilotFact.LOST), name="lost")
-    why = gate.against_rule(story.config, story.state, silent, (HOLDS,), story.state.updated_at)
+    why = gate.against_rule(
+        story.config, story.state, silent, (HOLDS,), story.state.own.updated_at
+    )
     assert why == "only silence speaks for it, and silence alone never deploys"
 
 
 def test_findings_that_do_not_belong_to_the_rule_are_an_error() -> None:
     story = flying()
     with pytest.raises(ValueError):
-        gate.against_rule(story.config, story.state, RULE, (HOLDS, HOLDS), story.state.updated_at)
+        gate.against_rule(
+            story.config, story.state, RULE, (HOLDS, HOLDS), story.state.own.updated_at
+        )
 
 
 def test_a_kill_of_one_that_stood_or_of_another_stage_excuses_nothing() -> None:
     state = flying(armed=Armed.DISARMED).state
-    config, now = with_rules(), state.updated_at
-    killed = replace(state, stage=Stage.KILLING, killed_in_flight=True, killed_at=now - 59.9)
+    config, now = with_rules(), state.own.updated_at
+    killed = replace(
+        state,
+        stage=Stage.KILLING,
+        killing=replace(state.killing, killed_in_flight=True, killed_at=now - 59.9),
+    )
     assert gate.against_rule(config, killed, RULE, (HOLDS,), now) == ""
-    long_ago = replace(killed, killed_at=now - 60.0)
-    standing = replace(killed, killed_standing=True)
+    long_ago = replace(killed, killing=replace(killed.killing, killed_at=now - 60.0))
+    standing = replace(killed, killing=replace(killed.killing, killed_standing=True))
     earlier = replace(killed, stage=Stage.IN_FLIGHT)
     for one in (standing, earlier, long_ago):
         assert gate.against_rule(config, one, RULE, (HOLDS,), now) == (
@@ -163,8 +181,10 @@ def test_a_step_whose_node_confirmed_is_out_and_no_other() -> None:
     told = MappingProxyType({"upf_can": frozenset({Outcome.CONFIRMED})})
     confirmed = replace(sent, outcomes=told)
     state = State(epoch=7, started_at=0.0)
-    assert not gate.out_already(replace(state, deploys=(sent,)), Rung("upf_can", "2"))
-    state = replace(state, deploys=(confirmed,))
+    assert not gate.out_already(
+        replace(state, deploying=replace(state.deploying, deploys=(sent,))), Rung("upf_can", "2")
+    )
+    state = replace(state, deploying=replace(state.deploying, deploys=(confirmed,)))
     assert gate.out_already(state, Rung("upf_can", "2"))
     assert not gate.out_already(state, Rung("upf_can", "1"))
     assert not gate.out_already(state, Rung(LINK, "2"))
@@ -193,11 +213,11 @@ def test_too_low_to_the_last_bit(height: float, minimum: float, was_high: bool, 
         story.config.profile, minimum_height=minimum, below_minimum=BelowMinimum.KILL
     )
     config = replace(story.config, profile=profile)
-    state = replace(story.state, was_high=was_high)
+    state = replace(story.state, flight=replace(story.state.flight, was_high=was_high))
     assert state.measured("height").value == height
-    assert gate.too_low(config, state, state.updated_at) == why
+    assert gate.too_low(config, state, state.own.updated_at) == why
     anywhere = replace(profile, below_minimum=BelowMinimum.DEPLOY)
-    assert gate.too_low(replace(config, profile=anywhere), state, state.updated_at) == ""
+    assert gate.too_low(replace(config, profile=anywhere), state, state.own.updated_at) == ""
 
 
 @pytest.mark.parametrize(
@@ -225,10 +245,8 @@ def test_what_is_low_above_home_may_be_high_above_the_ground_of_this_flight(
     state = State(
         epoch=7,
         started_at=0.0,
-        was_high=True,
-        measurements=known,
-        armed_height=armed,
-        took_off_height=took_off,
+        flight=ThisFlight(was_high=True, armed_height=armed, took_off_height=took_off),
+        heard=HeardHere(measurements=known),
     )
     assert bool(gate.too_low(SupervisorConfig(profile=profile), state, now)) is held_back
 
@@ -243,7 +261,7 @@ def test_one_that_flies_from_a_ground_below_home_is_deployed() -> None:
     story.fly(44.0, height=-20.0, vertical_speed=0.0, landed_state=LandedState.ON_GROUND)
     for step in range(140):
         story.fly(story.t + 0.1, every=0.1, height=-20.0 + 0.2 * step, vertical_speed=1.5)
-    assert story.state.took_off_height < -19.0
+    assert story.state.flight.took_off_height < -19.0
     story.fall(story.t + 2.0, height=8.0)
     assert story.fired() == ["KILL", "DEPLOY"]
 
@@ -262,5 +280,10 @@ def test_a_height_that_jumped_down_holds_nothing_back_for_its_time(
     profile = Profile("tested", (), minimum_height=10.0, below_minimum=BelowMinimum.KILL)
     config = SupervisorConfig(profile=profile)
     height = Measured(5.0, now, now, 9, jumped_at=now - passed, before_jump=before)
-    state = State(7, 0.0, was_high=True, measurements=MappingProxyType({"height": height}))
+    state = State(
+        7,
+        0.0,
+        flight=ThisFlight(was_high=True),
+        heard=HeardHere(measurements=MappingProxyType({"height": height})),
+    )
     assert bool(gate.too_low(config, state, now)) is held_back

@@ -14,7 +14,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
 
 K, D = Action.KILL, Action.DEPLOY
 CONFIG = SupervisorConfig(standby=True)
@@ -23,7 +23,7 @@ AHEAD = 5000.0
 
 
 def follower(now: float = START) -> State:
-    return State(epoch=1, started_at=now + AHEAD, leading=False)
+    return State(epoch=1, started_at=now + AHEAD, own=Own(leading=False))
 
 
 def handed(story: Story, to: State | None = None) -> State:
@@ -52,11 +52,11 @@ def test_times_are_told_as_ages_and_come_back_in_the_other_hosts_clock() -> None
     story.at(1.2)
     state = handed(story)
     assert state.stage is Stage.KILLING
-    assert state.deploy_due == pytest.approx(START + AHEAD + 1.5)
-    assert state.kill is not None
-    assert state.kill.decided_at == pytest.approx(START + AHEAD + 1.0)
+    assert state.deploying.deploy_due == pytest.approx(START + AHEAD + 1.5)
+    assert state.killing.kill is not None
+    assert state.killing.kill.decided_at == pytest.approx(START + AHEAD + 1.0)
     assert state.stage_since == pytest.approx(START + AHEAD + 1.0)
-    assert math.isnan(state.alarm_at)
+    assert math.isnan(state.alarming.alarm_at)
 
 
 def test_what_each_hears_itself_is_not_taken_over() -> None:
@@ -64,9 +64,9 @@ def test_what_each_hears_itself_is_not_taken_over() -> None:
     own = follower()
     own, _ = update(CONFIG, own, (story.heartbeat(), i.VehicleReport(FLYING)), START + AHEAD)
     state = handed(story, own)
-    assert state.links == own.links
-    assert state.vehicle == own.vehicle
-    assert not state.leading
+    assert state.heard.links == own.heard.links
+    assert state.heard.vehicle == own.heard.vehicle
+    assert not state.own.leading
 
 
 def test_one_that_follows_decides_and_answers_nothing() -> None:
@@ -142,7 +142,7 @@ def test_whoever_waits_at_one_that_steps_down_is_told() -> None:
     (answer,) = (o for o in outputs if isinstance(o, i.Finish))
     assert answer.token == 5
     assert "another supervisor decides, call again: it was stopped" in answer.message
-    assert not state.leading
+    assert not state.own.leading
 
 
 def test_what_another_version_wrote_is_refused_in_words() -> None:

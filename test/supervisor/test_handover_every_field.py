@@ -2,24 +2,38 @@
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pytest
-from story import FLYING, LINK, Story, vehicle
+from hypothesis import given
+from hypothesis import strategies as st
+from story import FLYING, LINK, Story, changed, vehicle
 
 from chute_ros.errors import RecordError
 from chute_ros.model import Action, Decision, Outcome
+from chute_ros.supervisor.codec import INLINE
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.handover import followed, told
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.state import Ask, Pending, State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.state import (
+    Alarms,
+    Ask,
+    DeployUnderWay,
+    HeardHere,
+    Killing,
+    Own,
+    Pending,
+    State,
+    ThisFlight,
+    Time,
+)
 
 #: When it is told, by the clock of each host, s.
 THERE, HERE = 1024.0, 512.0
@@ -43,6 +57,15 @@ def pending(action: Action, clock: float) -> Pending:
     )
 
 
+def every_field(state: State) -> dict[str, str]:
+    """Each field, as it is written, under its name; a group's one by one."""
+    told: dict[str, str] = {}
+    for field in fields(state):
+        value = getattr(state, field.name)
+        told |= every_field(value) if field.metadata == INLINE else {field.name: repr(value)}
+    return told
+
+
 def leader(clock: float) -> State:
     """Nothing is as at the start. clock: that host's, to which all times belong."""
     return State(
@@ -51,67 +74,75 @@ def leader(clock: float) -> State:
         stage=Stage.KILLING,
         stage_since=clock - 8.0,
         mode=Mode.SHADOW,
-        leading=True,
         next_id=6,
-        updated_at=clock - 0.5,
-        late_count=2,
-        links=frozen(umbilical=LinkEvidence(heard=clock)),
-        vehicle=replace(FLYING, source="the leader's"),
-        vehicle_received=clock - 0.25,
-        disputed=frozenset({"attitude"}),
-        measurements=frozen(height=Measured(30.0, clock, clock, 9)),
-        heights=((clock - 0.25, 30.0),),
-        pressure_heights=((clock - 0.25, 520.0),),
-        pressure_before=(clock - 0.75, 522.0),
-        motion=((clock - 0.25, 1.0, 9.8, 1.0),),
-        denied=frozen(acceleration="why"),
-        denied_since=frozen(acceleration=clock - 0.5),
-        commanded=frozen(tilt_deg="why"),
-        unfit=frozen(acceleration="0"),
-        fitness_since=clock - 0.25,
-        home_altitude=480.0,
-        ground_pressure_altitude=490.0,
-        kill_only=True,
-        up_for=1.0,
-        at_ground_since=clock - 0.5,
-        armed_by_us=True,
-        still_since=clock - 0.5,
-        faults_told=("slow",),
-        canopy_fails=True,
-        vehicle_rests_until=clock + 0.125,
         rules=frozen(tested=RuleEvidence(level=0.5, shown=(3.0,))),
         asks=MappingProxyType({"upf_can 33": Ask(clock - 0.5, "upf_can", "launching")}),
         block=pending(Action.FLIGHT_BLOCK, clock),
-        kill=pending(Action.KILL, clock),
-        deploys=(pending(Action.DEPLOY, clock), pending(Action.DEPLOY, clock)),
-        deploy_rule="rule",
-        deploy_reasons=("why",),
-        deploy_ladder=(Rung(LINK, "1/161"),),
-        deploy_due=clock + 0.5,
-        flown=True,
-        airborne=True,
-        killed_in_flight=True,
-        killed_at=clock - 4.0,
-        killed_height=80.0,
-        killed_sinking=1.5,
-        down_since=clock - 3.0,
-        killed_standing=True,
-        landed_at=clock - 64.0,
-        was_high=True,
-        airborne_since=clock - 32.0,
-        rebooted=True,
-        reboots_before=3,
-        armed_height=2.0,
-        took_off_height=3.0,
         newest=pending(Action.KILL, clock).decision,
-        home=(48.0, 11.0),
-        released_before=frozenset({("upf_can", "33")}),
         device_blocks=MappingProxyType({"upf_can 33": "it burns"}),
         block_refused=True,
-        kill_tokens=(5,),
-        deploy_tokens=(6,),
-        alarms=("beware",),
-        alarm_at=clock + 2.0,
+        own=Own(
+            leading=True,
+            updated_at=clock - 0.5,
+            late_count=2,
+            vehicle_rests_until=clock + 0.125,
+            kill_tokens=(5,),
+            deploy_tokens=(6,),
+        ),
+        heard=HeardHere(
+            links=frozen(umbilical=LinkEvidence(heard=clock)),
+            vehicle=replace(FLYING, source="the leader's"),
+            vehicle_received=clock - 0.25,
+            disputed=frozenset({"attitude"}),
+            measurements=frozen(height=Measured(30.0, clock, clock, 9)),
+            heights=((clock - 0.25, 30.0),),
+            pressure_heights=((clock - 0.25, 520.0),),
+            pressure_before=(clock - 0.75, 522.0),
+            motion=((clock - 0.25, 1.0, 9.8, 1.0),),
+            denied=frozen(acceleration="why"),
+            denied_since=frozen(acceleration=clock - 0.5),
+            commanded=frozen(tilt_deg="why"),
+            unfit=frozen(acceleration="0"),
+            fitness_since=clock - 0.25,
+            at_ground_since=clock - 0.5,
+            still_since=clock - 0.5,
+            faults_told=("slow",),
+        ),
+        flight=ThisFlight(
+            home_altitude=480.0,
+            ground_pressure_altitude=490.0,
+            up_for=1.0,
+            armed_by_us=True,
+            flown=True,
+            airborne=True,
+            down_since=clock - 3.0,
+            landed_at=clock - 64.0,
+            was_high=True,
+            airborne_since=clock - 32.0,
+            rebooted=True,
+            reboots_before=3,
+            armed_height=2.0,
+            took_off_height=3.0,
+            home=(48.0, 11.0),
+            released_before=frozenset({("upf_can", "33")}),
+        ),
+        killing=Killing(
+            kill_only=True,
+            kill=pending(Action.KILL, clock),
+            killed_in_flight=True,
+            killed_at=clock - 4.0,
+            killed_height=80.0,
+            killed_sinking=1.5,
+            killed_standing=True,
+        ),
+        alarming=Alarms(canopy_fails=True, alarms=("beware",), alarm_at=clock + 2.0),
+        deploying=DeployUnderWay(
+            deploys=(pending(Action.DEPLOY, clock), pending(Action.DEPLOY, clock)),
+            deploy_rule="rule",
+            deploy_reasons=("why",),
+            deploy_ladder=(Rung(LINK, "1/161"),),
+            deploy_due=clock + 0.5,
+        ),
     )
 
 
@@ -143,24 +174,56 @@ NOBODY: dict[str, Any] = {"leading": False, "kill_tokens": (), "deploy_tokens": 
 
 
 def test_every_field_is_told_in_the_time_of_the_other_host_or_is_heard_there() -> None:
-    follower = State(epoch=1, started_at=HERE, leading=False, **OWN)
+    follower = changed(State(epoch=1, started_at=HERE), **OWN, leading=False)
     state = followed(follower, told(leader(THERE), THERE), HERE)
-    expected = replace(leader(HERE), **OWN, **NOBODY)
-    for field in fields(State):
-        assert getattr(state, field.name) == getattr(expected, field.name), field.name
+    expected = changed(leader(HERE), **OWN, **NOBODY)
+    assert every_field(state) == every_field(expected)
 
 
 def test_in_the_test_above_no_field_is_as_at_the_start() -> None:
     start = State(epoch=0, started_at=math.nan)
-    one = replace(leader(THERE), leading=False)
-    same = [f.name for f in fields(State) if getattr(one, f.name) == getattr(start, f.name)]
-    assert same == []
+    one = replace(leader(THERE), own=replace(leader(THERE).own, leading=False))
+    first = every_field(start)
+    assert [name for name, value in every_field(one).items() if value == first[name]] == []
+
+
+#: Numbers of a state that others share, and of what it holds, that are no times.
+NO_TIMES = {
+    *("killed_height", "killed_sinking", "took_off_height", "armed_height", "home_altitude"),
+    *("ground_pressure_altitude", "up_for", "level", "unknown"),
+}
+
+
+def numbers(hint: Any) -> Iterator[tuple[str, bool]]:
+    """Each float that is held somewhere in this type: its field, and whether it is a Time."""
+    if is_dataclass(hint):
+        for name, one in get_type_hints(hint, include_extras=True).items():
+            if one == Time or one is float:
+                yield name, one == Time
+            elif not (hint is State and name in ("heard", "own")):
+                yield from numbers(one)
+    for argument in get_args(hint):
+        yield from numbers(argument)
+
+
+def test_every_number_that_is_shared_is_a_time_that_is_moved_or_none() -> None:
+    plain = {name for name, is_time in numbers(State) if not is_time}
+    assert plain >= NO_TIMES, "gone"
+    assert plain <= NO_TIMES, "add them here, or make them a Time"
+
+
+@given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
+def test_what_is_told_is_what_is_followed_with_every_time_moved(there: int, here: int) -> None:
+    """Whatever the clocks of the two hosts tell; in parts of a second that add up exactly."""
+    state = followed(State(1, 0.0), told(leader(there / 8.0), there / 8.0), here / 8.0)
+    expected = replace(leader(here / 8.0), heard=HeardHere(), own=Own(leading=False))
+    assert every_field(state) == every_field(expected)
 
 
 def test_what_never_happened_has_not_happened_for_the_other_host_either() -> None:
     state = followed(State(1, HERE), told(State(9, THERE), THERE), HERE)
-    assert (state.block, state.kill, state.deploys) == (None, None, ())
-    assert math.isnan(state.landed_at)
+    assert (state.block, state.killing.kill, state.deploying.deploys) == (None, None, ())
+    assert math.isnan(state.flight.landed_at)
 
 
 def test_one_that_follows_goes_on_knowing_the_sink_from_the_heights() -> None:
@@ -168,9 +231,9 @@ def test_one_that_follows_goes_on_knowing_the_sink_from_the_heights() -> None:
     story = Story(SupervisorConfig(standby=True))
     for tick in range(9):
         story.at(tick / 8, vehicle(height=90.0 - tick))
-    heights = story.state.heights
+    heights = story.state.heard.heights
     assert len(heights) == 9
-    assert followed(story.state, told(leader(THERE), THERE), THERE).heights == heights
+    assert followed(story.state, told(leader(THERE), THERE), THERE).heard.heights == heights
 
 
 NO_STATE = "[" + "1," * 50 + "1]"

@@ -12,9 +12,9 @@ from story import DOWN, LINK, START, Story, shipped
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.link_evidence import LinkLimits
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.wakes import next_deadline
 
 D = Action.DEPLOY
 BOTH = pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])
@@ -69,7 +69,7 @@ def test_one_that_was_not_heard_as_it_was_killed_is_counted_from_its_next_word(
     """Given a node that was started anew, and a kill before it hears of the vehicle."""
     story = silence(Story(shipped("multirotor")).flying().fly(2.0, height=80.0), 3.5)
     story.at(3.5, i.KillRequest(1, "operator", "a person saw it"))
-    assert math.isnan(story.state.killed_height)
+    assert math.isnan(story.state.killing.killed_height)
     silence(story, 3.5 + later - 0.05)
     falls = {"height": 79.0, "vertical_speed": -2.0, "acceleration": 1.0, **told}
     story.at(3.5 + later, story.told(**falls))
@@ -79,16 +79,16 @@ def test_one_that_was_not_heard_as_it_was_killed_is_counted_from_its_next_word(
 
 def test_what_was_told_after_a_kill_does_not_change_what_was_told_at_it() -> None:
     story = killed("multirotor", 80.0)
-    kept = story.state.killed_height, story.state.killed_sinking
+    kept = story.state.killing.killed_height, story.state.killing.killed_sinking
     story.at(2.1, story.told(height=79.9, vertical_speed=-1.0, acceleration=0.5))
-    assert (story.state.killed_height, story.state.killed_sinking) == kept
+    assert (story.state.killing.killed_height, story.state.killing.killed_sinking) == kept
 
 
 def test_one_that_was_killed_as_it_stood_is_not_in_the_air_by_a_height_told_later() -> None:
     story = Story(shipped("multirotor")).ready()
     story.at(2.0, i.KillRequest(1, "operator", "on the ground"))
     story.at(2.1, story.told(**DOWN, height=50.0, vertical_speed=0.0))
-    assert math.isnan(story.state.killed_height)
+    assert math.isnan(story.state.killing.killed_height)
     assert "DEPLOY" not in silence(story, 6.0).fired()
 
 
@@ -96,7 +96,7 @@ def test_it_waits_until_the_newest_measurements_are_too_old_and_no_longer() -> N
     story = silence(killed("multirotor", 80.0), 2.0 + WAITS - 0.1)
     assert story.fired() == ["KILL"]
     silence(story, 2.0 + WAITS + 0.1)
-    assert story.state.deploy_rule == "killed aloft and silent"
+    assert story.state.deploying.deploy_rule == "killed aloft and silent"
 
 
 def test_nothing_needs_to_come_for_it() -> None:
@@ -104,7 +104,7 @@ def test_nothing_needs_to_come_for_it() -> None:
     config = shipped("multirotor", link_limits=PATIENT)
     story = Story(config).flying().fly(2.0, height=80.0)
     story.at(2.0, i.KillRequest(1, "operator", "a person saw it"))
-    while not story.state.deploy_rule and story.t < 9.0:
+    while not story.state.deploying.deploy_rule and story.t < 9.0:
         due = next_deadline(story.config, story.state, START + story.t)
         assert due < math.inf
         story.at(due - START)
@@ -120,7 +120,7 @@ def test_where_nobody_is_heard_it_is_not_the_vehicle_that_is_silent() -> None:
 def test_one_that_was_not_heard_before_its_kill_tells_nothing_by_its_silence() -> None:
     """A supervisor that has heard of the kill, and never of the vehicle."""
     story = killed("multirotor", 80.0)
-    story.state = replace(story.state, vehicle_received=math.nan)
+    story.state = replace(story.state, heard=replace(story.state.heard, vehicle_received=math.nan))
     assert silence(story, 5.0).fired() == ["KILL"]
 
 
@@ -136,7 +136,7 @@ def test_one_that_comes_down_on_a_hill_and_is_unplugged_is_not_deployed(height: 
 def test_one_that_has_come_down_stays_down_though_nothing_but_its_word_said_so() -> None:
     story = killed("multirotor", 600.0)
     story.fly(4.0, **{**DOWN, **SILENT, "height": 600.0})
-    assert math.isnan(story.state.killed_height)
+    assert math.isnan(story.state.killing.killed_height)
     assert silence(story, 15.0).fired() == ["KILL"], "its word is old by then"
 
 
@@ -197,7 +197,7 @@ def test_one_that_was_said_to_stand_when_it_was_killed_and_falls_is_deployed() -
     story.at(8.0, i.KillRequest(1, "operator", "a person saw it"))
     story.fall(12.0, 80.0, landed_state=GROUND, armed=Armed.DISARMED)
     assert story.fired() == ["KILL", "DEPLOY"]
-    assert START + 8.0 < story.state.airborne_since < START + 9.0
+    assert START + 8.0 < story.state.flight.airborne_since < START + 9.0
     assert "it falls since the kill, although it said that it stood" in story.alarms()
 
 
@@ -209,4 +209,4 @@ def test_one_that_stands_when_it_is_killed_and_is_carried_away_is_not() -> None:
     for speed, force in ((1.5, 9.8), (-1.5, 8.0), (-3.0, 9.0), (0.0, 14.0)):
         story.fly(story.t + 0.5, height=1.0, vertical_speed=speed, acceleration=force, **DOWN)
     assert story.fired() == ["KILL"]
-    assert not story.state.killed_in_flight
+    assert not story.state.killing.killed_in_flight

@@ -93,8 +93,8 @@ def test_the_last_step_goes_on_though_its_device_refuses_for_now() -> None:
 def test_a_refusal_is_no_step_forward() -> None:
     story = deploying(Rung(LINK))
     story.at(1.1, story.report(D, Outcome.REFUSED))
-    assert not story.state.deploys[0].reached(Outcome.SENT)
-    assert not story.state.deploys[0].all_failed()
+    assert not story.state.deploying.deploys[0].reached(Outcome.SENT)
+    assert not story.state.deploying.deploys[0].all_failed()
 
 
 @pytest.mark.parametrize("outcome", [Outcome.SENT, Outcome.ACCEPTED])
@@ -213,7 +213,7 @@ def alarm_times(story: Story) -> list[float]:
     return [
         t
         for t, o in story.outputs
-        if isinstance(o, i.Say) and o.alarm and "no parachute" in o.text
+        if isinstance(o, i.LogMessage) and o.alarm and "no parachute" in o.text
     ]
 
 

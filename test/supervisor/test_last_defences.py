@@ -14,8 +14,9 @@ from chute_ros.supervisor.handover import followed
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
+from chute_ros.supervisor.sending import fire
 from chute_ros.supervisor.state import Pending
-from chute_ros.supervisor.steps import Steps
+from chute_ros.supervisor.turn import Turn
 
 K, D = Action.KILL, Action.DEPLOY
 TWO = SupervisorConfig(deploy_links=(LINK, "upf_can"))
@@ -32,21 +33,24 @@ def deploying() -> Story:
 
 def test_after_a_confirmation_no_step_is_fired_whoever_asks() -> None:
     story = deploying()
-    (step,) = story.state.deploys
+    (step,) = story.state.deploying.deploys
     confirmed = MappingProxyType({LINK: frozenset({Outcome.CONFIRMED})})
-    state = replace(story.state, deploys=(replace(step, outcomes=confirmed),))
-    steps = Steps(story.config, state, START + 1.2)
-    steps.fire(D, "mistake", ())
-    assert steps.outputs == []
+    state = replace(
+        story.state,
+        deploying=replace(story.state.deploying, deploys=(replace(step, outcomes=confirmed),)),
+    )
+    turn = Turn(story.config, state, START + 1.2)
+    fire(turn, D, "mistake", ())
+    assert turn.outputs == []
 
 
 def test_beyond_the_last_step_of_the_ladder_nothing_is_fired() -> None:
     story = deploying()
-    (step,) = story.state.deploys
-    state = replace(story.state, deploys=(step, step))
-    steps = Steps(story.config, state, START + 1.2)
-    steps.fire(D, "mistake", ())
-    assert steps.outputs == []
+    (step,) = story.state.deploying.deploys
+    state = replace(story.state, deploying=replace(story.state.deploying, deploys=(step, step)))
+    turn = Turn(story.config, state, START + 1.2)
+    fire(turn, D, "mistake", ())
+    assert turn.outputs == []
 
 
 @pytest.mark.parametrize(
@@ -55,17 +59,21 @@ def test_beyond_the_last_step_of_the_ladder_nothing_is_fired() -> None:
 def test_an_alarm_that_is_due_is_said_though_the_state_knows_of_none(alarms: tuple) -> None:
     """A state that contradicts itself, of a black box or of a leader: it still falls."""
     story = deploying()
-    story.state = replace(story.state, stage=Stage.FAULT, alarms=alarms, alarm_at=START + 1.2)
-    said = [o.text for o in story.at(1.2) if isinstance(o, i.Say)]
+    story.state = replace(
+        story.state,
+        stage=Stage.FAULT,
+        alarming=replace(story.state.alarming, alarms=alarms, alarm_at=START + 1.2),
+    )
+    said = [o.text for o in story.at(1.2) if isinstance(o, i.LogMessage)]
     assert ": ".join(("still no parachute", *alarms[-1:])) in said
-    assert story.state.alarm_at == START + 1.2 + story.config.alarm_interval
+    assert story.state.alarming.alarm_at == START + 1.2 + story.config.alarm_interval
 
 
 def test_a_step_of_the_ladder_that_addresses_nobody_is_followed_by_the_next() -> None:
     story = deploying()
-    (step,) = story.state.deploys
+    (step,) = story.state.deploying.deploys
     nobody = replace(step, targets=(), decision=replace(step.decision, targets=()))
-    story.state = replace(story.state, deploys=(nobody,))
+    story.state = replace(story.state, deploying=replace(story.state.deploying, deploys=(nobody,)))
     story.at(1.2)
     assert story.newest(D).targets == ("upf_can",)
 
@@ -85,8 +93,14 @@ def test_one_that_follows_takes_a_refusal_for_no_reason_to_decide_anew() -> None
     later = Decision(7, 99, D, "later", (), (LINK,))
     state = replace(
         story.state,
-        leading=False,
-        deploys=(*story.state.deploys, Pending(later, (LINK,), START + 1.1, START + 1.1)),
+        own=replace(story.state.own, leading=False),
+        deploying=replace(
+            story.state.deploying,
+            deploys=(
+                *story.state.deploying.deploys,
+                Pending(later, (LINK,), START + 1.1, START + 1.1),
+            ),
+        ),
     )
     story.state = state
     count = len(story.decisions())
@@ -130,5 +144,5 @@ def test_time_that_runs_backwards_is_not_followed() -> None:
     story = Story().flying().fly(1.0)
     before = story.state
     story._update((story.heartbeat(state=LinkState.OK),), 0.2)
-    assert story.state.updated_at == before.updated_at
-    assert story.state.links[LINK].heard == START + 1.0
+    assert story.state.own.updated_at == before.own.updated_at
+    assert story.state.heard.links[LINK].heard == START + 1.0

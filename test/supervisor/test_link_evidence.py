@@ -129,7 +129,7 @@ def test_a_link_that_flaps_at_its_limit_keeps_flight_blocked_and_fires_nothing()
         story.at(n * 1.01, story.heartbeat(), i.VehicleReport(STANDING))
         assert story.state.stage is Stage.BLOCKED
     assert story.fired() == []
-    assert story.state.links[LINK].lost_count == 20
+    assert story.state.heard.links[LINK].lost_count == 20
     for n in range(1, 13):
         story.at(20.2 + n * 0.1, story.heartbeat(), i.VehicleReport(STANDING))
     assert story.state.stage is Stage.READY

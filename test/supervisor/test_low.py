@@ -9,16 +9,16 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import START, Story, shipped, with_rules
+from story import START, Story, changed, shipped, with_rules
 
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
 from chute_ros.supervisor.deploying import release_due
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.state import State, ThisFlight
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 LOST = {"link_state": LinkState.LOST}
@@ -109,7 +109,7 @@ def test_what_a_person_wants_down_is_not_taken_to_fall() -> None:
 def test_a_person_who_wants_it_as_well_as_a_rule_makes_it_no_later() -> None:
     story = Story(shipped("multirotor")).ready().fly(1.0, height=45.0)
     story.fly(story.t + 2.6, **IMU_FALLS)
-    while not story.state.deploy_rule:
+    while not story.state.deploying.deploy_rule:
         asked = copy.copy(story)
         asked.outputs, asked.turns = list(story.outputs), list(story.turns)
         story.at(story.t + 0.05, story.heartbeat(), story.told(**IMU_FALLS, **LOST))
@@ -175,13 +175,13 @@ def test_a_confirmed_kill_is_not_waited_for_low_or_high() -> None:
 def test_it_wakes_by_itself_when_the_fall_may_have_come_low() -> None:
     story = Story(shipped("multirotor")).ready().fly(1.0, height=60.0)
     story.fly(story.t + 2.6, **IMU_FALLS)
-    while not story.state.deploy_rule:
+    while not story.state.deploying.deploy_rule:
         story.at(story.t + 0.05, story.heartbeat(), story.told(**IMU_FALLS, **LOST))
     # 30 m are fallen, from rest, a quarter of a second before the wait is over.
-    at = story.state.deploy_due - 0.25 - math.sqrt(2.0 * 30.0 / flight.GRAVITY)
+    at = story.state.deploying.deploy_due - 0.25 - math.sqrt(2.0 * 30.0 / flight.GRAVITY)
     state = with_height(story.state, 60.0, at)
     due = release_due(story.config, state, START + story.t)
-    assert due == pytest.approx(state.deploy_due - 0.25, abs=1e-6)
+    assert due == pytest.approx(state.deploying.deploy_due - 0.25, abs=1e-6)
     assert next_deadline(story.config, state, START + story.t) <= due + 1e-6
 
 
@@ -194,17 +194,20 @@ def with_height(state: State, height: float, at: float) -> State:
     """The same, with this as the only height and no speed."""
     others = {
         name: one
-        for name, one in state.measurements.items()
+        for name, one in state.heard.measurements.items()
         if name not in ("height", "vertical_speed")
     }
-    return replace(state, measurements=MappingProxyType({**others, **known(height, at)}))
+    return replace(
+        state,
+        heard=replace(state.heard, measurements=MappingProxyType({**others, **known(height, at)})),
+    )
 
 
 def in_flight(height: float, speed: float = math.nan, at: float = 100.0, **besides: Any) -> State:
     """In the air, as this height was told at 100 s and the speed at another time."""
     speeds = {"vertical_speed": Measured(value=speed, measured_at=at, count=1)}
     told = known(height, **besides.pop("told", {})) | speeds
-    return State(7, 0.0, airborne=True, measurements=told, **besides)
+    return changed(State(7, 0.0), airborne=True, measurements=told, **besides)
 
 
 @pytest.mark.parametrize(
@@ -247,8 +250,19 @@ def test_a_height_that_claims_to_come_from_the_future_came_just_now() -> None:
 
 def test_one_that_stands_or_was_never_heard_is_not_low() -> None:
     config = shipped("multirotor")
-    assert flight.low_at(config, replace(in_flight(5.0), airborne=False), True, 100.5) == math.inf
-    assert flight.low_at(config, State(7, 0.0, airborne=True), True, 100.5) == math.inf
+    assert (
+        flight.low_at(
+            config,
+            replace(in_flight(5.0), flight=replace(in_flight(5.0).flight, airborne=False)),
+            True,
+            100.5,
+        )
+        == math.inf
+    )
+    assert (
+        flight.low_at(config, State(7, 0.0, flight=ThisFlight(airborne=True)), True, 100.5)
+        == math.inf
+    )
 
 
 def test_an_old_height_of_what_nobody_saw_fall_says_nothing() -> None:

@@ -5,21 +5,21 @@ import itertools
 import pytest
 
 from chute_ros.errors import TransitionError
-from chute_ros.supervisor.machine import TRANSITIONS, Stage, Stimulus, listed
+from chute_ros.supervisor.machine import TRANSITIONS, Event, Stage, listed
 from chute_ros.transitions import after
 
-PAIRS = list(itertools.product(Stage, Stimulus))
+PAIRS = list(itertools.product(Stage, Event))
 
 
-@pytest.mark.parametrize(("stage", "stimulus"), PAIRS, ids=lambda one: one.name)
-def test_a_pair_is_listed_or_raises(stage: Stage, stimulus: Stimulus) -> None:
-    if (stage, stimulus) in TRANSITIONS:
-        assert listed(stage, stimulus)
-        assert after(TRANSITIONS, stage, stimulus) is TRANSITIONS[stage, stimulus]
+@pytest.mark.parametrize(("stage", "event"), PAIRS, ids=lambda one: one.name)
+def test_a_pair_is_listed_or_raises(stage: Stage, event: Event) -> None:
+    if (stage, event) in TRANSITIONS:
+        assert listed(stage, event)
+        assert after(TRANSITIONS, stage, event) is TRANSITIONS[stage, event]
     else:
-        assert not listed(stage, stimulus)
+        assert not listed(stage, event)
         with pytest.raises(TransitionError, match=stage.name):
-            after(TRANSITIONS, stage, stimulus)
+            after(TRANSITIONS, stage, event)
 
 
 def test_every_stage_is_reachable_from_the_start() -> None:
@@ -38,10 +38,10 @@ def test_deploying_is_entered_only_from_killing() -> None:
 
 
 def test_only_a_reset_a_person_who_insists_or_a_device_that_erred_leaves_deployed() -> None:
-    ways = {stimulus for (before, stimulus) in TRANSITIONS if before is Stage.DEPLOYED}
-    assert ways == {Stimulus.RESET, Stimulus.KILL, Stimulus.TAKEN_BACK}
+    ways = {event for (before, event) in TRANSITIONS if before is Stage.DEPLOYED}
+    assert ways == {Event.RESET, Event.KILL, Event.TAKEN_BACK}
 
 
 def test_nothing_but_a_reset_leads_back_to_the_start() -> None:
     ways = {s for (_, s), after in TRANSITIONS.items() if after is Stage.STARTUP}
-    assert ways == {Stimulus.RESET}
+    assert ways == {Event.RESET}

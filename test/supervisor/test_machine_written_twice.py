@@ -2,7 +2,7 @@
 
 from chute_ros.supervisor.machine import TRANSITIONS, Stage
 
-#: Stage -> "stimulus stage" of each pair that is listed.
+#: Stage -> "event stage" of each pair that is listed.
 EXPECTED = {
     "STARTUP": (
         "LINKS_HEALTHY READY",

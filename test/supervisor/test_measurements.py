@@ -11,14 +11,9 @@ from story import START, Story, vehicle
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import NAN, VehicleState
-from chute_ros.supervisor.measurements import (
-    STANDARD_LIMITS,
-    Limits,
-    Measured,
-    Sample,
-    distance_between,
-    samples_of,
-)
+from chute_ros.supervisor.measured import Measured, Sample
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+from chute_ros.supervisor.samples import distance_between, samples_of
 
 #: A speed: it may change by 200 m/s each s and 5 m/s besides, is old after 1 s, stuck after 5 s.
 LIMITS = STANDARD_LIMITS["vertical_speed"]

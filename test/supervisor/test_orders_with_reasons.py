@@ -8,9 +8,10 @@ from story import FLYING, LINK, SINKS, START, Story, rule, with_rules
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import BelowMinimum, MeasurementCondition
+from chute_ros.supervisor.rules import BelowMinimum
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"
@@ -195,4 +196,4 @@ def test_a_kill_after_a_failed_test_on_the_ground_is_none_in_flight() -> None:
     story.at(0.5, story.report(K, Outcome.CONFIRMED))
     assert story.answer(6).success
     assert story.state.stage is Stage.FAULT
-    assert not story.state.killed_in_flight
+    assert not story.state.killing.killed_in_flight

@@ -7,17 +7,12 @@ from story import DOWN, LINK, SINKS, STANDING, START, TILTS, Story, rule, with_r
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.core import next_deadline
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    AutopilotFact,
-    Clears,
-    DeviceCondition,
-    DeviceFact,
-    MeasurementCondition,
-    Rule,
-)
+from chute_ros.supervisor.rules import Clears, Rule
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D, ALARM = Action.KILL, Action.DEPLOY, Action.NONE
 HIGH = MeasurementCondition("height", above=100.0)
@@ -192,7 +187,7 @@ def test_in_shadow_the_whole_logic_runs_and_nothing_is_sent() -> None:
     assert all("counter 0.30 s of 0.3 s" in d.reasons for d in decisions)
     assert [d.targets for d in decisions] == [(LINK,), (LINK,)]
     assert story.state.stage is Stage.IN_FLIGHT
-    assert (story.state.kill, story.state.deploys) == (None, ())
+    assert (story.state.killing.kill, story.state.deploying.deploys) == (None, ())
 
 
 def test_what_was_only_said_in_shadow_is_done_when_active() -> None:

@@ -9,17 +9,13 @@ from story import SINKS, START, TILTS, Story, rule, vehicle, with_rules
 
 from chute_ros.model import Action, Armed, LandedState
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.base import JUST_AFTER
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measurements import JUMP_DOUBTED, Measured
+from chute_ros.supervisor.measured import JUMP_DOUBTED, Measured
 from chute_ros.supervisor.policy import judge, rule_deadlines
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    MeasurementCondition,
-    Rule,
-)
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Rule
 
 K, ALARM = Action.KILL, Action.NONE
 LOW = {"minimum_height": 10.0, "below_minimum": BelowMinimum.NOTHING}
@@ -77,7 +73,9 @@ def test_a_sign_in_doubt_counts_for_the_rules_part_of_it(doubted: float, holds: 
     story = Story(with_rules(one := rule(SINKS, doubted=doubted)))
     story.at(0.0, vehicle(vertical_speed=-14.0))
     assert judge(story.config, story.state, one, START).evidence.holds is True
-    state = replace(story.state, disputed=frozenset({"vertical_speed"}))
+    state = replace(
+        story.state, heard=replace(story.state.heard, disputed=frozenset({"vertical_speed"}))
+    )
     assert judge(story.config, state, one, START).evidence.holds is holds
 
 
@@ -100,7 +98,7 @@ def test_what_is_only_taken_to_be_so_is_in_doubt_with_what_it_stands_beside(
     one = rule(SINKS, presumed, TILTS, needed=1.5, doubted=0.5)
     story = Story(with_rules(one))
     story.at(0.0, vehicle(**told))
-    state = replace(story.state, disputed=frozenset(disputed))
+    state = replace(story.state, heard=replace(story.state.heard, disputed=frozenset(disputed)))
     assert judge(story.config, state, one, START).evidence.holds is holds
 
 
@@ -110,7 +108,9 @@ def test_heights_that_tell_a_sink_are_a_whole_sign_beside_one_in_doubt() -> None
     story = Story(with_rules(one))
     for step in range(12):
         story.at(step * 0.1, vehicle(vertical_speed=-14.0 - step * 1e-3, height=90.0 - step))
-    state = replace(story.state, disputed=frozenset({"vertical_speed"}))
+    state = replace(
+        story.state, heard=replace(story.state.heard, disputed=frozenset({"vertical_speed"}))
+    )
     judged = judge(story.config, state, one, START + story.t)
     assert "climb_rate -10.00" in judged.findings[1].text
     assert judged.evidence.holds is True
@@ -119,8 +119,10 @@ def test_heights_that_tell_a_sink_are_a_whole_sign_beside_one_in_doubt() -> None
 def test_a_rule_is_looked_at_when_a_doubt_of_what_it_rests_on_ends() -> None:
     story = flying(rule(SINKS, doubted=0.5))
     jumped = {"vertical_speed": Measured(jumped_at=START)}
-    state = replace(story.state, measurements=jumped)
-    assert START + JUMP_DOUBTED in rule_deadlines(story.config, state, START + story.t)
+    state = replace(story.state, heard=replace(story.state.heard, measurements=jumped))
+    assert START + JUMP_DOUBTED + JUST_AFTER in rule_deadlines(
+        story.config, state, START + story.t
+    )
 
 
 def test_a_sample_that_is_looked_at_twice_showed_it_once() -> None:
@@ -200,7 +202,7 @@ def test_an_inhibited_rule_warns_nobody_and_is_acted_on_once_it_may() -> None:
 
 def test_one_that_follows_leaves_a_rule_to_the_one_that_leads() -> None:
     story = flying(rule(TILTS, action=ALARM))
-    story.state = replace(story.state, leading=False)
+    story.state = replace(story.state, own=replace(story.state.own, leading=False))
     story.fly(0.5, tilt=90.0)
     assert story.alarms() == []
     story.at(0.5, i.TakeOver(9))

@@ -18,10 +18,11 @@ from chute_ros.model import (
     TriggerFlags,
 )
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.preflight import arm_reasons, block_reasons
-from chute_ros.supervisor.rules import Clears, DeviceCondition, DeviceFact
+from chute_ros.supervisor.rules import Clears
 
 TODAY = (datetime.date(2026, 7, 1) - datetime.date(1970, 1, 1)).days
 GOOD = ParachuteStatus(

@@ -11,7 +11,7 @@ from chute_ros.supervisor.config import PreflightLimits, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.preflight import arm_reasons, block_reasons
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import HeardHere, State
 
 NOW = 100.0
 CONFIG = SupervisorConfig(required_links=("a",), kill_links=("a",), deploy_links=("a",))
@@ -35,9 +35,11 @@ def standing(vehicle_received: float = NOW, **links: LinkEvidence) -> State:
         epoch=7,
         started_at=0.0,
         stage=Stage.READY,
-        links=MappingProxyType(links),
-        vehicle=VehicleState(armed=Armed.DISARMED, armed_age=0.0),
-        vehicle_received=vehicle_received,
+        heard=HeardHere(
+            links=MappingProxyType(links),
+            vehicle=VehicleState(armed=Armed.DISARMED, armed_age=0.0),
+            vehicle_received=vehicle_received,
+        ),
     )
 
 
@@ -99,7 +101,9 @@ def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link() -> None
 
 
 def test_a_vehicle_that_never_told_of_its_motors_blocks_flight() -> None:
-    state = replace(standing(a=link()), vehicle=VehicleState())
+    state = replace(
+        standing(a=link()), heard=replace(standing(a=link()).heard, vehicle=VehicleState())
+    )
     assert block_reasons(CONFIG, state, NOW) == (
         "vehicle/state: armed or disarmed was never reported",
     )

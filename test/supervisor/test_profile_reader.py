@@ -7,22 +7,15 @@ from story import LINK, PROFILES
 
 from chute_ros.errors import ProfileError
 from chute_ros.model import Action
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import STANDARD_LIMITS
 from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    Profile,
-    Rule,
-)
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Profile, Rule
 
 LINKS = (LINK, "upf_can")
 WHOLE = """\

@@ -462,7 +462,7 @@ def test_a_rocket_whose_computer_started_anew_without_a_fix_is_seen_to_fall(grou
     story = Story(shipped("rocket")).ready().fly(1.0, height=300.0, vertical_speed=1.0)
     unfixed = {**REBOOTED, "vertical_speed": math.nan}
     story.fly(1.05, height=300.0 + ground, **unfixed)
-    assert [height for _, height in story.state.heights] in ([], [300.0 + ground])
+    assert [height for _, height in story.state.heard.heights] in ([], [300.0 + ground])
     for step in range(1, 60):
         story.fly(story.t + 0.05, height=300.0 + ground - 40.0 * step * 0.05, **unfixed)
         if story.fired():

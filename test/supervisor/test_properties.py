@@ -7,11 +7,12 @@ from story import FLYING, LINK, STANDING, START, parachute
 from chute_ros.model import Action, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 LINKS = st.sampled_from([LINK, "upf_can", "stranger"])
 CONFIG = SupervisorConfig(deploy_links=(LINK, "upf_can"))

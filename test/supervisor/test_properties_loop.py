@@ -15,10 +15,11 @@ from story import FLYING, LINK, START, parachute
 from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.decision_gate import DecisionGate, Verdict
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY
 HEAL = 2.0  # s after START: from then on nothing is lost and nobody restarts

@@ -13,23 +13,15 @@ from story import FLYING_WELL, LINK, Story, parachute, shipped, vehicle
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    ALL,
-    ANY,
-    AutopilotCondition,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    MeasurementCondition,
-    Profile,
-    Rule,
-)
+from chute_ros.supervisor.profile_lines import ALL, ANY
+from chute_ros.supervisor.rules import BelowMinimum, Clears, Profile, Rule
 
 K, D = Action.KILL, Action.DEPLOY
 UPF = "upf_can"
@@ -209,7 +201,7 @@ def test_on_the_ground_and_disarmed_no_rule_of_any_profile_deploys(
             one = (one[0], {**one[1], **down}, one[2])
         run(watch, [one])
         assert watch.state.stage not in (Stage.IN_FLIGHT, Stage.DEPLOYING)
-        assert watch.state.deploys == ()
+        assert watch.state.deploying.deploys == ()
 
 
 SILENT = st.one_of(
@@ -254,8 +246,8 @@ def test_a_lost_heartbeat_alone_never_deploys_whatever_the_profile(
     watch = begun(config, flying=True)
     for one in goes:
         run(watch, [one])
-        assert watch.state.kill is None
-        assert watch.state.deploys == ()
+        assert watch.state.killing.kill is None
+        assert watch.state.deploying.deploys == ()
 
 
 @settings(max_examples=30)

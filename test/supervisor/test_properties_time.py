@@ -10,8 +10,9 @@ from test_properties import EVIDENCE, RELEASED, REQUESTS
 from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.core import next_deadline, update
+from chute_ros.supervisor.core import update
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.wakes import next_deadline
 
 CONFIG = SupervisorConfig(deploy_links=(LINK, "upf_can"))
 WAITS = st.floats(0.0, 9.0, allow_nan=False)

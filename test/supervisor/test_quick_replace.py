@@ -11,7 +11,7 @@ import pytest
 from chute_ros.supervisor import quick_replace
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state import Own, State
 
 
 @pytest.fixture(params=["CPython", "PyPy"])
@@ -28,8 +28,8 @@ def replace(request, monkeypatch):
 @pytest.mark.parametrize(
     ("one", "changes"),
     [
-        (State(8, 1.0, leading=True), {}),
-        (State(8, 1.0, leading=True), {"stage": Stage.IN_FLIGHT, "updated_at": 2.5}),
+        (State(8, 1.0, own=Own(leading=True)), {}),
+        (State(8, 1.0, own=Own(leading=True)), {"stage": Stage.IN_FLIGHT, "next_id": 2}),
         (RuleEvidence(level=0.5, shown=(1.0, 2.0)), {"level": 0.25, "kept": (0.0, 1.5)}),
     ],
 )

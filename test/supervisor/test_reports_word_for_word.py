@@ -197,17 +197,17 @@ def test_the_height_at_which_it_was_armed_is_kept(
     story = Story()
     story.at(0.0, vehicle(armed=before))
     story.at(0.1, vehicle(armed=now, height=7.0))
-    assert story.state.armed_height == height
+    assert story.state.flight.armed_height == height
 
 
 def test_armed_without_a_height_it_is_taken_for_0() -> None:
     story = Story()
     story.at(0.0, vehicle(armed=Armed.DISARMED, height=7.0))
     story.at(0.1, vehicle(armed=Armed.ARMED, height=7.0))
-    assert story.state.armed_height == 7.0
+    assert story.state.flight.armed_height == 7.0
     story.at(0.2, vehicle(armed=Armed.DISARMED))
     story.at(9.0, vehicle(armed=Armed.ARMED, height=math.nan))
-    assert story.state.armed_height == 0.0
+    assert story.state.flight.armed_height == 0.0
 
 
 def test_each_measurement_goes_on_from_its_own_past_and_the_distance_from_home() -> None:
@@ -223,7 +223,7 @@ def heights(*told: tuple[float, float]) -> list[tuple[float, float]]:
     story = Story()
     for t, height in told:
         story.at(t, vehicle(height=height))
-    return [(at - START, height) for at, height in story.state.heights]
+    return [(at - START, height) for at, height in story.state.heard.heights]
 
 
 def test_the_heights_of_the_last_second_are_kept() -> None:
@@ -240,7 +240,7 @@ def test_a_height_just_a_tenth_of_a_second_after_the_last_is_kept() -> None:
     state = State(epoch=7, started_at=0.0)
     for now in (0.0, 0.1):
         state, _ = update(SupervisorConfig(), state, (vehicle(height=now),), now)
-    assert state.heights == ((0.0, 0.0), (0.1, 0.1))
+    assert state.heard.heights == ((0.0, 0.0), (0.1, 0.1))
 
 
 def test_without_a_height_the_last_ones_are_kept_as_they_are() -> None:
@@ -255,7 +255,7 @@ def test_heights_from_before_a_clock_was_set_back_are_not_kept() -> None:
         story.at(tick / 8, vehicle(height=float(tick)))
     for tick in range(8, 14):
         story.at(tick / 8, vehicle(height=float(tick), age=30.0))
-    assert all(at < START - 25.0 for at, _ in story.state.heights)
+    assert all(at < START - 25.0 for at, _ in story.state.heard.heights)
 
 
 def reboots(*told: tuple[dict[str, Any], int, bool]) -> Story:
@@ -295,7 +295,7 @@ def test_a_restart_of_the_autopilot_counts_in_flight(
 ) -> None:
     story = reboots(*told)
     assert story.alarms() == alarms
-    assert story.state.rebooted is bool(alarms)
+    assert story.state.flight.rebooted is bool(alarms)
 
 
 # -- how decisions fare --------------------------------------------------------------------------
@@ -321,8 +321,8 @@ def test_the_newest_details_are_kept_each_once() -> None:
     story = killing()
     for number in (*range(10), 5, 9):
         story.at(story.t + 0.1, story.report(K, Outcome.SENT, detail=f"try {number}"))
-    assert story.state.kill is not None
-    assert story.state.kill.details == tuple(f"{LINK}: try {n}" for n in range(2, 10))
+    assert story.state.killing.kill is not None
+    assert story.state.killing.kill.details == tuple(f"{LINK}: try {n}" for n in range(2, 10))
 
 
 def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is_not() -> None:
@@ -339,8 +339,8 @@ def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is
     assert story.newest(D).targets == (UPF,)
     story.at(0.4, story.report(D, Outcome.CONFIRMED, UPF))
     assert story.state.stage is Stage.DEPLOYED
-    assert story.state.kill is not None
-    assert story.state.kill.of(UPF) == frozenset()
+    assert story.state.killing.kill is not None
+    assert story.state.killing.kill.of(UPF) == frozenset()
 
 
 def refused(
@@ -406,8 +406,8 @@ def test_a_newer_decision_for_another_link_overtakes_nothing() -> None:
     assert story.newest(D).id > story.newest(K).id
     story.at(0.8, refused(story, K))
     assert len(story.decisions(K)) == 1
-    assert story.state.kill is not None
-    assert story.state.kill.all_failed()
+    assert story.state.killing.kill is not None
+    assert story.state.killing.kill.all_failed()
 
 
 def test_an_older_number_that_failed_on_a_link_that_was_asked_again_says_nothing() -> None:
@@ -423,13 +423,13 @@ def test_an_older_number_that_failed_on_a_link_that_was_asked_again_says_nothing
     def old(outcome: Outcome, link: str) -> i.ActionReport:
         return i.ActionReport(first.epoch, first.id, link, outcome, "told", first.epoch)
 
-    assert story.state.kill is not None
+    assert story.state.killing.kill is not None
     story.at(0.81, old(Outcome.FAILED, LINK))
-    assert story.state.kill.of(LINK) == frozenset(), "it was asked again since"
+    assert story.state.killing.kill.of(LINK) == frozenset(), "it was asked again since"
     story.at(0.82, old(Outcome.FAILED, UPF))
-    assert story.state.kill.of(UPF) == {Outcome.SENT, Outcome.FAILED}, "it was not"
+    assert story.state.killing.kill.of(UPF) == {Outcome.SENT, Outcome.FAILED}, "it was not"
     story.at(0.83, old(Outcome.CONFIRMED, LINK))
-    assert story.state.kill.of(LINK) == {Outcome.CONFIRMED}, "done is done"
+    assert story.state.killing.kill.of(LINK) == {Outcome.CONFIRMED}, "done is done"
 
 
 # -- epochs --------------------------------------------------------------------------------------
@@ -489,7 +489,7 @@ def test_under_our_epoch_a_number_that_we_never_gave_is_anothers(
 
 def test_one_that_follows_leaves_epochs_alone() -> None:
     story = Story().ready()
-    story.state = replace(story.state, leading=False)
+    story.state = replace(story.state, own=replace(story.state.own, leading=False))
     story.at(0.1, seen(900))
     assert story.state.epoch == 7
 

@@ -1,6 +1,7 @@
 """Requests and their answers, word for word."""
 
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import pytest
@@ -19,12 +20,13 @@ from story import (
 )
 
 from chute_ros.model import Action, Armed, Outcome
-from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor import readings
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
-from chute_ros.supervisor.rules import Clears, DeviceCondition, DeviceFact
+from chute_ros.supervisor.rules import Clears
 from chute_ros.supervisor.state import ASK_LASTS, State
 
 K, D = Action.KILL, Action.DEPLOY
@@ -353,7 +355,7 @@ def test_after_a_reset_the_height_of_an_autopilot_that_started_anew_counts_again
     story.fly(14.0, **again, **DOWN, height=0.0, vertical_speed=0.0)
     story.at(14.1, story.told(**again, **DOWN, height=0.0), i.ResetRequest(2))
     assert story.answer(2).success
-    assert flight.unusable(story.config, story.state, "height", START + story.t) == ""
+    assert readings.unusable(story.config, story.state, "height", START + story.t) == ""
 
 
 def test_after_a_reset_a_rule_speaks_again() -> None:
@@ -370,9 +372,9 @@ def test_after_a_reset_nothing_of_the_flight_is_remembered() -> None:
     story = killed_and_down()
     story.at(1.4, story.heartbeat(), story.told(**DOWN), i.ResetRequest(2))
     new = State(epoch=7, started_at=START + 1.4)
-    names = ("started_at", "flown", "airborne", "killed_in_flight", "rebooted", "asks")
-    for name in names:
-        assert getattr(story.state, name) == getattr(new, name), name
+    names = ("started_at", "asks", "flight.flown", "flight.airborne", "flight.rebooted")
+    for name in (*names, "killing.killed_in_flight"):
+        assert attrgetter(name)(story.state) == attrgetter(name)(new), name
 
 
 def test_after_a_reset_the_alarm_of_the_last_deploy_is_not_said_any_more() -> None:
@@ -383,7 +385,7 @@ def test_after_a_reset_the_alarm_of_the_last_deploy_is_not_said_any_more() -> No
     assert story.state.stage is Stage.FAULT
     story.at(1.3, story.heartbeat(), story.told(**DOWN), i.ResetRequest(6))
     assert story.answer(6).success
-    assert story.state.alarms == ()
+    assert story.state.alarming.alarms == ()
     story.at(60.0)
     assert len(story.alarms()) == 1
 
@@ -433,7 +435,7 @@ def test_a_mode_that_ends_a_deploy_says_so() -> None:
     story.at(1.2, i.ModeRequest(2, i.Mode.INHIBITED, force=True))
     line = "DEPLOYING -> KILLING: a person changed the mode while a deploy was under way"
     assert line in story.said().splitlines()
-    assert (story.state.kill, story.state.deploys) == (None, ())
+    assert (story.state.killing.kill, story.state.deploying.deploys) == (None, ())
 
 
 def test_leaving_active_takes_the_block_back_in_whole_words() -> None:

@@ -123,7 +123,7 @@ def test_up_to_its_limit_it_is() -> None:
     for age in (0.0, 30.0):
         state = resumed(left(story), BOOT, SETTINGS, 30.0, START + age)
         assert state.stage is Stage.IN_FLIGHT
-        assert not state.leading
+        assert not state.own.leading
 
 
 @pytest.mark.parametrize(

@@ -7,17 +7,10 @@ from story import SINKS, Story, parachute
 
 from chute_ros.model import Action
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions.autopilot import AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import (
-    DEVICE_RULES,
-    AutopilotFact,
-    BelowMinimum,
-    Clears,
-    DeviceCondition,
-    DeviceFact,
-    Profile,
-    Rule,
-)
+from chute_ros.supervisor.rules import DEVICE_RULES, BelowMinimum, Clears, Profile, Rule
 
 #: Stage -> the rules of any vehicle that live in it.
 ALIVE = {

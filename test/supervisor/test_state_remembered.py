@@ -11,8 +11,8 @@ from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
-from chute_ros.supervisor.measurements import Measured
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.state import DeployUnderWay, HeardHere, Pending, State
 
 UPF = "upf_can"
 BOTH = (LINK, UPF)
@@ -122,9 +122,11 @@ def test_what_was_told_is_that() -> None:
     state = State(
         epoch=7,
         started_at=0.0,
-        measurements=MappingProxyType({"height": height}),
-        links=MappingProxyType({LINK: LinkEvidence(heard=1.0)}),
         rules=MappingProxyType({"tested": rule}),
+        heard=HeardHere(
+            measurements=MappingProxyType({"height": height}),
+            links=MappingProxyType({LINK: LinkEvidence(heard=1.0)}),
+        ),
     )
     assert state.measured("height") is height
     assert state.evidence(LINK).heard == 1.0
@@ -135,7 +137,7 @@ def test_a_link_is_heard_as_long_as_its_own_limits_say() -> None:
     limits = MappingProxyType({UPF: LinkLimits(lost_after=4.0)})
     config = SupervisorConfig(deploy_links=(*BOTH, "umbilical"), link_limits=limits)
     heard = {LINK: LinkEvidence(heard=10.0), UPF: LinkEvidence(heard=10.0)}
-    state = State(epoch=7, started_at=0.0, links=MappingProxyType(heard))
+    state = State(epoch=7, started_at=0.0, heard=HeardHere(links=MappingProxyType(heard)))
     counts = [state.links_heard(config, now) for now in (10.9, 11.0, 13.9, 14.0)]
     assert counts == [2, 1, 1, 0]
 
@@ -147,27 +149,29 @@ def test_a_vehicle_that_is_heard_counts_as_one_more(passed: float, count: int) -
     config = SupervisorConfig(vehicle_state_age=2.5)
     now = 10.0 + passed
     links = MappingProxyType({LINK: LinkEvidence(heard=now)})
-    state = State(epoch=7, started_at=0.0, links=links, vehicle_received=10.0)
+    state = State(epoch=7, started_at=0.0, heard=HeardHere(links=links, vehicle_received=10.0))
     assert state.links_heard(config, now) == count
 
 
 def test_the_newest_heartbeat_is_that_of_any_link() -> None:
     assert math.isnan(State(epoch=7, started_at=0.0).newest_heartbeat())
     heard = {"a": LinkEvidence(), "b": LinkEvidence(heard=12.0), "c": LinkEvidence(heard=11.0)}
-    state = State(epoch=7, started_at=0.0, links=MappingProxyType(heard))
+    state = State(epoch=7, started_at=0.0, heard=HeardHere(links=MappingProxyType(heard)))
     assert state.newest_heartbeat() == 12.0
 
 
 def test_the_newest_step_of_the_ladder_is_the_last() -> None:
     first, second = pending(Action.DEPLOY), replace(pending(Action.DEPLOY), decided_at=12.0)
-    state = State(epoch=7, started_at=0.0, deploys=(first, second))
+    state = State(epoch=7, started_at=0.0, deploying=DeployUnderWay(deploys=(first, second)))
     assert state.deploy is second
 
 
 def test_the_ladder_is_that_of_the_order_and_without_one_that_of_the_settings() -> None:
     state = State(epoch=7, started_at=0.0)
     assert state.ladder(TWO) == (Rung(LINK), Rung(UPF))
-    assert replace(state, deploy_ladder=(Rung(UPF),)).ladder(TWO) == (Rung(UPF),)
+    assert replace(state, deploying=replace(state.deploying, deploy_ladder=(Rung(UPF),))).ladder(
+        TWO
+    ) == (Rung(UPF),)
 
 
 # -- parachutes that are out ---------------------------------------------------------------------
@@ -182,7 +186,7 @@ def out(heard: float, released_at: float) -> State:
         released_at=released_at,
         devices=MappingProxyType({"33": status}),
     )
-    return State(epoch=7, started_at=0.0, links=MappingProxyType({UPF: evidence}))
+    return State(epoch=7, started_at=0.0, heard=HeardHere(links=MappingProxyType({UPF: evidence})))
 
 
 @pytest.mark.parametrize(
@@ -197,7 +201,7 @@ def test_a_parachute_counts_while_its_node_is_heard_or_has_just_told_it(
     state = out(heard, released_at)
     assert state.released(config) == {(UPF, "33")}
     assert bool(state.newly_released(config, 10.0)) is counts
-    before = replace(state, released_before=frozenset({(UPF, "33")}))
+    before = replace(state, flight=replace(state.flight, released_before=frozenset({(UPF, "33")})))
     assert not before.newly_released(config, 10.0)
 
 

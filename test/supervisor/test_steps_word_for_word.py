@@ -5,14 +5,26 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import FLYING, LINK, STANDING, START, Story, parachute
+from story import FLYING, LINK, STANDING, START, Story, changed, parachute
 
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor import sending
+from chute_ros.supervisor.answers import answer_all, deploy_details, end_kill, give_up_waiting
 from chute_ros.supervisor.config import Rung, SupervisorConfig
-from chute_ros.supervisor.machine import Stage, Stimulus
+from chute_ros.supervisor.machine import Event, Stage
+from chute_ros.supervisor.sending import (
+    fire,
+    kill_failed,
+    pending_in,
+    put,
+    renew,
+    renew_missing,
+    renew_not_begun,
+    send_again,
+)
 from chute_ros.supervisor.state import Pending, State
-from chute_ros.supervisor.steps import Steps
+from chute_ros.supervisor.turn import Turn
 
 K, D = Action.KILL, Action.DEPLOY
 BLOCK = Action.FLIGHT_BLOCK
@@ -23,8 +35,8 @@ TWO = SupervisorConfig(
 )
 
 
-def steps(config: SupervisorConfig = TWO, now: float = 100.0, **known: Any) -> Steps:
-    return Steps(config, State(epoch=7, started_at=0.0, **known), now)
+def steps(config: SupervisorConfig = TWO, now: float = 100.0, **known: Any) -> Turn:
+    return Turn(config, changed(State(epoch=7, started_at=0.0), **known), now)
 
 
 def decided(number: int, action: Action, *targets: str, **known: Any) -> Pending:
@@ -47,13 +59,13 @@ def reports(**outcomes: Outcome) -> MappingProxyType[str, frozenset[Outcome]]:
 
 def test_a_move_is_said_with_its_reason_and_without_one() -> None:
     one = steps()
-    one.move(Stimulus.LINKS_HEALTHY)
-    one.move(Stimulus.KILL, "smoke")
-    one.move(Stimulus.KILL, "smoke again")
+    one.move(Event.LINKS_HEALTHY)
+    one.move(Event.KILL, "smoke")
+    one.move(Event.KILL, "smoke again")
     assert (one.state.stage, one.state.stage_since) == (Stage.KILLING, 100.0)
     assert one.outputs == [
-        i.Say("STARTUP -> READY: every required link is healthy"),
-        i.Say("READY -> KILLING: a kill was decided (smoke)"),
+        i.LogMessage("STARTUP -> READY: every required link is healthy"),
+        i.LogMessage("READY -> KILLING: a kill was decided (smoke)"),
     ]
 
 
@@ -62,23 +74,23 @@ def test_a_move_is_said_with_its_reason_and_without_one() -> None:
 
 def test_a_shadow_names_all_that_it_would_have_sent() -> None:
     one = steps(mode=i.Mode.SHADOW, next_id=4)
-    one.fire(K, "tested", ("why",))
-    one.fire(D, "tested", ("why",))
+    fire(one, K, "tested", ("why",))
+    fire(one, D, "tested", ("why",))
     assert one.outputs == [
         i.Decide(Decision(7, 4, K, "tested", ("why",), BOTH, True)),
         i.Decide(Decision(7, 5, D, "tested", ("why",), (UPF,), True, "1/162")),
     ]
-    assert (one.state.kill, one.state.deploys) == (None, ())
+    assert (one.state.killing.kill, one.state.deploying.deploys) == (None, ())
 
 
 def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
     one = steps(stage=Stage.DEPLOYING, kill=decided(1, K), next_id=4)
-    one.fire(D, "tested", ("why",))
+    fire(one, D, "tested", ("why",))
     decision = Decision(7, 4, D, "tested", ("why",), (UPF,), False, "1/162")
     assert one.outputs == [i.Decide(decision)]
-    assert one.state.deploys == (Pending(decision, (UPF,), 100.0, 100.0),)
-    one.fire(D, "tested", ("not yet",))
-    assert [d.decision.targets for d in one.state.deploys] == [(UPF,), (LINK,)]
+    assert one.state.deploying.deploys == (Pending(decision, (UPF,), 100.0, 100.0),)
+    fire(one, D, "tested", ("not yet",))
+    assert [d.decision.targets for d in one.state.deploying.deploys] == [(UPF,), (LINK,)]
 
 
 @pytest.mark.parametrize(
@@ -94,21 +106,21 @@ def test_no_deploy_leaves_without_its_kill_its_stage_its_mode_and_the_lead(
     known: dict[str, Any],
 ) -> None:
     one = steps(**{"stage": Stage.DEPLOYING, "kill": decided(1, K), **known})
-    one.fire(D, "tested", ("why",))
+    fire(one, D, "tested", ("why",))
     assert one.outputs == []
 
 
 def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device() -> None:
     one = steps(next_id=4)
-    one.fire(K, "tested", ("why",))
+    fire(one, K, "tested", ("why",))
     decision = Decision(7, 4, K, "tested", ("why",), BOTH, False, "")
     assert one.outputs == [i.Decide(decision)]
-    assert one.state.kill == Pending(decision, BOTH, 100.0, 100.0)
+    assert one.state.killing.kill == Pending(decision, BOTH, 100.0, 100.0)
 
 
 def test_no_kill_leaves_from_one_that_follows() -> None:
     one = steps(leading=False)
-    one.fire(K, "tested", ("why",))
+    fire(one, K, "tested", ("why",))
     assert one.outputs == []
 
 
@@ -136,20 +148,20 @@ def test_each_stage_wants_what_still_helps(
     stage: Stage, known: dict[str, Any], wanted: tuple[bool, bool, bool]
 ) -> None:
     one = steps(stage=stage, deploys=(decided(2, D),), **known)
-    assert (one.wanted("block"), one.wanted("kill"), one.wanted(0)) == wanted
+    assert tuple(sending.wanted(one, slot) for slot in ("block", "kill", 0)) == wanted
 
 
 def test_what_is_decided_anew_keeps_its_order_and_its_limits() -> None:
     kill = decided(1, K, given_up=True, details=("old",))
     one = steps(stage=Stage.KILLING, kill=kill, next_id=4, deploy_rule="tested")
-    one.renew("kill", "it restarted")
-    one.renew("kill", "it restarted")
+    renew(one, "kill", "it restarted")
+    renew(one, "kill", "it restarted")
     decisions = [output.decision for output in one.outputs if isinstance(output, i.Decide)]
     assert decisions == [
         Decision(7, number, K, "tested", ("why", "it restarted"), BOTH, False, "1/162")
         for number in (4, 5)
     ]
-    assert one.state.kill == Pending(decisions[1], BOTH, 90.0, 100.0, given_up=True)
+    assert one.state.killing.kill == Pending(decisions[1], BOTH, 90.0, 100.0, given_up=True)
 
 
 @pytest.mark.parametrize(
@@ -163,14 +175,14 @@ def test_what_is_decided_anew_keeps_its_order_and_its_limits() -> None:
 )
 def test_a_kill_that_is_done_or_not_wanted_is_not_decided_anew(known: dict[str, Any]) -> None:
     one = steps(**{"stage": Stage.KILLING, "kill": decided(1, K), **known})
-    one.renew("kill", "it restarted")
+    renew(one, "kill", "it restarted")
     assert one.outputs == []
 
 
 def test_a_flight_block_is_decided_anew_also_when_it_was_confirmed() -> None:
     block = decided(1, BLOCK, outcomes=reports(a=Outcome.CONFIRMED, b=Outcome.CONFIRMED))
     one = steps(stage=Stage.BLOCKED, block=block)
-    one.renew("block", "it restarted")
+    renew(one, "block", "it restarted")
     assert len(one.outputs) == 1
 
 
@@ -179,21 +191,21 @@ def test_of_the_deploy_only_what_was_not_begun_is_decided_anew() -> None:
     deploys = (decided(2, D, UPF, outcomes=begun), decided(3, D, LINK))
     kill = decided(1, K, outcomes=reports(a=Outcome.SENT, b=Outcome.SENT))
     one = steps(stage=Stage.DEPLOYING, kill=kill, deploys=deploys, next_id=4)
-    one.renew_not_begun("another took over")
+    renew_not_begun(one, "another took over")
     (output,) = one.outputs
     assert isinstance(output, i.Decide)
     assert (output.decision.targets, output.decision.reasons) == (
         (LINK,),
         ("why", "another took over"),
     )
-    assert one.state.deploys[0] == deploys[0]
-    assert one.state.deploys[1].decision == output.decision
+    assert one.state.deploying.deploys[0] == deploys[0]
+    assert one.state.deploying.deploys[1].decision == output.decision
 
 
 def test_a_flight_block_is_decided_anew_also_where_it_was_begun() -> None:
     begun = decided(1, BLOCK, outcomes=reports(a=Outcome.SENT, b=Outcome.SENT))
     one = steps(stage=Stage.BLOCKED, block=begun)
-    one.renew_not_begun("another took over")
+    renew_not_begun(one, "another took over")
     assert len(one.outputs) == 1
 
 
@@ -201,36 +213,36 @@ def test_those_that_have_not_reported_get_a_new_number_and_the_rest_stays() -> N
     told = reports(a=Outcome.SENT)
     kill = decided(1, K, outcomes=told, details=("a: told",), earlier=frozenset({(7, 0)}))
     one = steps(stage=Stage.KILLING, kill=kill, next_id=4)
-    one.renew_missing("kill", "it saw a newer one first")
+    renew_missing(one, "kill", "it saw a newer one first")
     reasons = ("why", "it saw a newer one first")
     decision = Decision(7, 4, K, "tested", reasons, (UPF,), False, "1/162")
     assert one.outputs == [i.Decide(decision)]
-    assert one.state.kill == Pending(
+    assert one.state.killing.kill == Pending(
         decision, BOTH, 90.0, 100.0, told, ("a: told",), frozenset({(7, 0), (7, 1)})
     )
     follows = steps(stage=Stage.KILLING, kill=kill, leading=False)
-    follows.renew_missing("kill", "it saw a newer one first")
+    renew_missing(follows, "kill", "it saw a newer one first")
     assert follows.outputs == []
 
 
 def test_what_is_sent_again_is_the_same() -> None:
     kill = decided(1, K)
     one = steps(kill=kill)
-    one.send_again("kill")
+    send_again(one, "kill")
     assert one.outputs == [i.Decide(kill.decision, again=True)]
-    assert one.state.kill == replace(kill, sent_at=100.0)
+    assert one.state.killing.kill == replace(kill, sent_at=100.0)
 
 
 def test_each_step_of_the_ladder_has_its_own_place() -> None:
     first, second, third = (decided(number, D) for number in (2, 3, 4))
     one = steps(deploys=(first, second, third))
-    assert one.slots == ("block", "kill", 0, 1, 2)
+    assert sending.slots(one) == ("block", "kill", 0, 1, 2)
     changed = replace(second, sent_at=95.0)
-    one.put(1, changed)
-    assert one.state.deploys == (first, changed, third)
-    one.put(3, first)
-    assert one.state.deploys == (first, changed, third, first)
-    assert [one.pending(slot) for slot in (0, 1, 2)] == [first, changed, third]
+    put(one, 1, changed)
+    assert one.state.deploying.deploys == (first, changed, third)
+    put(one, 3, first)
+    assert one.state.deploying.deploys == (first, changed, third, first)
+    assert [pending_in(one, slot) for slot in (0, 1, 2)] == [first, changed, third]
 
 
 # -- in words ------------------------------------------------------------------------------------
@@ -238,7 +250,7 @@ def test_each_step_of_the_ladder_has_its_own_place() -> None:
 
 def test_the_details_of_every_step_are_told() -> None:
     deploys = (decided(2, D, details=("a: x",)), decided(3, D), decided(4, D, details=("b: y",)))
-    assert steps(deploys=deploys).deploy_details() == "a: x; b: y"
+    assert deploy_details(steps(deploys=deploys)) == "a: x; b: y"
 
 
 def test_an_alarm_is_kept_once_and_the_newest_are_kept() -> None:
@@ -246,9 +258,9 @@ def test_an_alarm_is_kept_once_and_the_newest_are_kept() -> None:
     for number in range(20):
         one.alarm(f"alarm {number}")
         one.alarm("alarm 0")
-    assert one.outputs[:2] == [i.Say("alarm 0", alarm=True)] * 2
-    assert one.state.alarms[-1] == "alarm 19"
-    assert len(one.state.alarms) == 16
+    assert one.outputs[:2] == [i.LogMessage("alarm 0", alarm=True)] * 2
+    assert one.state.alarming.alarms[-1] == "alarm 19"
+    assert len(one.state.alarming.alarms) == 16
 
 
 def test_who_waits_for_nothing_is_not_answered() -> None:
@@ -275,43 +287,43 @@ def test_a_kill_has_failed_when_nobody_is_expected_to_confirm_it_any_more(
     now: float, outcomes: dict[str, Outcome], failed: bool
 ) -> None:
     kill = decided(1, K, outcomes=reports(**outcomes))
-    assert steps(now=now).kill_failed(kill) is failed
+    assert kill_failed(steps(now=now), kill) is failed
 
 
 def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_once() -> None:
     one = steps(now=96.0, kill=decided(1, K), kill_tokens=(5, 6))
-    one.end_kill()
-    one.end_kill()
+    end_kill(one)
+    end_kill(one)
     words = "no report within 6.0 s"
     assert one.outputs == [
         i.Finish(5, False, False, words),
         i.Finish(6, False, False, words),
-        i.Say(f"the motors may still turn, no kill confirmed: {words}", alarm=True),
+        i.LogMessage(f"the motors may still turn, no kill confirmed: {words}", alarm=True),
     ]
-    assert one.state.kill_tokens == ()
+    assert one.state.own.kill_tokens == ()
 
 
 def test_a_kill_that_is_confirmed_answers_with_the_words_of_the_links() -> None:
     told = reports(a=Outcome.CONFIRMED)
     one = steps(kill=decided(1, K, outcomes=told, details=("a: off",)), kill_tokens=(5,))
-    one.end_kill()
+    end_kill(one)
     assert one.outputs == [i.Finish(5, True, True, "a: off")]
-    assert one.state.kill_tokens == ()
+    assert one.state.own.kill_tokens == ()
 
 
 def test_a_kill_that_was_taken_and_failed_says_that_it_was_taken() -> None:
     told = MappingProxyType({LINK: frozenset({Outcome.ACCEPTED})})
     one = steps(now=96.0, kill=decided(1, K, outcomes=told, details=("a: ok",)), kill_tokens=(5,))
-    one.end_kill()
+    end_kill(one)
     assert one.outputs[0] == i.Finish(5, False, True, "a: ok")
 
 
 def test_a_kill_that_is_under_way_is_not_answered() -> None:
     one = steps(now=91.0, kill=decided(1, K), kill_tokens=(5,))
-    one.end_kill()
-    steps().end_kill()
+    end_kill(one)
+    end_kill(steps())
     assert one.outputs == []
-    assert one.state.kill_tokens == (5,)
+    assert one.state.own.kill_tokens == (5,)
 
 
 # -- nobody waits any more -----------------------------------------------------------------------
@@ -326,18 +338,21 @@ WAITING: dict[str, Any] = {
 
 def test_one_that_steps_down_answers_and_what_was_ordered_stays() -> None:
     one = steps(**WAITING)
-    one.answer_all("another decides")
+    answer_all(one, "another decides")
     assert one.outputs == [i.Finish(n, False, False, "another decides") for n in (5, 6)]
-    assert (one.state.kill_tokens, one.state.deploy_tokens) == ((), ())
-    assert (one.state.deploy_rule, one.state.deploy_reasons) == ("tested", ("why",))
+    assert (one.state.own.kill_tokens, one.state.own.deploy_tokens) == ((), ())
+    assert (one.state.deploying.deploy_rule, one.state.deploying.deploy_reasons) == (
+        "tested",
+        ("why",),
+    )
 
 
 def test_one_that_gives_up_answers_and_pursues_nothing() -> None:
     one = steps(**WAITING)
-    one.give_up_waiting("reset")
+    give_up_waiting(one, "reset")
     assert one.outputs == [i.Finish(n, False, False, "reset") for n in (5, 6)]
-    assert (one.state.kill_tokens, one.state.deploy_tokens) == ((), ())
-    assert (one.state.deploy_rule, one.state.deploy_reasons) == ("", ())
+    assert (one.state.own.kill_tokens, one.state.own.deploy_tokens) == ((), ())
+    assert (one.state.deploying.deploy_rule, one.state.deploying.deploy_reasons) == ("", ())
 
 
 def test_a_link_that_is_heard_leaves_the_others_as_they_are() -> None:

@@ -9,9 +9,10 @@ import pytest
 from story import Story, rule, shipped, with_rules
 
 from chute_ros.model import Action, LinkState
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.counter import LINGERS
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.rules import MeasurementCondition, Rule
+from chute_ros.supervisor.rules import Rule
 
 LOST = {"link_state": LinkState.LOST}
 #: What an IMU alone does not tell; and a tilt that says nothing, as it is in doubt.

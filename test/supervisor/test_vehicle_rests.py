@@ -12,19 +12,15 @@ from story import LINK, START, TILTS, Story, falling, rule, shipped, with_rules
 from chute_ros.model import Action, Armed, LinkState
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor import policy
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
+from chute_ros.supervisor.conditions.link import LinkCondition
+from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.core import update
+from chute_ros.supervisor.link_evidence import LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import rests_until
-from chute_ros.supervisor.rules import (
-    AutopilotCondition,
-    AutopilotFact,
-    DeviceCondition,
-    DeviceFact,
-    LinkCondition,
-    LinkJudgement,
-    MeasurementCondition,
-    Rule,
-)
+from chute_ros.supervisor.rules import Rule
 
 LOST = AutopilotCondition(AutopilotFact.LOST)
 DISARMED = AutopilotCondition(AutopilotFact.DISARMED)
@@ -35,10 +31,13 @@ class Compared(Story):
     """Each update is made once more by one that looks at all, and must come to the same."""
 
     def _update(self, inputs: tuple[i.Input, ...], t: float) -> list[i.Output]:
-        before = replace(self.state, vehicle_rests_until=-math.inf)
+        before = replace(self.state, own=replace(self.state.own, vehicle_rests_until=-math.inf))
         outputs = super()._update(inputs, t)
         state, all_outputs = update(self.config, before, inputs, START + t)
-        rested = replace(self.state, vehicle_rests_until=state.vehicle_rests_until)
+        rested = replace(
+            self.state,
+            own=replace(self.state.own, vehicle_rests_until=state.own.vehicle_rests_until),
+        )
         assert repr(rested) == repr(state)
         assert repr(tuple(outputs)) == repr(all_outputs)
         return outputs

@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 from story import START, Story, falling, shipped
 
-from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor import readings
 from chute_ros.supervisor.machine import Stage
 
 SEEDS = pytest.mark.parametrize("seed", range(8))
@@ -50,7 +50,7 @@ def rate(*heights: float, every: float = 0.1) -> tuple[float, str]:
     story = Story(shipped("multirotor")).flying()
     for height in heights:
         story.fly(story.t + every, every=every, height=height)
-    return flight.reading(story.config, story.state, "climb_rate", START + story.t)
+    return readings.reading(story.config, story.state, "climb_rate", START + story.t)
 
 
 @pytest.mark.parametrize("acceleration", [-9.81, 0.0, 50.0, 100.0])

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from chute_ros.supervisor.conditions import find
+from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.rules import Condition
 from chute_ros.supervisor.state import State
 
 
@@ -20,5 +19,5 @@ class Told(NamedTuple):
 
 def told(config: SupervisorConfig, state: State, condition: Condition, now: float) -> Told:
     """Look at a condition, and ask for the words."""
-    found = find(config, state, condition, now)
+    found = condition.find(config, state, now)
     return Told(found.holds, found.text, found.samples)

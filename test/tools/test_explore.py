@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 
 from chute_ros.model import Action
-from chute_ros.supervisor import core, deploying, policy
+from chute_ros.supervisor import core, deploying, policy, requests
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence
-from chute_ros.supervisor.measurements import Measured
+from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.turn import Turn
 from chute_ros.tools import explore_key
 from chute_ros.tools.explore_properties import PROPERTIES
 from chute_ros.tools.explorer import BEGINNINGS, Explorer, Found, page
@@ -56,13 +57,14 @@ def test_a_gate_that_lets_nothing_through_is_found(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_deploy_that_does_not_wait_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    ordered = deploying.Deploying.order_deploy
+    ordered = policy.order_deploy
 
-    def at_once(turn: deploying.Deploying, rule: str, reasons: tuple[str, ...]) -> None:
+    def at_once(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
         ordered(turn, rule, reasons)
-        turn.state = replace(turn.state, deploy_due=turn.now)
+        turn.deploying = replace(turn.deploying, deploy_due=turn.now)
 
-    monkeypatch.setattr(deploying.Deploying, "order_deploy", at_once)
+    for module in (deploying, policy, requests):
+        monkeypatch.setattr(module, "order_deploy", at_once)
     found = found_from("in flight")
     assert found.violation is not None
     assert found.violation.name == "delay"
@@ -94,7 +96,8 @@ def test_what_raises_and_what_leaves_in_shadow_is_found(monkeypatch: pytest.Monk
 
 def test_every_field_of_a_state_decides_or_is_named_as_one_that_does_not() -> None:
     text = Path(explore_key.__file__).read_text()
-    kinds = (State, Pending, RuleEvidence, LinkEvidence, Measured)
+    groups = [type(one) for one in vars(State(1, 0.0)).values() if dataclasses.is_dataclass(one)]
+    kinds = (State, *groups, Pending, RuleEvidence, LinkEvidence, Measured)
     names = [field.name for kind in kinds for field in dataclasses.fields(kind)]
     used = {name for name in names if f".{name}" in text}
     used |= {"measurements"} if ".measured(" in text else set()

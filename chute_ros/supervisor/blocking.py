@@ -1,0 +1,82 @@
+"""The ground: is the vehicle fit to fly, is it armed, and is flight blocked or released?"""
+
+from __future__ import annotations
+
+from chute_ros.model import Action, LinkState
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Event, Stage, listed
+from chute_ros.supervisor.preflight import block_reasons, not_seen
+from chute_ros.supervisor.sending import decide, kill_failed, worth_sending
+from chute_ros.supervisor.turn import Turn
+
+#: What the health of the links can do; in flight nothing.
+_OF_LINKS = (Event.LINKS_UNHEALTHY, Event.LINKS_HEALTHY)
+#: Once `safety/arm` has armed the parachutes, their own status says so within this time, s.
+ARMED_SHOWS = 2.0
+
+
+def check_armed(turn: Turn) -> None:
+    """ARMED is what the parachutes say: one may be disarmed past us, or start anew."""
+    state = turn.state
+    if state.stage is not Stage.ARMED or turn.now < state.stage_since + ARMED_SHOWS:
+        return
+    said = [
+        status.armed
+        for link in turn.config.deploy_links
+        for status in state.evidence(link).devices.values()
+        if status.link_state is LinkState.OK
+    ]
+    if said and not any(said):
+        text = "no parachute says any more that it is armed"
+        turn.warn(text)
+        turn.move(Event.DISARMED, text)
+
+
+def check_links(turn: Turn) -> None:
+    stage = turn.state.stage
+    if not any(listed(stage, event) for event in _OF_LINKS):
+        return
+    reasons = block_reasons(turn.config, turn.state, turn.now)
+    grace = max(turn.config.limits(link).startup_grace for link in turn.config.links)
+    starting = turn.now < turn.state.started_at + grace
+    if stage is Stage.STARTUP and reasons and starting:
+        return
+    event = Event.LINKS_UNHEALTHY if reasons else Event.LINKS_HEALTHY
+    if listed(stage, event):
+        turn.move(event, "; ".join(reasons))
+        if not reasons and (text := not_seen(turn.config, turn.state)):
+            turn.log(f"not seen in flight: {text}")
+
+
+def block_or_release(turn: Turn) -> None:
+    """Flight is blocked on the ground until READY, and after a deploy until a reset."""
+    if turn.state.mode is i.Mode.INHIBITED:
+        return
+    if turn.state.stage in (Stage.READY, Stage.ARMED):
+        action = Action.FLIGHT_BLOCK_RELEASE
+        reasons: tuple[str, ...] = ("every required link is healthy",)
+    elif turn.state.stage in (Stage.STARTUP, Stage.BLOCKED, Stage.DEPLOYED, Stage.FAULT) or (
+        _killed_on_ground(turn)
+    ):
+        action = Action.FLIGHT_BLOCK
+        reasons = block_reasons(turn.config, turn.state, turn.now)
+    elif turn.state.stage is Stage.IN_FLIGHT:
+        action, reasons = Action.FLIGHT_BLOCK_RELEASE, ("in the air",)
+    else:
+        return
+    block = turn.state.block
+    if turn.state.mode is i.Mode.SHADOW and block is not None and not block.decision.shadow:
+        # Leaving ACTIVE took the block back; that must arrive before anything is only said.
+        if worth_sending(turn, block):
+            return
+        block = None
+    if block is None or block.decision.action is not action:
+        decide(turn, "block", action, "links", reasons, turn.config.links)
+
+
+def _killed_on_ground(turn: Turn) -> bool:
+    """The kill has ended, so that a block does not overtake it, and nothing follows it."""
+    kill = turn.killing.kill
+    ended = kill is not None and (kill.confirmed or kill_failed(turn, kill))
+    on_ground = not turn.killing.killed_in_flight and not turn.deploying.deploy_rule
+    return turn.state.stage is Stage.KILLING and ended and on_ground

@@ -1,0 +1,102 @@
+"""What the device nodes tell of themselves and of their parachutes. Nobody but a link that is
+configured is listened to."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+
+from chute_ros.model import Action, LinkState
+from chute_ros.supervisor import flight
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.link_evidence import LinkEvidence
+from chute_ros.supervisor.machine import Event, Stage
+from chute_ros.supervisor.quick_replace import replace
+from chute_ros.supervisor.sending import pending_in, renew, slots
+from chute_ros.supervisor.turn import Turn
+
+
+def take_heartbeat(turn: Turn, one: i.LinkHeartbeat) -> None:
+    """A node lives. One whose count does not rise has restarted; a lost one may have."""
+    if one.link not in turn.config.links:
+        return
+    before, limits = turn.state.evidence(one.link), turn.config.limits(one.link)
+    known = not math.isnan(before.heard)
+    silent = before.silent(limits.lost_after, turn.now)
+    _set_evidence(turn, one.link, before.with_heartbeat(one, limits, turn.now))
+    if turn.own.leading:
+        # The alarms of one that follows are those of the leader, which has another clock.
+        _check_clock(turn, one.link)
+        _check_delay(turn, one.link, before.looks_late)
+    if known and (silent or one.seq <= before.seq):
+        # It may know of no decision; what still holds for it is decided anew.
+        restarted = one.seq <= before.seq
+        why = f"{one.link} {'restarted' if restarted else 'is back'}"
+        for slot in slots(turn):
+            pending = pending_in(turn, slot)
+            if pending is None or one.link not in pending.targets:
+                continue
+            # One that goes on counting goes on with what it has begun: no second shot.
+            begun = not restarted and one.link not in pending.not_begun()
+            if slot == "block" or not begun:
+                renew(turn, slot, why)
+
+
+def _check_clock(turn: Turn, link: str) -> None:
+    """Its wall clock against the one here."""
+    text = f"{link}: its wall clock differs; it may refuse decisions as too old"
+    difference = abs(turn.state.evidence(link).clocks_differ_by)
+    told, limit = text in turn.alarming.alarms, turn.config.preflight.max_clock_difference
+    if difference > limit and not told:
+        turn.alarm(text)
+    elif difference <= limit and told:
+        alarms = tuple(one for one in turn.alarming.alarms if one != text)
+        turn.alarming = replace(turn.alarming, alarms=alarms)
+        turn.log(f"{link}: its wall clock agrees again")
+
+
+def _check_delay(turn: Turn, link: str, before: str) -> None:
+    """On the ground it forbids take-off."""
+    text = turn.state.evidence(link).looks_late
+    if turn.flight.airborne and text and not before:
+        turn.warn(f"{link}: {text}")
+
+
+def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
+    """One device on a link tells its picture."""
+    if one.link not in turn.config.links:
+        return
+    status, alive = one.status, one.status.link_state is LinkState.OK
+    said = turn.state.evidence(one.link).devices.get(status.device)
+    was_out = said is not None and said.deployed
+    # One that started anew has forgotten it, which takes nothing back.
+    forgot = said is not None and status.uptime < said.uptime
+    _set_evidence(turn, one.link, turn.state.evidence(one.link).with_status(status, turn.now))
+    if alive and not status.deployed:
+        before = turn.flight.released_before - {(one.link, status.device)}
+        turn.flight = replace(turn.flight, released_before=before)
+        aloft = flight.in_air(turn.config, turn.state, turn.now) is not False
+        if was_out and aloft and turn.state.stage is Stage.DEPLOYED:
+            text = f"{one.link} {status.device} no longer reports deployed"
+            if turn.deploying.deploys or not turn.flight.airborne or forgot:
+                turn.alarm(f"{text}; a forced deploy continues with the next")
+            else:
+                # It may have erred when it said so; with nothing out, the rules must live.
+                turn.alarm(text)
+                turn.move(Event.TAKEN_BACK, text)
+                _unlatch_deploys(turn)
+
+
+def _unlatch_deploys(turn: Turn) -> None:
+    """What a deploy rule was acted on for has not been done."""
+    deploys = {one.name for one in turn.config.profile.rules if one.action is Action.DEPLOY}
+    rules = {
+        name: replace(evidence, latched=evidence.latched and name not in deploys)
+        for name, evidence in turn.state.rules.items()
+    }
+    turn.state = replace(turn.state, rules=MappingProxyType(rules))
+
+
+def _set_evidence(turn: Turn, link: str, evidence: LinkEvidence) -> None:
+    links = {**turn.heard.links, link: evidence}
+    turn.heard = replace(turn.heard, links=MappingProxyType(links))

@@ -1,0 +1,175 @@
+"""Measurements as they can be used now, and the rates that heights tell in their place."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from itertools import pairwise
+from statistics import fmean, median
+from typing import TYPE_CHECKING
+
+from chute_ros.supervisor.contradictions import NO_DROP, NOT_TOLD, Drop, Rise
+from chute_ros.supervisor.measurements import (
+    CLIMB_RATE,
+    HEIGHT,
+    PRESSURE_ALTITUDE,
+    VERTICAL_ACCELERATION,
+    VERTICAL_SPEED,
+)
+
+if TYPE_CHECKING:  # both hold rules, whose conditions are found here
+    from chute_ros.supervisor.config import SupervisorConfig
+    from chute_ros.supervisor.state import State
+
+#: A climb rate needs heights this far apart at least, s.
+_CLIMB_OVER = 0.4
+#: Measurement -> the part of vehicle/state that tells it, where that has another name.
+PARTS = {"tilt_deg": "attitude"}
+#: What a barometer told longer ago says nothing of a fall, s.
+_DROP_WITHIN = 12.0
+_HEIGHT_LOST = "the autopilot started anew in flight, and its height with it"
+
+
+def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    """A measurement and "", or NaN and why it cannot be used."""
+    if name == CLIMB_RATE:
+        rate = pressure_rate(config, state, now)
+        return (rate, "") if not math.isnan(rate) else _estimated_rate(config, state, now)
+    if name == HEIGHT and state.flight.rebooted:
+        return math.nan, _HEIGHT_LOST
+    if name == VERTICAL_ACCELERATION:
+        return _vertical_acceleration(config, state, now)
+    known = state.measured(name)
+    why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
+    if not why:
+        return known.value, ""
+    if name == VERTICAL_SPEED:
+        rate = climb_rate(config, state, now)
+        return rate, why if math.isnan(rate) else ""
+    return math.nan, why
+
+
+def measured(config: SupervisorConfig, state: State, name: str, now: float) -> float:
+    """A measurement, or NaN where it cannot be used."""
+    return reading(config, state, name, now)[0]
+
+
+def doubt(state: State, name: str, value: float, now: float) -> str:
+    """Why a measurement that can be used is a weaker sign than another; empty: it is not. value:
+    what was read of it, which may be what the heights tell in its place."""
+    if value != state.measured(name).value:
+        return ""
+    if PARTS.get(name, name) in state.heard.disputed:
+        return "another source told otherwise"
+    return state.measured(name).doubt(name, now)
+
+
+def climb_rate(config: SupervisorConfig, state: State, now: float) -> float:
+    """Vertical speed from the estimator's heights of the last second, m/s, for sources that tell
+    none (a receiver without a fix, a barometer alone). NaN: not known. What they are
+    above is the same for all of them, also where the autopilot has started anew."""
+    return _rate_of(config, state, HEIGHT, now)[0]
+
+
+def pressure_rate(config: SupervisorConfig, state: State, now: float) -> float:
+    """Vertical speed from the barometer's heights of the last second, m/s; NaN: it tells none, or
+    has jumped within that second."""
+    if state.measured(PRESSURE_ALTITUDE).doubt(PRESSURE_ALTITUDE, now):
+        return math.nan
+    return _rate_of(config, state, PRESSURE_ALTITUDE, now)[0]
+
+
+def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
+    """By how much, and from when to when, the barometer's height changed in the last second."""
+    if math.isnan(pressure_rate(config, state, now)):
+        return NOT_TOLD
+    heights = state.heard.pressure_heights
+    (since, before), (until, after) = heights[0], heights[-1]
+    return Rise((after - before) / (until - since), since, until)
+
+
+def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
+    """By how much the barometer tells less than before it was last silent."""
+    known = state.measured(PRESSURE_ALTITUDE)
+    passed = known.measured_at - state.heard.pressure_before[0]
+    told = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
+    if known.doubt(PRESSURE_ALTITUDE, now) or not passed <= _DROP_WITHIN:
+        return NO_DROP
+    return Drop(state.heard.pressure_before[1] - told, passed)
+
+
+def pressure_height(config: SupervisorConfig, state: State, now: float) -> float:
+    """Height above the take-off by the barometer, m; NaN: not known, or in doubt."""
+    known = state.measured(PRESSURE_ALTITUDE)
+    if known.has_jumped(now):
+        return math.nan
+    usable = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
+    return usable - state.flight.ground_pressure_altitude
+
+
+def rate_count(config: SupervisorConfig, state: State, now: float) -> int:
+    """Samples that have come so far of what tells CLIMB_RATE."""
+    by_pressure = not math.isnan(pressure_rate(config, state, now))
+    return state.measured(PRESSURE_ALTITUDE if by_pressure else HEIGHT).count
+
+
+def _estimated_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:
+    if state.flight.rebooted:
+        return math.nan, _HEIGHT_LOST
+    return _rate_of(config, state, HEIGHT, now)
+
+
+def _vertical_acceleration(
+    config: SupervisorConfig, state: State, now: float
+) -> tuple[float, str]:
+    """Of the last second of vertical speeds, m/s^2, or NaN and why there is none."""
+    known = state.measured(VERTICAL_SPEED)
+    if why := known.unusable(config.profile.limits[VERTICAL_SPEED], now):
+        return math.nan, why
+    newest = state.heard.motion[-1][0] if state.heard.motion else math.nan
+    told = [(one[0], one[1]) for one in state.heard.motion if newest - one[0] <= 1.0]
+    told = [one for one in told if not math.isnan(one[1])]
+    if not told or told[-1][0] - told[0][0] < _CLIMB_OVER:
+        return math.nan, "too few vertical speeds that can be used"
+    return _slope(tuple(told)), ""
+
+
+def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    heights = state.heard.heights if name == HEIGHT else state.heard.pressure_heights
+    height = state.measured(name)
+    if height.unusable(config.profile.limits[name], now) or not _enough(
+        heights, height.measured_at
+    ):
+        return math.nan, "too few heights that can be used"
+    return _rate(heights), ""
+
+
+@lru_cache(maxsize=16)  # each picture of the vehicle asks for it several times
+def _rate(heights: tuple[tuple[float, float], ...]) -> float:
+    """What heights (monotonic s, m) tell of a climb, m/s."""
+    # The middle one of the single rates: one step of a height, however high, is no climb.
+    rates = [
+        (after[1] - before[1]) / (after[0] - before[0]) for before, after in pairwise(heights)
+    ]
+    rate = median(rates)
+    # The noise of neighbours has a middle one as well; over the whole second it is small, where a
+    # step is large. What both of them tell is flown.
+    over = _slope(heights)
+    return min(rate, over, key=abs) if rate * over > 0.0 else 0.0
+
+
+def _enough(heights: tuple[tuple[float, float], ...], newest: float) -> bool:
+    return bool(heights) and newest - heights[0][0] >= _CLIMB_OVER
+
+
+def _slope(heights: tuple[tuple[float, float], ...]) -> float:
+    """Of the straight line that is nearest to them by least squares, m/s."""
+    middle = fmean([at for at, _ in heights])
+    weights = [at - middle for at, _ in heights]
+    ways = [weight * height for weight, (_, height) in zip(weights, heights, strict=True)]
+    return sum(ways) / sum([weight**2 for weight in weights])
+
+
+def unusable(config: SupervisorConfig, state: State, name: str, now: float) -> str:
+    """Why a measurement cannot be used; empty: it can."""
+    return reading(config, state, name, now)[1]

@@ -1,0 +1,241 @@
+"""What is told of the vehicle: each measurement as evidence, and what they say together."""
+
+from __future__ import annotations
+
+import math
+from types import MappingProxyType
+
+from chute_ros.model import Armed, VehicleState
+from chute_ros.supervisor import flight, readings
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.contradictions import commanded, denials, noted
+from chute_ros.supervisor.kinds import kind
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measurements import (
+    ACCELERATION,
+    CLIMB_RATE,
+    DEGREES,
+    HEIGHT,
+    PRESSURE_ALTITUDE,
+    TILT,
+    VERTICAL_SPEED,
+)
+from chute_ros.supervisor.quick_replace import replace
+from chute_ros.supervisor.samples import pressure_altitude, samples_of
+from chute_ros.supervisor.state import CONTRADICTED_FOR
+from chute_ros.supervisor.turn import Turn
+
+#: Accelerometers differ by more than motors that shake make them, m/s^2.
+_FORCES_DIFFER = 6.0
+#: What the newest pressure counts in that of the ground.
+_OF_NEWEST = 0.1
+#: A barometer that was not heard for longer was silent, s.
+_SILENCE = 0.5
+#: No force without any speed is that of a fall for so long, s.
+_NEVER_FALLS_FOR = 3.0
+#: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); it is found
+#: fit or unfit by the samples of so long, s.
+_AT_REST, _FITNESS_TAKES = (7.8, 11.8), 1.0
+#: A vehicle that was not heard as it was killed may be so much later, s.
+_HEARD_AFTER_KILL = 1.0
+
+
+def take_vehicle(turn: Turn, one: i.VehicleReport) -> None:
+    """What the vehicle is told to be, and each measurement in it as evidence."""
+    new = one.state
+    _note_home(turn, new)
+    state, limits = turn.state, turn.config.profile.limits
+    samples = samples_of(new, turn.now, state.flight.home, state.flight.home_altitude)
+    before = {
+        # What nobody tells just now has not changed its source.
+        name: state.measured(name).told_by(one.told_by.get(readings.PARTS.get(name, name), ""))
+        if math.isfinite(sample.measured_at)
+        else state.measured(name)
+        for name, sample in samples.items()
+    }
+    measurements = {
+        name: before[name].with_sample(sample, limits[name]) for name, sample in samples.items()
+    }
+    was_disarmed = state.heard.vehicle.armed is Armed.DISARMED
+    differ = new.acceleration_spread > _FORCES_DIFFER
+    turn.heard = replace(
+        turn.heard,
+        vehicle=new,
+        vehicle_received=turn.now,
+        disputed=one.disputed | {ACCELERATION} if differ else one.disputed,
+        measurements=MappingProxyType({**state.heard.measurements, **measurements}),
+    )
+    _note_heights_told(turn)
+    _note_contradictions(turn)
+    _note_height_of_kill(turn)
+    _note_reboots(turn, new)
+    _note_faults(turn, new.faults)
+    if was_disarmed and new.armed is Armed.ARMED:
+        height = readings.measured(turn.config, turn.state, "height", turn.now)
+        turn.flight = replace(turn.flight, armed_height=0.0 if math.isnan(height) else height)
+
+
+def _note_height_of_kill(turn: Turn) -> None:
+    """Height and speed, where they were not known as it was killed: it has fallen since, so
+    that no more is counted on than is left."""
+    state = turn.state
+    known = not math.isnan(state.killing.killed_height + state.killing.killed_sinking)
+    if known or state.stage is not Stage.KILLING or not state.killing.killed_in_flight:
+        return
+    height = readings.measured(turn.config, state, HEIGHT, turn.now)
+    sinking = -readings.measured(turn.config, state, VERTICAL_SPEED, turn.now)
+    heard = not math.isnan(height + sinking)
+    if heard and turn.now <= state.killing.killed_at + _HEARD_AFTER_KILL:
+        sinking = max(sinking, 0.0)
+        turn.killing = replace(turn.killing, killed_height=height, killed_sinking=sinking)
+
+
+def _note_home(turn: Turn, new: VehicleState) -> None:
+    """What heights are above, as long as it has not taken off: an autopilot that moves its
+    home in flight, or sets its height to zero, moves nothing here."""
+    state = replace(turn.state, heard=replace(turn.heard, vehicle=new, vehicle_received=turn.now))
+    if state.flight.airborne and not math.isnan(state.flight.home_altitude):
+        return
+    home_altitude = new.altitude - new.height
+    if not math.isnan(home_altitude):
+        turn.flight = replace(turn.flight, home_altitude=home_altitude)
+    here = pressure_altitude(new.pressure)
+    if state.flight.airborne or flight.says_down(turn.config, state, turn.now) is not True:
+        return
+    before = state.flight.ground_pressure_altitude
+    still = flight.armed(turn.config, state, turn.now) is not Armed.ARMED
+    if not math.isnan(here) and (still or math.isnan(before)):
+        ground = here if math.isnan(before) else before + _OF_NEWEST * (here - before)
+        turn.flight = replace(turn.flight, ground_pressure_altitude=ground)
+
+
+def _note_heights_told(turn: Turn) -> None:
+    """Keep the heights of the last second, at most ten of them, all since one was doubted:
+    what is left of noise without its jumps may look like a fall."""
+    heights = _kept(turn, HEIGHT, turn.heard.heights)
+    pressure_heights = _kept(turn, PRESSURE_ALTITUDE, turn.heard.pressure_heights)
+    if heights is turn.heard.heights and pressure_heights is turn.heard.pressure_heights:
+        return
+    before, known = turn.heard.pressure_before, turn.heard.pressure_heights
+    if known and pressure_heights[-1][0] - known[-1][0] > _SILENCE:
+        before = known[-1]
+    turn.heard = replace(
+        turn.heard, heights=heights, pressure_heights=pressure_heights, pressure_before=before
+    )
+
+
+def _kept(
+    turn: Turn, name: str, before: tuple[tuple[float, float], ...]
+) -> tuple[tuple[float, float], ...]:
+    height = turn.state.measured(name)
+    if math.isnan(height.measured_at):
+        return before
+    kept = tuple(
+        one
+        for one in before
+        if 0.0 <= height.measured_at - one[0] <= 1.0 and not one[0] < height.doubted_at
+    )
+    if not kept or height.measured_at - kept[-1][0] >= 0.1:
+        kept = (*kept, (height.measured_at, height.value))
+    return before if kept == before else kept
+
+
+def _note_contradictions(turn: Turn) -> None:
+    """What is claimed of a fall and is not so; in flight an alarm once it has lasted."""
+    state, now = turn.state, turn.now
+
+    def certain(name: str) -> float:
+        doubted = name in state.heard.disputed or state.measured(name).doubt(name, now)
+        return math.nan if doubted else readings.measured(turn.config, state, name, now)
+
+    cosine = math.cos(certain(TILT) / DEGREES)
+    moment = (now, certain(VERTICAL_SPEED), certain(ACCELERATION), cosine)
+    motion = noted(state.heard.motion, moment)
+    if motion is state.heard.motion:
+        return
+    denied = denials(
+        motion,
+        readings.pressure_change(turn.config, state, now),
+        readings.pressure_drop(turn.config, state, now),
+    )
+    tilt, error, beyond, rate = (
+        readings.measured(turn.config, state, name, now)
+        for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
+    )
+    # An estimator that is wrong follows its command where the vehicle does not.
+    climb_beyond = beyond + readings.measured(turn.config, state, VERTICAL_SPEED, now) - rate
+    since = {name: state.heard.denied_since.get(name, now) for name in denied}
+    # Of motors that are off nothing is commanded, whatever an autopilot goes on to tell.
+    off = state.heard.vehicle.armed is Armed.DISARMED
+    told = {} if off else commanded(tilt, error, beyond, climb_beyond)
+    turn.heard = replace(
+        turn.heard,
+        motion=motion,
+        denied=MappingProxyType(dict(denied)),
+        denied_since=MappingProxyType(since),
+        commanded=MappingProxyType(dict(told)),
+    )
+    last = state.heard.motion[-1][0] if state.heard.motion else now
+    for name, begun in since.items():
+        if state.flight.airborne and last < begun + CONTRADICTED_FOR <= now:
+            turn.warn(f"{name} is contradicted: {denied[name]}")
+    _note_fitness(turn)
+
+
+def _note_fitness(turn: Turn) -> None:
+    """An accelerometer that tells on the ground what it cannot feel there, or without any
+    speed of a fall, is not used until it tells on the ground what it must."""
+    state, now = turn.state, turn.now
+    unfit = dict(state.heard.unfit)
+    begun = state.heard.denied_since.get(ACCELERATION, math.nan)
+    if now >= begun + _NEVER_FALLS_FOR:
+        unfit.setdefault(ACCELERATION, f"it reports a fall, but {turn.heard.denied[ACCELERATION]}")
+    since = math.nan
+    stands = not state.flight.airborne and flight.says_down(turn.config, state, now) is True
+    speeds = (
+        readings.measured(turn.config, state, name, now) for name in (VERTICAL_SPEED, CLIMB_RATE)
+    )
+    stands = stands and not any(abs(s) > turn.config.profile.moving_speed for s in speeds)
+    known = state.measured(ACCELERATION)
+    force = known.usable(turn.config.profile.limits[ACCELERATION], now)
+    if stands and not math.isnan(force):
+        least, most = _AT_REST
+        fits = least <= force <= most
+        if fits == (ACCELERATION in unfit):
+            since = now if math.isnan(state.heard.fitness_since) else state.heard.fitness_since
+            if now >= since + _FITNESS_TAKES:
+                unfit.pop(ACCELERATION, None)
+                if not fits:
+                    unfit[ACCELERATION] = (
+                        f"it reports {force:.1f} m/s^2 while the vehicle stands (need {least:g} "
+                        f"to {most:g}; a driver that removes gravity reports 0)"
+                    )
+    if unfit != state.heard.unfit or since != state.heard.fitness_since:
+        turn.heard = replace(turn.heard, unfit=MappingProxyType(unfit), fitness_since=since)
+
+
+def _note_faults(turn: Turn, faults: tuple[str, ...]) -> None:
+    """In flight what forbids a take-off is an alarm, each once as long as it lasts."""
+    told = set(map(kind, turn.heard.faults_told))
+    new = [one for one in faults if kind(one) not in told]
+    if turn.flight.airborne:
+        turn.outputs += [i.LogMessage(f"vehicle: {one}", alarm=True) for one in new]
+    if faults != turn.heard.faults_told:
+        turn.heard = replace(turn.heard, faults_told=faults if turn.flight.airborne else ())
+
+
+def _note_reboots(turn: Turn, new: VehicleState) -> None:
+    """Restarts on the ground do not count; a node that counts from 0 again has restarted."""
+    state = turn.state
+    before = min(state.flight.reboots_before, new.reboot_count)
+    if not state.flight.airborne and not flight.in_air(turn.config, state, turn.now):
+        before = new.reboot_count
+    again = new.rebooted_in_flight and new.reboot_count > before
+    if again and state.flight.airborne and not state.flight.rebooted:
+        turn.warn("the autopilot started anew in flight")
+    rebooted = state.flight.rebooted or (again and state.flight.airborne)
+    if (before, rebooted) != (state.flight.reboots_before, state.flight.rebooted):
+        # Heights from before it may be above another ground.
+        heights = state.heard.heights if rebooted == state.flight.rebooted else ()
+        turn.flight = replace(turn.flight, reboots_before=before, rebooted=rebooted)
+        turn.heard = replace(turn.heard, heights=heights)
