@@ -108,6 +108,7 @@ TESTS = {
         "against_its_word",
         "core_wakes_and_words",
     ),
+    "pending": ("core_deploy", "core_requests", "core_lost", "ladder", "state_remembered"),
     "state": ("core_deploy", "core_requests", "core_lost", "ladder", "state_remembered"),
     "config": ("config", "config_at_limits"),
     "decision_gate": ("decision_gate", "decision_gate_at_limits"),

@@ -33,7 +33,7 @@ def test_a_dead_end_and_a_lost_stage_are_found() -> None:
     assert state_diagram.never_left(itself) == {Stage.KILLING}
 
 
-def test_the_picture_has_every_stage_and_every_stimulus() -> None:
+def test_the_picture_has_every_stage_and_every_event() -> None:
     root = xml.etree.ElementTree.fromstring(drawing())
     texts = [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
     for stage in Stage:

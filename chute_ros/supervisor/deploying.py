@@ -10,10 +10,11 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.gate import OPERATOR, too_low
 from chute_ros.supervisor.machine import Event, Stage, listed
 from chute_ros.supervisor.orders import order_deploy
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.policy import put_off
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import fire, send_again
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.state import State
 from chute_ros.supervisor.turn import Turn
 
 

@@ -15,8 +15,9 @@ from typing import Any, TypeVar, cast, get_args, get_type_hints
 from chute_ros.errors import RecordError
 from chute_ros.supervisor.codec import Codec
 from chute_ros.supervisor.epochs import LARGEST_EPOCH
+from chute_ros.supervisor.pending import Time
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.state import HeardHere, Own, State, Time
+from chute_ros.supervisor.state import HeardHere, Own, State
 
 T = TypeVar("T")
 _CODEC = Codec(State)

@@ -9,9 +9,9 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_reached, end_kill
 from chute_ros.supervisor.gate import OPERATOR, out_already
 from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import fire, kill_failed
-from chute_ros.supervisor.state import Pending
 from chute_ros.supervisor.turn import Turn
 
 #: What a vehicle says so soon after a kill was decided may be from before it, s.

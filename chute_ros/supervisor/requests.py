@@ -15,10 +15,10 @@ from chute_ros.supervisor.answers import give_up_waiting
 from chute_ros.supervisor.gate import OPERATOR, against_person
 from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
 from chute_ros.supervisor.orders import note_released, order_deploy, order_kill
+from chute_ros.supervisor.pending import Ask
 from chute_ros.supervisor.preflight import arm_reasons
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import decide
-from chute_ros.supervisor.state import Ask
 from chute_ros.supervisor.turn import Turn
 
 #: Devices whose wish to block flight is remembered: made-up names must not grow us.

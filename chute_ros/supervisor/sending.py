@@ -7,8 +7,8 @@ from typing import Literal
 from chute_ros.model import Action, Decision
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.quick_replace import replace
-from chute_ros.supervisor.state import Pending
 from chute_ros.supervisor.turn import Turn
 
 #: A decision that may be on its way; a number is that of the deploy's step, from 0.

@@ -18,8 +18,9 @@ from chute_ros.supervisor.counter import UNKNOWN_STANDS
 from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import JUMP_DOUBTED, REJECTION_DOUBTED
+from chute_ros.supervisor.pending import ASK_LASTS, Pending
 from chute_ros.supervisor.rules import Rule
-from chute_ros.supervisor.state import ASK_LASTS, Pending, State
+from chute_ros.supervisor.state import State
 
 #: Fields that do not decide: texts, counts for people, what only times a repetition, and what is
 #: always the same here.

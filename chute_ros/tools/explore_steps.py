@@ -20,8 +20,9 @@ from chute_ros.model import (
 )
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.state import State
 
 FIRST, SECOND = LINKS = ("mavlink_parachute", "upf_can")
 LADDER = (FIRST, SECOND, f"{SECOND}:trigger")

@@ -16,9 +16,10 @@ from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
 from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.pending import ASK_LASTS, Ask
 from chute_ros.supervisor.profile_lines import ALL, ANY
 from chute_ros.supervisor.rules import Profile
-from chute_ros.supervisor.state import ASK_LASTS, Ask, HeardHere, State
+from chute_ros.supervisor.state import HeardHere, State
 
 LINKS = ("a", "b")
 PATIENT = LinkLimits(stale_after=50.0, lost_after=100.0)

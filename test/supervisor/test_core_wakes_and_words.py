@@ -28,8 +28,9 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.pending import Ask, Pending
 from chute_ros.supervisor.rules import Profile
-from chute_ros.supervisor.state import Ask, Pending, State
+from chute_ros.supervisor.state import State
 from chute_ros.supervisor.wakes import next_deadline
 
 K, D = Action.KILL, Action.DEPLOY

@@ -15,8 +15,9 @@ from chute_ros.supervisor.conditions.base import Finding
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.rules import BelowMinimum, Profile
-from chute_ros.supervisor.state import HeardHere, Pending, State, ThisFlight
+from chute_ros.supervisor.state import HeardHere, State, ThisFlight
 
 HOLDS = Finding(True, lambda: "it sinks")
 RULE = rule(SINKS, name="sinks")

@@ -22,17 +22,15 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.pending import Ask, Pending, Time
 from chute_ros.supervisor.state import (
     Alarms,
-    Ask,
     DeployUnderWay,
     HeardHere,
     Killing,
     Own,
-    Pending,
     State,
     ThisFlight,
-    Time,
 )
 
 #: When it is told, by the clock of each host, s.

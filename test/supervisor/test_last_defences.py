@@ -12,10 +12,10 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.handover import followed
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
 from chute_ros.supervisor.sending import fire
-from chute_ros.supervisor.state import Pending
 from chute_ros.supervisor.turn import Turn
 
 K, D = Action.KILL, Action.DEPLOY

@@ -25,9 +25,10 @@ from chute_ros.supervisor import readings
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.pending import ASK_LASTS
 from chute_ros.supervisor.requests import MOST_DEVICE_BLOCKS
 from chute_ros.supervisor.rules import Clears
-from chute_ros.supervisor.state import ASK_LASTS, State
+from chute_ros.supervisor.state import State
 
 K, D = Action.KILL, Action.DEPLOY
 BLOCK, RELEASE = Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE

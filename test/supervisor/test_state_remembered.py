@@ -12,7 +12,8 @@ from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.measured import Measured
-from chute_ros.supervisor.state import DeployUnderWay, HeardHere, Pending, State
+from chute_ros.supervisor.pending import Pending
+from chute_ros.supervisor.state import DeployUnderWay, HeardHere, State
 
 UPF = "upf_can"
 BOTH = (LINK, UPF)

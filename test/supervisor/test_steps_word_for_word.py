@@ -13,6 +13,7 @@ from chute_ros.supervisor import sending
 from chute_ros.supervisor.answers import answer_all, deploy_details, end_kill, give_up_waiting
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.machine import Event, Stage
+from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.sending import (
     fire,
     kill_failed,
@@ -23,7 +24,7 @@ from chute_ros.supervisor.sending import (
     renew_not_begun,
     send_again,
 )
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.state import State
 from chute_ros.supervisor.turn import Turn
 
 K, D = Action.KILL, Action.DEPLOY

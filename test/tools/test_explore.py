@@ -12,7 +12,8 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.measured import Measured
-from chute_ros.supervisor.state import Pending, State
+from chute_ros.supervisor.pending import Pending
+from chute_ros.supervisor.state import State
 from chute_ros.supervisor.turn import Turn
 from chute_ros.tools import explore_key
 from chute_ros.tools.explore_properties import PROPERTIES
