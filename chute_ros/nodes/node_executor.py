@@ -14,7 +14,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.utilities import timeout_sec_to_nsec
 
-from chute_ros.nodes.kept_wait_set import KINDS, KeptWaitSet
+from chute_ros.nodes.cached_wait_set import KINDS, CachedWaitSet
 
 _Coroutine = Coroutine[Any, Any, None]
 
@@ -27,7 +27,7 @@ class NodeExecutor(SingleThreadedExecutor):
 
     #: Entities came or went. On the class: rclpy's own __init__ may wake it already.
     _changed = True
-    _wait_set: KeptWaitSet | None = None
+    _wait_set: CachedWaitSet | None = None
     #: rclpy's own.
     _tasks: list[tuple[Any, Any, Any]]
 
@@ -95,14 +95,14 @@ class NodeExecutor(SingleThreadedExecutor):
             if not self._is_shutdown and entity.callback_group.beginning_execution(entity):
                 self._step(self._served(kind, entity))
 
-    def _gathered(self) -> KeptWaitSet:
+    def _gathered(self) -> CachedWaitSet:
         """The wait set for what there is to wait for now."""
         if self._changed or self._wait_set is None:
             self._changed = False  # before it looks: it may be woken meanwhile
             self._let_go()
             nodes = self.get_nodes()
             names = {kind: f"{kind.removesuffix('_condition')}s" for kind in KINDS}
-            self._wait_set = KeptWaitSet(
+            self._wait_set = CachedWaitSet(
                 self._context,
                 {kind: [e for n in nodes for e in getattr(n, names[kind])] for kind in KINDS},
                 [waitable for node in nodes for waitable in node.waitables],

@@ -16,20 +16,30 @@ from chute_ros.protocol.goal import (
     NO_ANSWER,
     Answer,
     CommandT,
+    ConfirmedCommand,
     EffectFinished,
     EffectLimits,
-    Goal,
     Report,
 )
 from chute_ros.transitions import after
 
-__all__ = ["NO_ANSWER", "Answer", "EffectFinished", "EffectLimits", "EffectLoop", "Goal", "Report"]
+__all__ = [
+    "NO_ANSWER",
+    "Answer",
+    "ConfirmedCommand",
+    "EffectFinished",
+    "EffectLimits",
+    "EffectLoop",
+    "Report",
+]
 
 
 class EffectLoop(Generic[CommandT]):
     """One goal on its way. The owner sends what take_commands gives and feeds back what comes."""
 
-    def __init__(self, token: int, goal: Goal[CommandT], limits: EffectLimits, now: float) -> None:
+    def __init__(
+        self, token: int, goal: ConfirmedCommand[CommandT], limits: EffectLimits, now: float
+    ) -> None:
         self.token = token
         self.goal = goal
         self.phase = Phase.WAIT_ACKNOWLEDGEMENT

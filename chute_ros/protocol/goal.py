@@ -73,7 +73,7 @@ def _nothing_else() -> None:
 
 
 @dataclass(frozen=True)
-class Goal(Generic[CommandT]):
+class ConfirmedCommand(Generic[CommandT]):
     """What to send and how to see that it worked.
 
     commands: sent in this order; the last one's acknowledgement counts, those before prepare it.
@@ -111,7 +111,7 @@ class Goal(Generic[CommandT]):
     hint: Callable[[], str] = str
     remark: Callable[[], str] = str
     looks: tuple[float, ...] = (0.0,)
-    otherwise: Callable[[], Goal[CommandT] | None] = _nothing_else
+    otherwise: Callable[[], ConfirmedCommand[CommandT] | None] = _nothing_else
     patience: float = math.inf
 
 

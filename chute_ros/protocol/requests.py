@@ -10,10 +10,10 @@ from chute_ros.model import Outcome
 from chute_ros.protocol.effect import (
     NO_ANSWER,
     Answer,
+    ConfirmedCommand,
     EffectFinished,
     EffectLimits,
     EffectLoop,
-    Goal,
     Report,
 )
 from chute_ros.protocol.events import Event, RequestFinished, RequestReport
@@ -99,7 +99,7 @@ class _Running:
     #: The goal, and those that were begun beside it (Goal.otherwise).
     ways: list[_Way]
     watch: Watch | None
-    follow_up: tuple[Goal[Any], Watch] | None
+    follow_up: tuple[ConfirmedCommand[Any], Watch] | None
     #: How the goal before this follow-up ended.
     first_end: EffectFinished | None = None
 
@@ -155,10 +155,10 @@ class Requests(Generic[TransactionsT]):
     def begin(
         self,
         token: int,
-        goal: Goal[Any],
+        goal: ConfirmedCommand[Any],
         now: float,
         watch: Watch | None = None,
-        follow_up: tuple[Goal[Any], Watch] | None = None,
+        follow_up: tuple[ConfirmedCommand[Any], Watch] | None = None,
     ) -> None:
         """Go for goal. watch: the message to hand over at the end. follow_up: what to ask after
         success; it adds its message to the answer, but cannot turn success into failure."""
@@ -174,7 +174,9 @@ class Requests(Generic[TransactionsT]):
         """End whatever would make a parachute less ready."""
         self.abandon_where(lambda goal: goal.hinders_release, "a release was ordered", now)
 
-    def abandon_where(self, which: Callable[[Goal[Any]], bool], why: str, now: float) -> bool:
+    def abandon_where(
+        self, which: Callable[[ConfirmedCommand[Any]], bool], why: str, now: float
+    ) -> bool:
         """End the requests whose goal is one of those; whether there was any."""
         found = [
             token
@@ -261,7 +263,7 @@ class Requests(Generic[TransactionsT]):
     def _loops(self) -> list[EffectLoop[Any]]:
         return [loop for running in self._running.values() for loop in running.loops]
 
-    def _way(self, token: int, goal: Goal[Any], now: float) -> _Way:
+    def _way(self, token: int, goal: ConfirmedCommand[Any], now: float) -> _Way:
         return _Way(EffectLoop(token, goal, self._limits, now), self._number())
 
     def _try_otherwise(self, token: int, running: _Running, now: float) -> None:

@@ -25,7 +25,7 @@ from chute_ros.protocol.events import (
     VehicleChanged,
 )
 from chute_ros.runtime.decisions import DecisionCarrier
-from chute_ros.runtime.requests import Begin, CallFailed, RequestDesk
+from chute_ros.runtime.requests import Begin, CallFailed, RequestTracker
 from chute_ros.runtime.shell import Shell
 from chute_ros.runtime.topics import DeviceBeat, SafetyPicture, SupervisorBeat
 from chute_ros.runtime.watch import SupervisorWatch
@@ -138,7 +138,7 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
         self.decisions = DecisionCarrier(
             name, settings.max_decision_age, shell, self.watch.age, self.carry_out
         )
-        self.desk = RequestDesk(shell, self.decisions.report)
+        self.desk = RequestTracker(shell, self.decisions.report)
         #: The newest answer of the link; None: none came yet.
         self.summary: Summary | None = None
         #: Of the link's turn: what diagnostics are made of, and when that is renewed, monotonic s.

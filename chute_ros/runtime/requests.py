@@ -24,7 +24,7 @@ class CallFailed:
     text: str
 
 
-class RequestDesk:
+class RequestTracker:
     """report: tells the supervisor how far a decision got."""
 
     def __init__(self, shell: Shell, report: Callable[[Decision, Outcome, str], None]) -> None:

@@ -18,8 +18,8 @@ from typing import Any, Protocol
 
 from chute_ros.model import Decision
 from chute_ros.protocol.events import Notice, Severity
-from chute_ros.runtime.afterwards import Afterwards
 from chute_ros.runtime.arming import ArmCaller, DeviceArming
+from chute_ros.runtime.deferred_work import DeferredWork
 from chute_ros.runtime.lease_keeper import LeaseKeeper, LeaseShell
 from chute_ros.runtime.supervisor_inputs import input_of
 from chute_ros.runtime.topics import DeviceBeat, LeaseClaim, SafetyTold, SupervisorBeat
@@ -99,7 +99,7 @@ class SupervisorRuntime:
                 self._first = (inputs.TakeOver(above),)
         self.lease = LeaseKeeper(lease, start.instance, shell, self, now)
         self._arming = DeviceArming(shell, self._armed)
-        self.afterwards = Afterwards()
+        self.afterwards = DeferredWork()
         #: The stamp of the newest heartbeat of each link, ns.
         self._stamps: dict[str, int] = {}
         self._tokens = count(1)

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
-from chute_ros.campaign import campaign, kept_tally
+from chute_ros.campaign import campaign, checkpoint
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.page import page
@@ -23,7 +23,7 @@ from chute_ros.campaign.picture import picture
 from chute_ros.campaign.rare import OfEach, rare
 from chute_ros.campaign.scenario import Scenario
 from chute_ros.campaign.scenario_text import scenario_of, text_of
-from chute_ros.campaign.tellers import outlives
+from chute_ros.campaign.sensor_sources import outlives
 from chute_ros.errors import RecordError
 from chute_ros.nodes.config_folder import config_folder
 from chute_ros.nodes.private_files import replace_text
@@ -132,7 +132,7 @@ class _Kept:
 
     def __init__(self, path: Path | None, seed: int, profiles: Path) -> None:
         self._path, self._seed = path, seed
-        self._code = "" if path is None else kept_tally.code_that_flies(profiles)
+        self._code = "" if path is None else checkpoint.code_that_flies(profiles)
         self._at = time.monotonic()
 
     def tally(self) -> campaign.Tally:
@@ -140,7 +140,7 @@ class _Kept:
         if self._path is None or not self._path.exists():
             return campaign.Tally()
         text = self._path.read_text(encoding="utf-8", errors="replace")
-        tally = kept_tally.tally_of(text, self._seed, self._code, str(self._path))
+        tally = checkpoint.tally_of(text, self._seed, self._code, str(self._path))
         print(f"continuing after {tally.flights} flights of {self._path}", file=sys.stderr)
         return tally
 
@@ -155,7 +155,7 @@ class _Kept:
         if self._path is None:
             return
         try:
-            replace_text(self._path, kept_tally.text_of(tally, self._seed, self._code))
+            replace_text(self._path, checkpoint.text_of(tally, self._seed, self._code))
         except OSError as error:
             print(f"not saved: {error}; trying again", file=sys.stderr, flush=True)
 

@@ -8,7 +8,7 @@ from collections import Counter
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
 from chute_ros.links.umbilical.protocol.layouts import Layout
-from chute_ros.links.umbilical.protocol.sayings import Telemetry, recognise
+from chute_ros.links.umbilical.protocol.line_parser import Telemetry, recognise
 from chute_ros.links.umbilical.protocol.stream import MOST_LINE, DumpBytes, Item, StreamReader
 from fuzz.program import Program
 from fuzz.target import Target, WrongError

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from chute_ros.campaign.campaign import Line, Tally
+from chute_ros.campaign.checkpoint import tally_of, text_of
 from chute_ros.campaign.judge import Count
-from chute_ros.campaign.kept_tally import tally_of, text_of
 from chute_ros.campaign.page import page
 from chute_ros.campaign.scenario import Failure
 

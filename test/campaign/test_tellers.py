@@ -9,8 +9,8 @@ from campaign_bench import scenario
 
 from chute_ros.campaign.channel import Spell
 from chute_ros.campaign.scenario import Failure, Stop, WayFault
+from chute_ros.campaign.sensor_sources import may_count, outlives
 from chute_ros.campaign.sensors import SensorFault
-from chute_ros.campaign.tellers import may_count, outlives
 from chute_ros.protocol.vehicle_merge import IMU, VEHICLE_STATE
 
 WITH_IMU, IMU_FIRST = (VEHICLE_STATE, IMU), (IMU, VEHICLE_STATE)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import TransitionError
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import NO_ANSWER, EffectLimits, EffectLoop, Goal
+from chute_ros.protocol.effect import NO_ANSWER, ConfirmedCommand, EffectLimits, EffectLoop
 from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase
 from chute_ros.transitions import after
 
@@ -34,7 +34,7 @@ class Bench:
         self.there = already
         shown = (lambda: self.there) if effect else None
         text = SHOWN if effect else "nothing shows it"
-        self.goal = Goal("open", ("<S>",), text, shown, unacknowledged=True, **goal)
+        self.goal = ConfirmedCommand("open", ("<S>",), text, shown, unacknowledged=True, **goal)
         self.loop = EffectLoop(1, self.goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
         self.sends_at_once = sends_at_once
         self.sent, self.waiting, self.reports = [], 0, []
@@ -194,7 +194,7 @@ def test_one_that_is_not_wanted_any_more_says_whether_it_left(left):
 
 
 def test_another_command_of_the_goal_is_not_the_one_that_counts():
-    goal = Goal(
+    goal = ConfirmedCommand(
         "two", ("<A1>", "<A2>"), "x", lambda: True, unacknowledged=True, even_if_shown=True
     )
     loop = EffectLoop(1, goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
@@ -209,7 +209,10 @@ def test_another_command_of_the_goal_is_not_the_one_that_counts():
 
 def test_what_is_acknowledged_does_not_take_sent_for_it():
     loop = EffectLoop(
-        1, Goal("open", ("<S>",), "x", lambda: False), EffectLimits(1.5, 0.25, 5.0), 0.0
+        1,
+        ConfirmedCommand("open", ("<S>",), "x", lambda: False),
+        EffectLimits(1.5, 0.25, 5.0),
+        0.0,
     )
     loop.command_sent("<S>", 0.0)
     assert loop.phase is Phase.WAIT_ACKNOWLEDGEMENT

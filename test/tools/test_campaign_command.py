@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from chute_ros.campaign import campaign as flights
-from chute_ros.campaign import kept_tally
+from chute_ros.campaign import checkpoint
+from chute_ros.campaign.checkpoint import code_that_flies
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count, Judged
-from chute_ros.campaign.kept_tally import code_that_flies
 from chute_ros.campaign.scenario import Failure
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
@@ -148,7 +148,7 @@ def test_flights_of_another_campaign_are_not_gone_on_with(
 
 
 def test_a_full_disk_does_not_end_the_flights(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(campaign.kept_tally, "text_of", full_disk)
+    monkeypatch.setattr(campaign.checkpoint, "text_of", full_disk)
     fly_on(monkeypatch, tmp_path, 2)
     told = capsys.readouterr()
     assert "2 of 2 flights in" in told.out
@@ -162,7 +162,7 @@ def full_disk(*_):
 
 @pytest.mark.parametrize("changed", ["profiles/one.yaml", "dsdl/flyfire/163", "telem/57.yaml"])
 def test_the_code_that_flies_is_told_apart(tmp_path, monkeypatch, changed):
-    monkeypatch.setattr(kept_tally, "shared_folder", lambda name, what: tmp_path / name)
+    monkeypatch.setattr(checkpoint, "shared_folder", lambda name, what: tmp_path / name)
     for name in ("profiles/one.yaml", "dsdl/flyfire/163", "telem/57.yaml"):
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).write_text("a")

@@ -21,8 +21,8 @@ from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.parameters import PARAMETERS, UmbilicalParameters
 from chute_ros.links.umbilical.protocol import events
+from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
-from chute_ros.links.umbilical.protocol.sayings import LogLine
 from chute_ros.links.umbilical.runtime import UmbilicalRuntime
 from chute_ros.links.umbilical.services import UmbilicalServices
 from chute_ros.links.umbilical.telem_message import telem, unfit, without_place

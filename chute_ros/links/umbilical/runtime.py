@@ -8,9 +8,9 @@ from typing import Any
 
 from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
 from chute_ros.links.umbilical.protocol.events import TelemetryReceived
+from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.protocol.reasons import reasons_of
-from chute_ros.links.umbilical.protocol.sayings import LogLine
 from chute_ros.model import NAN, Action, Decision
 from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
 from chute_ros.protocol.events import RequestFinished, VehicleChanged

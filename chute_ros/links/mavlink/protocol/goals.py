@@ -17,10 +17,10 @@ from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.links.mavlink.protocol.kill import KillPlan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import LinkState, TriggerFlags, flag_names
-from chute_ros.protocol.effect import Goal
+from chute_ros.protocol.effect import ConfirmedCommand
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 
-MavlinkGoal = Goal[Command]
+MavlinkGoal = ConfirmedCommand[Command]
 
 #: Whole numbers up to here are exact in a param, which is a 32-bit float.
 MOST_EXACT = 2**24
@@ -58,7 +58,7 @@ def set_triggers(
         [f"{name} armed" for name in flag_names(select & arm)]
         + [f"{name} disarmed" for name in flag_names(disarmed)]
     )
-    return Goal(
+    return ConfirmedCommand(
         "MAV_CMD_SET_PARACHUTE_ARM",
         (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, float(arm), float(select)),),
         f"PARACHUTE_STATUS reports {changed}",
@@ -89,7 +89,7 @@ def release(
         sources = float(TriggerFlags.FC | TriggerFlags.OFFBOARD)
         arm = command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, sources, sources)
         commands = (arm, *commands)
-    return Goal(
+    return ConfirmedCommand(
         RELEASE,
         commands,
         "PARACHUTE_STATUS reports deployed",
@@ -125,7 +125,7 @@ ACTION_NAMES: dict[int, str] = {
 
 def parachute_action(parachute: ParachuteTracker, action: int) -> MavlinkGoal:
     """MAV_CMD_DO_PARACHUTE disable or enable; the status has no field that shows it."""
-    return Goal(
+    return ConfirmedCommand(
         f"MAV_CMD_DO_PARACHUTE {ACTION_NAMES[action]}",
         (command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(action)),),
         "acknowledged",
@@ -152,7 +152,7 @@ def kill(
         way = plan().allowed(tried, deploy_decided())
         if way is None:
             return None
-        return Goal(
+        return ConfirmedCommand(
             f"kill ({way.method.value})",
             (_stop_order(autopilot, way.method),),
             "the autopilot reports motors off",
@@ -187,7 +187,7 @@ def disarm_on_ground(
 
     def disarm(forced: bool) -> MavlinkGoal:
         param2 = (FORCE_DISARM,) if forced else ()
-        return Goal(
+        return ConfirmedCommand(
             FORCED if forced else "disarm on the ground",
             (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
             "the autopilot's heartbeat reports disarmed",
@@ -241,7 +241,7 @@ def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Mavli
     kind = dialect.mavlink_map.get(message_id)
     name = kind.msgname if kind is not None else f"message {message_id}"
     ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
-    goal = Goal(
+    goal = ConfirmedCommand(
         f"request of {name}", (ask,), f"{name} came", watch.seen, needs_acknowledgement=True
     )
     return goal, watch
@@ -257,7 +257,7 @@ def set_message_interval(
         float(message_id),
         float(interval_us),
     )
-    return Goal(f"interval of message {message_id}", (order,), "acknowledged")
+    return ConfirmedCommand(f"interval of message {message_id}", (order,), "acknowledged")
 
 
 def read_message_interval(
@@ -273,4 +273,6 @@ def read_message_interval(
     )
     wanted = float(dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL)
     ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, float(message_id))
-    return Goal("request of MESSAGE_INTERVAL", (ask,), "MESSAGE_INTERVAL came", watch.seen), watch
+    return ConfirmedCommand(
+        "request of MESSAGE_INTERVAL", (ask,), "MESSAGE_INTERVAL came", watch.seen
+    ), watch

@@ -13,7 +13,7 @@ from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.protocol.layouts import Layout, Record
 from chute_ros.links.umbilical.protocol.modes import IN_FLIGHT, FlightMode
 from chute_ros.links.umbilical.protocol.scheduler import HEARTBEAT, Command
-from chute_ros.protocol.effect import Goal
+from chute_ros.protocol.effect import ConfirmedCommand
 
 #: Degrees: a 32-bit float of a longitude is exact to 8e-6.
 _TARGET_TOLERANCE = 2e-5
@@ -144,9 +144,9 @@ KINDS = _kinds()
 
 def goal_of(
     kind: CommandKind, shown: Callable[[], bool] | None, effect: str, even_if_shown: bool
-) -> Goal[Command]:
+) -> ConfirmedCommand[Command]:
     """A goal that sends the command; shown None: nothing can show it."""
-    return Goal(
+    return ConfirmedCommand(
         kind.command.name,
         (kind.command,),
         effect,

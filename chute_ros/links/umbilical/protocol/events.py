@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from chute_ros.links.umbilical.protocol.layouts import Record
-from chute_ros.links.umbilical.protocol.sayings import LogLine
+from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.protocol import events
 
 

@@ -11,7 +11,7 @@ import math
 from collections import Counter
 from collections.abc import Hashable
 
-from chute_ros.links.umbilical.protocol import sayings as s
+from chute_ros.links.umbilical.protocol import line_parser as s
 from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
 from chute_ros.links.umbilical.protocol.events import Progress, TelemetryReceived, UmbilicalEvent

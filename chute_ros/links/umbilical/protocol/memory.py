@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 from chute_ros.links.umbilical.protocol import events
 from chute_ros.links.umbilical.protocol.config import MemoryLimits
-from chute_ros.links.umbilical.protocol.sayings import (
+from chute_ros.links.umbilical.protocol.line_parser import (
     MemoryText,
     WipeBegan,
     WipeEnded,

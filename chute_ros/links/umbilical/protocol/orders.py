@@ -17,8 +17,8 @@ from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConf
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
 from chute_ros.links.umbilical.protocol.flight_computer import FlightComputer
 from chute_ros.links.umbilical.protocol.gate import Situation
+from chute_ros.links.umbilical.protocol.line_parser import FlashUsage
 from chute_ros.links.umbilical.protocol.memory import MemoryWorks
-from chute_ros.links.umbilical.protocol.sayings import FlashUsage
 from chute_ros.links.umbilical.protocol.scheduler import CommandScheduler
 from chute_ros.protocol.events import Notice, Severity
 from chute_ros.protocol.requests import Requests

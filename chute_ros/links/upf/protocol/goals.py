@@ -18,9 +18,9 @@ from chute_ros.links.upf.protocol.definitions import (
 from chute_ros.links.upf.protocol.devices import Controller, Trigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.calls import Call, CallFinished
-from chute_ros.protocol.effect import Goal
+from chute_ros.protocol.effect import ConfirmedCommand
 
-UpfGoal = Goal[Call]
+UpfGoal = ConfirmedCommand[Call]
 
 #: Priority of what fires, 0 the most urgent to 31.
 FIRE_PRIORITY = 2
@@ -104,7 +104,7 @@ def request(
     wanted = _SHOWN_BY[type_name]
     names = " or ".join(state.name for state in wanted)
     alive = controller.alive and not controller.overdue(now) and not even_if_shown
-    return Goal(
+    return ConfirmedCommand(
         type_name,
         (_call(controller, definitions, type_name),),
         f"ParachuteStatus reports {names}",
@@ -135,7 +135,7 @@ def deploy(
         return any(_fired(trigger, now) for trigger in triggers())
 
     type_name = _DEPLOYS[force]
-    return Goal(
+    return ConfirmedCommand(
         DEPLOY,
         (_call(controller, definitions, type_name, FIRE_PRIORITY),),
         "ParachuteStatus reports LAUNCHED",
@@ -154,7 +154,7 @@ def fire_trigger(
 ) -> UpfGoal:
     """Deploy through a trigger: the architecture without a controller. Any one that has fired is
     enough."""
-    return Goal(
+    return ConfirmedCommand(
         DEPLOY,
         (trigger_call(trigger, definitions),),
         f"TriggerStatus of {trigger.node_id} reports launched",

@@ -11,7 +11,7 @@ from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.commands import Command, CommandFinished
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import EffectLimits, EffectLoop, Goal
+from chute_ros.protocol.effect import ConfirmedCommand, EffectLimits, EffectLoop
 from chute_ros.protocol.effect_phases import TRANSITIONS, Happening, Phase
 from chute_ros.transitions import after
 
@@ -25,7 +25,7 @@ class Bench:
 
     def __init__(self, already=False, effect=True, **goal):
         self.there = already
-        self.goal = Goal(
+        self.goal = ConfirmedCommand(
             "release",
             (ORDER,),
             "PARACHUTE_STATUS reports deployed",

@@ -13,7 +13,7 @@ from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, 
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.goals import Watch
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import Goal
+from chute_ros.protocol.effect import ConfirmedCommand
 from chute_ros.protocol.events import RequestFinished, RequestReport
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.requests import Requests
@@ -29,7 +29,7 @@ def fresh():
 
 
 def goal(name="release", command=ORDER, **options):
-    return Goal(name, (command,), "shown", **options)
+    return ConfirmedCommand(name, (command,), "shown", **options)
 
 
 def ack(requests, command, now, result=results.ACCEPTED):
@@ -167,7 +167,7 @@ def test_each_request_ends_exactly_once_and_the_next_deadline_is_never_in_the_pa
 
 def test_what_prepared_a_goal_is_not_sent_again_once_it_is_reached():
     requests, prepare = fresh(), Command(1, 161, 225)
-    requests.begin(5, Goal("release", (prepare, ORDER), "shown"), 0.0)
+    requests.begin(5, ConfirmedCommand("release", (prepare, ORDER), "shown"), 0.0)
     assert [send.command for send in requests.drive(0.0)] == [prepare, ORDER]
     ack(requests, ORDER, 0.1)
     assert ends(requests)[0].finished.success

@@ -14,8 +14,8 @@ from umbilical_link_bench import (
 )
 
 from chute_ros.links.umbilical.protocol.events import TelemetryReceived
+from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.links.umbilical.protocol.link import DOUBTED
-from chute_ros.links.umbilical.protocol.sayings import LogLine
 from chute_ros.model import LinkState, ParachuteState
 from chute_ros.protocol.events import (
     DeviceLinkChanged,

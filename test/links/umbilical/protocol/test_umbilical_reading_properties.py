@@ -25,7 +25,7 @@ from chute_ros.links.umbilical.protocol import layouts
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
 from chute_ros.links.umbilical.protocol.fields import convert, problem_of
 from chute_ros.links.umbilical.protocol.layouts import Problem
-from chute_ros.links.umbilical.protocol.sayings import Telemetry, recognise
+from chute_ros.links.umbilical.protocol.line_parser import Telemetry, recognise
 from chute_ros.links.umbilical.protocol.stream import (
     MOST_LINE,
     DumpBegan,

@@ -6,7 +6,7 @@ import pytest
 from umbilical_lines import LAYOUTS, PAD, line
 
 from chute_ros.links.umbilical.protocol.decoder import TelemetryDecoder
-from chute_ros.links.umbilical.protocol.sayings import CUT_LINE, LogLine, Telemetry, recognise
+from chute_ros.links.umbilical.protocol.line_parser import CUT_LINE, LogLine, Telemetry, recognise
 from chute_ros.links.umbilical.protocol.stream import (
     MOST_LINE,
     TOO_LONG,

@@ -3,7 +3,7 @@
 import pytest
 from umbilical_lines import PAD
 
-from chute_ros.links.umbilical.protocol.sayings import (
+from chute_ros.links.umbilical.protocol.line_parser import (
     CUT_LINE,
     UNKNOWN_LINE,
     ArmingBlocked,

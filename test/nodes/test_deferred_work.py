@@ -11,7 +11,7 @@ from supervisor_bench import Scene
 
 from chute_ros.model import Action
 from chute_ros.runtime import afterwards
-from chute_ros.runtime.afterwards import QUIET, Afterwards
+from chute_ros.runtime.deferred_work import QUIET, DeferredWork
 
 #: Longer than anything here takes, s.
 LONG = 3.0
@@ -23,13 +23,13 @@ def told():
 
 
 def test_while_nothing_was_decided_all_is_told_at_once(told):
-    later = Afterwards()
+    later = DeferredWork()
     later.tell(lambda: told.append("a log line"))
     assert (told, later.quiet, later.until) == (["a log line"], False, math.inf)
 
 
 def test_after_a_decision_it_waits_and_comes_in_order_once(told):
-    later = Afterwards()
+    later = DeferredWork()
     later.decided(10.0)
     for what in ("the decision", "a log line"):
         later.tell(lambda what=what: told.append(what))
@@ -42,7 +42,7 @@ def test_after_a_decision_it_waits_and_comes_in_order_once(told):
 
 
 def test_decisions_one_after_the_other_do_not_keep_it_quiet_for_ever(told):
-    later = Afterwards()
+    later = DeferredWork()
     later.decided(10.0)
     later.tell(lambda: told.append("the first"))
     later.decided(10.0 + QUIET * 0.9)
@@ -51,7 +51,7 @@ def test_decisions_one_after_the_other_do_not_keep_it_quiet_for_ever(told):
 
 
 def test_what_raises_keeps_nothing_else_back(told):
-    later = Afterwards()
+    later = DeferredWork()
     later.decided(10.0)
     later.tell(lambda: told.append("the first"))
     later.tell(lambda: 1 // 0)
@@ -64,7 +64,7 @@ def test_what_raises_keeps_nothing_else_back(told):
 
 
 def test_what_is_told_may_be_decided_upon(told):
-    later = Afterwards()
+    later = DeferredWork()
     later.decided(10.0)
     later.tell(lambda: later.decided(11.0))
     later.look(11.0)

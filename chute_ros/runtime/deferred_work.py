@@ -14,7 +14,7 @@ from contextlib import ExitStack
 QUIET = 0.005
 
 
-class Afterwards:
+class DeferredWork:
     """Holds back what is to be told while those who carry a decision out are at work."""
 
     def __init__(self) -> None:

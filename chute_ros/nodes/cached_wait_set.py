@@ -20,7 +20,7 @@ KINDS: tuple[Kind, ...] = ("guard_condition", "subscription", "service", "client
 _TURNS_FOR_EVENTS = 10
 
 
-class KeptWaitSet:
+class CachedWaitSet:
     """entities: of each kind; events: waitables that are nothing but events; guards: guard
     conditions of nobody, that only wake. Nothing of it is destroyed before `close`."""
 
