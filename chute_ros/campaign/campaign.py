@@ -166,7 +166,8 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
         for batch in ordered:
             yield from batch.result()
     finally:
-        pool.shutdown(wait=False)
         # Nobody waits for what they fly now.
         for process in active_children():
             process.kill()
+        # Not left to the end of Python, which then may wake a thread that has just ended (EBADF).
+        pool.shutdown(cancel_futures=True)

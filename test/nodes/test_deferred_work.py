@@ -10,7 +10,7 @@ from chute_msgs.srv import Kill
 from supervisor_bench import Scene
 
 from chute_ros.model import Action
-from chute_ros.runtime import afterwards
+from chute_ros.runtime import deferred_work
 from chute_ros.runtime.deferred_work import QUIET, DeferredWork
 
 #: Longer than anything here takes, s.
@@ -80,7 +80,7 @@ def ready(bench, monkeypatch):
     bench.until(
         lambda: not scene.supervisor.runtime.afterwards.quiet, "all is told of the release"
     )
-    monkeypatch.setattr(afterwards, "QUIET", LONG)
+    monkeypatch.setattr(deferred_work, "QUIET", LONG)
     return scene
 
 
