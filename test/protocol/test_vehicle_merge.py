@@ -6,7 +6,7 @@ import math
 import pytest
 
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
-from chute_ros.protocol.vehicle_merge import DISPUTED, VehicleMerge
+from chute_ros.protocol.vehicle_merge import DISPUTED, IMU, VEHICLE_STATE, VehicleMerge
 from chute_ros.supervisor.measurements import STANDARD_LIMITS
 
 LEVEL, TILTED = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)
@@ -535,3 +535,11 @@ def test_who_tells_a_part_is_named_where_it_is_not_the_first():
     assert one.told_by(10.1) == {**told, "acceleration": "imu"}
     one.hear("imu", {"attitude": LEVEL}, 10.4)
     assert one.told_by(10.51)["attitude"] == "imu"
+
+
+def test_every_state_of_a_link_has_its_place_among_the_others() -> None:
+    """What another node says of the autopilot is taken, whatever it is."""
+    for state in LinkState:
+        one = VehicleMerge((VEHICLE_STATE, IMU), 2.5)
+        one.hear_state(VehicleState(link_state=state), 10.0)
+        assert one.state(10.1).link_state is state

@@ -11,6 +11,7 @@ import yaml
 from node_bench import LOCAL
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
+from chute_ros.links.relay.node import RelayNode
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
@@ -22,6 +23,7 @@ NODES = {
     "mavlink_parachute": (MavlinkParachuteNode, lambda: f"udpin:{LOCAL}:0"),
     "upf_can": (UpfCanNode, lambda: f"mcast:0:{free_udp_ports(1)[0]}"),
     "umbilical": (UmbilicalNode, lambda: "serial:/nowhere/ttyACM0"),
+    "relay": (RelayNode, lambda: "serial:/nowhere/ttyUSB0"),
     "safety_supervisor": (SafetySupervisorNode, None),
 }
 #: What ROS itself gives every node.
@@ -159,9 +161,9 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
         ("safety/decision", {"safety_supervisor", "standby"}),
         ("safety/lease", {"safety_supervisor", "standby"}),
         ("safety/state", {"safety_supervisor", "standby"}),
-        ("safety/request", {"mavlink_parachute", "upf_can", "umbilical"}),
-        ("safety/action", {"mavlink_parachute", "upf_can", "umbilical"}),
-        ("parachute/status", {"mavlink_parachute", "upf_can", "umbilical"}),
+        ("safety/request", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
+        ("safety/action", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
+        ("parachute/status", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("vehicle/state", {"mavlink_parachute", "umbilical"}),
     ],
 )
