@@ -19,7 +19,7 @@ from bench.decoding import Batch, Peer, Times, take_turns, times_table
 from bench.flight_lines import REAL_RATE, FlightLines
 from bench.report import load
 from chute_ros.links.umbilical.layout_files import load_layouts
-from chute_ros.links.umbilical.protocol import sayings
+from chute_ros.links.umbilical.protocol import line_parser
 from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
 from chute_ros.links.umbilical.protocol.decoder import LINES_TO_RECOGNISE, TelemetryDecoder
 from chute_ros.links.umbilical.protocol.events import TelemetryReceived
@@ -61,8 +61,8 @@ class Decoder:
         records = 0
         for item in self._reader.feed(data):
             if isinstance(item, Line):
-                said, _ = sayings.recognise(item.data)
-                if isinstance(said, sayings.Telemetry):
+                said, _ = line_parser.recognise(item.data)
+                if isinstance(said, line_parser.Telemetry):
                     records += self._decoder.decode(said.body, now) is not None
         return records
 
