@@ -120,7 +120,7 @@ def note_height(turn: Turn) -> None:
     was_high, up_for = (state.flight.was_high or high) and not down, 0.0 if down else up_for
     if (was_high, up_for) != (state.flight.was_high, state.flight.up_for):
         turn.flight = replace(turn.flight, was_high=was_high, up_for=min(up_for, _UP_TAKES))
-    if since != state.heard.at_ground_since:
+    if since is not state.heard.at_ground_since:  # not equal: NaN never is
         turn.heard = replace(turn.heard, at_ground_since=since)
 
 

@@ -76,9 +76,9 @@ class Codec:
 
     def _told(self, value: object, whole: bool) -> dict[str, Any]:
         told: dict[str, Any] = {}
-        for field in _fields(cast(type, type(value))):
+        for field, inline in _fields(cast(type, type(value))):
             one = getattr(value, field.name)
-            if field.metadata == INLINE:
+            if inline:
                 told |= self._told(one, whole)
             elif whole or not _is_default(field, one):
                 told[field.name] = self.plain(one, whole)
@@ -130,8 +130,8 @@ class Codec:
 
     def _made(self, kind: type, plain: dict[str, Any]) -> Any:
         hints, told = _hints(kind), {}
-        for field in _fields(kind):
-            if field.metadata == INLINE:
+        for field, inline in _fields(kind):
+            if inline:
                 told[field.name] = self._made(hints[field.name], plain)
             elif field.name in plain:
                 told[field.name] = self.value(plain[field.name], hints[field.name])
@@ -154,16 +154,16 @@ def _hints(kind: type) -> dict[str, Any]:
 
 
 @functools.cache
-def _fields(kind: type) -> tuple[dataclasses.Field[Any], ...]:
-    return dataclasses.fields(kind)
+def _fields(kind: type) -> tuple[tuple[dataclasses.Field[Any], bool], ...]:
+    """Each field, and whether its own stand in the object that it is in."""
+    return tuple((field, field.metadata == INLINE) for field in dataclasses.fields(kind))
 
 
 @functools.cache
 def _names(kind: type) -> frozenset[str]:
     """The fields of an object of this class."""
-    inline = [_hints(kind)[field.name] for field in _fields(kind) if field.metadata == INLINE]
-    own = {field.name for field in _fields(kind) if field.metadata != INLINE}
-    return frozenset(own.union(*map(_names, inline)))
+    inner = [_names(_hints(kind)[field.name]) for field, inline in _fields(kind) if inline]
+    return frozenset({field.name for field, inline in _fields(kind) if not inline}.union(*inner))
 
 
 @functools.cache

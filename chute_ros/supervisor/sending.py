@@ -152,6 +152,7 @@ def send_again(turn: Turn, slot: Slot) -> None:
 
 
 def send_unreported(turn: Turn) -> None:
+    """Send again what is due of what nobody has reported on."""
     waiting = {slot: one for slot in slots(turn) if (one := _unheard(turn, slot)) is not None}
     due = {slot for slot, one in waiting.items() if turn.now >= one.resend_at(turn.config)}
     # A node that is started anew must not see the deploy first.

@@ -77,13 +77,9 @@ class Turn:
 
     def alarm(self, text: str) -> None:
         """Something that stays until a reset, or until what it tells is over."""
-        if text not in self.state.alarming.alarms:
-            self.state = replace(
-                self.state,
-                alarming=replace(
-                    self.state.alarming, alarms=(*self.state.alarming.alarms, text)[-_MOST_ALARMS:]
-                ),
-            )
+        if text not in self.alarming.alarms:
+            alarms = (*self.alarming.alarms, text)[-_MOST_ALARMS:]
+            self.alarming = replace(self.alarming, alarms=alarms)
         self.warn(text)
 
     def finish(self, token: int, success: bool, accepted: bool, message: str) -> None:

@@ -93,16 +93,17 @@ def _note_height_of_kill(turn: Turn) -> None:
 def _note_home(turn: Turn, new: VehicleState) -> None:
     """What heights are above, as long as it has not taken off: an autopilot that moves its
     home in flight, or sets its height to zero, moves nothing here."""
-    state = replace(turn.state, heard=replace(turn.heard, vehicle=new, vehicle_received=turn.now))
-    if state.flight.airborne and not math.isnan(state.flight.home_altitude):
+    if turn.flight.airborne and not math.isnan(turn.flight.home_altitude):
         return
     home_altitude = new.altitude - new.height
     if not math.isnan(home_altitude):
         turn.flight = replace(turn.flight, home_altitude=home_altitude)
-    here = pressure_altitude(new.pressure)
-    if state.flight.airborne or flight.says_down(turn.config, state, turn.now) is not True:
+    if turn.flight.airborne:
         return
-    before = state.flight.ground_pressure_altitude
+    state = replace(turn.state, heard=replace(turn.heard, vehicle=new, vehicle_received=turn.now))
+    if flight.says_down(turn.config, state, turn.now) is not True:
+        return
+    here, before = pressure_altitude(new.pressure), turn.flight.ground_pressure_altitude
     still = flight.armed(turn.config, state, turn.now) is not Armed.ARMED
     if not math.isnan(here) and (still or math.isnan(before)):
         ground = here if math.isnan(before) else before + _OF_NEWEST * (here - before)
@@ -210,7 +211,7 @@ def _note_fitness(turn: Turn) -> None:
                         f"it reports {force:.1f} m/s^2 while the vehicle stands (need {least:g} "
                         f"to {most:g}; a driver that removes gravity reports 0)"
                     )
-    if unfit != state.heard.unfit or since != state.heard.fitness_since:
+    if unfit != state.heard.unfit or since is not state.heard.fitness_since:
         turn.heard = replace(turn.heard, unfit=MappingProxyType(unfit), fitness_since=since)
 
 

@@ -224,10 +224,12 @@ class MeasurementCondition(Condition):
         """When it is too old to hold, and, where that lets it hold, known or doubted no more."""
         limits = config.profile.limits
         turning = self._known_by if self.if_unknown else self.measured if doubts else ()
-        for name in turning:
-            yield state.measured(name).turns_at(limits[name], now) + JUST_AFTER
+        if not (turning or holds):
+            return ()  # most are so, each time that the supervisor asks when to wake
+        told = [state.measured(name).turns_at(limits[name], now) + JUST_AFTER for name in turning]
         for name in self.measured if holds else ():
-            yield state.measured(name).measured_at + limits[name].max_age + JUST_AFTER
+            told.append(state.measured(name).measured_at + limits[name].max_age + JUST_AFTER)
+        return told
 
 
 def _until(lines: ProfileLines, what: str, where: Where, limits: dict[str, float]) -> float:
