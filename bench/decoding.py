@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from bench.report import summary, table
+from bench.report import ratios, summary, table
 from chute_ros.errors import ChuteError
 
 
@@ -54,8 +54,8 @@ def times_table(what: str, measured: Mapping[str, Mapping[str, Times]], base: st
         bare = summary(times[base].batches)
         for peer, one in times.items():
             numbers = summary(one.batches)
-            ratios = (f"{number / bare[i]:.1f}" for i, number in enumerate(numbers[:2]))
-            values = (*(f"{number:.1f} us" for number in numbers), *ratios, str(one.missed))
+            told = (f"{number:.1f} us" for number in numbers)
+            values = (*told, *ratios(numbers, bare), str(one.missed))
             rows.append((f"{name}: {peer}", *values))
     head = (
         what,

@@ -16,7 +16,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from bench.command import at_least, run, with_children
-from bench.report import load, summary, table
+from bench.report import load, ratios, summary, table
 from bench.wire_ends import NOMINAL_RATE, Round, RoundFailedError, WireEnds, WrongOrderError
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports
@@ -209,8 +209,8 @@ def report(peers: list[Peer], before: str) -> str:
             base = summary(times[BARE])
             for peer in peers:
                 numbers = summary(times[peer.name])
-                ratios = (f"{number / base[i]:.1f}" for i, number in enumerate(numbers[:2]))
-                values = (*(f"{n:.2f} ms" for n in numbers), *ratios, str(peer.missed[how]))
+                told = (f"{number:.2f} ms" for number in numbers)
+                values = (*told, *ratios(numbers, base), str(peer.missed[how]))
                 rows.append((f"to {what}, {how}: {peer.name}", *values))
     head = (
         "from the kill switch on the bus",

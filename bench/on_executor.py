@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import runpy
 import sys
-from collections.abc import Callable
-from typing import Any
+
+from rclpy.executors import SingleThreadedExecutor
 
 import chute_ros.nodes.node_executor as ours
 
-
-def _single_threaded() -> type[Any]:
-    from rclpy.executors import SingleThreadedExecutor
-
-    return SingleThreadedExecutor
-
-
-#: Name -> its class. rclpy's EventsExecutor runs no node with a guard condition, as ours are.
-EXECUTORS: dict[str, Callable[[], type[Any]]] = {
-    "NodeExecutor": lambda: ours.NodeExecutor,
-    "SingleThreadedExecutor": _single_threaded,
+#: rclpy's EventsExecutor runs no node with a guard condition, as ours are.
+EXECUTORS: dict[str, type[SingleThreadedExecutor]] = {
+    one.__name__: one for one in (ours.NodeExecutor, SingleThreadedExecutor)
 }
 
 
 if __name__ == "__main__":
     name, module, *arguments = sys.argv[1:]
-    ours.NodeExecutor = EXECUTORS[name]()  # type: ignore[misc]
+    ours.NodeExecutor = EXECUTORS[name]  # type: ignore[misc]
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name="__main__", alter_sys=True)

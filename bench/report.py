@@ -16,6 +16,17 @@ def summary(values: Sequence[float]) -> tuple[float, float, float]:
     return statistics.median(ordered), ordered[math.ceil(0.99 * len(ordered)) - 1], ordered[-1]
 
 
+def ratios(values: Sequence[float], base: Sequence[float]) -> tuple[str, str]:
+    """Of the medians and of the 99th percentiles (summary) to those of base; one that is small is
+    told with more digits, as it is none that is not there."""
+    first, second = (value / bare for value, bare in zip(values[:2], base[:2], strict=True))
+    return _ratio(first), _ratio(second)
+
+
+def _ratio(value: float) -> str:
+    return f"{value:.1f}" if value >= 0.1 else f"{value:.4f}"
+
+
 def load() -> str:
     """How busy the machine was in the last minute, as a line: to be asked before a measurement."""
     return f"Load before the run: {os.getloadavg()[0]:.1f} (of the last minute)."

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from bench.command import Children, at_least, run, with_children
 from bench.flight_lines import REAL_RATE, FlightLines
-from bench.report import load, summary, table
+from bench.report import load, ratios, summary, table
 from bench.umbilical_ends import LATE, Ends, Step, Subscriber
 from chute_ros.links.umbilical.layout_files import load_layouts
 
@@ -190,9 +190,9 @@ def _latency(peers: list[Peer]) -> str:
     rows = []
     for peer in peers:
         numbers = summary(delays[peer.name])
-        ratios = (f"{number / base[i]:.1f}" for i, number in enumerate(numbers[:2]))
         lost = sum(step.lost for step in peer.turns[REAL_RATE])
-        values = (*(f"{number:.2f} ms" for number in numbers), *ratios, str(lost))
+        told = (f"{number:.2f} ms" for number in numbers)
+        values = (*told, *ratios(numbers, base), str(lost))
         rows.append((f"at {REAL_RATE:g} lines/s: {peer.name}", *values))
     head = (
         "from writing a line to the subscriber",
