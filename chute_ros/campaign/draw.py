@@ -19,6 +19,7 @@ from chute_ros.campaign.scenario import (
     Stalls,
     Stop,
     WayFault,
+    flown_vehicles,
     is_rocket,
     sensors_of,
     stopping_of,
@@ -105,7 +106,7 @@ def draw(seed: int) -> Scenario:
 
 
 def _vehicle(chance: random.Random, seed: int) -> str:
-    kinds = sorted(vehicles().values(), key=lambda one: (-one.often, one.name))
+    kinds = sorted(flown_vehicles(), key=lambda one: (-one.often, one.name))
     name = _one_of(chance, {one.name: one.often for one in kinds if not one.replaces})
     for kind in kinds:
         # By a chance of its own: all other flights stay as they are.

@@ -11,7 +11,7 @@ from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import SOFT
-from chute_ros.links.api import AUTOPILOT_LINK, SUPERVISOR, Part, VehicleKind, load
+from chute_ros.links.api import AUTOPILOT_LINK, SUPERVISOR, CampaignPart, VehicleKind, load
 from chute_ros.links.registered import links, vehicles
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 from chute_ros.sim.autopilot_kinds import GENERIC
@@ -50,10 +50,17 @@ AUTOPILOT_WAYS = ("autopilot", AUTOPILOT_LINK)
 
 
 @functools.cache
-def part(link: str) -> Part:
+def part(link: str) -> CampaignPart:
     """What the campaign has of a link."""
-    made: Part = load(links()[link].part)()
+    made: CampaignPart = load(links()[link].part)()
     return made
+
+
+@functools.cache
+def flown_vehicles() -> tuple[VehicleKind, ...]:
+    """Those whose links all have a part in the campaign."""
+    kinds = links()
+    return tuple(v for v in vehicles().values() if all(kinds[one].part for one in v.links))
 
 
 def ways_of(vehicle: str) -> tuple[str, ...]:

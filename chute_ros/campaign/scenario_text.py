@@ -22,10 +22,10 @@ from chute_ros.campaign.scenario import (
     Stalls,
     Stop,
     WayFault,
+    flown_vehicles,
 )
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
-from chute_ros.links.registered import vehicles
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
@@ -62,8 +62,10 @@ def scenario_of(text: str, named: str) -> tuple[Scenario, str]:
         if whole["format"] != FORMAT:
             raise RecordError(f"{named}: format {whole['format']}: need {FORMAT}")
         values = dict(whole["scenario"])
-        if values["vehicle"] not in vehicles():
-            raise RecordError(f"{named}: no link has a vehicle {values['vehicle']!r}")
+        if values["vehicle"] not in {one.name for one in flown_vehicles()}:
+            raise RecordError(
+                f"{named}: no link that is flown has a vehicle {values['vehicle']!r}"
+            )
         values["failure"] = Failure[values["failure"]]
         values["faults"] = tuple(map(_fault, values["faults"]))
         if "vehicle_sources" in values:

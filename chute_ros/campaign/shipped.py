@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from chute_ros.campaign.scenario import part
-from chute_ros.links.registered import links, vehicles
+from chute_ros.campaign.scenario import flown_vehicles, part
+from chute_ros.links.registered import vehicles
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
 
@@ -36,5 +36,5 @@ class Shipped:
 
     def read_all(self) -> None:
         """Now, before processes part that share it."""
-        for link in links():
+        for link in {link for vehicle in flown_vehicles() for link in vehicle.links}:
             part(link).read()

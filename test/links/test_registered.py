@@ -139,6 +139,22 @@ def test_a_link_of_another_package_is_found_behind_ours(tmp_path: Path) -> None:
     assert module == "other_link"
 
 
+def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(
+    tmp_path: Path,
+) -> None:
+    code = OTHERS.replace('name="rocket_motor"', 'name="rocket_motor", part=""')
+    tell = (
+        "from pathlib import Path; from chute_ros.campaign.draw import draw; "
+        "from chute_ros.campaign.shipped import Shipped; "
+        "Shipped(Path()).read_all(); print([draw(n) for n in range(50)])"
+    )
+    (tmp_path / "without").mkdir()
+    other_package(tmp_path, "rocket_motor = other_link:LINK", code)
+    beside, alone = python(tell, tmp_path), python(tell, tmp_path / "without")
+    assert alone.returncode == 0, alone.stderr
+    assert (beside.returncode, beside.stdout) == (0, alone.stdout), beside.stderr
+
+
 @pytest.mark.parametrize(
     ("entry", "said"),
     [
