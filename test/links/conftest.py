@@ -1,16 +1,3 @@
 """A bench for each test of a link's node."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
-
-import pytest
-from node_bench import Bench
-
-
-@pytest.fixture
-def bench(namespace: str) -> Iterator[Bench]:
-    """Nodes, simulators and a client of this test alone."""
-    one = Bench(namespace)
-    yield one
-    one.close()
+from node_bench import bench  # noqa: F401

@@ -5,20 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from node_bench import Bench
+from node_bench import Bench, bench  # noqa: F401
 from supervisor_processes import Pair
 
 
 @pytest.fixture
-def bench(namespace: str) -> Iterator[Bench]:
-    """Nodes, simulators and a client of this test alone."""
-    one = Bench(namespace)
-    yield one
-    one.close()
-
-
-@pytest.fixture
-def pair(bench: Bench) -> Iterator[Pair]:
+def pair(bench: Bench) -> Iterator[Pair]:  # noqa: F811
     """Supervisors to start; what they wrote is shown when the test fails."""
     pair = Pair(bench)
     yield pair

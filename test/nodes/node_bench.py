@@ -7,11 +7,12 @@ import itertools
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import pytest
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -159,6 +160,14 @@ class Bench:
         future = self.ask(kind, service, **fields)
         self.until(future.done, f"{service} answers")
         return future.result()
+
+
+@pytest.fixture
+def bench(namespace: str) -> Iterator[Bench]:
+    """Nodes, simulators and a client of this test alone."""
+    one = Bench(namespace)
+    yield one
+    one.close()
 
 
 def stamped(node: Node, message: Any, age: float = 0.0) -> Any:

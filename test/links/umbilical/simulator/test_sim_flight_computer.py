@@ -5,50 +5,18 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 import serial
+from test_command_line import Simulator
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 
 FOLDER = str(Path(__file__).parents[4] / "msg_defs" / "telem")
 LAYOUTS = {layout.name: layout for layout in load_layouts(FOLDER, "the tests")}
-PROGRAM = (
-    sys.executable,
-    "-m",
-    "chute_ros.links.umbilical.simulator.sim_flight_computer",
-    "--telem-path",
-    FOLDER,
-)
-
-
-class Simulator:
-    """One that runs, and the lines that it has printed."""
-
-    def __init__(self, *arguments):
-        self.process = subprocess.Popen(
-            [*PROGRAM, *arguments],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.lines = []
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def end(self, number=signal.SIGINT):
-        """Its exit code after this signal."""
-        self.process.send_signal(number)
-        code = self.process.wait(20.0)
-        self._reader.join()
-        return code
+MODULE = "chute_ros.links.umbilical.simulator.sim_flight_computer"
+PROGRAM = (sys.executable, "-m", MODULE, "--telem-path", FOLDER)
 
 
 @pytest.fixture
@@ -61,7 +29,9 @@ def start(link, await_until):
     started = []
 
     def begin(*arguments):
-        one = Simulator("--link", str(link), *arguments)
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        more = ("--telem-path", FOLDER, "--link", str(link), *arguments)
+        one = Simulator(MODULE, environment, *more)
         started.append(one)
         await_until(lambda: os.path.lexists(link), "the link is there")
         return one
