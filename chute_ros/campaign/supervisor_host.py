@@ -13,7 +13,7 @@ from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.events import Notice
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY, VEHICLE_STATE
 from chute_ros.runtime.arming import Answered
-from chute_ros.runtime.supervisor import Start, SupervisorRuntime, Turn
+from chute_ros.runtime.supervisor import FinishedTurn, Start, SupervisorRuntime
 from chute_ros.runtime.topics import (
     ActionTold,
     DeviceBeat,
@@ -141,7 +141,7 @@ class SupervisorHost:
         if said.alarm:
             self.alarmed.append(told)
 
-    def record(self, turn: Turn) -> None:
+    def record(self, turn: FinishedTurn) -> None:
         """The judge looks at what comes of it."""
 
     def keep(self, state: State) -> None:

@@ -9,7 +9,7 @@ A link is how one kind of device is spoken to. Everything of it is in one folder
     parameters.py   the settings of the node (chute_ros/settings.py), each parameter written once
     __main__.py     starts the node
     simulator/      the simulated device, where there is one
-    virtual.py      its node and its simulated device in a flight of the campaign (a Part)
+    virtual.py      its node and its simulated device in a flight of the campaign (a CampaignPart)
     __init__.py     LINK, a LinkKind: how launch files, parameter tables, the campaign, the device
                     suite and the docs find all that
 
@@ -74,7 +74,7 @@ class BlockingLink(Link, Protocol):
         """Keep the vehicle on the ground for this reason; empty: let it go."""
 
 
-class Part(Protocol):
+class CampaignPart(Protocol):
     """What the campaign has of a link: its node and its simulated device in virtual time."""
 
     def ways(self, vehicle: VehicleKind) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ class Part(Protocol):
 
 
 @dataclass(frozen=True)
-class Argument:
+class ConnectionArgument:
     """An argument of vehicle.launch.py that overrides the parameter `connection` of a link."""
 
     name: str
@@ -155,7 +155,7 @@ class LinkKind:
     description: str
     node: Place
     parameters: Place
-    argument: Argument
+    argument: ConnectionArgument
     vehicles: tuple[VehicleKind, ...]
     simulators: Callable[[VehicleKind, Sockets], tuple[tuple[str, ...], ...]]
     connection: Callable[[Sockets], str]

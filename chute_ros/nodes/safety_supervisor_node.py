@@ -42,9 +42,9 @@ from chute_ros.protocol.events import Notice
 from chute_ros.runtime.arming import Answered
 from chute_ros.runtime.supervisor import (
     HEARTBEAT_INTERVAL,
+    FinishedTurn,
     Start,
     SupervisorRuntime,
-    Turn,
 )
 from chute_ros.runtime.topics import LeaseClaim, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
@@ -174,7 +174,7 @@ class SafetySupervisorNode(SuiteNode):
         log = self.get_logger()
         log.error(said.text) if said.alarm else log.info(said.text)
 
-    def record(self, turn: Turn) -> None:
+    def record(self, turn: FinishedTurn) -> None:
         """In the black box, with the decisions that left."""
         self._recorder.turn(turn.now, turn.new, turn.outputs, turn.before, turn.after, self.config)
         sent, self._unrecorded = self._unrecorded, []

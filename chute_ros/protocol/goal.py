@@ -41,6 +41,17 @@ class EffectLimits(Settings):
     )
 
 
+class Commanded:
+    """Settings of a link whose commands have an effect."""
+
+    effect: EffectLimits
+
+    @property
+    def give_up_after(self) -> float:
+        """Limit for all tries of a command together, s."""
+        return self.effect.give_up_after
+
+
 #: A command of the link's protocol; the loop only compares them.
 CommandT = TypeVar("CommandT")
 

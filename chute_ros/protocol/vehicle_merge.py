@@ -62,7 +62,11 @@ DISPUTED = 10.0
 
 #: A link in order of preference: who hears the autopilot knows more of it than who lost it.
 _PREFERENCE = (
-    *(LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.NEVER_SEEN, LinkState.UNMONITORED),
+    LinkState.OK,
+    LinkState.STALE,
+    LinkState.LOST,
+    LinkState.NEVER_SEEN,
+    LinkState.UNMONITORED,
 )
 
 

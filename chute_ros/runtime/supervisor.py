@@ -36,7 +36,7 @@ STATE_INTERVAL = 1.0  # s, at the latest
 
 
 @dataclass(frozen=True)
-class Turn:
+class FinishedTurn:
     """What one update of the core was given and gave, for the black box."""
 
     now: float
@@ -61,7 +61,7 @@ class SupervisorShell(LeaseShell, ArmCaller, Protocol):
     """Carries out what a supervisor does. publish gets decisions, SupervisorBeat, SafetyTold and
     LeaseClaim."""
 
-    def record(self, turn: Turn) -> None:
+    def record(self, turn: FinishedTurn) -> None:
         """Keep it in the black box."""
 
     def keep(self, state: State) -> None:
@@ -189,7 +189,7 @@ class SupervisorRuntime:
         # Before anything is kept or told of it: a device waits for this.
         for one in decided:
             self._shell.publish(one.decision)
-        self._shell.record(Turn(now, new, outputs, before, self.state))
+        self._shell.record(FinishedTurn(now, new, outputs, before, self.state))
         if decided:
             self.afterwards.decided(now)
             self.afterwards.tell(partial(self._tell_decisions, decided))

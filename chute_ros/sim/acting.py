@@ -63,18 +63,17 @@ class Actor:
 
 
 class Script:
-    """The entries of --at: (s after the start, action)."""
+    """The entries of --at: (s after the start, action). It starts as it is first asked what is
+    due."""
 
     def __init__(self, entries: list[tuple[float, str]]) -> None:
         self._entries = sorted(entries)
         self._started = math.nan
 
-    def start(self, now: float) -> None:
-        """The times count from here."""
-        self._started = now
-
     def take_due(self, now: float) -> list[str]:
         """The actions whose time has come; each is handed out once."""
+        if math.isnan(self._started):
+            self._started = now
         due = []
         while self._entries and self._entries[0][0] <= now - self._started:
             due.append(self._entries.pop(0)[1])
@@ -82,4 +81,6 @@ class Script:
 
     def next_deadline(self) -> float:
         """When the next one is due; infinity: never."""
-        return self._entries[0][0] + self._started if self._entries else math.inf
+        if not self._entries:
+            return math.inf
+        return -math.inf if math.isnan(self._started) else self._entries[0][0] + self._started

@@ -80,7 +80,6 @@ class MavlinkDevice(Actor):
         self.now = now
         if math.isnan(self._started_at):
             self._started_at = now
-            self._script.start(now)
             self.reboot()
         for action in self._script.take_due(now):
             self.act(action)

@@ -28,7 +28,7 @@ CODEC = Codec(
 
 
 @dataclass(frozen=True)
-class Turn:
+class CoreTurn:
     """One update of the core: what went in and what came out. now: monotonic s."""
 
     now: float
@@ -37,8 +37,8 @@ class Turn:
 
 
 def replay(
-    config: SupervisorConfig, state: State, turns: Iterable[Turn]
-) -> Iterator[tuple[Turn, State, tuple[i.Output, ...]]]:
+    config: SupervisorConfig, state: State, turns: Iterable[CoreTurn]
+) -> Iterator[tuple[CoreTurn, State, tuple[i.Output, ...]]]:
     """Decide once more: each turn as it was recorded, the state after it, what comes out now."""
     for turn in turns:
         state, outputs = update(config, state, turn.inputs, turn.now)

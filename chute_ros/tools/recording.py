@@ -17,7 +17,7 @@ from chute_ros.nodes.box_writer import RECORD
 from chute_ros.nodes.message_definitions import type_hash, type_name
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.record import CODEC, Turn
+from chute_ros.supervisor.record import CODEC, CoreTurn
 from chute_ros.supervisor.state import State
 from chute_ros.tools.mcap_entries import Entry, McapEntries
 from chute_ros.tools.progress import Progress
@@ -30,7 +30,7 @@ class RecordedTurn:
 
     wall: int
     number: int
-    turn: Turn
+    turn: CoreTurn
     config: SupervisorConfig | None = None
     state: State | None = None
 
@@ -154,7 +154,7 @@ class _Reader:
     def _turn(self, entry: Entry) -> RecordedTurn:
         message = self._message(entry, SupervisorRecord)
         try:
-            turn = Turn(
+            turn = CoreTurn(
                 message.monotonic,
                 tuple(CODEC.from_json(one, i.Input) for one in message.inputs),
                 tuple(CODEC.from_json(one, i.Output) for one in message.outputs),

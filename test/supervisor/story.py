@@ -26,7 +26,7 @@ from chute_ros.supervisor.config import TRIGGER, SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.profile_reader import read_profile
-from chute_ros.supervisor.record import Turn
+from chute_ros.supervisor.record import CoreTurn
 from chute_ros.supervisor.rules import Profile, Rule
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.wakes import next_deadline
@@ -172,7 +172,7 @@ class Story:
         self.t = 0.0
         self.seq = 0
         self.noise = 0
-        self.turns: list[Turn] = []
+        self.turns: list[CoreTurn] = []
         self.state = State(epoch=7, started_at=START, mode=self.mode)
         self.outputs: list[tuple[float, i.Output]] = []
 
@@ -189,7 +189,7 @@ class Story:
     def _update(self, inputs: tuple[i.Input, ...], t: float) -> list[i.Output]:
         self.t = t
         self.state, outputs = update(self.config, self.state, inputs, START + t)
-        self.turns.append(Turn(START + t, inputs, outputs))
+        self.turns.append(CoreTurn(START + t, inputs, outputs))
         self.outputs += [(t, output) for output in outputs]
         return list(outputs)
 

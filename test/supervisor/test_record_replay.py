@@ -11,7 +11,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.record import CODEC, Turn, replay
+from chute_ros.supervisor.record import CODEC, CoreTurn, replay
 from chute_ros.supervisor.state import State
 
 MULTIROTOR = shipped("multirotor")
@@ -35,13 +35,13 @@ SEQUENCES = st.lists(
 
 def record(
     config: SupervisorConfig, state: State, sequence: list[tuple[float, list[i.Input]]]
-) -> tuple[State, list[Turn]]:
+) -> tuple[State, list[CoreTurn]]:
     """Live: each turn as the black box keeps it."""
     now, turns = START, []
     for wait, inputs in sequence:
         now += wait
         state, outputs = update(config, state, tuple(inputs), now)
-        turns.append(Turn(now, tuple(inputs), outputs))
+        turns.append(CoreTurn(now, tuple(inputs), outputs))
     return state, turns
 
 
@@ -50,10 +50,10 @@ def decided(outputs: tuple[i.Output, ...]) -> list[i.Output]:
     return [output for output in outputs if isinstance(output, i.Decide)]
 
 
-def through_the_file(turns: list[Turn]) -> list[Turn]:
+def through_the_file(turns: list[CoreTurn]) -> list[CoreTurn]:
     """Each part written as text and read back."""
     return [
-        Turn(
+        CoreTurn(
             CODEC.from_json(CODEC.to_json(turn.now)),
             tuple(CODEC.from_json(CODEC.to_json(one)) for one in turn.inputs),
             tuple(CODEC.from_json(CODEC.to_json(one)) for one in turn.outputs),

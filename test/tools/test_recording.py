@@ -12,7 +12,7 @@ from zstandard import ZstdCompressor
 
 from chute_ros.errors import RecordError
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.record import Turn
+from chute_ros.supervisor.record import CoreTurn
 from chute_ros.tools.mcap_entries import McapEntries
 from chute_ros.tools.recording import RecordedTurn, Recording, files_of, read
 
@@ -201,7 +201,7 @@ def test_ctrl_c_in_the_middle_of_a_message_is_not_the_fault_of_the_recording(fli
 
 
 def turn(number, wall, now):
-    return RecordedTurn(round(wall * 1e9), number, Turn(now, (), ()))
+    return RecordedTurn(round(wall * 1e9), number, CoreTurn(now, (), ()))
 
 
 @pytest.mark.parametrize("step", [86_400.0, -3_600.0])

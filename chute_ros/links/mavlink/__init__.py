@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chute_ros.links.api import AUTOPILOT_LINK, Argument, LinkKind, Sockets, VehicleKind
+from chute_ros.links.api import AUTOPILOT_LINK, ConnectionArgument, LinkKind, Sockets, VehicleKind
 
 _FOLDER = "chute_ros.links.mavlink"
 
@@ -25,7 +25,7 @@ LINK = LinkKind(
     description="a parachute on a MAVLink network, and the autopilot there",
     node=f"{_FOLDER}.node:MavlinkParachuteNode",
     parameters=f"{_FOLDER}.parameters:MavlinkParameters",
-    argument=Argument("connection", "address of the MAVLink network"),
+    argument=ConnectionArgument("connection", "address of the MAVLink network"),
     vehicles=(
         VehicleKind(
             "mavlink", "a MAVLink parachute, all as delivered", (AUTOPILOT_LINK,), {}, often=4

@@ -9,7 +9,7 @@ from functools import partial
 from chute_ros.campaign.aircraft import Aircraft, is_for_devices
 from chute_ros.campaign.bus import Bus, Plug
 from chute_ros.campaign.ros import Process, Ros
-from chute_ros.campaign.scenario import HomeMove, Scenario
+from chute_ros.campaign.scenario import AUTOPILOT_WAYS, HomeMove, Scenario
 from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.links.api import AUTOPILOT_LINK, VehicleKind
 from chute_ros.links.mavlink import carries_parachute
@@ -32,7 +32,7 @@ class MavlinkPart:
     """The autopilot itself is the aircraft's."""
 
     def ways(self, vehicle: VehicleKind) -> tuple[str, ...]:
-        return ("autopilot", AUTOPILOT_LINK, *self.stopping(vehicle))
+        return (*AUTOPILOT_WAYS, *self.stopping(vehicle))
 
     def stopping(self, vehicle: VehicleKind) -> tuple[str, ...]:
         return (_PARACHUTE,) if carries_parachute(vehicle) else ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from chute_ros.links.api import (
     AUTOPILOT_LINK,
     SUPERVISOR,
-    Argument,
+    ConnectionArgument,
     LinkKind,
     Sockets,
     VehicleKind,
@@ -24,7 +24,7 @@ LINK = LinkKind(
     description="a parachute without telemetry, fired by a relay, GPIO or PWM output",
     node=f"{_FOLDER}.node:RelayNode",
     parameters=f"{_FOLDER}.parameters:RelayParameters",
-    argument=Argument("output", "output that fires a parachute without telemetry"),
+    argument=ConnectionArgument("output", "output that fires a parachute without telemetry"),
     vehicles=(
         VehicleKind(
             "relay",

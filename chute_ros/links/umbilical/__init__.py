@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chute_ros.links.api import SUPERVISOR, Argument, LinkKind, Sockets, VehicleKind
+from chute_ros.links.api import SUPERVISOR, ConnectionArgument, LinkKind, Sockets, VehicleKind
 
 _FOLDER = "chute_ros.links.umbilical"
 _NAME = "umbilical"
@@ -17,7 +17,7 @@ LINK = LinkKind(
     description="a rocket's flight computer on a serial umbilical",
     node=f"{_FOLDER}.node:UmbilicalNode",
     parameters=f"{_FOLDER}.parameters:UmbilicalParameters",
-    argument=Argument("cable", "serial port of an umbilical"),
+    argument=ConnectionArgument("cable", "serial port of an umbilical"),
     vehicles=(
         VehicleKind(
             "umbilical",

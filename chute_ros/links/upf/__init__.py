@@ -5,7 +5,7 @@ from __future__ import annotations
 from chute_ros.links.api import (
     AUTOPILOT_LINK,
     SUPERVISOR,
-    Argument,
+    ConnectionArgument,
     LinkKind,
     Sockets,
     VehicleKind,
@@ -30,7 +30,7 @@ LINK = LinkKind(
     description="a Flyfire UPF parachute on a DroneCAN bus",
     node=f"{_FOLDER}.node:UpfCanNode",
     parameters=f"{_FOLDER}.parameters:UpfParameters",
-    argument=Argument("bus", "address of the CAN bus of a UPF"),
+    argument=ConnectionArgument("bus", "address of the CAN bus of a UPF"),
     vehicles=(
         VehicleKind(
             "upf",

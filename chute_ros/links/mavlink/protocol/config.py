@@ -10,7 +10,7 @@ from chute_ros.errors import ParameterError
 from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.links.mavlink.protocol.parachute import StatusLimits
 from chute_ros.model import TriggerFlags
-from chute_ros.protocol.effect import EffectLimits
+from chute_ros.protocol.goal import Commanded, EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.settings import Settings, nested, parameter
 
@@ -30,7 +30,7 @@ _NOT_SOONER = {"minimum": 0.1}
 
 
 @dataclass(frozen=True)
-class MavlinkConfig(Settings):
+class MavlinkConfig(Commanded, Settings):
     """Settings of a MavlinkLink. heartbeat_interval: of its own heartbeat, s."""
 
     system_id: int = parameter(1, "MAVLink system id of this node: the vehicle's", 1, 255)
@@ -100,8 +100,3 @@ class MavlinkConfig(Settings):
             raise ParameterError(
                 f"heartbeat_interval is {self.heartbeat_interval}: need a time above 0 s"
             )
-
-    @property
-    def give_up_after(self) -> float:
-        """Limit for all tries of a command together, s."""
-        return self.effect.give_up_after

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Hashable
 
 from chute_ros.links.relay.protocol.link import RelayConfig
@@ -25,7 +24,6 @@ class RelayBoard(Actor):
         self._stuck = False
         self._heard = b""
         self._script = Script(script or [])
-        self._is_started = False
         self._bytes = RelayConfig()
         self.actions = {"stuck": lambda _: self._hold(True), "free": lambda _: self._hold(False)}
 
@@ -51,14 +49,11 @@ class RelayBoard(Actor):
         pass
 
     def update(self, now: float) -> None:
-        if not self._is_started:
-            self._is_started = True
-            self._script.start(now)
         for action in self._script.take_due(now):
             self.act(action)
 
     def next_deadline(self) -> float:
-        return self._script.next_deadline() if self._is_started else -math.inf
+        return self._script.next_deadline()
 
     def take_output(self) -> list[bytes]:
         return []

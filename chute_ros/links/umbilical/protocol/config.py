@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 
 from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
-from chute_ros.protocol.effect import EffectLimits
+from chute_ros.protocol.goal import Commanded, EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.settings import Settings, nested, parameter
 
@@ -52,7 +52,7 @@ class MemoryLimits(Settings):
 
 
 @dataclass(frozen=True)
-class UmbilicalConfig(Settings):
+class UmbilicalConfig(Commanded, Settings):
     """Settings of an UmbilicalLink."""
 
     layout: str = parameter(
@@ -99,8 +99,3 @@ class UmbilicalConfig(Settings):
         False, "the firmware's <V> opens the SV to vent; by the reference <V> closes it"
     )
     memory: MemoryLimits = nested(MemoryLimits())
-
-    @property
-    def give_up_after(self) -> float:
-        """Limit for all tries of a command together, s."""
-        return self.effect.give_up_after

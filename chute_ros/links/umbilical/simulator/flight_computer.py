@@ -185,7 +185,6 @@ class FlightComputer(Actor):
     def _start(self, now: float) -> None:
         """It was switched on before, so that it needs no time to boot."""
         self.now = self._started_at = self._loop_at = now
-        self._script.start(now)
         self.reboot()
         self._running_from = self._telem_at = now
 

@@ -10,7 +10,7 @@ from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID
-from chute_ros.protocol.effect import EffectLimits
+from chute_ros.protocol.goal import Commanded, EffectLimits
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.settings import Settings, nested, parameter
 
@@ -44,7 +44,7 @@ class AllocatorUse(enum.Enum):
 
 
 @dataclass(frozen=True)
-class UpfConfig(Settings):
+class UpfConfig(Commanded, Settings):
     """Settings of a UpfLink. utc_offset: UTC minus monotonic time at the start, s."""
 
     node_id: int = parameter(
@@ -145,8 +145,3 @@ class UpfConfig(Settings):
             time_master=self.time_master,
             utc_offset=self.utc_offset,
         )
-
-    @property
-    def give_up_after(self) -> float:
-        """Limit for all tries of a command together, s."""
-        return self.effect.give_up_after

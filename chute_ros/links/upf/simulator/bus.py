@@ -39,7 +39,6 @@ class UpfBus:
     def update(self, now: float) -> None:
         if not self._is_started:
             self._is_started = True
-            self._script.start(now)
             for node in self.nodes:
                 node.start(now)
         for action in self._script.take_due(now):
