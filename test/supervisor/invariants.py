@@ -35,6 +35,8 @@ class Watch:
         self.outputs: tuple[i.Output, ...] = ()
         self.moved_at = -math.inf
         self.killed_at = math.nan
+        #: The motors were off once since then.
+        self.stopped = False
         self.forced = False
 
     def copy(self) -> Watch:
@@ -55,6 +57,7 @@ class Watch:
         """The supervisor begins anew with nothing but a higher epoch."""
         self.state = State(epoch=self.state.epoch + 4, started_at=self.now, mode=self.state.mode)
         self.killed_at = math.nan
+        self.stopped = False
         self.forced = False
 
     def _looks_at_all_that_changes(self, before: State, inputs: tuple[i.Input, ...]) -> None:
@@ -85,7 +88,10 @@ class Watch:
             assert not {K, D} & set(done), "in another mode nothing is sent"
         going_on = before.stage in (Stage.KILLING, Stage.DEPLOYING)
         if K in done and (math.isnan(self.killed_at) or not going_on):
-            self.killed_at = self.now
+            self.killed_at, self.stopped = self.now, False
+        kill = self.state.killing.kill
+        # One that is repeated was confirmed under its first number.
+        self.stopped |= kill is not None and kill.confirmed
         ordered = self.state.deploying.deploy_rule and not before.deploying.deploy_rule
         self._kill_first(before, done)
         self._confirmed_is_not_told_again(before, inputs, done)
@@ -111,9 +117,7 @@ class Watch:
             waited = self.now - self.killed_at + 1e-9
             delays = [self.config.kill_to_deploy_delay]
             delays += [self.config.low_kill_to_deploy_delay] if self._may_be_low() else []
-            # One that had left before a kill was repeated has waited for the first.
-            left = before.stage is Stage.DEPLOYING and bool(before.deploying.deploys)
-            assert left or kill.confirmed or waited >= min(delays)
+            assert kill.confirmed or self.stopped or waited >= min(delays)
 
     def _may_be_low(self) -> bool:
         height, speed = self.state.measured("height"), self.state.measured("vertical_speed").value
