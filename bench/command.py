@@ -16,6 +16,7 @@ from chute_ros.tools.isolation import isolated_ros
 from chute_ros.tools.processes import Processes
 
 T = TypeVar("T")
+Number = TypeVar("Number", int, float)
 
 
 class Part(Protocol):
@@ -31,10 +32,10 @@ class Part(Protocol):
         """Measure; the section without its heading."""
 
 
-def at_least(kind: Callable[[str], T], lowest: T) -> Callable[[str], T]:
+def at_least(kind: Callable[[str], Number], lowest: Number) -> Callable[[str], Number]:
     """The type of an option."""
 
-    def value(text: str) -> T:
+    def value(text: str) -> Number:
         given = kind(text)
         if not given >= lowest:
             raise argparse.ArgumentTypeError(f"need {lowest} or more")

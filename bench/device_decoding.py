@@ -101,7 +101,8 @@ class Link:
         link.take_output()
         link.take_events()
         link.next_deadline()
-        return self._received() - before
+        after: int = self._received()
+        return after - before
 
 
 class BareCan:
@@ -184,7 +185,8 @@ def section(chosen: argparse.Namespace) -> str:
 
 def _said(device: Device, batches: int, counter: Peer) -> Iterator[tuple[Batch, int]]:
     """What a device says by itself, from its start on, and how many messages that is."""
-    now, waiting = 0.0, []
+    now = 0.0
+    waiting: list[tuple[float, bytes]] = []
     for _ in range(batches):
         while len(waiting) < BATCH:
             device.update(now)

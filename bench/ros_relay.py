@@ -34,7 +34,8 @@ def _read(step: Callable[[], None]) -> None:
 
 
 def _bus(node: Node, port: int) -> None:
-    bus, waiting = Bus(port), []
+    bus = Bus(port)
+    waiting: list[tuple[int, int]] = []
     publisher = node.create_publisher(*_REQUEST, qos.STATUS)
 
     def step() -> None:

@@ -129,9 +129,9 @@ def _measure(namespace: str, children: Children, seconds: float, top_rate: float
             _say(f"{number + 1} of {_TURNS} turns")
         while any(peer.search.next_rate() for peer in peers):
             for peer in peers:
-                rate = peer.search.next_rate()
-                if rate is not None:
-                    peer.search.tried(_try(peer, rate, children, seconds))
+                next_rate = peer.search.next_rate()
+                if next_rate is not None:
+                    peer.search.tried(_try(peer, next_rate, children, seconds))
     return peers
 
 

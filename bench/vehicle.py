@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 from bench.command import Children, at_least, run, with_children
 from bench.person import Person
@@ -141,10 +142,14 @@ def _deploys(wire: VehicleWire, person: Person, children: Children, count: int) 
     cannot tell whose it is, and asks again."""
     times, alone_at = [], 0.0
     for _ in range(count):
-        _until("alone", lambda at=alone_at: time.monotonic() > at, children)
+        _until("alone", partial(_is_past, alone_at), children)
         times.append(_deploy(wire, person, children))
         alone_at = time.monotonic() + CommandLimits().late_ack_window
     return times
+
+
+def _is_past(at: float) -> bool:
+    return time.monotonic() > at
 
 
 def _deploy(wire: VehicleWire, person: Person, children: Children) -> float:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from chute_ros.links.registered import module_of
@@ -219,7 +220,7 @@ class Fleet:
                     self.act(number, "arm")
                     self.act(number, f"takeoff={HEIGHT}")
             asked_at = time.monotonic()
-            until("states come", 10.0, lambda t=asked_at: _told_since(station, t + 2.0))
+            until("states come", 10.0, partial(_told_since, station, asked_at + 2.0))
             seen = newest_states(station.find(vehicle=..., state=...))
             missing = tuple(n for n in missing if seen.get(name_of(n)) != Stage.IN_FLIGHT)
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from sitl.pilot import FORCE
@@ -111,7 +112,7 @@ def events_of(record: Sequence[Seen], truth_ports: Sequence[int]) -> Events:
     return Events(releases, out, kills, armed, said)
 
 
-def _kill_of(message: object) -> str:
+def _kill_of(message: Any) -> str:
     if message.command == dialect.MAV_CMD_DO_FLIGHTTERMINATION:
         return "termination"
     forced = message.param1 == 0.0 and message.param2 == FORCE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from chute_ros.tools.machine import machine
@@ -96,7 +96,7 @@ def _row(runs: Sequence[Flown]) -> str:
     return "| " + " | ".join(_cell(text) for text in cells) + " |"
 
 
-def _each(lists: object) -> list[str]:
+def _each(lists: Iterable[Iterable[str]]) -> list[str]:
     """What the runs say, each once, with the number of runs if several say it differently."""
     return list(dict.fromkeys(text for one in lists for text in one))
 

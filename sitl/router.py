@@ -14,12 +14,12 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from sitl.record import Recorder
 from sitl.routing import FrameSplitter, Routes
 
-End = tuple[int, Any]  # port here, address there
+End: TypeAlias = tuple[int, Any]  # port here, address there
 _MOST = 65536
 
 
@@ -28,7 +28,7 @@ class Network:
 
     def __init__(self, texts: list[str], recorder: Recorder, selector: selectors.BaseSelector):
         self._recorder, self._selector = recorder, selector
-        self._routes = Routes()
+        self._routes: Routes[End] = Routes()
         self._splitters: dict[End, FrameSplitter] = {}
         self._sockets: dict[int, socket.socket] = {}
         for text in texts:
@@ -41,7 +41,9 @@ class Network:
                 one.bind(("127.0.0.1", port))
                 self._watch(one, self._take, port)
 
-    def _watch(self, one: socket.socket, take: Callable[[socket.socket, int], None], port: int):
+    def _watch(
+        self, one: socket.socket, take: Callable[[socket.socket, int], None], port: int
+    ) -> None:
         one.setblocking(False)
         self._selector.register(one, selectors.EVENT_READ, (take, port))
 

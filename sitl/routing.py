@@ -11,12 +11,14 @@ import re
 import struct
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator
+from typing import Generic, TypeVar
 
 from chute_ros.protocol.mavlink.dialect import dialect
 
 _MAGIC_V1, _MAGIC_V2 = 0xFE, 0xFD
 _SIGNED = 0x01
 _LONGEST = 10 + 255 + 2 + 13
+End = TypeVar("End", bound=Hashable)
 
 
 class FrameSplitter:
@@ -88,22 +90,22 @@ def _places(number: int) -> tuple[int, int]:
     return places.get("target_system", -1), places.get("target_component", -1)
 
 
-class Routes:
+class Routes(Generic[End]):
     """Who was heard on which end."""
 
     def __init__(self) -> None:
-        self._heard: defaultdict[Hashable, set[tuple[int, int]]] = defaultdict(set)
+        self._heard: defaultdict[End, set[tuple[int, int]]] = defaultdict(set)
 
-    def hear(self, end: Hashable, frame: bytes) -> None:
+    def hear(self, end: End, frame: bytes) -> None:
         """A frame came from there."""
         self._heard[end].add(sender(frame))
 
-    def ways(self, source: Hashable, frame: bytes, ends: Iterable[Hashable]) -> list[Hashable]:
+    def ways(self, source: End, frame: bytes, ends: Iterable[End]) -> list[End]:
         """Of these ends, those that this frame goes to."""
         system, component = target(frame)
         return [end for end in ends if end != source and self._wants(end, system, component)]
 
-    def _wants(self, end: Hashable, system: int, component: int) -> bool:
+    def _wants(self, end: End, system: int, component: int) -> bool:
         if not system:
             return True
         if component:

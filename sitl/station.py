@@ -94,7 +94,7 @@ class Station:
 
     def accepted(self, number: int) -> bool:
         """Its acknowledgement came and says so."""
-        return self.results.get(number) == dialect.MAV_RESULT_ACCEPTED
+        return bool(self.results.get(number) == dialect.MAV_RESULT_ACCEPTED)
 
     def ask_for(self, number: int, rate: float) -> None:
         """A message at this rate, Hz."""

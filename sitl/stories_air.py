@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
@@ -99,7 +100,7 @@ def _through(flight: Flight, steps: tuple[Step, ...], height: float) -> None:
             flight.vehicle.rest(2.0)
         flight.pilot.sticks(*step.sticks)
         flight.pilot.mode(step.mode)
-        changed = flight.vehicle.until(2.0, lambda step=step: flight.pilot.in_mode(step.mode))
+        changed = flight.vehicle.until(2.0, partial(flight.pilot.in_mode, step.mode))
         if not changed and step.mode != "FLIP":  # over before a heartbeat tells of it
             flight.verdict.happened.append(f"{step.mode} was refused")
             continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
@@ -90,7 +91,7 @@ def _low(flight: Flight) -> None:
     _note_answer(flight, answer)
 
 
-def _note_answer(flight: Flight, answer: object) -> None:
+def _note_answer(flight: Flight, answer: Any) -> None:
     flight.vehicle.until(6.0, answer.done)
     if not answer.done():
         flight.verdict.wrong.append("error: the call was not answered within 6 s")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from sitl.record import Seen
 
@@ -35,7 +36,7 @@ class Truth:
         self.samples: list[Sample] = []
         self._ground = math.nan
 
-    def take(self, at: float, name: str, message: object) -> None:
+    def take(self, at: float, name: str, message: Any) -> None:
         """A message that holds truth, or another one."""
         if name == "SIM_STATE":
             self._add(at, message.alt, -message.vd, _tilt(message.roll, message.pitch),

@@ -8,7 +8,7 @@ from pathlib import Path
 from chute_ros.errors import ChuteError, RecordError
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.record import CODEC, Turn
+from chute_ros.supervisor.record import CODEC, CoreTurn
 from chute_ros.supervisor.state import State
 from chute_ros.tools.parameter_file import other_from
 from chute_ros.tools.recording import RecordedTurn, read
@@ -46,7 +46,7 @@ def _turns(data: bytes) -> None:
             except RecordError:
                 pass  # the others may be good
         number += 1
-        turn = Turn(now, tuple(inputs), ())
+        turn = CoreTurn(now, tuple(inputs), ())
         try:
             replayer.step(RecordedTurn(0, number, turn, SupervisorConfig(), begin))
         except ChuteError as error:

@@ -223,6 +223,8 @@ def test_bus_off_is_told_and_over_once_the_controller_restarts(bench):
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
     devices = Devices(network)
     devices.act("silent")
+    # What was still on its way would say that the bus is not off.
+    devices.await_beat(link_state=LinkState.LOST)
     # As the wire of an interface that tells of errors hands them on.
     off = pack(CanFrame(ERROR_BUS_OFF, b"", False, error=True))
     network.node.loop.call(lambda link, now: link.receive(off, now))
