@@ -136,12 +136,15 @@ def _climb(turn: Turn) -> None:
         over = step.all_failed() or turn.now >= step_deadline(turn.config, turn.state, step)
         # What refuses may yet do it, and the next step need not wait for that.
         over |= not last and step.all_refused()
+        unconfirmable = last and step.all_sent() and all(map(turn.state.unmonitored, step.targets))
+        over |= unconfirmable
         if not over and (last or not silent):
             return
         if last:
             first = turn.deploying.deploys[0].decided_at
             turn.move(Event.DEPLOY_FAILED, text)
-            turn.alarm(f"no parachute confirmed within {turn.now - first:.1f} s: {text}")
+            limit = "and none can be" if unconfirmable else f"within {turn.now - first:.1f} s"
+            turn.alarm(f"no parachute confirmed {limit}: {text}")
             alarm_at = turn.now + turn.config.alarm_interval
             turn.alarming = replace(turn.alarming, alarm_at=alarm_at)
             return
@@ -178,7 +181,7 @@ def _alarm_again(turn: Turn) -> None:
     out = turn.state.stage is Stage.DEPLOYED
     if (not out or turn.alarming.canopy_fails) and turn.now >= turn.alarming.alarm_at:
         # A state that was handed over or read from a black box may know of no alarm.
-        begin = "the canopy does not carry" if out else "still no parachute"
+        begin = "the canopy does not carry" if out else "still no parachute confirmed"
         text = ": ".join((begin, *turn.alarming.alarms[-1:]))
         turn.warn(text)
         alarm_at = turn.now + turn.config.alarm_interval

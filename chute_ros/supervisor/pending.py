@@ -85,6 +85,10 @@ class Pending:
         refused = all(self.of(target) & _NOT_NOW for target in self.targets)
         return refused and not self.confirmed
 
+    def all_sent(self) -> bool:
+        """Every target has at least sent it."""
+        return all(self.of(target) & _STEPS for target in self.targets)
+
     def unreported(self) -> tuple[str, ...]:
         """The targets that have not even said that they have sent it."""
         return tuple(target for target in self.targets if not self.of(target))

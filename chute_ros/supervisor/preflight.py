@@ -61,10 +61,6 @@ def link_problem(config: SupervisorConfig, link: str, evidence: LinkEvidence, no
     return ""
 
 
-def _unmonitored(state: State, link: str) -> bool:
-    return state.evidence(link).reported is LinkState.UNMONITORED
-
-
 def _faults(evidence: LinkEvidence) -> str:
     devices = sorted(evidence.devices.items())
     faults = [f"{name} {fault}" for name, status in devices for fault in status.faults]
@@ -82,7 +78,7 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
     against = [
         link
         for link in config.links
-        if problem[link] and (link in config.required_links or _unmonitored(state, link))
+        if problem[link] and (link in config.required_links or state.unmonitored(link))
     ]
     for links in (config.kill_links, config.deploy_links):
         # One that can do it is enough; none at all means that nobody would.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from chute_ros.model import Action, Decision, VehicleState
+from chute_ros.model import Action, Decision, LinkState, VehicleState
 from chute_ros.supervisor.codec import INLINE
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
@@ -204,6 +204,10 @@ class State:
     def evidence(self, link: str) -> LinkEvidence:
         """What is known of a link."""
         return self.heard.links.get(link, _NEVER_HEARD)
+
+    def unmonitored(self, link: str) -> bool:
+        """Its node says that of its device nothing can be known."""
+        return self.evidence(link).reported is LinkState.UNMONITORED
 
     def links_heard(self, config: SupervisorConfig, now: float) -> int:
         """How many links have a node that is not silent; the vehicle counts as one more."""

@@ -162,7 +162,7 @@ def test_the_alarm_is_said_again_with_its_words() -> None:
     story.at(5.4)
     assert story.alarms() == [first]
     story.at(9.6)
-    assert story.alarms() == [first, *[f"still no parachute: {first}"] * 2]
+    assert story.alarms() == [first, *[f"still no parachute confirmed: {first}"] * 2]
 
 
 def test_it_is_tried_again_with_the_first_rule_and_says_why() -> None:
@@ -220,7 +220,7 @@ def test_a_confirmation_that_comes_after_the_end_and_another_kill_counts() -> No
     story.at(2.0, i.DeployRequest(7, False, "again"))
     assert "out already" in story.answer(7).message
     story.at(60.0)
-    assert "still no parachute" not in story.said()
+    assert "still no parachute confirmed" not in story.said()
 
 
 # -- its answer ----------------------------------------------------------------------------------

@@ -129,7 +129,7 @@ def test_the_step_that_is_confirmed_is_the_last(number: int) -> None:
     story.at(story.t + 60.0)
     assert steps(story) == ALL[: number + 1]
     assert story.answer(5).success
-    assert "still no parachute" not in story.said()
+    assert "still no parachute confirmed" not in story.said()
 
 
 def test_a_step_that_confirms_late_ends_the_climb() -> None:

@@ -65,7 +65,7 @@ def test_an_alarm_that_is_due_is_said_though_the_state_knows_of_none(alarms: tup
         alarming=replace(story.state.alarming, alarms=alarms, alarm_at=START + 1.2),
     )
     said = [o.text for o in story.at(1.2) if isinstance(o, i.LogMessage)]
-    assert ": ".join(("still no parachute", *alarms[-1:])) in said
+    assert ": ".join(("still no parachute confirmed", *alarms[-1:])) in said
     assert story.state.alarming.alarm_at == START + 1.2 + story.config.alarm_interval
 
 

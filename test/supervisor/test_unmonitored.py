@@ -85,13 +85,34 @@ def test_a_deploy_that_was_sent_is_never_taken_for_confirmed() -> None:
     story.at(14.15, story.report(Action.KILL, Outcome.CONFIRMED))
     deploy = story.newest(Action.DEPLOY)
     assert deploy.targets == (RELAY,)
+    assert story.alarms() == []
     story.at(14.2, story.report(Action.DEPLOY, Outcome.SENT, RELAY, "sent"))
-    for step in range(1, 101):
-        story.at(14.2 + step * 0.1, *beats(story), story.told(height=50.0))
-    assert story.state.stage is Stage.FAULT
+    assert story.state.stage is Stage.FAULT, "nothing more can come"
     assert not story.answer(1).success
+    alarm = "no parachute confirmed and none can be: relay: sent"
+    assert story.alarms() == [alarm]
+    for step in range(1, 80):
+        story.at(14.2 + step * 0.1, *beats(story), story.told(height=50.0))
     assert len(story.decisions(Action.DEPLOY)) == 1, "SENT is heard: nothing is sent again"
-    assert any("confirm" in text for text in story.alarms())
+    assert story.alarms() == [alarm, *[f"still no parachute confirmed: {alarm}"] * 3]
+
+
+def test_while_another_link_may_yet_confirm_a_deploy_the_relay_s_sent_does_not_end_it() -> None:
+    story = standing(RELAY, required_links=(LINK,), deploy_links=(LINK, RELAY))
+    for step in range(1, 21):
+        story.at(12.0 + step * 0.1, *beats(story), parachute(), story.told(height=80.0))
+    story.at(14.1, i.DeployRequest(1, False, "a person saw it"))
+    story.at(14.15, story.report(Action.KILL, Outcome.CONFIRMED))
+    story.at(14.2, story.report(Action.DEPLOY, Outcome.SENT, LINK, "sent"))
+    assert story.state.stage is Stage.DEPLOYING
+    for step in range(1, 31):
+        story.at(14.2 + step * 0.1, *beats(story), parachute(), story.told(height=70.0))
+    first, second = story.decisions(Action.DEPLOY)
+    assert second.targets == (RELAY,)
+    story.at(17.3, story.report(Action.DEPLOY, Outcome.SENT, RELAY, "sent"))
+    assert story.state.stage is Stage.FAULT
+    story.at(17.4, i.ActionReport(first.epoch, first.id, LINK, Outcome.CONFIRMED, "out"))
+    assert story.state.stage is Stage.DEPLOYED, "the first one opened late"
 
 
 def test_beside_a_parachute_that_tells_it_fires_once_that_one_does_not_open() -> None:
