@@ -47,7 +47,7 @@ setup(
         "console_scripts": [
             *(f"{node} = {NAME}.links.{link}.__main__:main" for node, link in LINKS.items()),
             *map(simulator, sorted(glob(f"{NAME}/**/sim_*.py", recursive=True))),
-            "safety_supervisor = chute_ros.nodes.safety_supervisor:main",
+            "safety_supervisor = chute_ros.ros.safety_supervisor:main",
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",

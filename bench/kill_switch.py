@@ -156,7 +156,7 @@ def start_ours(
 
     start(
         "supervisor",
-        "chute_ros.nodes.safety_supervisor",
+        "chute_ros.ros.safety_supervisor",
         required_links="[mavlink_parachute, upf_can]",
         deploy_links="[upf_can]",
         kill_timeout=str(_KILL_TIMEOUT),

@@ -7,7 +7,7 @@ import sys
 
 from rclpy.executors import SingleThreadedExecutor
 
-import chute_ros.nodes.node_executor as ours
+import chute_ros.ros.node_executor as ours
 
 #: rclpy's EventsExecutor runs no node with a guard condition, as ours are.
 EXECUTORS: dict[str, type[SingleThreadedExecutor]] = {

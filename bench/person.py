@@ -10,7 +10,7 @@ from chute_msgs.srv import Deploy
 from std_srvs.srv import Trigger
 
 from bench.ros_thread import RosThread
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 
 _INTERVAL = 0.05  # s, of the heartbeats
 

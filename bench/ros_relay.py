@@ -16,7 +16,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
 from bench.bare_relay import Bus, Network
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 
 _REQUEST = (SafetyRequest, "safety/request")
 _DECISION = (SafetyDecision, "safety/decision")

@@ -15,7 +15,7 @@ from bench.flight_lines import FlightLines
 from bench.process_cost import cpu_time
 from bench.ros_thread import RosThread
 from chute_ros.errors import ChuteError
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 from chute_ros.sim.pty_wire import PtyWire
 
 #: A line that was not received so long after it was written is late, s.

@@ -13,7 +13,8 @@ from bench.process_cost import cpu_time
 
 #: What a command line contains -> what it is counted as.
 _KINDS = {
-    "chute_ros.nodes.": "nodes",
+    "chute_ros.ros.": "nodes",
+    "chute_ros.links.": "nodes",
     "faults.fleet_simulators": "simulators",
     "faults.ground_station": "ground station",
     "faults.switch": "switch",

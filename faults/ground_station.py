@@ -30,8 +30,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
-from chute_ros.nodes import qos
-from chute_ros.nodes.middleware import set_up_middleware
+from chute_ros.ros import qos
+from chute_ros.ros.middleware import set_up_middleware
 
 _SERVICES = {"arm": Arm, "deploy": Deploy, "kill": Kill, "set_mode": SetMode}
 #: A parachute's status that comes after so long is told even if it says the same, s.

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from chute_ros.nodes.memory_limit import VARIABLE
+from chute_ros.ros.memory_limit import VARIABLE
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.demo_director import StepFailedError
 from faults.flight import Flight

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from chute_ros.nodes.middleware import LEADS_ELSEWHERE
+from chute_ros.ros.middleware import LEADS_ELSEWHERE
 from chute_ros.tools.processes import Processes
 
 #: As launch/vehicle.launch.py has it, s.

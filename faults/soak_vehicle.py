@@ -197,7 +197,7 @@ class Vehicle(Patient):
             )
             self.keeper.start(
                 name,
-                "chute_ros.nodes.safety_supervisor",
+                "chute_ros.ros.safety_supervisor",
                 *node,
                 *("-r", f"__node:={name}"),
                 *[part for one in values for part in ("-p", one)],

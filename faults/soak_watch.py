@@ -25,8 +25,8 @@ from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
 
 from chute_ros.model import Action
-from chute_ros.nodes import qos
-from chute_ros.nodes.middleware import set_up_middleware
+from chute_ros.ros import qos
+from chute_ros.ros.middleware import set_up_middleware
 
 #: Diagnostics come once a second.
 _FRESH = 2.5  # s

@@ -13,7 +13,7 @@ from pathlib import Path
 from chute_msgs.msg import SupervisorLease
 
 from chute_ros.model import Action, Outcome
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
 from faults.flight import Flight, reported
 from faults.network import Network

@@ -21,7 +21,7 @@ from launch_ros.substitutions import ExecutableInPackage
 
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
-from chute_ros.nodes.middleware import LEADS_ELSEWHERE
+from chute_ros.ros.middleware import LEADS_ELSEWHERE
 from launch import LaunchContext, LaunchDescription
 
 

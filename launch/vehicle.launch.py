@@ -13,7 +13,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from chute_ros.links.registered import links, vehicles
-from chute_ros.nodes.middleware import LEADS_ELSEWHERE, RANGE
+from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
 from launch import LaunchContext, LaunchDescription
 
 #: A node that dies is started again: a supervisor goes on where it stopped, and sends a device

@@ -15,7 +15,7 @@ NAMES = {
     "orjson": "python3-orjson",
     "can": "python-can",
 }
-#: Imported only where a parameter asks for it, with what to install (nodes/vehicle_sources.py).
+#: Imported only where a parameter asks for it, with what to install (ros/vehicle_sources.py).
 OPTIONAL = {"mavros_msgs"}
 #: Comes with rclpy and its interfaces.
 COMES_ALONG = {"builtin_interfaces", "rcl_interfaces", "rosidl_runtime_py", "rosidl_pycommon"}

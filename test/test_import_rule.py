@@ -45,13 +45,13 @@ def test_the_rule_holds(copy):
         ("links.mavlink.protocol", "from time import monotonic", "time"),
         ("links.upf.protocol", "from chute_ros.links import mavlink", "chute_ros.links.mavlink"),
         ("campaign", "from chute_ros.supervisor.core import update", "chute_ros.supervisor.core"),
-        ("protocol", "from chute_ros.nodes import offender", "chute_ros.nodes"),
+        ("protocol", "from chute_ros.ros import offender", "chute_ros.ros"),
         ("supervisor", "from chute_ros.transport import offender", "chute_ros.transport"),
-        ("sim", "from chute_ros.nodes import offender", "chute_ros.nodes"),
+        ("sim", "from chute_ros.ros import offender", "chute_ros.ros"),
     ],
 )
 def test_the_rule_names_an_offender(copy, package, line, named):
-    for layer in ("nodes", "transport"):
+    for layer in ("ros", "transport"):
         (copy / "chute_ros" / layer / "offender.py").touch()
     (copy / "chute_ros" / package.replace(".", "/") / "offending.py").write_text(line + "\n")
     result = lint(copy)

@@ -16,7 +16,7 @@ from chute_ros.supervisor.decision_gate import in_order
 
 #: From a publisher to a subscription on one host, s.
 _NATURE = Nature(0.0005, in_order=True)
-#: What a queue keeps of what nobody reads, one of decisions (nodes/qos.py), and one of sensors.
+#: What a queue keeps of what nobody reads, one of decisions (ros/qos.py), and one of sensors.
 _QUEUE, _DECISIONS, _SENSORS = 10, 50, 5
 
 #: Types whose ways draw their chances under another name: flights are stored by their seeds.

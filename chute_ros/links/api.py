@@ -5,7 +5,7 @@ A link is how one kind of device is spoken to. Everything of it is in one folder
     protocol/       pure: bytes and time in, bytes and events out; its link object is a Link
     runtime.py      pure: when the device is healthy, and what a decision becomes
                     (a subclass of chute_ros.runtime.device.DeviceRuntime)
-    node.py         the ROS node (a subclass of chute_ros.nodes.device_node.DeviceNode)
+    node.py         the ROS node (a subclass of chute_ros.ros.device_node.DeviceNode)
     parameters.py   the settings of the node (chute_ros/settings.py), each parameter written once
     __main__.py     starts the node
     simulator/      the simulated device, where there is one

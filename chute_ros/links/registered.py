@@ -36,7 +36,7 @@ def vehicles() -> Mapping[str, VehicleKind]:
 def module_of(name: str) -> str:
     """Return the module of a node, for python -m."""
     if name == SUPERVISOR:
-        return "chute_ros.nodes.safety_supervisor"
+        return "chute_ros.ros.safety_supervisor"
     return links()[name].node.partition(":")[0].rpartition(".")[0]
 
 

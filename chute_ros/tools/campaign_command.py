@@ -25,9 +25,9 @@ from chute_ros.campaign.scenario import Scenario
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.sensor_sources import outlives
 from chute_ros.errors import RecordError
-from chute_ros.nodes.config_folder import config_folder
-from chute_ros.nodes.private_files import replace_text
-from chute_ros.nodes.ros_home import ros_home
+from chute_ros.ros.config_folder import config_folder
+from chute_ros.ros.private_files import replace_text
+from chute_ros.ros.ros_home import ros_home
 from chute_ros.tools.machine import machine
 
 _TELL_EVERY = 5.0  # s

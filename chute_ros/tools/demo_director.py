@@ -14,8 +14,8 @@ from rclpy.node import Node
 
 from chute_ros import model
 from chute_ros.errors import ChuteError
-from chute_ros.nodes import messages, qos
-from chute_ros.nodes.middleware import set_up_middleware
+from chute_ros.ros import messages, qos
+from chute_ros.ros.middleware import set_up_middleware
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.processes import Processes
 

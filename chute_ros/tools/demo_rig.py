@@ -63,7 +63,7 @@ class Rig:
         links = ", ".join(dict.fromkeys((MAVLINK, *self.links)))
         self.processes.start(
             name,
-            "chute_ros.nodes.safety_supervisor",
+            "chute_ros.ros.safety_supervisor",
             *self._node,
             *_parameter("required_links", f"[{links}]"),
             *_parameter("deploy_links", f"[{', '.join(self.links)}]"),

@@ -9,7 +9,7 @@ import typing
 from dataclasses import dataclass, field
 
 from chute_ros.model import Action, Decision
-from chute_ros.nodes.messages import decision_from
+from chute_ros.ros.messages import decision_from
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.recording import Recording
 from chute_ros.tools.stage_tones import ACTION_TONES, OUTCOME_TONES

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 from domain_coordinator import domain_id
 
-from chute_ros.nodes.middleware import LEADS_ELSEWHERE
+from chute_ros.ros.middleware import LEADS_ELSEWHERE
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from chute_ros.links.api import SUPERVISOR, VehicleKind, load
 from chute_ros.links.registered import links, vehicles
-from chute_ros.nodes.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
+from chute_ros.ros.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
 from chute_ros.settings import Parameter, parameters_of
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 

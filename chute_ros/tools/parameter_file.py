@@ -11,8 +11,8 @@ import yaml
 
 from chute_ros import plain_yaml
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.parameters import what_was_meant
-from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.ros.parameters import what_was_meant
+from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.replaying import Other
 

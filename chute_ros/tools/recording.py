@@ -13,8 +13,8 @@ from chute_msgs.msg import SupervisorRecord
 from rclpy.serialization import deserialize_message
 
 from chute_ros.errors import RecordError
-from chute_ros.nodes.box_writer import RECORD
-from chute_ros.nodes.message_definitions import type_hash, type_name
+from chute_ros.ros.box_writer import RECORD
+from chute_ros.ros.message_definitions import type_hash, type_name
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC, CoreTurn

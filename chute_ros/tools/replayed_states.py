@@ -6,7 +6,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 
-from chute_ros.nodes.supervisor_messages import state_message
+from chute_ros.ros.supervisor_messages import state_message
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording

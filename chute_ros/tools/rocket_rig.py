@@ -33,7 +33,7 @@ class RocketRig:
         ]
         supervisor += ["-p", "profile:=rocket"]
         start = self.processes.start
-        start("supervisor", "chute_ros.nodes.safety_supervisor", *node, *supervisor)
+        start("supervisor", "chute_ros.ros.safety_supervisor", *node, *supervisor)
         start(
             UMBILICAL,
             "chute_ros.links.umbilical",

@@ -9,7 +9,7 @@ from chute_msgs.msg import Telem
 from chute_msgs.srv import UmbilicalCommand
 
 from chute_ros.model import Action, Outcome
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.chart import chart
 from chute_ros.tools.demo_director import Director, StepFailedError

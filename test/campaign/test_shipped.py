@@ -19,8 +19,8 @@ from chute_ros.links.umbilical.runtime import UmbilicalSettings
 from chute_ros.links.upf.parameters import UpfParameters, config_from
 from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.runtime import UpfSettings
-from chute_ros.nodes import supervisor_parameters
-from chute_ros.nodes.vehicle_sources import SOURCES
+from chute_ros.ros import supervisor_parameters
+from chute_ros.ros.vehicle_sources import SOURCES
 from chute_ros.settings import Parameter, Settings, parameters_of, settings_from
 
 

@@ -24,7 +24,7 @@ from rclpy.parameter import Parameter
 
 from chute_ros.links.registered import module_of
 from chute_ros.model import Action
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.processes import Processes
 

@@ -40,7 +40,6 @@ from node_bench import LOCAL, stamped
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.model import Action, LinkState, Outcome
-from chute_ros.nodes import qos
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 from chute_ros.protocol.mavlink.signing import (
@@ -49,6 +48,7 @@ from chute_ros.protocol.mavlink.signing import (
     WRONG_SIGNATURE,
     Verifier,
 )
+from chute_ros.ros import qos
 from chute_ros.tools.isolation import free_udp_ports
 
 RELEASE = float(dialect.PARACHUTE_RELEASE)

@@ -24,8 +24,8 @@ from sensor_msgs.msg import Imu
 from umbilical_bench import Cable
 from upf_bench import Network as Bus
 
-from chute_ros.nodes import qos
-from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.ros import qos
+from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 NAMES = ("mavlink_parachute", "upf_can", "umbilical", "safety_supervisor", "liar")
 TEXTS = (*NAMES, "", "1/161", "33", "parachute open", "ä\N{PARACHUTE}", "\0", "{}", "x" * 3000)

@@ -15,11 +15,11 @@ from supervisor_bench import Scene
 from chute_ros.errors import ParameterError, SigningKeyError
 from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.upf.allocation_file import AllocationFile
-from chute_ros.nodes import qos
-from chute_ros.nodes.box_folder import BoxFolder
-from chute_ros.nodes.kept_file import KeptFile
-from chute_ros.nodes.mcap_file import McapFile, Topic
-from chute_ros.nodes.private_files import make_folder, open_new, read_own_text, replace_text
+from chute_ros.ros import qos
+from chute_ros.ros.box_folder import BoxFolder
+from chute_ros.ros.kept_file import KeptFile
+from chute_ros.ros.mcap_file import McapFile, Topic
+from chute_ros.ros.private_files import make_folder, open_new, read_own_text, replace_text
 from chute_ros.transport.signing_key import signing_from_file
 
 

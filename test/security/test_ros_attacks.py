@@ -14,7 +14,7 @@ from mavlink_bench import Module, Network
 from node_bench import stamped
 
 from chute_ros.model import Action, Outcome
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 from chute_ros.supervisor.epochs import LARGEST_EPOCH
 
 NAME = "mavlink_parachute"

@@ -15,7 +15,7 @@ from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.qos import QoSProfile
 
-from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 #: One digit short, and in a file that others may read.
 TEXTS = {"digits": KEY.hex()[:-1].encode(), "raw": KEY}

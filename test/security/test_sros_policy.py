@@ -14,7 +14,7 @@ from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.relay.node import RelayNode
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
-from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.tools.isolation import free_udp_ports
 
 CONFIG = Path(__file__).parents[2] / "config"

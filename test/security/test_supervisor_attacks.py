@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 from supervisor_bench import Scene
 
 from chute_ros.model import Action, LinkState, Outcome
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 from chute_ros.supervisor import handover
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, epoch_above
 

@@ -8,10 +8,10 @@ from typing import Any
 from chute_msgs.msg import SafetyState
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
-from chute_ros.nodes.black_box import BlackBox
-from chute_ros.nodes.box_folder import BoxFolder
-from chute_ros.nodes.recorded_topics import recorded_topics
-from chute_ros.nodes.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.ros.black_box import BlackBox
+from chute_ros.ros.box_folder import BoxFolder
+from chute_ros.ros.recorded_topics import recorded_topics
+from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update

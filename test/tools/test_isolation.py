@@ -3,7 +3,7 @@
 import os
 import socket
 
-from chute_ros.nodes.middleware import LEADS_ELSEWHERE
+from chute_ros.ros.middleware import LEADS_ELSEWHERE
 from chute_ros.tools.isolation import free_udp_ports, isolated_ros
 
 

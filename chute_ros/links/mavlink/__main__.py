@@ -1,7 +1,7 @@
 """Executable mavlink_parachute."""
 
 from chute_ros.links.mavlink import LINK
-from chute_ros.nodes.entry import run
+from chute_ros.ros.entry import run
 
 
 def main() -> None:

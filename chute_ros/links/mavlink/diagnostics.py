@@ -12,7 +12,7 @@ from chute_ros import model
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
-from chute_ros.nodes import diagnostics
+from chute_ros.ros import diagnostics
 
 
 @dataclass(frozen=True)

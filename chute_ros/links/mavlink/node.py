@@ -29,10 +29,10 @@ from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.links.mavlink.runtime import MavlinkRuntime
 from chute_ros.links.mavlink.signing_memory import SigningMemory
-from chute_ros.nodes import messages, qos
-from chute_ros.nodes.device_node import DeviceNode
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.ros import messages, qos
+from chute_ros.ros.device_node import DeviceNode
 from chute_ros.runtime.device import Summary
 from chute_ros.settings import settings_from
 from chute_ros.supervisor.inputs import VehicleReport

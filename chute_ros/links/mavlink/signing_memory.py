@@ -13,11 +13,11 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
-from chute_ros.nodes import diagnostics
-from chute_ros.nodes.kept_file import KeptFile
-from chute_ros.nodes.private_files import read_own_text
-from chute_ros.nodes.ros_home import ros_home
 from chute_ros.protocol.mavlink.signing import LAST_TIME, Signer, Times, Verifier, times_of
+from chute_ros.ros import diagnostics
+from chute_ros.ros.kept_file import KeptFile
+from chute_ros.ros.private_files import read_own_text
+from chute_ros.ros.ros_home import ros_home
 from chute_ros.transport.signing_key import signing_from_file
 
 #: Between two writes, s: so old a frame may be that is replayed into a node after it crashed.

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.links.relay.protocol.link import RelayLink
 from chute_ros.model import LinkState
-from chute_ros.nodes import diagnostics
+from chute_ros.ros import diagnostics
 
 
 @dataclass(frozen=True)

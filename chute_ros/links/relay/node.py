@@ -11,7 +11,7 @@ from chute_ros.links.relay.output import make_output
 from chute_ros.links.relay.parameters import PARAMETERS, RelayParameters
 from chute_ros.links.relay.protocol.link import RelayLink
 from chute_ros.links.relay.runtime import RelayRuntime
-from chute_ros.nodes.device_node import DeviceNode
+from chute_ros.ros.device_node import DeviceNode
 from chute_ros.runtime.device import Summary
 from chute_ros.settings import settings_from
 from chute_ros.transport.loop import WireLoop

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
-from chute_ros.nodes import diagnostics
+from chute_ros.ros import diagnostics
 
 
 @dataclass(frozen=True)

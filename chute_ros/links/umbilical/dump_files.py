@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from io import BufferedWriter
 from pathlib import Path
 
-from chute_ros.nodes.private_files import make_folder, open_new
-from chute_ros.nodes.ros_home import ros_home
+from chute_ros.ros.private_files import make_folder, open_new
+from chute_ros.ros.ros_home import ros_home
 from chute_ros.transport.given_path import given_path
 
 PART = ".part"

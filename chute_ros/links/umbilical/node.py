@@ -26,10 +26,10 @@ from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.links.umbilical.runtime import UmbilicalRuntime
 from chute_ros.links.umbilical.services import UmbilicalServices
 from chute_ros.links.umbilical.telem_message import telem, unfit, without_place
-from chute_ros.nodes import messages, qos
-from chute_ros.nodes.device_node import DeviceNode
-from chute_ros.nodes.link_log import log_notice
 from chute_ros.protocol.events import Notice
+from chute_ros.ros import messages, qos
+from chute_ros.ros.device_node import DeviceNode
+from chute_ros.ros.link_log import log_notice
 from chute_ros.runtime.device import Summary
 from chute_ros.settings import settings_from
 from chute_ros.supervisor.inputs import VehicleReport

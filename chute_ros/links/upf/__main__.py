@@ -1,7 +1,7 @@
 """Executable upf_can."""
 
 from chute_ros.links.upf import LINK
-from chute_ros.nodes.entry import run
+from chute_ros.ros.entry import run
 
 
 def main() -> None:

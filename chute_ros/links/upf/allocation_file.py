@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
-from chute_ros.nodes.private_files import read_own_text, replace_text
-from chute_ros.nodes.ros_home import ros_home
 from chute_ros.protocol.dronecan.allocation import HIGHEST, LOWEST, UNIQUE_ID_LENGTH
+from chute_ros.ros.private_files import read_own_text, replace_text
+from chute_ros.ros.ros_home import ros_home
 from chute_ros.transport.given_path import given_path
 
 

@@ -13,7 +13,7 @@ from chute_ros import model
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.devices import Controller, Device
 from chute_ros.links.upf.protocol.link import UpfLink
-from chute_ros.nodes import diagnostics
+from chute_ros.ros import diagnostics
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,10 @@ from chute_ros.links.upf.protocol.events import TriggerChanged
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.links.upf.runtime import UpfRuntime
 from chute_ros.links.upf.services import UpfServices
-from chute_ros.nodes import messages, qos
-from chute_ros.nodes.device_node import DeviceNode
-from chute_ros.nodes.kept_file import Newest
 from chute_ros.protocol.dronecan.allocation import KeepTable
+from chute_ros.ros import messages, qos
+from chute_ros.ros.device_node import DeviceNode
+from chute_ros.ros.kept_file import Newest
 from chute_ros.runtime.device import Summary
 from chute_ros.settings import settings_from
 from chute_ros.transport.can_address import parse_can_address

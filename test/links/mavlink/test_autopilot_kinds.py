@@ -15,9 +15,9 @@ from node_bench import LOCAL, port_of, stamped
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import Action, Outcome
-from chute_ros.nodes import qos
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameEncoder
+from chute_ros.ros import qos
 from chute_ros.sim.autopilot_kinds import ARDUCOPTER, ARDUPLANE, GENERIC, PX4
 
 TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION

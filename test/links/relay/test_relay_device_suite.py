@@ -11,7 +11,7 @@ from node_bench import Bench
 from relay_bench import Board
 
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 
 
 class TestRelay(NodeSuite):

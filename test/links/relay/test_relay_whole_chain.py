@@ -13,8 +13,8 @@ from node_bench import LOCAL, Bench, port_of
 from relay_bench import Board
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
-from chute_ros.nodes import qos
-from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.ros import qos
+from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 HEIGHT = 20.0  # m
 

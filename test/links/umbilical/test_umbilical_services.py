@@ -15,7 +15,7 @@ from chute_ros.links.umbilical.dump_files import PART
 from chute_ros.links.umbilical.protocol import events
 from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
 from chute_ros.model import Action, Outcome
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 
 #: Name -> (token, what telemetry then says; None: it cannot show it).
 SIMPLE = {

@@ -21,7 +21,7 @@ from upf_bench import PATIENT, Devices, Network, tasks, vehicle_state
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.model import Action, Outcome
-from chute_ros.nodes import qos
+from chute_ros.ros import qos
 
 SCRIPT = Path(__file__).with_name("upf_third_party.py")
 DSDL = Path(__file__).parents[3] / "msg_defs" / "dsdl" / "flyfire"

@@ -12,9 +12,9 @@ from upf_bench import Network
 from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.links.upf.protocol.definitions import VEHICLE_SERVICE
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
-from chute_ros.nodes import qos
-from chute_ros.nodes.node_executor import NodeExecutor
 from chute_ros.protocol.events import Ask, AskSupervisor
+from chute_ros.ros import qos
+from chute_ros.ros.node_executor import NodeExecutor
 
 KILL, BLOCK, RELEASE = "TYPE_KILLSWITCH", "TYPE_FLIGHT_BLOCK", "TYPE_FLIGHT_BLOCK_RELEASE"
 LONG = {"vehicle_service_timeout": 60.0}

@@ -13,8 +13,8 @@ from upf_bench import Network
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.model import LinkState
-from chute_ros.nodes import qos
-from chute_ros.nodes.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.ros import qos
+from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 LINKS = ["mavlink_parachute", "upf_can"]
 HEIGHT = 20.0  # m

@@ -1,0 +1,140 @@
+"""Starting a node from the command line: one clear line for every mistake that a user can make."""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import importlib
+import os
+import signal
+import sys
+from typing import Any, NoReturn
+
+from chute_ros.errors import ChuteError
+from chute_ros.interrupts import CtrlC, at_ctrl_c
+from chute_ros.plain_text import plain
+from chute_ros.ros.memory_limit import limit_memory
+from chute_ros.ros.middleware import set_up_middleware
+
+#: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
+#: executor hand a kill to each other, and Python's own 5 ms would be most of its way.
+_SWITCH_INTERVAL = 0.0002
+_NOT_BUILT = (
+    "chute_msgs cannot be imported: build both packages and source the result:\n"
+    "  colcon build --base-paths src src/chute_ros/msg_defs   (in your workspace)\n"
+    "  colcon build                                           (in the repository's root)\n"
+    "  source install/setup.bash"
+)
+
+
+def run(name: str, place: str) -> None:
+    """Make the node name, whose class is at place (module:class), and spin it until the end; exit
+    with 2 on a user's mistake."""
+    with at_ctrl_c(signal.SIG_DFL):
+        node_class = _imported(*place.split(":"))
+    set_up_middleware()
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+    import rclpy
+    from rclpy.executors import ExternalShutdownException
+
+    from chute_ros.ros.node_executor import NodeExecutor
+
+    node = executor = None
+    # Before ROS, whose own handler calls it.
+    ctrl_c = CtrlC()
+    ctrl_c.install()
+    try:
+        limit_memory()
+        _look_at_arguments(name)
+        _init(name)
+        # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
+        executor = NodeExecutor()
+        with ctrl_c.held():
+            node = node_class()
+        executor.add_node(node)
+        # What is there now stays; to go over all of it once more would hold up a decision by
+        # 30 ms.
+        gc.collect()
+        gc.freeze()
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass  # the usual ways to end a node
+    except RuntimeError as error:
+        if node is None and _security():
+            _refused(name, error)  # the node or one of its topics
+        # What a publish raises once a signal has shut ROS down; otherwise a mistake of ours.
+        if rclpy.ok():
+            raise
+    except ChuteError as error:
+        # Of several lines, where it lists several mistakes.
+        lines = [plain(line) for line in f"{name}: {error}".splitlines()]
+        print("\n".join(lines), file=sys.stderr)
+        sys.exit(2)
+    finally:
+        # A second Ctrl-C must not cut the ending short: the link's thread is being joined.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        if node is not None:
+            node.destroy_node()
+        elif executor is not None:
+            # One that is collected after ROS has ended complains.
+            executor.shutdown()
+        # The signal's own handler may be shutting down at this very moment.
+        with contextlib.suppress(RuntimeError):
+            rclpy.try_shutdown()
+
+
+def _imported(module: str, class_name: str) -> Any:
+    try:
+        return getattr(importlib.import_module(module), class_name)
+    except ImportError as error:
+        missing = getattr(error, "name", None) or ""
+        if missing.startswith("chute_msgs") or isinstance(error, ChuteError):
+            sys.exit(f"{_NOT_BUILT}\n({error})")
+        if missing:
+            sys.exit(
+                f"{missing} is not installed: `rosdep install --from-paths src "
+                "src/chute_ros/msg_defs --ignore-src` and "
+                "`pip install -r requirements/runtime.in` bring all that is needed"
+            )
+        raise
+
+
+def _look_at_arguments(name: str) -> None:
+    """What is not for ROS is for nobody: a node has parameters alone."""
+    from rclpy.utilities import remove_ros_args
+
+    others = remove_ros_args(sys.argv)[1:]
+    usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
+    if "--help" in others or "-h" in others:
+        print(f"usage: {usage}\nIts parameters, topics and services: docs/reference/")
+        sys.exit(0)
+    if others:
+        text = f"unknown argument {others[0]}: the settings of a node follow --ros-args"
+        print(f"{name}: {text}\nusage: {usage}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _init(name: str) -> None:
+    import rclpy
+
+    try:
+        rclpy.init()
+    except RuntimeError as error:
+        # Arguments and parameter files that cannot be read; ROS names them before its own code.
+        _refused(name, error)
+
+
+def _security() -> bool:
+    return os.environ.get("ROS_SECURITY_ENABLE") == "true"
+
+
+def _refused(name: str, error: RuntimeError) -> NoReturn:
+    """In one line why ROS did not let it start."""
+    text = " ".join(str(error).partition(", at /")[0].split())
+    if _security():
+        text += (
+            " (ROS_SECURITY_ENABLE is true: docs/guide/security.md lists the needed keystore, "
+            "enclave and middleware)"
+        )
+    print(f"{name}: {text}", file=sys.stderr)
+    sys.exit(2)

@@ -1,0 +1,136 @@
+"""The supervisor's picture as it is published: safety/state and /diagnostics."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from chute_msgs.msg import RuleState, SafetyState
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from chute_ros.ros import diagnostics, messages
+from chute_ros.runtime.topics import SafetyTold
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.policy import judge
+from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.readings import doubt, measured, unusable
+from chute_ros.supervisor.rules import Rule
+from chute_ros.supervisor.state import State
+
+#: What the modes mean in which no vehicle is protected.
+MODES = {
+    Mode.SHADOW: "SHADOW: reports its decisions and sends none",
+    Mode.INHIBITED: "INHIBITED: decides nothing",
+}
+
+
+def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> SafetyState:
+    """safety/state."""
+    state, now = told.state, told.now
+    reasons = block_reasons(config, state, now)
+    blocked = state.flight_blocked
+    message = SafetyState(
+        supervisor=told.supervisor,
+        epoch=state.epoch,
+        state=int(state.stage),
+        state_text=_text(state, reasons),
+        mode=int(state.mode),
+        flight_blocked=blocked,
+        block_reasons=list(reasons) if blocked else [],
+        device_blocks=sorted(state.device_blocks),
+        alarms=list(state.alarming.alarms),
+    )
+    message.header.stamp = stamp
+    for link in config.links:
+        evidence = state.evidence(link)
+        message.links.append(link)
+        message.link_stamps.append(messages.stamp_of(told.stamps.get(link, 0)))
+        message.link_states.append(int(evidence.judged(config.limits(link), now)))
+        message.link_ages.append(now - evidence.heard)
+        message.devices_healthy.append(evidence.device_healthy)
+    message.rules = [_rule_message(config, state, rule, now) for rule in config.profile.rules]
+    message.unusable = [
+        f"{name}: {why}"
+        for name in config.profile.limits
+        if (why := unusable(config, state, name, now))
+    ]
+    if state.newest is not None:
+        message.decision_id = state.newest.id
+        message.decision_action = int(state.newest.action)
+        message.decision_rule = state.newest.rule
+    return message
+
+
+def decisions_task(
+    name: str, config: SupervisorConfig, state: State, now: float
+) -> DiagnosticStatus:
+    """The same in diagnostics."""
+    reasons = block_reasons(config, state, now)
+    level = diagnostics.OK
+    if state.alarming.alarms or state.stage is Stage.FAULT:
+        level = diagnostics.ERROR
+    elif reasons or state.heard.disputed or state.mode is not Mode.ACTIVE:
+        level = diagnostics.WARN
+    values: dict[str, object] = {
+        "state": state.stage.name,
+        "mode": state.mode.name,
+        "epoch": state.epoch,
+        "decisions": state.next_id - 1,
+        "profile": config.profile.name,
+        "device requested a kill": ", ".join(state.asks),
+        "sources contradict each other": ", ".join(sorted(state.heard.disputed)),
+    }
+    for link in config.links:
+        evidence = state.evidence(link)
+        values[f"{link}: link"] = evidence.judged(config.limits(link), now).name
+        values[f"{link}: times lost"] = evidence.lost_count
+        values[f"{link}: clock differs by (s)"] = evidence.clock_difference
+        values[f"{link}: heartbeat age (s)"] = now - evidence.heard
+        values[f"{link}: device healthy"] = evidence.device_healthy
+    for rule in config.profile.rules:
+        counted = state.rule(rule.name)
+        latched = ", acted on" if counted.latched else ""
+        values[f"rule {rule.name}"] = f"{counted.level:.2f} s of {rule.hold:g} s{latched}"
+    for measurement in config.profile.limits:
+        value = measured(config, state, measurement, now)
+        why = unusable(config, state, measurement, now)
+        in_doubt = doubt(state, measurement, value, now)
+        told = f"{value:.2f} (in doubt: {in_doubt})" if in_doubt else f"{value:.2f}"
+        values[measurement] = f"unusable: {why}" if why else told
+    return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")
+
+
+def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float) -> RuleState:
+    judged = judge(config, state, rule, now)
+    counted = state.rule(rule.name)
+    alive = state.stage in rule.states
+    marks = {True: "[x]", False: "[ ]", None: "[?]"}
+    return RuleState(
+        name=rule.name,
+        action=int(rule.action),
+        alive=alive,
+        fulfilled=alive and counted.fulfilled(rule),
+        latched=counted.latched,
+        level=counted.level,
+        hold=rule.hold,
+        conditions=[f"{marks[one.holds]} {one.text}" for one in judged.findings] if alive else [],
+        denied=counted.denied,
+    )
+
+
+def _text(state: State, reasons: tuple[str, ...]) -> str:
+    text = _stage_text(state, reasons)
+    return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
+
+
+def _stage_text(state: State, reasons: tuple[str, ...]) -> str:
+    if state.stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
+        return f"{state.stage.name}: {'; '.join(reasons)}"
+    if state.alarming.alarms:
+        return f"{state.stage.name}: {state.alarming.alarms[-1]}"
+    if state.heard.disputed:
+        parts = ", ".join(sorted(state.heard.disputed))
+        return (
+            f"{state.stage.name}: {parts} in doubt, as the vehicle's sources contradict each other"
+        )
+    return state.stage.name

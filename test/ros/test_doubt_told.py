@@ -1,0 +1,61 @@
+"""What a measurement in doubt looks like in diagnostics and safety/state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from chute_ros.model import Armed, LinkState, VehicleState
+from chute_ros.ros.supervisor_messages import decisions_task, state_message
+from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
+from chute_ros.runtime.topics import SafetyTold
+from chute_ros.supervisor.link_evidence import LinkEvidence
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.state import HeardHere, State
+
+NOW = 100.0
+CONFIG = config_from({parameter.name: parameter.default for parameter in PARAMETERS})
+WELL = LinkEvidence(heard=NOW, reported=LinkState.OK, device_healthy=True)
+
+
+def known(**doubts: float) -> State:
+    """In flight on its side, by an attitude that is known as well as this."""
+    tilt = Measured(value=90.0, measured_at=NOW, same_since=NOW, count=9, **doubts)
+    told = MappingProxyType({"tilt_deg": tilt})
+    return State(
+        epoch=1,
+        started_at=0.0,
+        stage=Stage.IN_FLIGHT,
+        heard=HeardHere(
+            links=MappingProxyType(dict.fromkeys(CONFIG.links, WELL)),
+            vehicle=VehicleState(link_state=LinkState.OK, armed=Armed.ARMED, armed_age=0.0),
+            vehicle_received=NOW,
+            measurements=told,
+        ),
+    )
+
+
+def values(status: DiagnosticStatus) -> dict[str, str]:
+    return {one.key: one.value for one in status.values}
+
+
+def test_a_measurement_in_doubt_says_why_beside_its_value() -> None:
+    sound = decisions_task("safety_supervisor", CONFIG, known(), NOW)
+    assert (sound.level, values(sound)["tilt_deg"]) == (DiagnosticStatus.OK, "90.00")
+    doubted = decisions_task("safety_supervisor", CONFIG, known(jumped_at=NOW - 2.0), NOW)
+    assert values(doubted)["tilt_deg"] == "90.00 (in doubt: it jumped 2.0 s ago)"
+
+
+def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() -> None:
+    state = replace(known(), heard=replace(known().heard, disputed=frozenset({"attitude"})))
+    task = decisions_task("safety_supervisor", CONFIG, state, NOW)
+    assert task.level == DiagnosticStatus.WARN
+    text = "IN_FLIGHT: attitude in doubt, as the vehicle's sources contradict each other"
+    assert text in task.message
+    assert values(task)["sources contradict each other"] == "attitude"
+    assert values(task)["tilt_deg"] == "90.00 (in doubt: another source told otherwise)"
+    assert text in state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text

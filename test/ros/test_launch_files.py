@@ -1,0 +1,251 @@
+"""The launch files refer to what there is. `launch` itself is not among the wheels."""
+
+import ast
+import importlib.util
+import itertools
+import subprocess
+import sys
+import types
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+
+from chute_ros.links.api import Sockets
+from chute_ros.links.registered import links, vehicles
+from chute_ros.links.upf.protocol.parameters import EXCLUDES
+from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
+from chute_ros.links.upf.simulator.sim_upf import _parameters
+from chute_ros.ros.middleware import LEADS_ELSEWHERE
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = sorted((ROOT / "launch").glob("*.launch.py"))
+EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+
+
+def calls(file, name):
+    """The keyword arguments of every call of name, as source."""
+    found = []
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == name:
+            found.append({k.arg: ast.unparse(k.value) for k in node.keywords})
+            found[-1] |= {index: ast.unparse(value) for index, value in enumerate(node.args)}
+    return found
+
+
+def executables():
+    """What setup.py installs: name -> module."""
+    installed = entry_points(group="console_scripts")
+    ours = [one for one in installed if one.value.startswith("chute_ros.")]
+    return {one.name: one.module for one in ours}
+
+
+def test_there_are_launch_files_with_and_without_simulators():
+    assert [file.name for file in FILES] == ["simulation.launch.py", "vehicle.launch.py"]
+
+
+@EVERY
+def test_every_argument_that_it_uses_is_declared_and_described(file):
+    declared = calls(file, "DeclareLaunchArgument")
+    used = {call[0] for call in calls(file, "LaunchConfiguration")}
+    assert {call[0] for call in declared} == used
+    assert all(call.get("description") for call in declared)
+
+
+def test_the_files_that_they_name_are_installed():
+    setup = (ROOT / "setup.py").read_text()
+    for pattern in ("launch/*.py", "config/*.yaml", "config/*.xml"):
+        folder = pattern.partition("/")[0]
+        assert f'"/{folder}", glob("{pattern}")' in setup
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.JoinedStr):
+                text = ast.unparse(node).strip("f'\"")
+                if text.startswith("{share}/"):
+                    assert (ROOT / text.removeprefix("{share}/")).is_file(), text
+
+
+def test_every_parachute_that_can_be_chosen_has_a_parameter_file():
+    for parachute in vehicles():
+        assert (ROOT / "config" / f"{parachute}_vehicle.yaml").is_file()
+
+
+def test_the_simulation_stays_on_this_host():
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    (variable,) = calls(simulation, "SetEnvironmentVariable")
+    assert variable[0] == "'ROS_AUTOMATIC_DISCOVERY_RANGE'"
+    assert variable[1] == "'LOCALHOST'"
+    (variable,) = calls(simulation, "UnsetEnvironmentVariable")
+    assert variable[0] == "name"
+    assert "for name in LEADS_ELSEWHERE" in simulation.read_text()
+    assert {"ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"} < set(LEADS_ELSEWHERE)
+    assert "0.0.0.0" not in simulation.read_text()
+
+
+def test_the_simulators_take_the_options_that_are_given_to_them():
+    sockets = Sockets("127.0.0.1:1", "127.0.0.1:2", "mcast:0:3", "/tmp/none")
+    given = {
+        command[0]: {word for word in command if word.startswith("--")}
+        for vehicle in vehicles().values()
+        for link in vehicle.links
+        for command in links()[link].simulators(vehicle, sockets)
+    }
+    assert len(given) >= 4
+    for name, options in given.items():
+        command = [sys.executable, "-m", executables()[name], "--help"]
+        known = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert {one for one in options if one not in known} == set(), name
+
+
+def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    for node in calls(vehicle, "Node"):
+        assert node["namespace"] == "namespace"
+        assert "config" in node["parameters"]
+
+
+class Recorded:
+    """Stands for whatever a launch file imports: remembers what it was made with."""
+
+    made: ClassVar[list] = []
+    chosen: ClassVar[dict] = {}
+
+    def __init__(self, *args, **options):
+        self.args, self.options = args, options
+        Recorded.made.append(self)
+
+    def perform(self, context):
+        return Recorded.chosen.get(self.args[0], "")
+
+
+#: Parachute -> what vehicle.launch.py starts for it, and simulation.launch.py beside that.
+STARTED = {
+    "mavlink": ({"mavlink_parachute"}, {"sim_autopilot", "sim_mavlink_parachute"}),
+    "upf": ({"mavlink_parachute", "upf_can"}, {"sim_autopilot", "sim_upf"}),
+    "both": (
+        {"mavlink_parachute", "upf_can"},
+        {"sim_autopilot", "sim_mavlink_parachute", "sim_upf"},
+    ),
+    "umbilical": ({"umbilical"}, {"sim_flight_computer"}),
+}
+
+
+def loaded(file, monkeypatch):
+    """What is in a launch file: run for real, with stand-ins for `launch`."""
+    for name in {"launch", "launch.actions", "launch.substitutions", "launch_ros.actions"} | {
+        "launch.launch_description_sources",
+        "launch_ros",
+        "launch_ros.substitutions",
+    }:
+        module = types.ModuleType(name)
+        module.__getattr__ = lambda wanted: type(wanted, (Recorded,), {})
+        monkeypatch.setitem(sys.modules, name, module)
+    space = {}
+    exec(compile(file.read_text(), str(file), "exec"), space)
+    return space
+
+
+def made_by(file, monkeypatch, **arguments):
+    """What the function of a launch file makes."""
+    space = loaded(file, monkeypatch)
+    Recorded.made.clear()
+    monkeypatch.setattr(Recorded, "chosen", {"port": "14600", **arguments})
+    function = space.get("_nodes") or space["_vehicle"]
+    function(context=None)
+    return list(Recorded.made)
+
+
+@pytest.mark.parametrize("parachute", STARTED)
+@EVERY
+def test_its_function_makes_the_nodes_and_simulators_of_every_parachute(
+    file, parachute, monkeypatch
+):
+    made = made_by(file, monkeypatch, parachute=parachute, namespace="drone1")
+    names = {one.options.get("executable") or one.options.get("name") for one in made}
+    nodes, simulators = STARTED[parachute]
+    vehicle = file.name.startswith("vehicle")
+    assert names - {None} == ({*nodes, "safety_supervisor"} if vehicle else simulators)
+    if vehicle:
+        started = [one for one in made if "executable" in one.options]
+        assert all(one.options["respawn"] for one in started), "what dies is started again"
+
+
+@pytest.mark.parametrize("parachute", vehicles())
+@EVERY
+def test_it_starts_what_setup_installs(file, parachute, monkeypatch):
+    made = made_by(file, monkeypatch, parachute=parachute)
+    names = {one.options.get("executable") or one.options.get("name") for one in made} - {None}
+    assert names
+    assert names <= executables().keys()
+
+
+@pytest.mark.parametrize(
+    ("given", "who"),
+    [
+        ({}, "LOCALHOST"),
+        ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}, "SUBNET"),
+        ({"ROS_STATIC_PEERS": "192.0.2.1"}, "SUBNET"),
+        ({"ROS_DISCOVERY_SERVER": "192.0.2.1:11811"}, "SUBNET"),
+        (
+            {"ROS_STATIC_PEERS": "192.0.2.1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
+            "LOCALHOST",
+        ),
+    ],
+)
+def test_a_vehicle_is_heard_on_its_own_computer_unless_it_is_said_otherwise(
+    given, who, monkeypatch
+):
+    for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", *LEADS_ELSEWHERE):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    space = loaded(vehicle, monkeypatch)
+    Recorded.made.clear()
+    space["generate_launch_description"]()
+    (argument,) = [one for one in Recorded.made if one.args[:1] == ("range",) and one.options]
+    assert argument.options["default_value"] == who
+    (variable,) = [one for one in Recorded.made if type(one).__name__ == "SetEnvironmentVariable"]
+    assert variable.args[0] == "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    assert variable.args[1].args == ("range",)
+
+
+@pytest.mark.parametrize("parachute", ["upf", "both"])
+def test_a_simulated_upf_can_be_armed_by_command(parachute, monkeypatch):
+    """As delivered it arms by itself, and rejects who tells it to."""
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    made = made_by(simulation, monkeypatch, parachute=parachute, namespace="sim")
+    (upf,) = [one.options["cmd"] for one in made if one.options.get("name") == "sim_upf"]
+    given = [after for before, after in itertools.pairwise(upf) if before == "--parameter"]
+    values = {**CONTROLLER_PARAMETERS, **_parameters(given)}
+    assert [name for name in EXCLUDES.values() if values[name]] == []
+
+
+@pytest.mark.parametrize(
+    ("namespace", "place"), [("", ""), ("drone1", "/drone1"), ("/fleet/drone1", "/fleet/drone1")]
+)
+def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(namespace, place, monkeypatch):
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    given = {"parachute": "both", "namespace": namespace}
+    for enclaves in ("true", "false"):
+        made = made_by(vehicle, monkeypatch, **given, enclaves=enclaves)
+        nodes = [one.options for one in made if "executable" in one.options]
+        assert len(nodes) == 3
+        for node in nodes:
+            own = ["--enclave", f"{place}/{node['executable']}"]
+            assert node["ros_arguments"] == (own if enclaves == "true" else [])
+
+
+@EVERY
+def test_it_makes_a_description(file):
+    """Really, where `launch` is there; elsewhere at least as Python with that one function."""
+    code = compile(file.read_text(), str(file), "exec")
+    if all(importlib.util.find_spec(name) for name in ("launch.actions", "launch_ros")):
+        space = {}
+        exec(code, space)
+        description = space["generate_launch_description"]()
+        assert len(description.entities) >= 3
+    else:
+        functions = [n.name for n in ast.parse(file.read_text()).body if hasattr(n, "name")]
+        assert "generate_launch_description" in functions
