@@ -17,6 +17,6 @@ EXECUTORS: dict[str, type[SingleThreadedExecutor]] = {
 
 if __name__ == "__main__":
     name, module, *arguments = sys.argv[1:]
-    ours.NodeExecutor = EXECUTORS[name]  # type: ignore[misc]
+    ours.new_executor = EXECUTORS[name]
     sys.argv = [module, *arguments]
     runpy.run_module(module, run_name="__main__", alter_sys=True)

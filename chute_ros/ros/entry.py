@@ -37,7 +37,7 @@ def run(name: str, place: str) -> None:
     import rclpy
     from rclpy.executors import ExternalShutdownException
 
-    from chute_ros.ros.node_executor import NodeExecutor
+    from chute_ros.ros.node_executor import new_executor
 
     node = executor = None
     # Before ROS, whose own handler calls it.
@@ -48,7 +48,7 @@ def run(name: str, place: str) -> None:
         _look_at_arguments(name)
         _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
-        executor = NodeExecutor()
+        executor = new_executor()
         with ctrl_c.held():
             node = node_class()
         executor.add_node(node)

@@ -2,21 +2,119 @@
 
 rclpy's SingleThreadedExecutor makes its wait set anew for each callback, twice, and asks every
 event of the middleware each time: most of what a message costs a node. Here the wait set is kept
-while the entities stay the same. docs/evidence/speed.md has what that brings.
+while the entities stay the same. docs/evidence/speed.md has what that brings. It rests on private
+members of rclpy; where one of them is missing, `new_executor` gives rclpy's own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
-from typing import Any
+from collections.abc import Callable, Coroutine, Iterable
+from contextlib import ExitStack, suppress
+from functools import partial
+from typing import Any, Literal
 
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.logging import get_logger
 from rclpy.utilities import timeout_sec_to_nsec
-
-from chute_ros.ros.cached_wait_set import KINDS, CachedWaitSet
+from rclpy.waitable import NumberOfEntities
 
 _Coroutine = Coroutine[Any, Any, None]
+Kind = Literal["guard_condition", "subscription", "service", "client", "timer"]
+#: In the order in which they are served: what came over a wire (guard conditions) first, then
+#: messages; a timer can wait for them.
+KINDS: tuple[Kind, ...] = ("guard_condition", "subscription", "service", "client", "timer")
+#: Events of the middleware (a quality of service that does not match) decide nothing, stay until
+#: they are taken, and are many: they are waited for in one turn of so many. A node's timers make
+#: more turns than that in a second.
+_TURNS_FOR_EVENTS = 10
+#: rclpy's private ways to take what has come, by the kind of entity; each gives what is to be done
+#: with it, or None. ("": an event.)
+_TAKES: dict[str, str] = {
+    "guard_condition": "_take_guard_condition",
+    "subscription": "_take_subscription",
+    "service": "_take_service",
+    "client": "_take_client",
+    "timer": "_take_timer",
+    "": "_take_waitable",
+}
+#: What else of an executor, and of the compiled part of rclpy, is private and used here.
+_OF_EXECUTOR = (
+    "_spin_once_impl", "_is_shutdown", "_context", "_guard", "_sigint_gc", "_tasks", "_tasks_lock",
+)  # fmt: skip
+_OF_RCLPY = ("WaitSet", "InvalidHandle")
+
+
+class CachedWaitSet:
+    """entities: of each kind; events: waitables that are nothing but events; guards: guard
+    conditions of nobody, that only wake. Nothing of it is destroyed before `close`."""
+
+    def __init__(
+        self,
+        context: Any,
+        entities: dict[str, list[Any]],
+        events: Iterable[Any],
+        guards: Iterable[Any],
+    ) -> None:
+        self._held = ExitStack()
+        self._held.enter_context(context.handle)
+        self._by_pointer: dict[int, Any] = {}
+        held = {kind: [one for one in entities[kind] if self._hold(one.handle)] for kind in KINDS}
+        waking = [guard.handle for guard in guards if self._hold(guard.handle)]
+        self._events = [event for event in events if self._hold(event)]
+        count = sum((event.get_num_entities() for event in self._events), NumberOfEntities())
+        self._wait_set = _rclpy.WaitSet(
+            len(held["subscription"]) + count.num_subscriptions,
+            len(held["guard_condition"]) + len(waking) + count.num_guard_conditions,
+            len(held["timer"]) + count.num_timers,
+            len(held["client"]) + count.num_clients,
+            len(held["service"]) + count.num_services,
+            count.num_events,
+            context.handle,
+        )
+        #: (entity or None, what puts it into the wait set)
+        self._waited_for: list[tuple[Any, Callable[[], Any]]] = [
+            (None, partial(self._wait_set.add_guard_condition, handle)) for handle in waking
+        ]
+        for kind in KINDS:
+            add = getattr(self._wait_set, f"add_{kind}")
+            for one in held[kind]:
+                self._by_pointer[one.handle.pointer] = one
+                self._waited_for.append((one, partial(add, one.handle)))
+        self._turns = 0
+
+    def wait(self, timeout_ns: int, busy: bool) -> list[tuple[str, Any]]:
+        """What is ready, with its kind (an event's is ""). timeout_ns below zero: for ever. busy:
+        some group may let in nobody just now."""
+        wait_set = self._wait_set
+        wait_set.clear_entities()
+        for entity, add in self._waited_for:
+            if not busy or entity is None or entity.callback_group.can_execute(entity):
+                add()
+        self._turns = (self._turns + 1) % _TURNS_FOR_EVENTS
+        events = [] if self._turns else self._events
+        for event in events:
+            event.add_to_wait_set(wait_set)
+        wait_set.wait(timeout_ns)
+        ready = [
+            (kind, self._by_pointer[pointer])
+            for kind in KINDS
+            for pointer in wait_set.get_ready_entities(kind)
+            if pointer in self._by_pointer
+        ]
+        return ready + [("", event) for event in events if event.is_ready(wait_set)]
+
+    def close(self) -> None:
+        """What was to be destroyed meanwhile is destroyed now."""
+        self._held.close()
+
+    def _hold(self, handle: Any) -> bool:
+        # One that was destroyed just now has woken the executor, which makes another wait set.
+        with suppress(_rclpy.InvalidHandle):
+            self._held.enter_context(handle)
+            return True
+        return False
 
 
 class NodeExecutor(SingleThreadedExecutor):
@@ -35,15 +133,6 @@ class NodeExecutor(SingleThreadedExecutor):
         super().__init__(context=context)
         #: Callbacks that wait for something.
         self._suspended: list[_Coroutine] = []
-        #: rclpy's ways to take what has come; each gives what is to be done with it, or None.
-        self._takes: dict[str, Callable[[Any], Callable[[], _Coroutine] | None]] = {
-            "guard_condition": self._take_guard_condition,
-            "subscription": self._take_subscription,
-            "service": self._take_service,
-            "client": self._take_client,
-            "timer": self._take_due_timer,
-            "": self._take_waitable,
-        }
 
     def wake(self) -> None:
         """Entities came or went, or ROS shuts down."""
@@ -112,15 +201,13 @@ class NodeExecutor(SingleThreadedExecutor):
 
     async def _served(self, kind: str, entity: Any) -> None:
         try:
-            execute = self._takes[kind](entity)
+            # A timer that was cancelled meanwhile seems ready to rcl_wait.
+            due = kind != "timer" or entity.handle.is_timer_ready()
+            execute = getattr(self, _TAKES[kind])(entity) if due else None
             if execute is not None:
                 await execute()
         finally:
             entity.callback_group.ending_execution(entity)
-
-    def _take_due_timer(self, timer: Any) -> Callable[[], _Coroutine] | None:
-        # One that was cancelled meanwhile seems ready to rcl_wait.
-        return self._take_timer(timer) if timer.handle.is_timer_ready() else None
 
     def _step(self, coroutine: _Coroutine) -> bool:
         """Run it until its end, or until it has to wait; whether it has ended."""
@@ -149,3 +236,21 @@ class NodeExecutor(SingleThreadedExecutor):
                 one for one in self._tasks if not one[0].done() and not one[0].cancelled()
             ]
         return ended or any(task.done() for task in tasks)
+
+
+def missing(executor: SingleThreadedExecutor) -> list[str]:
+    """What of rclpy's private members this file needs and the distribution does not have."""
+    of_executor = [one for one in (*_OF_EXECUTOR, *_TAKES.values()) if not hasattr(executor, one)]
+    return of_executor + [one for one in _OF_RCLPY if not hasattr(_rclpy, one)]
+
+
+def new_executor(context: Context | None = None) -> SingleThreadedExecutor:
+    """Ours; rclpy's own, which serves the same later, where ours cannot run."""
+    executor = NodeExecutor(context=context)
+    gone = missing(executor)
+    if not gone:
+        return executor
+    executor.shutdown()
+    text = f"rclpy no longer has {', '.join(gone)}: its own executor is used, which is slower"
+    get_logger("chute_ros").warning(text)
+    return SingleThreadedExecutor(context=context)

@@ -11,14 +11,15 @@ import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from chute_ros.ros.node_executor import NodeExecutor
+from chute_ros.ros import node_executor
+from chute_ros.ros.node_executor import NodeExecutor, missing, new_executor
 
 PATIENCE = 20.0
 
@@ -256,6 +257,33 @@ def test_a_time_to_wait_is_kept(spun):
     spun.executor.spin_once(timeout_sec=0.0)
     rclpy.spin_until_future_complete(spun.node, Future(), spun.executor, timeout_sec=0.2)
     assert 0.2 <= time.monotonic() - begun < PATIENCE
+
+
+def test_this_distribution_has_every_private_member_that_is_used(spun):
+    assert missing(spun.executor) == []
+    assert type(new_executor()) is NodeExecutor
+
+
+@pytest.mark.parametrize(
+    ("owner", "gone"),
+    [(SingleThreadedExecutor, "_take_timer"), (node_executor._rclpy, "InvalidHandle")],
+)
+def test_where_one_is_gone_a_node_runs_on_rclpy_s_own_and_says_so(
+    namespace, monkeypatch, capfd, owner, gone
+):
+    holder = next(one for one in getattr(owner, "__mro__", (owner,)) if gone in vars(one))
+    with monkeypatch.context() as change:
+        change.delattr(holder, gone)
+        executor = new_executor()
+    assert type(executor) is SingleThreadedExecutor
+    node, heard = Node("spun", namespace=namespace), []
+    node.create_timer(0.01, lambda: heard.append(1))
+    executor.add_node(node)
+    while not heard:
+        executor.spin_once(timeout_sec=PATIENCE)
+    executor.shutdown()
+    node.destroy_node()
+    assert f"rclpy no longer has {gone}: its own executor is used" in capfd.readouterr().err
 
 
 def test_a_shutdown_ends_it(namespace):
