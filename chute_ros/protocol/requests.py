@@ -8,15 +8,12 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import (
-    NO_ANSWER,
-    Answer,
     ConfirmedCommand,
     EffectFinished,
     EffectLimits,
     EffectLoop,
-    Report,
 )
-from chute_ros.protocol.events import Event, RequestFinished, RequestReport
+from chute_ros.protocol.events import Event, RequestFinished, RequestReport, ended
 
 
 class Watch(Protocol):
@@ -28,18 +25,6 @@ class Watch(Protocol):
 
     def offer(self, *said: Any) -> None:
         """A device said something, in the link's own terms: keep it if it is the one."""
-
-
-class Finished(Answer, Protocol):
-    """The end of a transaction, with what it belongs to."""
-
-    @property
-    def token(self) -> int:
-        """Number of the transaction."""
-
-    @property
-    def command(self) -> Any:
-        """What was sent."""
 
 
 class Send(Protocol):
@@ -76,7 +61,7 @@ class Transactions(Protocol[SendT]):
         """When update has something to do; infinity: never."""
 
     def take_finished(self) -> list[Any]:
-        """The ended ones (Finished); each is handed out once."""
+        """The ended ones: an Answer each, with its token and command; each is handed out once."""
 
     def take_output(self) -> list[SendT]:
         """What is to be sent; each is handed out once."""
@@ -189,9 +174,7 @@ class Requests(Generic[TransactionsT]):
 
     def refuse(self, token: int, why: str) -> None:
         """End a request before anything was sent."""
-        self._events.append(RequestReport(Report(token, Outcome.FAILED, why)))
-        finished = EffectFinished(token, False, False, NO_ANSWER, why)
-        self._events.append(RequestFinished(finished))
+        self._events += ended(token, Outcome.FAILED, why)
 
     def heard(self, *said: Any) -> None:
         """A device said something: is it what a request waits for?"""

@@ -15,8 +15,7 @@ from chute_ros.links.mavlink.protocol.optional_streams import OptionalStreams
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
 from chute_ros.links.mavlink.protocol.sensors import FURTHER_ACCELEROMETERS, PRESSURE
-from chute_ros.links.mavlink.protocol.stream_rate import StreamRate
-from chute_ros.links.mavlink.protocol.stream_watch import Ask, StreamWatch
+from chute_ros.links.mavlink.protocol.stream_watch import Ask, StreamRate, StreamWatch
 from chute_ros.links.mavlink.protocol.targets import Vehicle
 from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders

@@ -11,8 +11,7 @@ import math
 from collections import defaultdict
 from collections.abc import Mapping
 
-from chute_ros.links.mavlink.protocol.stream_rate import StreamRate
-from chute_ros.links.mavlink.protocol.stream_watch import ASK_AGAIN, Ask
+from chute_ros.links.mavlink.protocol.stream_watch import ASK_AGAIN, Ask, StreamRate
 
 #: So much seldomer than the needed ones.
 SELDOMER = 2.0

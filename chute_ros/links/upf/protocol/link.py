@@ -19,14 +19,12 @@ from chute_ros.links.upf.protocol.desk import ErrandDesk
 from chute_ros.links.upf.protocol.devices import Controller
 from chute_ros.links.upf.protocol.errands import Errand
 from chute_ros.links.upf.protocol.events import UpfEvent
-from chute_ros.links.upf.protocol.last_resort import LastResort
-from chute_ros.links.upf.protocol.over_motors import OverMotors
 from chute_ros.links.upf.protocol.roster import UpfDevices
 from chute_ros.links.upf.protocol.vehicle_service import VehicleService
 from chute_ros.links.upf.protocol.vehicle_status import Vehicle
 from chute_ros.model import Armed, ParachuteState, TriggerFlags, VehicleState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS, BusNode
-from chute_ros.protocol.dronecan.calls import ServiceCalls
+from chute_ros.protocol.dronecan.calls import Call, ServiceCalls
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.protocol.dronecan.transfer import Kind
@@ -43,14 +41,14 @@ class UpfLink:
         self.bus = BusNode(types, config.bus())
         self.devices = UpfDevices(config, self.definitions)
         self.vehicle_service = VehicleService(config, self.definitions)
-        last_resort = LastResort(config.effect.retry_interval)
-        read = goals.read_answer(self.definitions, last_resort.answered)
+        read = goals.read_answer(self.definitions, self._deploy_answered)
         calls = ServiceCalls(config.calls, read)
         self.requests: Requests[ServiceCalls] = Requests(calls, config.effect)
         endpoint = self.bus.endpoint
-        self._deploying = Deploying(config, self.devices, self.requests, endpoint, last_resort)
         self._vehicle = Vehicle(config, self.devices, endpoint)
-        self._over_motors = OverMotors(self._vehicle, self.vehicle_service, self.devices)
+        self._deploying = Deploying(
+            config, self.devices, self.requests, endpoint, self._vehicle, self.vehicle_service
+        )
         self._desk = ErrandDesk(self.bus, self.devices, self._vehicle.in_air)
         #: Our own requests count down from -1; what follows once such a one has succeeded.
         self._next_internal = -1
@@ -84,11 +82,7 @@ class UpfLink:
         self.vehicle_service.update(now)
         self.requests.update(now)
         self._vehicle.update(now)
-        # What ends now must not be pursued any more.
-        self._drive(now)
-        if self._deploying.update(now):
-            self._drive(now)
-        self._events += self._deploying.take_reports()
+        self._pursue_deploys(now)
 
     def next_deadline(self) -> float:
         """When update has something to do."""
@@ -218,19 +212,13 @@ class UpfLink:
 
     def deploy(self, token: int, force: bool, now: float, node_id: int = 0) -> None:
         """Deploy through the controller; if it does not answer, or there is none, the trigger."""
-        self._over_motors.begin(token)
         self._deploying.deploy(token, force, node_id, now)
-        self._drive(now)
-        if self._deploying.update(now):
-            self._drive(now)
+        self._pursue_deploys(now)
 
     def fire_triggers(self, token: int, now: float) -> None:
         """Fire the triggers directly, whatever the controller does: the end of a ladder."""
-        self._over_motors.begin(token)
         self._deploying.fire_triggers(token, now)
-        self._drive(now)
-        if self._deploying.update(now):
-            self._drive(now)
+        self._pursue_deploys(now)
 
     def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
         """Ask something of a device: ends in one ErrandFinished. node_id 0: the chosen one."""
@@ -297,6 +285,15 @@ class UpfLink:
             self._drive(now)
         return controller
 
+    def _deploy_answered(self, call: Call, accepted: bool) -> None:
+        self._deploying.answered(call, accepted)
+
+    def _pursue_deploys(self, now: float) -> None:
+        # What ends now must not be pursued any more.
+        self._drive(now)
+        if self._deploying.update(now):
+            self._drive(now)
+
     def _drive(self, now: float) -> None:
         for send in self.requests.drive(now):
             call = send.command
@@ -319,10 +316,9 @@ class UpfLink:
             self._events.append(event)
         else:
             assert isinstance(event, RequestFinished)
-            finished = event.finished
-            self._deploying.over(finished.token)
+            finished = self._deploying.over(event.finished, now)
             if finished.token not in self._then:
-                self._events.append(RequestFinished(self._over_motors.end(finished, now)))
+                self._events.append(RequestFinished(finished))
                 return
             token, then = self._then.pop(finished.token)
             if finished.success:
