@@ -16,14 +16,7 @@ from chute_msgs.srv import (
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
-from chute_ros.links.mavlink.diagnostics import (
-    Details,
-    autopilot_task,
-    details_of,
-    kill_task,
-    link_task,
-    parachute_tasks,
-)
+from chute_ros.links.mavlink.diagnostics import Details, details_of, link_task, tasks
 from chute_ros.links.mavlink.parameters import PARAMETERS, MavlinkParameters
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import component_information
@@ -93,12 +86,9 @@ class MavlinkParachuteNode(DeviceNode):
             "frames sent": details.sent,
             "send errors": self.loop.send_errors,
         }
-        wire = self.wire_picture()
         return [
-            link_task(name, details, traffic, wire),
-            *parachute_tasks(name, details, self.values["expect_parachute"]),
-            autopilot_task(name, details),
-            kill_task(name, details.setup),
+            link_task(name, details, traffic, self.wire_picture()),
+            *tasks(name, details, self.values["expect_parachute"]),
             self._signing.task(name),
         ]
 
@@ -168,15 +158,8 @@ class MavlinkParachuteNode(DeviceNode):
         response.success, response.message = end.finished.success, end.finished.message
         response.uptime = model.NAN
         if end.data is not None:
-            information = component_information(end.data)
-            response.vendor_name = information.vendor_name
-            response.model_name = information.model_name
-            response.software_version = information.software_version
-            response.hardware_version = information.hardware_version
-            response.serial_number = information.serial_number
-            response.manufacture_date = information.manufacture_date
-            response.capabilities = information.capabilities
-            response.uptime = information.uptime
+            for name, value in vars(component_information(end.data)).items():
+                setattr(response, name, value)
         return response
 
     def _message(self, message_id: int, device: str) -> Any:

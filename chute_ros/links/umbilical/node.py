@@ -10,13 +10,7 @@ from chute_msgs.msg import Telem, VehicleState
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.errors import ParameterError
-from chute_ros.links.umbilical.diagnostics import (
-    computer_task,
-    details_of,
-    heartbeat_task,
-    memory_task,
-    port_task,
-)
+from chute_ros.links.umbilical.diagnostics import details_of, memory_task, port_task
 from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.parameters import PARAMETERS, UmbilicalParameters
@@ -27,7 +21,7 @@ from chute_ros.links.umbilical.runtime import UmbilicalRuntime
 from chute_ros.links.umbilical.services import UmbilicalServices
 from chute_ros.links.umbilical.telem_message import telem, unfit, without_place
 from chute_ros.protocol.events import Notice
-from chute_ros.ros import messages, qos
+from chute_ros.ros import diagnostics, messages, qos
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.ros.link_log import log_notice
 from chute_ros.runtime.device import Summary
@@ -110,11 +104,10 @@ class UmbilicalNode(DeviceNode):
             "records per s": self.rate(details.records),
             "writes that failed": self.loop.send_errors,
         }
-        wire = self.wire_picture()
         return [
-            port_task(name, details, traffic, wire),
-            computer_task(name, details),
-            heartbeat_task(name, details, wire.is_open),
+            port_task(name, details, traffic, self.wire_picture()),
+            diagnostics.status(name, *details.computer),
+            diagnostics.status(name, *details.heartbeat),
             memory_task(name, details, self._progress),
         ]
 

@@ -11,11 +11,15 @@ from typing import Any
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
 from chute_ros.links.mavlink.protocol.firmware import firmware_of
 from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
-from chute_ros.links.mavlink.protocol.optional_streams import OptionalStreams
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
 from chute_ros.links.mavlink.protocol.sensors import FURTHER_ACCELEROMETERS, PRESSURE
-from chute_ros.links.mavlink.protocol.stream_watch import Ask, StreamRate, StreamWatch
+from chute_ros.links.mavlink.protocol.stream_watch import (
+    Ask,
+    OptionalStreams,
+    StreamRate,
+    StreamWatch,
+)
 from chute_ros.links.mavlink.protocol.targets import Vehicle
 from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders

@@ -157,7 +157,7 @@ def kill(
             (_stop_order(autopilot, way.method),),
             "the autopilot reports motors off",
             shown,
-            _request_heartbeat(autopilot),
+            request_heartbeat(autopilot),
             insist=True,
             urgent=True,
             looks=_LOOKS,
@@ -174,7 +174,8 @@ def _stop_order(autopilot: AutopilotTracker, method: KillMethod) -> Command:
     return command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
 
 
-def _request_heartbeat(autopilot: AutopilotTracker) -> Command:
+def request_heartbeat(autopilot: AutopilotTracker) -> Command:
+    """Ask for one HEARTBEAT."""
     message_id = float(dialect.MAVLINK_MSG_ID_HEARTBEAT)
     return command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
 
@@ -192,7 +193,7 @@ def disarm_on_ground(
             (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
             "the autopilot's heartbeat reports disarmed",
             lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
-            _request_heartbeat(autopilot),
+            request_heartbeat(autopilot),
             # The plain one, which may be tried on, must not keep it waiting.
             urgent=forced,
             looks=_LOOKS,

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Hashable
 from dataclasses import replace
 
-from chute_ros.links.mavlink.protocol import arm_authorization, goals, results
+from chute_ros.links.mavlink.protocol import goals, results
 from chute_ros.links.mavlink.protocol.announcements import Announcements
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
@@ -264,7 +264,7 @@ class MavlinkLink:
         self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
-        elif arm_authorization.is_request(message, self._own_ids):
+        elif self._care.asks_to_arm(message):
             self._care.authorize(ids, now)
         else:
             self._devices.heard(message, ids, now)
