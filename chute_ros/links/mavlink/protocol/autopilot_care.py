@@ -48,7 +48,6 @@ HEARTBEAT_INTERVAL = 0.2
 _OLD = 0.3
 #: The interval is asked for again after so long, s, so often at most for each autopilot.
 _ASK_AGAIN, _MOST_ASKED = 2.0, 3
-_HEARTBEAT = float(dialect.MAVLINK_MSG_ID_HEARTBEAT)
 
 
 class AutopilotCare:
@@ -199,12 +198,8 @@ class _HeartbeatWatch:
         again = self._times_asked < _MOST_ASKED and now >= self._asked + _ASK_AGAIN
         if rate_too and obeys and again:
             self._asked, self._times_asked = now, self._times_asked + 1
-            interval_us = HEARTBEAT_INTERVAL * 1e6
-            due.append(
-                goals.command(
-                    autopilot, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, _HEARTBEAT, interval_us
-                )
-            )
+            message_id = dialect.MAVLINK_MSG_ID_HEARTBEAT
+            due.append(goals.set_interval(autopilot, message_id, HEARTBEAT_INTERVAL * 1e6))
         if blocked and now >= self._polled + _OLD:
             self._polled = now
             due.append(goals.request_heartbeat(autopilot))

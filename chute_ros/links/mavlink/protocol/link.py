@@ -10,10 +10,10 @@ import math
 from collections import Counter
 from collections.abc import Hashable
 from dataclasses import replace
+from typing import Any
 
 from chute_ros.links.mavlink.protocol import goals, results
 from chute_ros.links.mavlink.protocol.announcements import Announcements
-from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
@@ -21,7 +21,6 @@ from chute_ros.links.mavlink.protocol.devices import Devices
 from chute_ros.links.mavlink.protocol.kill import DeployDecided
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
-from chute_ros.links.mavlink.protocol.stream_watch import Ask
 from chute_ros.links.mavlink.protocol.wire import Duplicates, Inbox, Outbox
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event
@@ -152,8 +151,7 @@ class MavlinkLink:
         parachute = self._target(token, device)
         if parachute is not None:
             goal, watch = goals.request_message(parachute, message_id)
-            self.requests.begin(token, goal, now, watch)
-            self._drive(now)
+            self._begin(token, goal, now, watch=watch)
 
     def set_message_interval(
         self, token: int, message_id: int, interval_us: int, device: str, now: float
@@ -163,8 +161,7 @@ class MavlinkLink:
         if parachute is not None:
             goal = goals.set_message_interval(parachute, message_id, interval_us)
             read_back = goals.read_message_interval(parachute, message_id)
-            self.requests.begin(token, goal, now, follow_up=read_back)
-            self._drive(now)
+            self._begin(token, goal, now, follow_up=read_back)
 
     def kill(self, token: int, now: float) -> None:
         """Stop the motors through the autopilot."""
@@ -172,20 +169,20 @@ class MavlinkLink:
         if autopilot is None:
             why = "no autopilot of ours was received yet; set autopilot_system_id"
             self.requests.refuse(token, why)
+            return
+        goal = goals.kill(
+            autopilot,
+            lambda: self._care.plan_of(autopilot),
+            self._deploy_decided,
+            self.config.commands.ack_timeout,
+            now,
+        )
+        if goal is None:
+            why = f"no way is allowed: {self._care.plan_of(autopilot).text()}"
+            self.requests.refuse(token, why)
         else:
-            goal = goals.kill(
-                autopilot,
-                lambda: self._care.plan_of(autopilot),
-                self._deploy_decided,
-                self.config.commands.ack_timeout,
-                now,
-            )
-            if goal is None:
-                why = f"no way is allowed: {self._care.plan_of(autopilot).text()}"
-                self.requests.refuse(token, why)
-            else:
-                self._announcements.ordered(token, "KILL")
-                self._begin(token, goal, now)
+            self._announcements.ordered(token, "KILL")
+            self._begin(token, goal, now)
 
     def flight_block(self, reason: str, now: float) -> None:
         """Block flight for reason, or release the block (empty)."""
@@ -302,8 +299,8 @@ class MavlinkLink:
             self.requests.refuse(token, f"{what} was received on this link (received: {known})")
         return target
 
-    def _begin(self, token: int, goal: goals.MavlinkGoal, now: float) -> None:
-        self.requests.begin(token, goal, now)
+    def _begin(self, token: int, goal: goals.MavlinkGoal, now: float, **then: Any) -> None:
+        self.requests.begin(token, goal, now, **then)
         self._drive(now)
 
     def _look_after_autopilot(self, now: float) -> None:
@@ -313,27 +310,16 @@ class MavlinkLink:
             return
         rate = self.config.autopilot_message_rate
         self._care.look(autopilot, rate > 0, now)
-        if rate > 0:
-            self._ask_for(autopilot.messages_due(1.0 / rate, now), autopilot, now)
+        for ask in autopilot.messages_due(1.0 / rate, now) if rate > 0 else ():
+            interval_us = min(ask.interval * 1e6, _LONGEST_INTERVAL_US)
+            order = goals.set_interval(autopilot, ask.message_id, interval_us)
+            self.requests.commands.send_once(order, now)
 
     def _look_after_parachutes(self, now: float) -> None:
         """Ask for the status that does not come; a ground station may have switched it off."""
         for parachute in self.parachutes.all():
             if parachute.status_due(now):
                 self.requests.commands.send_once(goals.request_status(parachute), now)
-
-    def _ask_for(self, asks: tuple[Ask, ...], autopilot: AutopilotTracker, now: float) -> None:
-        for ask in asks:
-            interval_us = min(ask.interval * 1e6, _LONGEST_INTERVAL_US)
-            self.requests.commands.send_once(
-                goals.command(
-                    autopilot,
-                    dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
-                    float(ask.message_id),
-                    interval_us,
-                ),
-                now,
-            )
 
     def _drive(self, now: float) -> None:
         for send in self.requests.drive(now):
