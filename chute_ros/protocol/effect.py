@@ -23,16 +23,6 @@ from chute_ros.protocol.goal import (
 )
 from chute_ros.transitions import after
 
-__all__ = [
-    "NO_ANSWER",
-    "Answer",
-    "ConfirmedCommand",
-    "EffectFinished",
-    "EffectLimits",
-    "EffectLoop",
-    "Report",
-]
-
 
 class EffectLoop(Generic[CommandT]):
     """One goal on its way. The owner sends what take_commands gives and feeds back what comes."""

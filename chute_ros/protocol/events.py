@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.model import Outcome, ParachuteStatus, VehicleState
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
+from chute_ros.protocol.goal import NO_ANSWER, EffectFinished, Report
 from chute_ros.protocol.liveness import LinkChange
 
 

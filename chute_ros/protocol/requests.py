@@ -7,13 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import (
-    ConfirmedCommand,
-    EffectFinished,
-    EffectLimits,
-    EffectLoop,
-)
+from chute_ros.protocol.effect import EffectLoop
 from chute_ros.protocol.events import Event, RequestFinished, RequestReport, ended
+from chute_ros.protocol.goal import ConfirmedCommand, EffectFinished, EffectLimits
 
 
 class Watch(Protocol):

@@ -23,8 +23,8 @@ from chute_ros.model import (
     ParachuteStatus,
     VehicleState,
 )
-from chute_ros.protocol.effect import EffectFinished
 from chute_ros.protocol.events import Ask, AskSupervisor, Notice, Severity, failed_request
+from chute_ros.protocol.goal import EffectFinished
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import ActionTold, DeviceRequest, SafetyPicture
 from chute_ros.settings import nested, parameter

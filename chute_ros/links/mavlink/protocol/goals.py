@@ -17,7 +17,7 @@ from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.links.mavlink.protocol.kill import KillPlan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import LinkState, TriggerFlags, flag_names
-from chute_ros.protocol.effect import ConfirmedCommand
+from chute_ros.protocol.goal import ConfirmedCommand
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 
 MavlinkGoal = ConfirmedCommand[Command]

@@ -26,8 +26,8 @@ from chute_ros.links.umbilical.protocol.line_parser import (
 from chute_ros.links.umbilical.protocol.scheduler import Command
 from chute_ros.links.umbilical.protocol.stream import DumpBegan, DumpBytes, DumpEnded
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import Report
 from chute_ros.protocol.events import Notice, RequestReport, Severity, ended
+from chute_ros.protocol.goal import Report
 from chute_ros.transitions import after
 
 #: A progress of a dump is told each so many bytes.

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.protocol.goal import NO_ANSWER
 from chute_ros.settings import Settings, parameter
 
 

@@ -23,8 +23,8 @@ from chute_ros.links.upf.protocol.vehicle_status import Vehicle
 from chute_ros.model import LinkState, Outcome
 from chute_ros.protocol.dronecan.calls import Call, ServiceCalls
 from chute_ros.protocol.dronecan.endpoint import Endpoint
-from chute_ros.protocol.effect import EffectFinished, Report
 from chute_ros.protocol.events import RequestReport, Severity
+from chute_ros.protocol.goal import EffectFinished, Report
 from chute_ros.protocol.requests import Requests
 
 

@@ -18,7 +18,7 @@ from chute_ros.links.upf.protocol.definitions import (
 from chute_ros.links.upf.protocol.devices import Controller, Trigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.calls import Call, CallFinished
-from chute_ros.protocol.effect import ConfirmedCommand
+from chute_ros.protocol.goal import ConfirmedCommand
 
 UpfGoal = ConfirmedCommand[Call]
 

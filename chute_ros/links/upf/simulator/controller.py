@@ -16,8 +16,12 @@ from chute_ros.links.upf.protocol import machine
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.machine import Stimulus
-from chute_ros.links.upf.simulator.aps import ApsLimits, AutomaticDeployment
-from chute_ros.links.upf.simulator.automatic import AutomaticFunctions, AutomaticLimits
+from chute_ros.links.upf.simulator.automatic import (
+    ApsLimits,
+    AutomaticDeployment,
+    AutomaticFunctions,
+    AutomaticLimits,
+)
 from chute_ros.links.upf.simulator.errors import error_places, told_errors
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
 from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
