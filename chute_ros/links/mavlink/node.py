@@ -101,12 +101,11 @@ class MavlinkParachuteNode(DeviceNode):
 
     async def _set_triggers(self, request: Any, response: Any) -> Any:
         if not 1 <= request.select <= 255 or request.arm > 255:
-            response.result = dialect.MAV_RESULT_DENIED
-            response.message = (
+            why = (
                 f"arm {request.arm}, select {request.select}: arm is a mask from 0 to 255, "
                 "select from 1 to 255 (ParachuteStatus.TRIGGER_*); nothing was sent"
             )
-            return response
+            return _denied(response, why)
         end = await self.request(
             lambda link, token, now: link.set_triggers(
                 token, request.arm, request.select, request.device, now
@@ -117,9 +116,8 @@ class MavlinkParachuteNode(DeviceNode):
 
     async def _parachute_action(self, request: Any, response: Any) -> Any:
         if request.action > dialect.PARACHUTE_RELEASE:
-            response.result = dialect.MAV_RESULT_DENIED
-            response.message = f"action {request.action}: need DISABLE 0, ENABLE 1 or RELEASE 2"
-            return response
+            why = f"action {request.action}: need DISABLE 0, ENABLE 1 or RELEASE 2"
+            return _denied(response, why)
         self.get_logger().warning(
             f"~/parachute_action {request.action} called: {request.reason!r}"
         )
@@ -139,11 +137,8 @@ class MavlinkParachuteNode(DeviceNode):
 
     async def _set_interval(self, request: Any, response: Any) -> Any:
         if request.interval_us < -1:
-            response.result = dialect.MAV_RESULT_DENIED
-            response.message = (
-                f"interval_us {request.interval_us}: need microseconds, -1 (off) or 0 (default)"
-            )
-            return response
+            why = f"interval_us {request.interval_us}: need microseconds, -1 (off) or 0 (default)"
+            return _denied(response, why)
         end = await self.request(
             lambda link, token, now: link.set_message_interval(
                 token, request.message_id, request.interval_us, request.device, now
@@ -177,9 +172,13 @@ class MavlinkParachuteNode(DeviceNode):
         return next((int(status.armed_triggers) for status in (*heard, *told)), 0)
 
 
+def _denied(response: Any, why: str) -> Any:
+    response.result, response.message = dialect.MAV_RESULT_DENIED, why
+    return response
+
+
 def _fill(response: Any, end: RequestFinished) -> Any:
     """The fields that all answers to a command share."""
-    response.success = end.finished.success
+    response.success, response.message = end.finished.success, end.finished.message
     response.result = end.finished.result
-    response.message = end.finished.message
     return response

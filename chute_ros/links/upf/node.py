@@ -98,17 +98,8 @@ class UpfCanNode(DeviceNode):
     # -- inside ---------------------------------------------------------------------------------
 
     def _publish_trigger(self, event: TriggerChanged, stamp: Time) -> None:
-        picture = event.picture
-        message = TriggerStatus(
-            link=self.get_name(),
-            node_id=picture["node_id"],
-            link_state=int(picture["link_state"]),
-            state=_TRIGGER_STATES.get(picture["state"], TriggerStatus.UNKNOWN),
-            launched=picture["launched"],
-            supply_voltage=picture["supply_voltage"],
-            error_flags=picture["error_flags"],
-            faults=list(picture["faults"]),
-        )
+        state = _TRIGGER_STATES.get(event.picture["state"], TriggerStatus.UNKNOWN)
+        message = TriggerStatus(link=self.get_name(), **{**event.picture, "state": state})
         message.header.stamp = stamp
         self._trigger_publisher.publish(message)
 

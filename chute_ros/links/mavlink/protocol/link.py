@@ -18,7 +18,6 @@ from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
-from chute_ros.links.mavlink.protocol.kill import DeployDecided
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
 from chute_ros.links.mavlink.protocol.wire import Duplicates, Inbox, Outbox
@@ -51,7 +50,8 @@ class MavlinkLink:
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
         self._announcements = Announcements()
-        self._deploy_decided = DeployDecided(self._devices.arming_count)
+        #: In which flight, counted by armings, a deploy was decided last.
+        self._deploy_decided_in = -1
         self._care = AutopilotCare(
             config, self._devices, self.requests, self._outbox, self._announcements
         )
@@ -126,7 +126,7 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
-        self._deploy_decided.decide()
+        self._deploy_decided_in = self._devices.arming_count()
         parachute = self._devices.to_release(device) or self._target(token, device)
         if parachute is not None:
             self.requests.make_way_for_release(now)
@@ -281,6 +281,10 @@ class MavlinkLink:
             self.requests.commands.acknowledged(ack, now)
             if ack.result == results.ACCEPTED:
                 self._devices.accepted(ack, now)
+
+    def _deploy_decided(self) -> bool:
+        """In this flight: one begins as the autopilot is armed."""
+        return self._deploy_decided_in == self._devices.arming_count()
 
     def _release_under_way(self, token: int) -> bool:
         """A release is under way, which nothing may undo: the request is refused."""

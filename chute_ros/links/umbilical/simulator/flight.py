@@ -130,10 +130,6 @@ class FlightProgram:
             self.rocket.main_out_for = 60.0
         self._enter(mode)
 
-    def land(self) -> None:
-        """Put the rocket on the ground."""
-        self.rocket.land()
-
     # -- the flight by itself -------------------------------------------------------------------
 
     def _watch(self) -> None:

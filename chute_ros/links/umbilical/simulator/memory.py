@@ -22,20 +22,16 @@ class _Dump:
 
     def __init__(self, content: bytes, end: bytes, rate: float, now: float) -> None:
         self._content = content
-        self._end = end
+        self.end = end
         self._interval = 1.0 / rate
         self._next_at = now
         self._sent = 0
         #: It sends no more than the first half.
         self.stalls = False
 
-    def lose_end(self) -> None:
-        """The marker of the end does not come."""
-        self._end = b""
-
     def step(self, now: float, queue: OutboundQueue) -> bool:
         """Send what is due; whether all is sent."""
-        data = self._content + self._end
+        data = self._content + self.end
         while self._sent < len(data) and not self._is_stuck() and self._next_at <= now:
             if not queue.room:
                 self._next_at = now
@@ -149,7 +145,7 @@ class Memory:
         if isinstance(self._job, _Dump):
             self._job.stalls = self.dump_outcome == "stalls"
             if self.dump_outcome == "loses-end":
-                self._job.lose_end()
+                self._job.end = b""  # its marker does not come
             self.dump_outcome = ""
 
     def begin_wipe(self, now: float) -> None:

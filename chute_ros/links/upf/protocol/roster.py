@@ -250,7 +250,7 @@ class UpfDevices:
         self.notice(Severity.WARNING, f"trigger {trigger.node_id} has fired")
 
     def _trigger_changed(self, trigger: Trigger, now: float) -> None:
-        self._events.append(TriggerChanged(trigger.node_id, trigger_picture(trigger, now)))
+        self._events.append(TriggerChanged(trigger_picture(trigger, now)))
         if self._config.without_controller:
             self._events.append(ParachuteChanged(trigger.parachute_status(now)))
 
