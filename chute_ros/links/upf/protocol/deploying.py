@@ -152,8 +152,9 @@ class Deploying:
     # -- inside ----------------------------------------------------------------------------------
 
     def _is_silent(self, node_id: int) -> bool:
-        """This controller is not heard any more."""
-        return self._devices.controllers[node_id].liveness.state is not LinkState.OK
+        """This controller is not heard any more, or another device has its node id."""
+        controller = self._devices.controllers.get(node_id)
+        return controller is None or controller.liveness.state is not LinkState.OK
 
     def _by_controller(
         self, token: int, controller: Controller, force: bool, named: int, now: float
