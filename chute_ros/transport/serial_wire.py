@@ -103,7 +103,7 @@ def find_usb_port(vendor: int, product: int, serial_number: str) -> str:
     if found:
         numbers = ", ".join(f"{port.device} {port.serial_number}" for port in found)
         raise OSError(
-            f"{len(found)} devices have these ids: add the serial number of one ({numbers})",
+            f"{len(found)} devices have these ids: add the serial number of one ({numbers})"
         )
     raise FileNotFoundError(f"no such USB device is plugged in{_ports()}")
 

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
-from chute_ros.model import LinkState, flag_names
+from chute_ros.model import NAN, LinkState, flag_names
 from chute_ros.ros import diagnostics
 
 #: Task, level, text, values and device: diagnostics.status makes a message of it.
@@ -88,7 +88,10 @@ def _parachute(one: ParachuteTracker, now: float) -> Task:
 
 
 def _autopilot(link: MavlinkLink, now: float) -> Task:
-    vehicle, rates = link.vehicle_state(now), link.autopilot_rates(now)
+    vehicle, autopilot = link.vehicle_state(now), link.chosen_autopilot()
+    rates, round_trip = {}, NAN
+    if autopilot is not None:
+        rates, round_trip = autopilot.rates(now), autopilot.round_trip.seconds(now)
     level, text = diagnostics.OK, f"{vehicle.armed.name}, {vehicle.landed_state.name}"
     if vehicle.link_state is LinkState.NEVER_SEEN:
         level, text = diagnostics.STALE, "never received"
@@ -109,7 +112,7 @@ def _autopilot(link: MavlinkLink, now: float) -> Task:
         "battery (V)": vehicle.battery_voltage,
         "restarts": vehicle.reboot_count,
         "rates (Hz)": ", ".join(f"{kind} {hz:.1f}" for kind, hz in sorted(rates.items())),
-        "answers after (s, TIMESYNC)": link.autopilot_round_trip(now),
+        "answers after (s, TIMESYNC)": round_trip,
         "not detected": "; ".join(not_seen(rates)),
     }
     return "autopilot", level, text, values, vehicle.source
@@ -125,10 +128,7 @@ _SIGHTS = (
         ("SCALED_IMU2", "SCALED_IMU3"),
         "no SCALED_IMU2: a wrong accelerometer is not contradicted by another",
     ),
-    (
-        ("ATTITUDE_TARGET",),
-        "no ATTITUDE_TARGET: a commanded attitude looks like an accident",
-    ),
+    (("ATTITUDE_TARGET",), "no ATTITUDE_TARGET: a commanded attitude looks like an accident"),
     (
         ("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED", "NAV_CONTROLLER_OUTPUT"),
         "no targets: an uncommanded level sink raises only an alarm",

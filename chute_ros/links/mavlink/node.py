@@ -56,8 +56,7 @@ class MavlinkParachuteNode(DeviceNode):
         )
         vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.follow(
-            VehicleReport,
-            lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at)),
+            VehicleReport, lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at))
         )
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)

@@ -55,7 +55,7 @@ class UmbilicalNode(DeviceNode):
         )
         self._progress = ""
         # The flight computer's own log, told apart from ours by the logger's name.
-        self._its_log = self.get_logger().get_child("flight_computer")
+        its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
         if settings.publish_vehicle_state:
             vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
@@ -65,9 +65,9 @@ class UmbilicalNode(DeviceNode):
             )
         for kind, follower in (
             (events.TelemetryReceived, self._telemetry),
-            (LogLine, self._log_line),
+            (LogLine, lambda one, at: log_notice(its_log, Notice(one.severity, one.text))),
             (events.Progress, self._progressed),
-            (events.DumpData, self._dump_data),
+            (events.DumpData, lambda one, at: self.files.write(one.data)),
             (events.DumpStarted, self._dump_started),
             (events.DumpFinished, self._dump_finished),
         ):
@@ -87,15 +87,9 @@ class UmbilicalNode(DeviceNode):
     def _telemetry(self, event: events.TelemetryReceived, stamp: Time) -> None:
         self._telem_publisher.publish(telem(event.record, event.sequence, stamp))
 
-    def _log_line(self, event: LogLine, stamp: Time) -> None:
-        log_notice(self._its_log, Notice(event.severity, event.text))
-
     def _progressed(self, event: events.Progress, stamp: Time) -> None:
         self._progress = event.text
         self.get_logger().info(event.text, throttle_duration_sec=1.0)
-
-    def _dump_data(self, event: events.DumpData, stamp: Time) -> None:
-        self.files.write(event.data)
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         assert self.loop is not None

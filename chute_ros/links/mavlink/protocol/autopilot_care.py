@@ -168,11 +168,10 @@ class AutopilotCare:
             self._announcements.say(f"{reason}: flight blocked, disarming")
         self._disarming -= 1
         patience = self._config.commands.ack_timeout
-        goal = goals.disarm_on_ground(autopilot, self._may_force, patience, now)
+        goal = goals.disarm_on_ground(
+            autopilot, lambda: self.block.may_force(self._now), patience, now
+        )
         self._requests.begin(self._disarming, goal, now)
-
-    def _may_force(self) -> bool:
-        return self.block.may_force(self._now)
 
 
 class _HeartbeatWatch:

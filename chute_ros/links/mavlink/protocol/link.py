@@ -14,6 +14,7 @@ from typing import Any
 
 from chute_ros.links.mavlink.protocol import goals, results
 from chute_ros.links.mavlink.protocol.announcements import Announcements
+from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
@@ -211,9 +212,13 @@ class MavlinkLink:
         """A device that can deploy was received."""
         return self._devices.to_release("") is not None
 
+    def chosen_autopilot(self) -> AutopilotTracker | None:
+        """The first autopilot of ours that is not lost, or the first."""
+        return self._devices.chosen_autopilot()
+
     def has_autopilot(self) -> bool:
         """A device that can stop the motors was received."""
-        return self._devices.chosen_autopilot() is not None
+        return self.chosen_autopilot() is not None
 
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Device for requests without a device: the first that is not lost, or the first."""
@@ -227,16 +232,6 @@ class MavlinkLink:
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
-
-    def autopilot_rates(self, now: float) -> dict[str, float]:
-        """Hz of each message that is read of our autopilot."""
-        autopilot = self._devices.chosen_autopilot()
-        return {} if autopilot is None else autopilot.rates(now)
-
-    def autopilot_round_trip(self, now: float) -> float:
-        """How long our autopilot takes to answer, s; NaN: it does not."""
-        autopilot = self._devices.chosen_autopilot()
-        return math.nan if autopilot is None else autopilot.round_trip.seconds(now)
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""

@@ -31,11 +31,7 @@ class Setup:
 def setup_of(autopilot: AutopilotTracker, plan: KillPlan, own_system_id: int) -> Setup:
     """As far as the autopilot has told it."""
     settings = autopilot.settings
-    warnings = [
-        plan.warning(),
-        _block_warning(settings, own_system_id),
-        *_by_itself(settings),
-    ]
+    warnings = [plan.warning(), _block_warning(settings, own_system_id), *_by_itself(settings)]
     return Setup(
         settings.firmware.value,
         plan.text(),

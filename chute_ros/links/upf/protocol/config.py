@@ -56,8 +56,7 @@ class UpfConfig(Commanded, Settings):
     controller_node_id: int = parameter(0, "node id of the controller; 0: any", 0, HIGHEST_NODE_ID)
     trigger_node_id: int = parameter(0, "node id of the trigger; 0: any", 0, HIGHEST_NODE_ID)
     without_controller: bool = parameter(
-        False,
-        "the vehicle has no controller: its trigger is the parachute and is fired directly",
+        False, "the vehicle has no controller: its trigger is the parachute and is fired directly"
     )
     liveness: LivenessLimits = nested(LivenessLimits(1.5, 3.0), "device")
     status_timeout: float = parameter(

@@ -29,6 +29,7 @@ from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.events import RequestFinished, RequestReport, Severity
+from chute_ros.protocol.goal import EffectFinished
 from chute_ros.protocol.requests import Requests
 
 
@@ -50,9 +51,10 @@ class UpfLink:
             config, self.devices, self.requests, endpoint, self._vehicle, self.vehicle_service
         )
         self._desk = ErrandDesk(self.bus, self.devices, self._vehicle.in_air)
-        #: Our own requests count down from -1; what follows once such a one has succeeded.
-        self._next_internal = -1
-        self._then: dict[int, tuple[int, Callable[[float], None]]] = {}
+        #: Our own requests to take off count down from -1; once one has succeeded, the request
+        #: with this token arms this controller.
+        self._next_takeoff = -1
+        self._arm_after: dict[int, tuple[int, int]] = {}
         self._events: list[UpfEvent] = []
         for absent in self.definitions.absent:
             self.devices.notice(
@@ -160,18 +162,13 @@ class UpfLink:
         controller = self._target(token, 0, now)
         if controller is None:
             return
+        on_ground = controller.state is ParachuteState.READY
         if not arm:
             self.service(token, "TYPE_DISARM", 0, now)
-        elif controller.state is ParachuteState.READY and not goals.excluded(
-            controller, "TYPE_ARM"
-        ):
-            internal, self._next_internal = self._next_internal, self._next_internal - 1
-
-            def then(later: float) -> None:
-                self.service(token, "TYPE_ARM", controller.node_id, later)
-
-            self._then[internal] = (token, then)
-            self.service(internal, "TYPE_TAKEOFF", controller.node_id, now)
+        elif on_ground and not goals.excluded(controller, "TYPE_ARM"):
+            takeoff, self._next_takeoff = self._next_takeoff, self._next_takeoff - 1
+            self._arm_after[takeoff] = (token, controller.node_id)
+            self.service(takeoff, "TYPE_TAKEOFF", controller.node_id, now)
         else:
             self.service(token, "TYPE_ARM", controller.node_id, now)
 
@@ -306,23 +303,18 @@ class UpfLink:
         self._desk.update(now)
         self._events += self._deploying.take_reports()
         for event in self.requests.take_events():
-            self._pass_on(event, now)
+            if isinstance(event, RequestFinished):
+                self._over(self._deploying.over(event.finished, now), now)
+            elif not (isinstance(event, RequestReport) and event.report.token in self._arm_after):
+                self._events.append(event)
 
-    def _pass_on(self, event: object, now: float) -> None:
-        """Events of requests: those of ours stay inside and start what follows."""
-        if isinstance(event, RequestReport):
-            if event.report.token in self._then:
-                return
-            self._events.append(event)
+    def _over(self, finished: EffectFinished, now: float) -> None:
+        """The end of a request: of our own take-off it is followed by what it is for."""
+        token, node_id = self._arm_after.pop(finished.token, (0, 0))
+        if not node_id:
+            self._events.append(RequestFinished(finished))
+        elif finished.success:
+            self.service(token, "TYPE_ARM", node_id, now)
         else:
-            assert isinstance(event, RequestFinished)
-            finished = self._deploying.over(event.finished, now)
-            if finished.token not in self._then:
-                self._events.append(RequestFinished(finished))
-                return
-            token, then = self._then.pop(finished.token)
-            if finished.success:
-                then(now)
-            else:
-                self.requests.refuse(token, finished.message)
-                self._drive(now)
+            self.requests.refuse(token, finished.message)
+            self._drive(now)
