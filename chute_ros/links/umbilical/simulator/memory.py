@@ -136,8 +136,13 @@ class Memory:
         self.disturb_dump("")
 
     def content(self) -> bytes:
-        """What a dump of the flash holds."""
-        return self._bytes() if self._settings.binary_dump else self._table()
+        """What a dump of the flash holds: what is of an earlier time up to the size that was set,
+        and the flight's."""
+        rows = "".join(f"{row}\n" for row in self._rows).encode()
+        if self._settings.binary_dump:
+            return random.Random(self._settings.seed).randbytes(self._stored) + rows
+        earlier = ",".join("0" for _ in self._header.split(",")) + "\n"
+        return f"{self._header}\n{earlier * (self._stored // len(earlier))}".encode() + rows
 
     def disturb_dump(self, outcome: str) -> None:
         """Have the dump that runs, or else the next, end so; empty: as was said before."""
@@ -174,17 +179,6 @@ class Memory:
     def stop(self) -> None:
         """A reboot ends what runs."""
         self._job = None
-
-    def _table(self) -> bytes:
-        """The header, rows of an earlier time up to the size that was set, and the flight's."""
-        lines = [self._header]
-        row = ",".join("0" for _ in self._header.split(","))
-        lines += [row] * (self._stored // (len(row) + 1))
-        return "".join(f"{line}\n" for line in [*lines, *self._rows]).encode()
-
-    def _bytes(self) -> bytes:
-        rows = "".join(f"{row}\n" for row in self._rows).encode()
-        return random.Random(self._settings.seed).randbytes(self._stored) + rows
 
     # -- FRAM -----------------------------------------------------------------------------------
 
