@@ -54,7 +54,6 @@ class Acknowledgement:
     component_id: int
     number: int
     result: int
-    progress: int = 255
 
 
 @dataclass(frozen=True)
