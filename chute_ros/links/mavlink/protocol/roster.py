@@ -32,9 +32,7 @@ class Roster(Generic[DeviceT]):
     """The devices of one kind, by (system id, component id). An id of 0 means any."""
 
     def __init__(self, kind: str, system_id: int, component_id: int) -> None:
-        self.kind = kind
-        self.system_id = system_id
-        self.component_id = component_id
+        self.kind, self.system_id, self.component_id = kind, system_id, component_id
         self.refused_count = 0
         #: The system was named by a parameter, not taken as the first one heard.
         self.fixed = system_id != 0

@@ -51,11 +51,8 @@ class Orders:
         decoder: TelemetryDecoder,
         memory: MemoryWorks,
     ) -> None:
-        self._config = config
-        self._requests = requests
-        self._computer = computer
-        self._decoder = decoder
-        self._memory = memory
+        self._config, self._requests, self._computer = config, requests, computer
+        self._decoder, self._memory = decoder, memory
         self._block = ""
         self._key_disarmed = False
         self._flash_usage_at = -math.inf
