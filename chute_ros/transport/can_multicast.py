@@ -21,6 +21,7 @@ from collections.abc import Hashable
 
 from chute_ros.protocol.dronecan.can_frame import LAYOUT, MOST_DATA, pack, unpack
 from chute_ros.transport.can_address import CanAddress
+from chute_ros.transport.udp import received
 
 _GROUP = "239.65.82."
 _MAGIC, _FLAG_FD = 0x2934, 0x0001
@@ -28,8 +29,6 @@ _HEAD, _BODY = struct.Struct("<HH"), struct.Struct("<HI")
 _CRC_START = 0xFFFF
 _MOST_DATA_FD = 64
 _LARGEST = _HEAD.size + _BODY.size + _MOST_DATA_FD
-#: Packets taken at once, so that a flood cannot keep the loop from its deadlines.
-_BURST = 64
 _LOOPBACK, _BY_ROUTE = (socket.inet_aton(host) for host in ("127.0.0.1", "0.0.0.0"))
 
 
@@ -100,11 +99,7 @@ class CanMulticastWire:
     def read(self, file: int) -> list[tuple[bytes, Hashable]]:
         assert self._receiver is not None
         frames: list[tuple[bytes, Hashable]] = []
-        for _ in range(_BURST):
-            try:
-                packet, sender = self._receiver.recvfrom(_LARGEST + 1)
-            except BlockingIOError:
-                break
+        for packet, sender in received(self._receiver, _LARGEST + 1):
             if sender == self._own_name:
                 continue  # a bus does not hear itself
             frame = self._frame(packet, sender[0])
