@@ -15,15 +15,8 @@ from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.kill import kill_plan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import Armed, LinkState, VehicleState
-from chute_ros.protocol.events import (
-    DeviceLinkChanged,
-    Event,
-    Notice,
-    ParachuteChanged,
-    Severity,
-    VehicleChanged,
-)
-from chute_ros.protocol.liveness import LinkChange, first_alive
+from chute_ros.protocol.events import EventLog, ParachuteChanged, Severity, VehicleChanged
+from chute_ros.protocol.liveness import first_alive
 from chute_ros.protocol.mavlink.dialect import dialect
 
 DeviceT = TypeVar("DeviceT", ParachuteTracker, AutopilotTracker)
@@ -98,10 +91,11 @@ class Roster(Generic[DeviceT]):
         )
 
 
-class Devices:
+class Devices(EventLog):
     """Follows the devices that are ours, each known by its heartbeat's type and its ids."""
 
     def __init__(self, config: MavlinkConfig) -> None:
+        super().__init__()
         self.parachutes: Roster[ParachuteTracker] = Roster(
             "parachute", config.parachute_system_id, config.parachute_component_id
         )
@@ -113,7 +107,6 @@ class Devices:
         #: By the type in their heartbeat they are something else.
         self._others: set[Ids] = set()
         self._config = config
-        self._events: list[Event] = []
 
     # -- who -------------------------------------------------------------------------------------
 
@@ -195,12 +188,12 @@ class Devices:
         """Look at the clock."""
         for parachute in self.parachutes.all():
             changes, picture_changed = parachute.update(now)
-            self._changed(f"parachute {parachute.device}", changes)
+            self.link_changed(f"parachute {parachute.device}", changes)
             if picture_changed:
                 self._events.append(ParachuteChanged(parachute.status(now)))
         for autopilot in self.autopilots.all():
             changes = autopilot.liveness.update(now)
-            self._changed(f"autopilot {autopilot.device}", changes)
+            self.link_changed(f"autopilot {autopilot.device}", changes)
             if changes:
                 self._vehicle_changed(now)
 
@@ -219,15 +212,6 @@ class Devices:
         fault = kill_plan(self._config.kill_method, autopilot.vehicle_type, settings).fault()
         return replace(state, faults=(*state.faults, fault)) if fault else state
 
-    def take_events(self) -> list[Event]:
-        """New events, oldest first; each is handed out once."""
-        events, self._events = self._events, []
-        return events
-
-    def notice(self, severity: Severity, text: str) -> None:
-        """Put a notice among the events."""
-        self._events.append(Notice(severity, text))
-
     def _parachute_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
         if not self.parachutes.admits(*ids):
             return
@@ -235,7 +219,7 @@ class Devices:
         if parachute is None:
             parachute = self._unproven.pop(ids, None) or self._tracker(ids)
             self.parachutes.add(*ids, parachute)
-        self._changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
+        self.link_changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
         self._events.append(ParachuteChanged(parachute.status(now)))
 
     def _tracker(self, ids: Ids) -> ParachuteTracker:
@@ -249,7 +233,7 @@ class Devices:
             limits, needed = self._config.autopilot_liveness, self._config.needed_message_rate
             autopilot = AutopilotTracker(*ids, limits, needed)
             self.autopilots.add(*ids, autopilot)
-        self._changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
+        self.link_changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
         self._vehicle_changed(now)
 
     def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:
@@ -289,6 +273,3 @@ class Devices:
 
     def _vehicle_changed(self, now: float) -> None:
         self._events.append(VehicleChanged(self.vehicle_state(now)))
-
-    def _changed(self, name: str, changes: list[LinkChange]) -> None:
-        self._events += [DeviceLinkChanged(name, change) for change in changes]
