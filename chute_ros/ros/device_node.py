@@ -289,6 +289,8 @@ class DeviceNode(SuiteNode, ABC):
         summary = self.runtime.summary
         assert self.loop is not None
         silent = now - self.loop.last_run
+        if summary is None and silent <= OWNER_SILENCE:
+            return  # it has just started: its first heartbeat is to come
         statuses = [] if summary is None else self.diagnose(summary)
         if summary is None or silent > OWNER_SILENCE:
             text = f"the link's thread has not run for {silent:.1f} s"
