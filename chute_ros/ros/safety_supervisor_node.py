@@ -71,8 +71,9 @@ class SafetySupervisorNode(SuiteNode):
             # above it.
             max(0, int(time.time()) & 0xFFFFFFFF),
             secrets.token_hex(8),
-            inputs.Mode[self.values["mode"]],
             self._memory.recall(),
+            self._memory.released(),
+            inputs.Mode[self.values["mode"]],
         )
         self._recorder = FlightRecorder(self, self.values)
         self.at_end.callback(self._recorder.close)

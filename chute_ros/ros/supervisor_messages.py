@@ -10,7 +10,7 @@ from chute_ros.ros import diagnostics, messages
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
-from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.readings import doubt, measured, unusable
@@ -33,7 +33,7 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         supervisor=told.supervisor,
         epoch=state.epoch,
         state=int(state.stage),
-        state_text=_text(state, reasons),
+        state_text=_text(config, state, reasons),
         mode=int(state.mode),
         flight_blocked=blocked,
         block_reasons=list(reasons) if blocked else [],
@@ -97,7 +97,7 @@ def decisions_task(
         in_doubt = doubt(state, measurement, value, now)
         told = f"{value:.2f} (in doubt: {in_doubt})" if in_doubt else f"{value:.2f}"
         values[measurement] = f"unusable: {why}" if why else told
-    return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")
+    return diagnostics.status(name, "decisions", level, _text(config, state, reasons), values, "")
 
 
 def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float) -> RuleState:
@@ -118,8 +118,11 @@ def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float
     )
 
 
-def _text(state: State, reasons: tuple[str, ...]) -> str:
+def _text(config: SupervisorConfig, state: State, reasons: tuple[str, ...]) -> str:
     text = _stage_text(state, reasons)
+    armed = ", ".join(map(" ".join, state.armed(config)))
+    if armed and state.stage in ON_GROUND and state.stage is not Stage.ARMED:
+        text += f"; ARMED all the same: {armed} (safety/arm disarms)"
     return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
 
 

@@ -1,14 +1,16 @@
-"""What a measurement in doubt looks like in diagnostics and safety/state."""
+"""What a measurement in doubt, and a parachute that is armed, look like in diagnostics and
+safety/state."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
 
+import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from chute_ros.model import Armed, LinkState, VehicleState
+from chute_ros.model import Armed, LinkState, ParachuteStatus, VehicleState
 from chute_ros.ros.supervisor_messages import decisions_task, state_message
 from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.runtime.topics import SafetyTold
@@ -59,3 +61,28 @@ def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() 
     assert values(task)["sources contradict each other"] == "attitude"
     assert values(task)["tilt_deg"] == "90.00 (in doubt: another source told otherwise)"
     assert text in state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text
+
+
+ARMED = ParachuteStatus("1/161", LinkState.OK, armed=True)
+
+
+@pytest.mark.parametrize(
+    ("stage", "armed", "text"),
+    [
+        (Stage.READY, True, "READY; ARMED all the same: {} (safety/arm disarms)"),
+        (Stage.LANDED, True, "LANDED; ARMED all the same: {} (safety/arm disarms)"),
+        (Stage.ARMED, True, "ARMED"),
+        (Stage.IN_FLIGHT, True, "IN_FLIGHT"),
+        (Stage.READY, False, "READY"),
+    ],
+)
+def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(
+    stage: Stage, armed: bool, text: str
+) -> None:
+    state, link = known(), CONFIG.deploy_links[0]
+    evidence = replace(WELL, devices=MappingProxyType({"1/161": replace(ARMED, armed=armed)}))
+    links = MappingProxyType({**state.heard.links, link: evidence})
+    state = replace(state, stage=stage, heard=replace(state.heard, links=links))
+    told = state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text
+    assert told == text.format(f"{link} 1/161")
+    assert decisions_task("safety_supervisor", CONFIG, state, NOW).message.endswith(told)
