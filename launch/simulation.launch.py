@@ -22,13 +22,15 @@ from launch_ros.substitutions import ExecutableInPackage
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
+from chute_ros.tools.launch_checks import check_arguments, check_port, checked
 from launch import LaunchContext, LaunchDescription
 
 
 def _vehicle(context: LaunchContext) -> list:
     share = get_package_share_directory("chute_ros")
     namespace = LaunchConfiguration("namespace").perform(context)
-    port = int(LaunchConfiguration("port").perform(context))
+    text = LaunchConfiguration("port").perform(context)
+    port = checked("simulation.launch.py", lambda: check_port(text))
     sockets = Sockets(
         network=f"127.0.0.1:{port}",
         air=f"127.0.0.1:{port + 1}",
@@ -62,6 +64,26 @@ def _simulator(package: str, executable: str, *arguments: str) -> ExecuteProcess
     return ExecuteProcess(cmd=command, name=executable, output="screen")
 
 
+def _look(context: LaunchContext) -> list:
+    """Before the defaults are set: what is there was given."""
+    known = [one.name for one in _arguments()]
+    checked("simulation.launch.py", lambda: check_arguments(context.launch_configurations, known))
+    return []
+
+
+def _arguments() -> list:
+    return [
+        DeclareLaunchArgument("namespace", default_value="sim", description="of the vehicle"),
+        DeclareLaunchArgument(
+            "parachute",
+            default_value="mavlink",
+            choices=list(vehicles()),
+            description="kind of parachute",
+        ),
+        DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
+    ]
+
+
 def generate_launch_description() -> LaunchDescription:
     """The vehicle and what it speaks to."""
     return LaunchDescription(
@@ -69,14 +91,8 @@ def generate_launch_description() -> LaunchDescription:
             # A simulation must never meet a real vehicle on the network.
             SetEnvironmentVariable("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
             *(UnsetEnvironmentVariable(name) for name in LEADS_ELSEWHERE),
-            DeclareLaunchArgument("namespace", default_value="sim", description="of the vehicle"),
-            DeclareLaunchArgument(
-                "parachute",
-                default_value="mavlink",
-                choices=list(vehicles()),
-                description="kind of parachute",
-            ),
-            DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
+            OpaqueFunction(function=_look),
+            *_arguments(),
             OpaqueFunction(function=_vehicle),
         ]
     )
