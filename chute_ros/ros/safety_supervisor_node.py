@@ -109,9 +109,9 @@ class SafetySupervisorNode(SuiteNode):
             before=self.runtime.state.heard.vehicle.link_state,
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
-            self.get_logger().warning(
-                f"rule '{rule}' can never be fulfilled: the autopilot is the only source of "
-                "measurements; add imu or odometry to vehicle_sources"
+            self.get_logger().info(
+                f"rule '{rule}' is not used: it needs a source besides the autopilot (imu or "
+                "odometry in vehicle_sources)"
             )
         mode = self.runtime.state.mode
         if mode in MODES:
