@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from chute_ros.links.relay.protocol.link import RelayConfig, RelayLink
 from chute_ros.model import NAN, Action, Decision, LinkState, Outcome
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
-from chute_ros.protocol.events import RequestFinished
+from chute_ros.protocol.events import RequestFinished, failed_request
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.settings import nested
 
@@ -32,7 +31,7 @@ class RelayRuntime(DeviceRuntime[RelaySettings]):
         return Summary(link.state, False, NAN, (_UNMONITORED if unmonitored else _NOT_WRITTEN,))
 
     def failed_end(self, token: int, text: str) -> RequestFinished:
-        return RequestFinished(EffectFinished(token, False, False, NO_ANSWER, text))
+        return failed_request(token, text)
 
     def carry_out(self, decision: Decision) -> None:
         if decision.action is Action.DEPLOY and decision.device:

@@ -13,8 +13,7 @@ from functools import cached_property
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, Outcome, ParachuteStatus
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
-from chute_ros.protocol.events import Event, ParachuteChanged, RequestFinished, RequestReport
+from chute_ros.protocol.events import Event, ParachuteChanged, ended
 from chute_ros.settings import Settings, parameter
 
 #: The one device of an output.
@@ -211,7 +210,4 @@ class RelayLink:
         self._events.append(ParachuteChanged(ParachuteStatus(DEVICE, self.state)))
 
     def _end(self, token: int, outcome: Outcome, text: str) -> None:
-        self._events.append(RequestReport(Report(token, outcome, text)))
-        success = outcome is Outcome.CONFIRMED
-        finished = EffectFinished(token, success, False, NO_ANSWER, text)
-        self._events.append(RequestFinished(finished))
+        self._events += ended(token, outcome, text)
