@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from chute_ros.links import mavlink, umbilical, upf
+import chute_ros
+from chute_ros.links.mavlink import diagnostics as mavlink
+from chute_ros.links.umbilical import diagnostics as umbilical
+from chute_ros.links.upf import diagnostics as upf
 from chute_ros.ros.diagnostics import RecentDrops, WirePicture, wire_task
-
-NOISE = "bytes that are no frame"
 
 
 class Line:
