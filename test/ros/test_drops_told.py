@@ -36,7 +36,7 @@ def test_garbage_beside_what_works_is_a_warning_until_it_is_over() -> None:
     for _ in range(20):
         told = line.second(50, noise=500, checksum=1)
     assert told.level == DiagnosticStatus.WARN
-    assert told.message == "open; of the last 10 s much could not be read, mostly: noise (5000)"
+    assert told.message == "open; in the last 10 s much could not be read, mostly: noise (5000)"
     for _ in range(9):
         assert line.second(50).level == DiagnosticStatus.WARN
     assert line.second(50).level == DiagnosticStatus.OK
