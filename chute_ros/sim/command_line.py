@@ -7,7 +7,6 @@ import contextlib
 import math
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -30,6 +29,8 @@ from chute_ros.transport.wire_events import LoopFault, WireChange
 if TYPE_CHECKING:
     from chute_ros.sim.mavlink_device import MavlinkDevice
 
+#: What ends a simulator.
+_ENDS = (signal.SIGINT, signal.SIGTERM)
 KnobsT = TypeVar("KnobsT", bound=FaultKnobs)
 _FAULTS = (
     ("loss", "probability that a packet is lost, 0 to 1, each way"),
@@ -179,7 +180,8 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
         device.sign(*signing_from_file(options.signing_key_file, 0, "--signing-key-file"))
     link = FaultyLink(device, _knobs(FaultKnobs, options), options.seed)
     wires = [make_wire(parse_address(text)) for text in _connections(options)]
-    _run_link(device, link, wires, options, _ended())
+    _hold_signals()
+    _run_link(device, link, wires, options)
 
 
 def run_on_can(
@@ -195,9 +197,9 @@ def run_on_can(
     wires: list[Wire] = [
         make_can_wire(parse_can_address(text, options.bitrate)) for text in _connections(options)
     ]
-    ended = _ended()
+    _hold_signals()
     with beside:
-        _run_link(device, link, wires, options, ended)
+        _run_link(device, link, wires, options)
 
 
 def run_on_pty(
@@ -209,7 +211,7 @@ def run_on_pty(
     # First, so that a mistake in it leaves no link behind.
     _check_script(device, options)
     # Whoever sees the link may end it at once.
-    ended = _ended()
+    _hold_signals()
     wire = PtyWire(options.link)
     try:
         wire.open()
@@ -218,7 +220,7 @@ def run_on_pty(
     if not options.quiet:
         print(wire.path + (f" linked from {options.link}" if options.link else ""), flush=True)
     with beside or contextlib.nullcontext():
-        _run_link(device, device, [wire], options, ended)
+        _run_link(device, device, [wire], options)
 
 
 def _knobs(kind: type[KnobsT], options: argparse.Namespace) -> KnobsT:
@@ -229,12 +231,10 @@ def _connections(options: argparse.Namespace) -> list[str]:
     return options.connection or [options.default_connection]
 
 
-def _ended() -> threading.Event:
-    """Set by SIGINT and SIGTERM, from now on."""
-    ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
-    return ended
+def _hold_signals() -> None:
+    """From now on a signal that ends it waits until _run_link takes it. A handler would run in the
+    middle of whatever the main thread does, and wait for a lock that this holds."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
 
 
 def _run_link(
@@ -242,7 +242,6 @@ def _run_link(
     link: ProtocolLink,
     wires: list[Wire],
     options: argparse.Namespace,
-    ended: threading.Event,
 ) -> None:
     _check_script(device, options)
     started = time.monotonic()
@@ -255,7 +254,7 @@ def _run_link(
 
     loop = WireLoop(link, WireBundle(wires), show)
     loop.start()
-    ended.wait()
+    signal.sigwait(_ENDS)
     loop.stop()
 
 
