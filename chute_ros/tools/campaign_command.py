@@ -21,9 +21,8 @@ from chute_ros.campaign.judge import Count
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.rare import OfEach, rare
-from chute_ros.campaign.scenario import Scenario
+from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
-from chute_ros.campaign.sensor_sources import outlives
 from chute_ros.errors import RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text

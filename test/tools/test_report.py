@@ -14,7 +14,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report_command as report
 from chute_ros.tools.recording import read
-from chute_ros.tools.replayed_states import replayed_states
+from chute_ros.tools.report_command import replayed_states
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline_rows import Band, Level
 
