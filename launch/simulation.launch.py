@@ -19,11 +19,14 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.substitutions import ExecutableInPackage
 
+from chute_ros.errors import ParameterError
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
-from chute_ros.tools.launch_checks import check_arguments, check_port, checked
+from chute_ros.tools.launch_checks import check_arguments, check_port, checked, flight_script
 from launch import LaunchContext, LaunchDescription
+
+AUTOPILOT = "sim_autopilot"
 
 
 def _vehicle(context: LaunchContext) -> list:
@@ -40,6 +43,10 @@ def _vehicle(context: LaunchContext) -> list:
     parachute = LaunchConfiguration("parachute").perform(context)
     vehicle = vehicles()[parachute]
     kinds = [links()[name] for name in vehicle.links]
+    commands = [
+        (kind.package, command) for kind in kinds for command in kind.simulators(vehicle, sockets)
+    ]
+    flight = checked("simulation.launch.py", lambda: _flight(context, commands))
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
@@ -51,11 +58,19 @@ def _vehicle(context: LaunchContext) -> list:
             }.items(),
         ),
         *(
-            _simulator(kind.package, *command)
-            for kind in kinds
-            for command in kind.simulators(vehicle, sockets)
+            _simulator(package, *command, *(flight if command[0] == AUTOPILOT else ()))
+            for package, command in commands
         ),
     ]
+
+
+def _flight(context: LaunchContext, commands: list) -> list:
+    """What the autopilot is told to do."""
+    fly = LaunchConfiguration("fly").perform(context)
+    fail = LaunchConfiguration("fail").perform(context)
+    if (fly or fail) and all(command[0] != AUTOPILOT for _, command in commands):
+        raise ParameterError("fly and fail need an autopilot, which this vehicle has not")
+    return flight_script(fly, fail)
 
 
 def _simulator(package: str, executable: str, *arguments: str) -> ExecuteProcess:
@@ -81,6 +96,19 @@ def _arguments() -> list:
             description="kind of parachute",
         ),
         DeclareLaunchArgument("port", default_value="14600", description="of loopback UDP"),
+        DeclareLaunchArgument(
+            "fly",
+            default_value="",
+            description="height to which it takes off after 11 s, m; empty: it stands",
+        ),
+        DeclareLaunchArgument(
+            "fail",
+            default_value="",
+            description=(
+                "what fails, and how long after the take-off, s: motor@15, autopilot@15 (it "
+                "starts again) or telemetry@15 (it falls silent); empty: nothing"
+            ),
+        ),
     ]
 
 

@@ -6,6 +6,7 @@ on settings that nobody gave.
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -20,6 +21,10 @@ from chute_ros.ros.supervisor_parameters import SupervisorParameters
 from chute_ros.settings import Settings, parameters_of, settings_from
 
 T = TypeVar("T")
+#: When a simulated vehicle arms and takes off, s after its start: the supervisor is READY by then.
+_ARMS_AT, _TAKES_OFF_AT = 10.0, 11.0
+#: What can fail in a simulated flight -> the action of sim_autopilot.
+_FAILURES = {"motor": "fail-motor", "autopilot": "reboot", "telemetry": "silent"}
 #: Two more follow it, and there is none above 65535.
 _LAST_PORT = 65533
 
@@ -50,6 +55,35 @@ def check_port(text: str) -> int:
     if not (text.isascii() and text.isdigit() and 1 <= int(text) <= _LAST_PORT):
         raise ParameterError(f"port is {text!r}: need a whole number from 1 to {_LAST_PORT}")
     return int(text)
+
+
+def flight_script(fly: str, fail: str) -> list[str]:
+    """Options of sim_autopilot for a flight. fly: its height, m; empty: it stands. fail: what
+    fails and, after @, how long after the take-off, s; empty: nothing. ParameterError: they are
+    none."""
+    if not fly and not fail:
+        return []
+    height, (what, _, after) = _number(fly), fail.partition("@")
+    if not 1.0 <= height <= 500.0:
+        raise ParameterError(f"fly is {fly!r}: need a height from 1 to 500 (m), for example 60")
+    script = {_ARMS_AT: "arm", _TAKES_OFF_AT: f"takeoff={height:g}"}
+    if fail:
+        seconds = _number(after)
+        if what not in _FAILURES or not 0.0 <= seconds <= 3600.0:
+            known = ", ".join(_FAILURES)
+            raise ParameterError(
+                f"fail is {fail!r}: need one of {known}, @ and seconds after the take-off from 0 "
+                "to 3600, for example motor@15"
+            )
+        script[_TAKES_OFF_AT + seconds] = _FAILURES[what]
+    return [word for at, action in script.items() for word in ("--at", f"{at:g}:{action}")]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def check_file(path: Path, namespace: str, nodes: Iterable[str]) -> None:

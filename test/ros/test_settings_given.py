@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -177,3 +178,45 @@ def test_a_launch_argument_that_is_misspelt_is_told(
 def test_a_port_that_is_none_is_told(port: str, monkeypatch, capsys) -> None:
     line = refused(monkeypatch, capsys, SIMULATION, parachute="mavlink", port=port)
     assert line == f"port is {port!r}: need a whole number from 1 to 65533"
+
+
+def flown(monkeypatch, **arguments: str) -> list[str]:
+    """What the autopilot of a simulation is told to do."""
+    made = made_by(LAUNCH / SIMULATION, monkeypatch, **arguments)
+    (command,) = [one.options["cmd"] for one in made if one.options.get("name") == "sim_autopilot"]
+    return [after for before, after in itertools.pairwise(command) if before == "--at"]
+
+
+@pytest.mark.parametrize("parachute", ["mavlink", "upf", "relay"])
+def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch) -> None:
+    assert flown(monkeypatch, parachute=parachute) == []
+    start = ["10:arm", "11:takeoff=60"]
+    assert flown(monkeypatch, parachute=parachute, fly="60") == start
+    told = flown(monkeypatch, parachute=parachute, fly="60", fail="motor@15.5")
+    assert told == [*start, "26.5:fail-motor"]
+
+
+@pytest.mark.parametrize(
+    ("fly", "fail", "words"),
+    [
+        ("high", "", "fly is 'high': need a height from 1 to 500 (m), for example 60"),
+        ("0.5", "", "fly is '0.5': need a height"),
+        ("501", "", "fly is '501': need a height"),
+        ("nan", "", "fly is 'nan': need a height"),
+        ("", "motor@15", "fly is '': need a height"),
+        ("60", "motor", "fail is 'motor': need one of motor, autopilot, telemetry, @ and seconds"),
+        ("60", "wing@15", "fail is 'wing@15': need one of"),
+        ("60", "motor@-1", "fail is 'motor@-1': need one of"),
+        ("60", "motor@nan", "fail is 'motor@nan': need one of"),
+    ],
+)
+def test_a_flight_that_cannot_be_flown_is_told(
+    fly: str, fail: str, words: str, monkeypatch, capsys
+) -> None:
+    line = refused(monkeypatch, capsys, SIMULATION, parachute="mavlink", fly=fly, fail=fail)
+    assert line.startswith(words)
+
+
+def test_a_rocket_is_flown_by_its_flight_computer(monkeypatch, capsys) -> None:
+    line = refused(monkeypatch, capsys, SIMULATION, parachute="umbilical", fly="60")
+    assert line == "fly and fail need an autopilot, which this vehicle has not"
