@@ -20,7 +20,7 @@ from bench.report import load, ratios, summary, table
 from bench.wire_ends import NOMINAL_RATE, Round, RoundFailedError, WireEnds, WrongOrderError
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.processes import Processes
+from chute_ros.tools.processes import Processes, ros_arguments
 from chute_ros.transport.data_types import load_data_types
 
 HEADING = "Kill switch"
@@ -148,11 +148,10 @@ def start_ours(
     mark: str = "",
 ) -> None:
     """starter: a module and its arguments, which starts each node; mark: behind their names."""
-    node = ("--ros-args", "-r", f"__ns:={namespace}{mark}")
 
     def start(name: str, module: str, **parameters: str) -> None:
-        given = [part for key, value in parameters.items() for part in ("-p", f"{key}:={value}")]
-        processes.start(name + mark, *starter, module, *node, *given)
+        arguments = ros_arguments(namespace + mark, **parameters)
+        processes.start(name + mark, *starter, module, *arguments)
 
     start(
         "supervisor",
@@ -177,7 +176,7 @@ def start_ours(
 
 
 def _start_ros(namespace: str, processes: Processes, bus: int, network: int) -> None:
-    node = ("--ros-args", "-r", f"__ns:={namespace}/relay")
+    node = ros_arguments(f"{namespace}/relay")
     for role, *port in (("bus", str(bus)), ("decide",), ("network", str(network))):
         processes.start(f"relay_{role}", "bench.ros_relay", role, *port, *node)
 

@@ -18,6 +18,7 @@ from bench.flight_lines import REAL_RATE, FlightLines
 from bench.report import load, ratios, summary, table
 from bench.umbilical_ends import LATE, Ends, Step, Subscriber
 from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.tools.processes import ros_arguments
 
 HEADING = "Umbilical telemetry"
 
@@ -106,10 +107,9 @@ def start_peers(
         stack.callback(ends.wire.close)
         peers.append(Peer(name, ends, Search(top_rate)))
     ours, bare = peers
-    node = ("--ros-args", "-r", f"__ns:={namespace}")
-    port = f"connection:=serial:{ours.ends.wire.path}"
-    children.start("umbilical", "chute_ros.links.umbilical", *node, "-p", port)
-    node = ("--ros-args", "-r", f"__ns:={namespace}/bare")
+    node = ros_arguments(namespace, connection=f"serial:{ours.ends.wire.path}")
+    children.start("umbilical", "chute_ros.links.umbilical", *node)
+    node = ros_arguments(f"{namespace}/bare")
     children.start("bare", "bench.bare_telemetry", bare.ends.wire.path, *node)
     ours.ends.pid, bare.ends.pid = children.pid("umbilical"), children.pid("bare")
     subscriber.start()

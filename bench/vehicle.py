@@ -22,6 +22,7 @@ from chute_ros.errors import ChuteError
 from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.links.registered import module_of
 from chute_ros.tools.isolation import free_udp_ports
+from chute_ros.tools.processes import ros_arguments
 
 HEADING = "A vehicle"
 
@@ -103,7 +104,6 @@ def _measure(namespace: str, children: Children, chosen: argparse.Namespace) -> 
 
 
 def _start(namespace: str, children: Children, port: int) -> None:
-    node = ("--ros-args", "-r", f"__ns:={namespace}")
     limits = f"person stale_after={_STALE_AFTER} lost_after={_LOST_AFTER} regain_after=0.0"
     given = {
         "mavlink_parachute": {"connection": f"udpin:127.0.0.1:{port}"},
@@ -113,8 +113,7 @@ def _start(namespace: str, children: Children, port: int) -> None:
         },
     }
     for name in NODES:
-        parts = [p for key, value in given[name].items() for p in ("-p", f"{key}:={value}")]
-        children.start(name, module_of(name), *node, *parts)
+        children.start(name, module_of(name), *ros_arguments(namespace, **given[name]))
 
 
 def _until(what: str, holds: Callable[[], bool], children: Children) -> None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
 from pathlib import Path
 
-from chute_ros.model import Action, Outcome
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.demo_director import Director
 from chute_ros.tools.demo_rig import Rig
@@ -68,8 +66,3 @@ class Flight:
         lines = (line for line in text.splitlines() if "not acted on" not in line)
         found = (_ACTED.search(line) for line in lines if "[WARN]" in line)
         return [(int(one[1]), int(one[2]), one[3]) for one in found if one]
-
-
-def reported(director: Director, action: Action, outcome: Outcome) -> Callable[[], bool]:
-    """The device node says that it got so far with this."""
-    return lambda: director.outcome(action, outcome) is not None

@@ -16,7 +16,6 @@ from pathlib import Path
 from chute_ros.errors import ChuteError
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor.machine import Stage
-from faults.flight import reported
 from faults.ground_station_flight import (
     CAREFUL,
     GROUND,
@@ -60,7 +59,7 @@ def _deploys(flight: GroundStationFlight, seen: Seen, station: str = USUAL) -> N
     """The operator deploys; the call, what leaves on the wire, the answer."""
     operator = flight.station(station)
     token, called_at = flight.deploy(operator, "the operator sees it fall")
-    sent = reported(flight.director, Action.DEPLOY, Outcome.SENT)
+    sent = flight.director.reported(Action.DEPLOY, Outcome.SENT)
     flight.director.until("the release is on the wire", 30.0, sent)
     seen.wire = flight.on_the_wire(Action.DEPLOY) - called_at
     seen.answer = flight.seen(operator, called_at, answered=token, success=True) - called_at
@@ -85,7 +84,7 @@ def _deploys_through_losses(station: str) -> Act:
 def _kills(flight: GroundStationFlight, seen: Seen) -> None:
     operator = flight.station(USUAL)
     token, called_at = flight.kill(operator, "a person stands below")
-    sent = reported(flight.director, Action.KILL, Outcome.SENT)
+    sent = flight.director.reported(Action.KILL, Outcome.SENT)
     flight.director.until("the kill is on the wire", 30.0, sent)
     seen.wire = flight.on_the_wire(Action.KILL) - called_at
     seen.answer = flight.seen(operator, called_at, answered=token, success=True) - called_at
@@ -141,7 +140,7 @@ def _waits(cut: float, station: str, gives_up: bool) -> Act:
         healed_at = time.monotonic()
         seen.again = flight.seen(operator, healed_at, state=...) - healed_at
         flight.spin(WATCHED)
-        if reported(flight.director, Action.DEPLOY, Outcome.SENT)():
+        if flight.director.reported(Action.DEPLOY, Outcome.SENT)():
             seen.wire = flight.on_the_wire(Action.DEPLOY) - called_at
             late = f"carried out {seen.wire:.1f} s after the call"
             # A client as ROS 2 makes it keeps its call for as long as the network needs.

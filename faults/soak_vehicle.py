@@ -16,7 +16,9 @@ from std_srvs.srv import Trigger
 
 from chute_ros.links.registered import module_of
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.demo_rig import BY_COMMAND
 from chute_ros.tools.pilot import Pilot
+from chute_ros.tools.processes import ros_arguments
 from faults.network import Network
 from faults.patience import Patient
 from faults.soak_clock import WallClock
@@ -170,50 +172,33 @@ class Vehicle(Patient):
     # -- processes ------------------------------------------------------------------------------
 
     def _start_nodes(self) -> None:
-        node = ("--ros-args", "-r", f"__ns:={NAMESPACE}")
-        more: dict[str, tuple[str, ...]] = {
-            "mavlink_parachute": (f"connection:=udpin:0.0.0.0:{self.ports.node}",),
-            "upf_can": (f"connection:={self.ports.node_bus}",),
-            "umbilical": (f"connection:=serial:{self.wires.port}",),
+        connections = {
+            "mavlink_parachute": f"udpin:0.0.0.0:{self.ports.node}",
+            "upf_can": self.ports.node_bus,
+            "umbilical": f"serial:{self.wires.port}",
         }
         for name in NODES:
-            arguments = [part for one in more[name] for part in ("-p", one)]
-            self.keeper.start(
-                name,
-                module_of(name),
-                *node,
-                *arguments,
-                more=self.clocks[name].environment,
-            )
+            arguments = ros_arguments(NAMESPACE, connection=connections[name])
+            environment = self.clocks[name].environment
+            self.keeper.start(name, module_of(name), *arguments, more=environment)
         for rank, name in enumerate(self.supervisors):
-            values = (
-                f"required_links:=[{', '.join(NODES)}]",
-                "kill_links:=[mavlink_parachute]",
-                "deploy_links:=[mavlink_parachute, upf_can]",
-                f"hot_standby:={str(len(self.supervisors) > 1).lower()}",
-                f"rank:={rank}",
-                "black_box_file_limit:=4",
-                "black_box_most_files:=4",
+            arguments = ros_arguments(
+                NAMESPACE,
+                required_links=f"[{', '.join(NODES)}]",
+                kill_links="[mavlink_parachute]",
+                deploy_links="[mavlink_parachute, upf_can]",
+                hot_standby=str(len(self.supervisors) > 1).lower(),
+                rank=rank,
+                black_box_file_limit=4,
+                black_box_most_files=4,
             )
-            self.keeper.start(
-                name,
-                "chute_ros.ros.safety_supervisor",
-                *node,
-                *("-r", f"__node:={name}"),
-                *[part for one in values for part in ("-p", one)],
-                more=self.clocks[name].environment,
-            )
+            arguments += ["-r", f"__node:={name}"]
+            module, environment = module_of("safety_supervisor"), self.clocks[name].environment
+            self.keeper.start(name, module, *arguments, more=environment)
 
     def _start_devices(self, names: tuple[str, ...]) -> None:
         ports = self.ports
         feel = f"udpout:127.0.0.1:{ports.pilot}"
-        manual = (
-            "Enable APS",
-            "Enable Auto-Takeoff",
-            "Enable Auto-Arm",
-            "Enable Auto-Disarm",
-            "Enable Auto-Land",
-        )
         what: dict[str, tuple[str, ...]] = {
             "autopilot": (
                 "chute_ros.sim.sim_autopilot",
@@ -228,7 +213,11 @@ class Vehicle(Patient):
             "upf": (
                 "chute_ros.links.upf.simulator.sim_upf",
                 *("--connection", ports.device_bus, "--vehicle", feel),
-                *[part for name in manual for part in ("--parameter", f"{name}=false")],
+                *[
+                    part
+                    for name in ("Enable APS", *BY_COMMAND)
+                    for part in ("--parameter", f"{name}=false")
+                ],
             ),
             "rocket": (
                 "chute_ros.links.umbilical.simulator.sim_flight_computer",

@@ -15,7 +15,7 @@ from chute_msgs.msg import SupervisorLease
 from chute_ros.model import Action, Outcome
 from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
-from faults.flight import Flight, reported
+from faults.flight import Flight
 from faults.network import Network
 from faults.stories import flown, fly_stories
 
@@ -155,7 +155,7 @@ def _fly(scene: Scene, story: Story, told: Told) -> None:
         scene.spoil(story)
         scene.spin(story.healed_after)
         scene.heal()
-    director.until("a kill is on the wire", 10.0, reported(director, Action.KILL, Outcome.SENT))
+    director.until("a kill is on the wire", 10.0, director.reported(Action.KILL, Outcome.SENT))
     told.killed = director.when(Action.KILL, Outcome.SENT) - failed_at
     if story.at_kill:
         scene.spoil(story)

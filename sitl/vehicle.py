@@ -24,6 +24,7 @@ from chute_ros.protocol.mavlink.signing import (
     SigningClock,
 )
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.processes import ros_arguments
 from faults.patience import Patient
 from faults.soak_processes import Keeper
 from faults.soak_watch import Watch, ready
@@ -269,9 +270,12 @@ class Vehicle(Patient):
         if setup.dronecan:
             values["expect_parachute"] = "false"
             supervisor |= _ON_THE_BUS
-            self.keeper.start(CAN_NODE, module_of(CAN_NODE), *_ros({"connection": _BUS}))
-        self.keeper.start(NODE, module_of(NODE), *_ros(values))
-        self.keeper.start(SUPERVISOR, module_of(SUPERVISOR), *_ros(supervisor))
+            self._start_node(CAN_NODE, {"connection": _BUS})
+        self._start_node(NODE, values)
+        self._start_node(SUPERVISOR, supervisor)
+
+    def _start_node(self, name: str, values: Mapping[str, str]) -> None:
+        self.keeper.start(name, module_of(name), *ros_arguments(NAMESPACE, **values))
 
     def start_parachute(self) -> None:
         """A parachute that is not released."""
@@ -308,10 +312,3 @@ _ON_THE_BUS = {
     "deploy_links": f"[{CAN_NODE}]",
     "deploy_ladder": f"['{CAN_NODE}', '{CAN_NODE}:trigger']",
 }
-
-
-def _ros(values: Mapping[str, str]) -> list[str]:
-    parts = ["--ros-args", "-r", f"__ns:={NAMESPACE}"]
-    for name, value in values.items():
-        parts += ["-p", f"{name}:={value}"]
-    return parts

@@ -86,10 +86,7 @@ class Aircraft(Rig):
             self.add_source(source, self.model)
         self._speed = 0.0
         self._left = self._flew = False
-        self._light_until = math.nan
         self._first_out = ""
-        self._opened_by_kill = math.nan
-        self._unclear = (math.nan, math.nan)
 
     # -- the flight ------------------------------------------------------------------------------
 
@@ -104,15 +101,6 @@ class Aircraft(Rig):
 
     def is_up(self) -> bool:
         return self._left and (self._flew or self.scenario.stands) and not self.nature.lifts
-
-    def light_until(self) -> float:
-        return self._light_until
-
-    def opened_by_kill(self) -> float:
-        return self._opened_by_kill
-
-    def unclear(self) -> tuple[float, float]:
-        return self._unclear
 
     def plan(self, up: float) -> None:
         super().plan(up)
@@ -166,10 +154,10 @@ class Aircraft(Rig):
     def _look_at_fall(self, now: float) -> None:
         model = self.model
         if model.acceleration < GRAVITY / 2.0:
-            self._light_until = now
+            self.light_until = now
         if abs(model.height) < _NEAR and model.clearance > _NEAR:
-            begin = self._unclear[0]
-            self._unclear = (now if math.isnan(begin) else begin, now)
+            begin = self.unclear[0]
+            self.unclear = (now if math.isnan(begin) else begin, now)
         due = self.released + _CARRIES_AFTER
         if not self.another.falls and now >= due and -model.vertical_speed > _NOT_CARRIED:
             self.another = observe(model, now)
@@ -182,7 +170,7 @@ class Aircraft(Rig):
             self._first_out = whose
             decided = [one.action for host in self.supervisors for _, one in host.decided]
             if self.autopilot.released_at <= now and Action.DEPLOY not in decided:
-                self._opened_by_kill = now
+                self.opened_by_kill = now
             self.model.release()
         elif whose != self._first_out and math.isnan(self.released_another):
             self.released_another = now

@@ -8,8 +8,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from chute_ros.campaign.estimator import EstimatorFault
-from chute_ros.campaign.scenario import Failure, Scenario, Stalls, Stop, WayFault
-from chute_ros.campaign.sensor_sources import may_count, outlives
+from chute_ros.campaign.scenario import (
+    Failure,
+    Scenario,
+    Stalls,
+    Stop,
+    WayFault,
+    may_count,
+    outlives,
+)
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.campaign.truth import SOFT
 from chute_ros.protocol.vehicle_merge import FRESH, IMU, VEHICLE_STATE

@@ -6,7 +6,6 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TypeVar
 
 from chute_ros.campaign.channel import Channel, Nature, Way
 from chute_ros.campaign.world import World
@@ -110,9 +109,6 @@ class Plug:
     def keeps_waiting(self) -> bool:
         """A system keeps for it what it does not read."""
         return False
-
-
-PlugT = TypeVar("PlugT", bound=Plug)
 
 
 class Bus:

@@ -18,17 +18,19 @@ from chute_ros.transport.shared_folder import shared_folder
 
 #: Rises when what is written means something else.
 FORMAT = 1
-#: Of the package: what becomes of a flight hangs on these.
-_FLYING = ("campaign", "model.py", "protocol", "sim", "supervisor", "transport")
+#: Of the package: what becomes of a flight hangs on all but these.
+_NOT_FLYING = ("ros", "tools")
 
 
 def code_that_flies(profiles: Path) -> str:
     """A sum of it, of the profiles and of the wires' data types: flights of two sums cannot be
     counted together."""
     package = Path(chute_ros.__file__).parent
-    files = [package / name for name in _FLYING if name.endswith(".py")]
-    for name in _FLYING:
-        files += (package / name).rglob("*.py")
+    files = [
+        one
+        for one in package.rglob("*.py")
+        if one.relative_to(package).parts[0] not in _NOT_FLYING
+    ]
     files += profiles.glob("*.yaml")
     files.append(Path(dialect.__file__))
     for folder in ("dsdl", "telem"):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from chute_ros.campaign.channel import Spell
-from chute_ros.campaign.draw_world import in_the_world
+from chute_ros.campaign.draw_world import SETTLED, in_the_world
 from chute_ros.campaign.scenario import (
     PROFILES,
     SECOND_SENSORS,
@@ -65,8 +65,6 @@ _STANDBY_WAYS = ("to the standby", "from the standby")
 _WITH_SECOND, _SECOND_FAULT, _WITH_SECOND_HIGH, _HIGH = 0.3, 0.4, 0.3, (120.0, 300.0)
 #: Of the people who kill so many want no deploy after it.
 _KILL_ONLY = 0.4
-#: Heights are looked at for a second, of which the flight has settled for 0.3 s.
-_CARRIED_UNTIL = 0.7
 
 
 def draw(seed: int) -> Scenario:
@@ -130,9 +128,14 @@ def _person(chance: random.Random, seed: int, earliest: float) -> Person | None:
     return Person(does, round(chance.uniform(0.5, 4.0) + earliest, 3))
 
 
-def _fault(chance: random.Random, vehicle: str, around: float, standby: bool) -> Fault:
+def _when(chance: random.Random, around: float) -> tuple[float, float]:
+    """The beginning of a fault, and how long it lasts, s."""
     begin = round(around + chance.uniform(-2.0, 2.0), 3)
-    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
+    return begin, round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
+
+
+def _fault(chance: random.Random, vehicle: str, around: float, standby: bool) -> Fault:
+    begin, lasts = _when(chance, around)
     end = round(begin + lasts, 3)
     supervisors = ("supervisor", "standby") if standby else ("supervisor",)
     kind = chance.choices(("way", "stop", "stalls", "clock", "sensor"), (9, 3, 1, 1, 4))[0]
@@ -142,7 +145,7 @@ def _fault(chance: random.Random, vehicle: str, around: float, standby: bool) ->
         how = chance.choice(sensors[sensor])
         if not is_rocket(vehicle) and sensor in ("height", "speed"):
             # Being carried up, as no vehicle climbs, makes the heights tell nothing until then.
-            begin = max(begin, _CARRIED_UNTIL)
+            begin = max(begin, SETTLED)
             end = round(begin + lasts, 3)
         return SensorFault(sensor, how, begin, end)
     if kind == "stalls":
@@ -174,8 +177,7 @@ def _with_second_source(chance: random.Random, drawn: Scenario, around: float) -
 
 
 def _second_fault(chance: random.Random, source: str, around: float) -> Fault:
-    begin = round(around + chance.uniform(-2.0, 2.0), 3)
-    lasts = round(chance.choice((chance.uniform(0.1, 1.0), chance.uniform(1.0, 5.0))), 3)
+    begin, lasts = _when(chance, around)
     kind = chance.choices(("way", "stop", "sensor"), (2, 1, 3))[0]
     if kind == "way":
         return WayFault(source, _spell(chance, begin, round(begin + lasts, 3)))
@@ -183,7 +185,7 @@ def _second_fault(chance: random.Random, source: str, around: float) -> Fault:
         return Stop(source, begin, min(lasts, 3.0), dies=chance.random() < 0.5)
     sensor = chance.choice(list(SECOND_SENSORS[source]))
     how = chance.choice(SECOND_SENSORS[source][sensor])
-    begin = max(begin, _CARRIED_UNTIL)
+    begin = max(begin, SETTLED)
     return SensorFault(sensor, how, begin, round(begin + lasts, 3), source)
 
 

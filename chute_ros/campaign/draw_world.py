@@ -41,7 +41,12 @@ _FAILS_IN_ONE = 0.1
 #: A manoeuvre ends so high, and a hill leaves so much room, m.
 _ROOM = 15.0
 #: Heights are looked at for a second, of which the flight has settled for 0.3 s.
-_SETTLED = 0.7
+SETTLED = 0.7
+#: Who flies it, where home does this and the vehicle is of this kind.
+_ARDUPILOTS = {
+    (Homing.ZEROED, "fixed_wing"): ARDUPLANE,
+    (Homing.STAYS, "multirotor"): ARDUCOPTER,
+}
 
 
 def in_the_world(chance: random.Random, drawn: Scenario) -> Scenario:
@@ -84,13 +89,9 @@ def _autopilot(chance: random.Random, profile: str) -> Autopilot:
     }
     homing = chance.choices(list(often), list(often.values()))[0]
     drifts = round(chance.uniform(-0.5, 0.5), 2) if chance.random() < _DRIFTS else 0.0
-    kind = GENERIC
+    kind = _ARDUPILOTS.get((homing, profile), GENERIC)
     if homing is Homing.FOLLOWS and chance.random() < 0.6:
         kind = PX4
-    elif homing is Homing.ZEROED and profile == "fixed_wing":
-        kind = ARDUPLANE
-    elif homing is Homing.STAYS and profile == "multirotor":
-        kind = ARDUCOPTER
     return Autopilot(homing, drifts, kind.name, chance.choice((1, 2)))
 
 
@@ -137,7 +138,7 @@ def _over_ground(chance: random.Random, drawn: Scenario) -> Scenario:
 
 
 def _around(chance: random.Random, drawn: Scenario) -> float:
-    return round(max(_SETTLED, drawn.failure_at + chance.uniform(-2.0, 2.0)), 3)
+    return round(max(SETTLED, drawn.failure_at + chance.uniform(-2.0, 2.0)), 3)
 
 
 def _with_estimator(chance: random.Random, drawn: Scenario) -> Scenario:
@@ -190,7 +191,7 @@ def _with_manoeuvre(chance: random.Random, drawn: Scenario) -> Scenario:
         return drawn
     sensors = sensors_of(drawn.vehicle)
     sensor = chance.choice(list(sensors))
-    wrong = max(_SETTLED, begin + chance.uniform(-0.5, 3.0))
+    wrong = max(SETTLED, begin + chance.uniform(-0.5, 3.0))
     end = round(wrong + chance.uniform(0.5, 4.0), 3)
     fault = SensorFault(sensor, chance.choice(sensors[sensor]), round(wrong, 3), end)
     return _with_one_wrong(drawn, fault)

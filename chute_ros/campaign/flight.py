@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 
 from chute_ros.campaign.aircraft import Aircraft
-from chute_ros.campaign.person import Call
 from chute_ros.campaign.rig import Rig
-from chute_ros.campaign.scenario import (
-    ClockJump,
-    Fault,
-    HomeMove,
-    Scenario,
-    Stop,
-    WayFault,
-)
+from chute_ros.campaign.scenario import ClockJump, Fault, HomeMove, Scenario, Stop, WayFault
 from chute_ros.campaign.shipped import Shipped
-from chute_ros.campaign.truth import Truth
+from chute_ros.campaign.truth import Course
 from chute_ros.campaign.virtual_node import Acted
 from chute_ros.links.api import load
 from chute_ros.model import Action, Decision
@@ -33,25 +26,24 @@ _SETTLES = 0.3
 #: A flight is followed so long after the last thing that happens to it, and after its release: as
 #: long as anybody would order that again, s.
 _FOLLOWED, _FOLLOWED_RELEASE = 1.5, 2.5
+#: A person waits so long for an answer; where no supervisor leads, the next call comes after this,
+#: s.
+_PATIENCE, _AGAIN = 2.0, 0.5
+_MOST_CALLS = 12
 #: What falls is on the ground by then, s.
 _FALLS = 30.0
 
 
-@dataclass(frozen=True)
-class Flown:
-    """What happened, in virtual s; NaN: it did not."""
+@dataclass(kw_only=True)
+class Flown(Course):
+    """All that happened."""
 
     scenario: Scenario
-    truth: Truth
     #: Why it never took off; empty: it did.
     grounded: str
     #: From when on the scenario's times count.
     up: float
     killed: float
-    released: float
-    landed: float
-    landing_speed: float
-    release_height: float
     #: Orders to release that a node sent, or a supervisor decided, although it had heard that the
     #: parachute is out.
     ordered_again: int
@@ -59,22 +51,13 @@ class Flown:
     decided: tuple[tuple[float, Decision], ...]
     acted: tuple[Acted, ...]
     said: tuple[tuple[float, str], ...]
+    alarmed: tuple[tuple[float, str], ...]
     #: When lines of a rocket's flight computer came whole.
-    told: tuple[float, ...] = ()
+    told: tuple[float, ...]
     #: When the only parachute refused its release, as by the height that it is told it stands.
-    refused: float = math.nan
+    refused: float
     #: What the person was answered; empty: nothing.
-    answer: str = ""
-    #: When less than half of its weight last carried it in its fall.
-    light_until: float = math.nan
-    #: When a second parachute came out, as the first one did not carry; when that was in time.
-    released_another: float = math.nan
-    another: Truth = Truth()
-    #: When the autopilot released a parachute that nobody had ordered.
-    opened_by_kill: float = math.nan
-    #: From when until when it fell past the height of its take-off, high above the ground.
-    unclear: tuple[float, float] = (math.nan, math.nan)
-    alarmed: tuple[tuple[float, str], ...] = ()
+    answer: str
 
 
 def _end_of(fault: Fault) -> float:
@@ -85,6 +68,34 @@ def _end_of(fault: Fault) -> float:
     return fault.at if isinstance(fault, (ClockJump, HomeMove)) else fault.end
 
 
+class Call:
+    """One wish of a person at the services of the supervisor that leads, called again where there
+    is no answer, or where another leads. make: the input of the core with a token."""
+
+    def __init__(self, rig: Rig, make: Callable[[int], i.Input]) -> None:
+        self._rig, self._make = rig, make
+        self._calls = 0
+        self.answer: i.Finish | None = None
+
+    def begin(self, now: float) -> None:
+        """Call, and again until there is an answer."""
+        if self.answer is not None or self._calls >= _MOST_CALLS:
+            return
+        self._calls += 1
+        leader = self._rig.leader
+        if leader is not None:
+            leader.call(self._make, self._answered)
+        self._rig.world.post(now + (_AGAIN if leader is None else _PATIENCE), self.begin)
+
+    def _answered(self, answer: i.Finish) -> None:
+        if self.answer is not None:
+            return
+        if i.CALL_AGAIN in answer.message and not answer.accepted:
+            self._rig.world.post(self._rig.world.now + _AGAIN, self.begin)
+        else:
+            self.answer = answer
+
+
 class Flight:
     """Everything that lives in one world."""
 
@@ -92,11 +103,9 @@ class Flight:
         self.scenario = scenario
         kind: type[Rig] = load(scenario.carries.rig) if scenario.carries.rig else Aircraft
         self.rig: Rig = kind(scenario, shipped)
-        self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
+        self._arming: Call | None = None
         self._person = Call(self.rig, self._wish)
-        self.up = math.nan
-        self._took_off = math.nan
-        self._arms_at = math.nan
+        self.up = self._took_off = math.nan
         self.rig.world.post(_FIRST_LOOK, self._look)
 
     def _wish(self, token: int) -> i.Input:
@@ -113,13 +122,13 @@ class Flight:
         if not math.isnan(self._took_off):
             rig.world.run(self._took_off + _UP_WITHIN, lambda: not math.isnan(self.up))
         if not math.isnan(self.up):
-            last = max([scenario.failure_at, *map(_end_of, scenario.faults)])
+            happens = [scenario.failure_at, scenario.apogee_at + 1.0]
+            happens += map(_end_of, scenario.faults)
             if scenario.manoeuvre is not None:
-                last = max(last, scenario.manoeuvre.begin + scenario.manoeuvre.lasts + 2.0)
-            last = max(
-                last, scenario.apogee_at + 1.0, scenario.person.at if scenario.person else 0.0
-            )
-            quiet = self.up + last + _FOLLOWED
+                happens.append(scenario.manoeuvre.begin + scenario.manoeuvre.lasts + 2.0)
+            if scenario.person is not None:
+                happens.append(scenario.person.at)
+            quiet = self.up + max(happens) + _FOLLOWED
             rig.world.run(quiet + _FALLS, lambda: self._over(quiet))
         return self._flown()
 
@@ -145,13 +154,12 @@ class Flight:
             return False
         if not self.scenario.arms:
             return True
-        if math.isnan(self._arms_at):
-            self._arms_at = now
+        if self._arming is None:
+            self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
             self._arming.begin(now)
         answer = self._arming.answer
         if answer is not None and not answer.success:
-            self._arming = Call(self.rig, lambda token: i.ArmRequest(token, True, 0))
-            self._arms_at = math.nan
+            self._arming = None  # until the next look
         return answer is not None and answer.success
 
     def _is_believed(self) -> bool:
@@ -178,7 +186,9 @@ class Flight:
 
     def _flown(self) -> Flown:
         rig = self.rig
-        acted = sorted((one for node in rig.nodes.values() for one in node.acted), key=_at)
+        acted = sorted(
+            (one for node in rig.nodes.values() for one in node.acted), key=lambda one: one.at
+        )
         killed = [one.at for one in acted if one.decision.action is Action.KILL]
         again = sum(node.ordered_again for node in rig.nodes.values())
         for host in rig.supervisors:
@@ -194,33 +204,20 @@ class Flight:
             grounded = "; ".join(text for _, text in said) or "nothing was said"
         answer = self._person.answer
         return Flown(
-            self.scenario,
-            rig.truth,
-            grounded,
-            self.up,
-            killed[0] if killed else math.nan,
-            rig.released,
-            rig.landed,
-            rig.landing_speed,
-            rig.release_height,
-            again,
-            tuple(decided),
-            tuple(acted),
-            tuple(said),
-            tuple(rig.told()),
-            rig.refused_at(),
-            "" if answer is None else f"{answer.success}: {answer.message}",
-            rig.light_until(),
-            rig.released_another,
-            rig.another,
-            rig.opened_by_kill(),
-            rig.unclear(),
-            tuple(sorted(one for host in rig.supervisors for one in host.alarmed)),
+            **{one.name: getattr(rig, one.name) for one in fields(Course)},
+            scenario=self.scenario,
+            grounded=grounded,
+            up=self.up,
+            killed=killed[0] if killed else math.nan,
+            ordered_again=again,
+            decided=tuple(decided),
+            acted=tuple(acted),
+            said=tuple(said),
+            alarmed=tuple(sorted(one for host in rig.supervisors for one in host.alarmed)),
+            told=tuple(rig.told()),
+            refused=rig.refused_at(),
+            answer="" if answer is None else f"{answer.success}: {answer.message}",
         )
-
-
-def _at(one: Acted) -> float:
-    return one.at
 
 
 def fly(scenario: Scenario, shipped: Shipped) -> Flown:

@@ -24,7 +24,7 @@ from chute_ros.campaign.second_source import SecondSource
 from chute_ros.campaign.sensors import SensorFault, Sensors
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.supervisor_host import SupervisorHost
-from chute_ros.campaign.truth import Truth
+from chute_ros.campaign.truth import Course
 from chute_ros.campaign.virtual_node import VirtualNode
 from chute_ros.campaign.world import World
 from chute_ros.runtime.arming import Answered
@@ -35,10 +35,11 @@ from chute_ros.supervisor import inputs as i
 _BETWEEN_STALLS = 0.5
 
 
-class Rig(ABC):
+class Rig(Course, ABC):
     """The subclass plugs in its devices and nodes, and says what becomes of the vehicle."""
 
     def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
+        super().__init__()
         self.scenario, self.shipped = scenario, shipped
         self.world = World()
         self.ros = Ros(self.world, scenario.seed)
@@ -50,17 +51,11 @@ class Rig(ABC):
         self.plugs: dict[str, Plug] = {}
         self._processes: dict[str, Process] = {}
         self._restart: dict[str, Callable[[float], None]] = {}
-        self.truth = Truth()
-        self.released = self.release_height = self.landed = self.landing_speed = math.nan
-        #: When a second parachute came out, as the first one did not carry; since when and until
-        #: when that would have helped.
-        self.released_another, self.another = math.nan, Truth()
         #: When the only parachute refused its release by a wrong height, virtual s; NaN: never.
         self.refused_at: Callable[[], float] = lambda: math.nan
         for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
             config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
-            process = self.process(name)
-            sources = scenario.vehicle_sources
+            process, sources = self.process(name), scenario.vehicle_sources
             host = SupervisorHost(config, sources, process, self.ros, self._call_arm)
             self.supervisors.append(host)
             self._restart[name] = host.start_again
@@ -122,19 +117,6 @@ class Rig(ABC):
     def told(self) -> Sequence[float]:
         """When lines of a rocket's flight computer came whole, virtual s."""
         return ()
-
-    def light_until(self) -> float:
-        """When less than half of its weight last carried it in its fall, virtual s; NaN: never."""
-        return math.nan
-
-    def opened_by_kill(self) -> float:
-        """When its autopilot released a parachute unordered, virtual s; NaN: never."""
-        return math.nan
-
-    def unclear(self) -> tuple[float, float]:
-        """From when until when it fell past the height at which it took off, and the ground was
-        elsewhere, virtual s; NaN: it did not."""
-        return math.nan, math.nan
 
     # -- faults ----------------------------------------------------------------------------------
 

@@ -63,6 +63,12 @@ def flown_vehicles() -> tuple[VehicleKind, ...]:
     return tuple(v for v in vehicles().values() if all(kinds[one].part for one in v.links))
 
 
+#: Their names, for who writes a scenario by hand: Vehicle.MAVLINK is "mavlink".
+Vehicle = enum.Enum(  # type: ignore[misc]  # mypy knows only members that are written here
+    "Vehicle", {one.name.upper(): one.name for one in flown_vehicles()}, type=str
+)
+
+
 def ways_of(vehicle: str) -> tuple[str, ...]:
     """The ways that a spell can lie on."""
     kind = vehicles()[vehicle]
@@ -250,3 +256,42 @@ class Scenario:
     def apogee_at(self) -> float:
         """About when the rocket turns over, s after its launch."""
         return self.burn * (1.0 + (_BURN - _GRAVITY) / _GRAVITY)
+
+
+_KNOWN_BY = {
+    VEHICLE_STATE: ("height", "speed", "tilt", "force", "pressure", "estimator"),
+    **SECOND_SENSORS,
+}
+_SILENCES = (Failure.REBOOT, Failure.POWER, Failure.HANG)
+
+
+def outlives(scenario: Scenario) -> bool:
+    """The autopilot has no power any more, and another source still tells of the vehicle."""
+    return scenario.failure is Failure.POWER and bool(scenario.second_sources)
+
+
+def may_count(scenario: Scenario, fault: SensorFault | EstimatorFault) -> bool:
+    """What this sensor says may be told to the supervisor: its source is the preferred one of
+    those that know it, or one that is preferred falls silent at some time."""
+    teller = fault.source or VEHICLE_STATE
+    for source in scenario.vehicle_sources:
+        if source == teller:
+            return True
+        if fault.sensor in _KNOWN_BY[source] and not _falls_silent(scenario, source):
+            return False
+    return True
+
+
+def _falls_silent(scenario: Scenario, source: str) -> bool:
+    """At some time, or one of its sensors."""
+    is_autopilot = source == VEHICLE_STATE
+    ways = AUTOPILOT_WAYS if is_autopilot else (source,)
+    for one in scenario.faults:
+        if isinstance(one, SensorFault):
+            silent = one.how == "gone" and (one.source or VEHICLE_STATE) == source
+        else:
+            silent = isinstance(one, WayFault) and one.way in ways
+            silent |= isinstance(one, Stop) and one.who in ways
+        if silent:
+            return True
+    return is_autopilot and scenario.failure in _SILENCES

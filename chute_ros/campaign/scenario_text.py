@@ -4,37 +4,29 @@ scenarios are drawn differently one day."""
 from __future__ import annotations
 
 import json
+import typing
 from dataclasses import asdict
 from typing import Any
 
 from chute_ros.campaign.channel import Spell
-from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.manoeuvre import Manoeuvre
 from chute_ros.campaign.scenario import (
     Autopilot,
     Canopy,
-    ClockJump,
     Failure,
     Fault,
-    HomeMove,
     Person,
     Scenario,
-    Stalls,
-    Stop,
     WayFault,
     flown_vehicles,
 )
-from chute_ros.campaign.sensors import SensorFault
 from chute_ros.errors import RecordError
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
 #: Rises when what is written means something else.
 FORMAT = 2
-_FAULTS: dict[str, type[Any]] = {
-    one.__name__: one
-    for one in (WayFault, Stop, Stalls, ClockJump, SensorFault, EstimatorFault, HomeMove)
-}
+_FAULTS: dict[str, type[Any]] = {one.__name__: one for one in typing.get_args(Fault)}
 #: Fields that are parts of their own: none of them is told by null, or by being left out.
 _PARTS: dict[str, type[Any]] = {
     "person": Person,

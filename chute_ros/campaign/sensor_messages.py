@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 
 @dataclass(frozen=True)
@@ -41,45 +42,17 @@ class Imu:
 
 
 @dataclass(frozen=True)
-class Pose:
-    """As geometry_msgs/Pose."""
-
-    position: Vector
-    orientation: Quaternion
-
-
-@dataclass(frozen=True)
-class PoseEstimate:
-    """As geometry_msgs/PoseWithCovariance."""
-
-    pose: Pose
-
-
-@dataclass(frozen=True)
-class Twist:
-    """As geometry_msgs/Twist, in the body's frame."""
-
-    linear: Vector
-
-
-@dataclass(frozen=True)
-class TwistEstimate:
-    """As geometry_msgs/TwistWithCovariance."""
-
-    twist: Twist
-
-
-@dataclass(frozen=True)
 class Odometry:
-    """As nav_msgs/Odometry."""
+    """As nav_msgs/Odometry: pose.pose.position and .orientation, twist.twist.linear."""
 
-    pose: PoseEstimate
-    twist: TwistEstimate
+    pose: SimpleNamespace
+    twist: SimpleNamespace
 
 
 def odometry(height: float, vertical_speed: float, roll: float) -> Odometry:
     """Of a vehicle that moves up or down only: m over the origin, m/s, rad."""
-    position = Vector(z=height)
+    pose = SimpleNamespace(position=Vector(z=height), orientation=rolled(roll))
     # What is upward in the world, seen from a body that is rolled.
     along = Vector(y=vertical_speed * math.sin(roll), z=vertical_speed * math.cos(roll))
-    return Odometry(PoseEstimate(Pose(position, rolled(roll))), TwistEstimate(Twist(along)))
+    twist = SimpleNamespace(linear=along)
+    return Odometry(SimpleNamespace(pose=pose), SimpleNamespace(twist=twist))

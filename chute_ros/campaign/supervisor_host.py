@@ -74,6 +74,7 @@ class SupervisorHost:
         #: When it was first told that a parachute is out.
         self.knew_release = math.nan
         self._kept: State | None = None
+        self._released: frozenset[tuple[str, str]] = frozenset()
         self._begin(_FIRST_EPOCH, None, 0.0)
         for kind in _HEARD:
             ros.subscribe(kind, process, self._take)
@@ -84,7 +85,7 @@ class SupervisorHost:
             ros.subscribe(LeaseClaim, process, self._claim)
 
     def _begin(self, epoch: int, before: State | None, now: float) -> None:
-        start = Start(epoch, f"{self.process.name} {now}", before=before)
+        start = Start(epoch, f"{self.process.name} {now}", before, self._released)
         self.runtime = SupervisorRuntime(self.config, self._lease_config, self, start, now)
         self._hearing = VehicleHearing(
             self._vehicle_sources,
@@ -146,7 +147,7 @@ class SupervisorHost:
 
     def keep(self, state: State) -> None:
         """Until the next start."""
-        self._kept = state
+        self._kept, self._released = state, state.released_since_reset
 
     def offer(self, offered: bool) -> None:
         """Who calls asks the one that leads."""

@@ -48,6 +48,26 @@ class Truth:
         return -1.0 if math.isnan(self.latest) else self.latest - self.at
 
 
+@dataclass(eq=False)
+class Course:
+    """What became of a vehicle, virtual s; NaN: it did not happen."""
+
+    truth: Truth = Truth()
+    released: float = math.nan
+    release_height: float = math.nan
+    landed: float = math.nan
+    landing_speed: float = math.nan
+    #: When a second parachute came out, as the first one did not carry; when that was in time.
+    released_another: float = math.nan
+    another: Truth = Truth()
+    #: When its autopilot released a parachute that nobody had ordered.
+    opened_by_kill: float = math.nan
+    #: When less than half of its weight last carried an aircraft in its fall.
+    light_until: float = math.nan
+    #: From when until when it fell past the height of its take-off, high above the ground.
+    unclear: tuple[float, float] = (math.nan, math.nan)
+
+
 def observe(model: FlightModel, now: float) -> Truth:
     """Nothing carries the aircraft from now on, nor does a canopy that is out already."""
     return Truth(now, now + _latest(_fall_of(model), SOFT), model.height)

@@ -49,10 +49,12 @@ class Newest(Generic[T]):
 
 class KeptFile(Generic[T]):
     """A file with the newest of what it is given. render: the text for it; empty: the file goes.
-    name: of the thread."""
+    name: of the thread. durable: a power cut does not cost it."""
 
-    def __init__(self, path: Path, render: Callable[[T], str], name: str) -> None:
-        self.path = path
+    def __init__(
+        self, path: Path, render: Callable[[T], str], name: str, durable: bool = False
+    ) -> None:
+        self.path, self._durable = path, durable
         #: Why the newest is not in the file; empty: it is.
         self.trouble = ""
         self.times_written = 0
@@ -63,8 +65,7 @@ class KeptFile(Generic[T]):
     def _write(self, value: T) -> None:
         try:
             if text := self._render(value):
-                # Not flushed to the disk: a power cut may cost it, a crash does not.
-                replace_text(self.path, text)
+                replace_text(self.path, text, self._durable)
                 self.times_written += 1
             else:
                 self.path.unlink(missing_ok=True)

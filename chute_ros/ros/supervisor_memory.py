@@ -1,4 +1,7 @@
-"""Keeps the supervisor's state in a file while a flight lasts, for one that starts again in it."""
+"""Keeps the supervisor's state in a file while a flight lasts, for one that starts again in it.
+
+In another file: what was released, until a person resets.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,14 @@ from chute_ros.ros.private_files import read_own_text
 from chute_ros.ros.ros_home import ros_home
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written
+from chute_ros.supervisor.resume import (
+    Left,
+    released_in,
+    resumed,
+    worth_leaving,
+    written,
+    written_released,
+)
 from chute_ros.supervisor.state import State
 
 #: Changes with each start of the computer, with which the monotonic clock begins anew.
@@ -47,6 +57,23 @@ class Memory:
         self._settings = hashlib.sha256(told.encode()).hexdigest()
         self._boot = _BOOT_ID.read_text().strip() if self._within else ""
         self._file = KeptFile(self._path, self._text, "memory") if self._within else None
+        self._released_file = KeptFile(
+            ros_home() / "released" / f"{own}.json", written_released, "released", durable=True
+        )
+        self._released = frozenset[tuple[str, str]]()
+
+    def released(self) -> frozenset[tuple[str, str]]:
+        """What was released since the last reset, before this start. Where that cannot be read,
+        something may have been."""
+        path = self._released_file.path
+        try:
+            self._released = released_in(read_own_text(path))
+        except (FileNotFoundError, NotADirectoryError):
+            pass  # nothing was ever kept there
+        except (OSError, ValueError, RecordError) as error:
+            self._log.error(f"cannot read what was released before this start: {path}: {error}")
+            self._released = frozenset({("a parachute that is not known", f"({path} is damaged)")})
+        return self._released
 
     def recall(self) -> State | None:
         """The saved state, read once: a state that ends this process does not end the next."""
@@ -69,6 +96,9 @@ class Memory:
 
     def keep(self, state: State) -> None:
         """The newest state."""
+        if state.released_since_reset != self._released:
+            self._released = state.released_since_reset
+            self._released_file.keep(state)
         if self._file is not None:
             self._file.keep(state)
 
@@ -80,6 +110,9 @@ class Memory:
             if self._file.trouble:
                 level = diagnostics.WARN
                 text = f"a restart in flight would lose it: {self._file.trouble}"
+        if self._released_file.trouble:
+            level = diagnostics.WARN
+            text = f"a restart would forget what was released: {self._released_file.trouble}"
         written_times = 0 if self._file is None else self._file.times_written
         values = {"file": str(self._path), "times written": written_times}
         return diagnostics.status(name, "memory", level, text, values, "")
@@ -88,6 +121,7 @@ class Memory:
         """Write what waits, then the name is free."""
         if self._file is not None:
             self._file.close()
+        self._released_file.close()
         self._lock.close()
 
     def _text(self, state: State) -> str:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import RuleState, SafetyState
+from chute_msgs.msg import RuleState, SafetyState, SafetySummary
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.ros import diagnostics, messages
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
-from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.policy import judge
-from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.preflight import block_reasons, link_problem
 from chute_ros.supervisor.readings import doubt, measured, unusable
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
@@ -33,7 +33,7 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         supervisor=told.supervisor,
         epoch=state.epoch,
         state=int(state.stage),
-        state_text=_text(state, reasons),
+        state_text=_text(config, state, reasons),
         mode=int(state.mode),
         flight_blocked=blocked,
         block_reasons=list(reasons) if blocked else [],
@@ -59,6 +59,29 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         message.decision_action = int(state.newest.action)
         message.decision_rule = state.newest.rule
     return message
+
+
+def summary_message(
+    config: SupervisorConfig, told: SafetyTold, whole: SafetyState
+) -> SafetySummary:
+    """safety/summary. whole: the message of the same for safety/state."""
+    state = told.state
+    return SafetySummary(
+        header=whole.header,
+        supervisor=whole.supervisor,
+        state=whole.state,
+        state_name=state.stage.name,
+        text=whole.state_text,
+        mode=whole.mode,
+        flight_blocked=whole.flight_blocked,
+        armed=[" ".join(one) for one in state.armed(config)],
+        released=[" ".join(one) for one in sorted(state.released_since_reset)],
+        links_ok=sum(
+            not link_problem(config, one, state.evidence(one), told.now) for one in config.links
+        ),
+        links=len(config.links),
+        alarms=len(whole.alarms),
+    )
 
 
 def decisions_task(
@@ -97,7 +120,7 @@ def decisions_task(
         in_doubt = doubt(state, measurement, value, now)
         told = f"{value:.2f} (in doubt: {in_doubt})" if in_doubt else f"{value:.2f}"
         values[measurement] = f"unusable: {why}" if why else told
-    return diagnostics.status(name, "decisions", level, _text(state, reasons), values, "")
+    return diagnostics.status(name, "decisions", level, _text(config, state, reasons), values, "")
 
 
 def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float) -> RuleState:
@@ -118,8 +141,11 @@ def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float
     )
 
 
-def _text(state: State, reasons: tuple[str, ...]) -> str:
+def _text(config: SupervisorConfig, state: State, reasons: tuple[str, ...]) -> str:
     text = _stage_text(state, reasons)
+    armed = ", ".join(map(" ".join, state.armed(config)))
+    if armed and state.stage in ON_GROUND and state.stage is not Stage.ARMED:
+        text += f"; ARMED all the same: {armed} (safety/arm disarms)"
     return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
 
 

@@ -10,7 +10,7 @@ device nodes do what on_supervisor_lost says.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from operator import attrgetter
@@ -49,12 +49,14 @@ class FinishedTurn:
 @dataclass(frozen=True)
 class Start:
     """epoch: rises from start to start; before: the state that the last one left, None: none that
-    is to be gone on with; instance: a text that no other supervisor has."""
+    is to be gone on with; released: what was released since the last reset, of whatever start;
+    instance: a text that no other supervisor has."""
 
     epoch: int
     instance: str
-    mode: inputs.Mode = inputs.Mode.ACTIVE
     before: State | None = None
+    released: frozenset[tuple[str, str]] = frozenset()
+    mode: inputs.Mode = inputs.Mode.ACTIVE
 
 
 class SupervisorShell(LeaseShell, ArmCaller, Protocol):
@@ -97,6 +99,8 @@ class SupervisorRuntime:
             if not lease.standby:
                 above = epoch_above(max(epoch, start.before.epoch), lease.rank)
                 self._first = (inputs.TakeOver(above),)
+        released = self.state.released_since_reset | start.released
+        self.state = replace(self.state, released_since_reset=released)
         self.lease = LeaseKeeper(lease, start.instance, shell, self, now)
         self._arming = DeviceArming(shell, self._armed)
         self.afterwards = DeferredWork()
@@ -277,7 +281,7 @@ def _told(decision: Decision) -> str:
     shadow = " (SHADOW, not sent)" if decision.shadow else ""
     device = f" device {decision.device}" if decision.device else ""
     return (
-        f"decision {decision.epoch}.{decision.id} {decision.action.name}{shadow} by rule "
+        f"{decision.named}: {decision.action.name}{shadow} by rule "
         f"'{decision.rule}' to {', '.join(decision.targets)}{device}: "
         f"{'; '.join(decision.reasons)}"
     )

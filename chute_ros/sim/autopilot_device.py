@@ -43,23 +43,19 @@ class AutopilotDevice(AutopilotTelemetry):
         self._in_air_from = math.inf
         self.terminated = False
         self._stepped_to = math.nan
-        own = {
-            dialect.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat,
-            dialect.MAVLINK_MSG_ID_SYSTEM_TIME: self._system_time,
-            dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_sys_state,
-            dialect.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
-            dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position_int,
-            dialect.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
-            dialect.MAVLINK_MSG_ID_SCALED_IMU: self._scaled_imu,
-        }
-        self.streams |= own
         if kind.targets_of_a_wing:
             self.tell_targets_of_a_wing()
-        # Attitude and acceleration only on request, as many autopilots are delivered.
-        self.default_intervals |= dict.fromkeys(own, 1.0)
-        self.default_intervals[dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT] = 0.2
-        self.default_intervals[dialect.MAVLINK_MSG_ID_ATTITUDE] = math.inf
-        self.default_intervals[dialect.MAVLINK_MSG_ID_SCALED_IMU] = math.inf
+        for message, make, interval in (
+            (dialect.MAVLINK_MSG_ID_HEARTBEAT, self._heartbeat, 1.0),
+            (dialect.MAVLINK_MSG_ID_SYSTEM_TIME, self._system_time, 1.0),
+            (dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, self._extended_sys_state, 1.0),
+            (dialect.MAVLINK_MSG_ID_SYS_STATUS, self._sys_status, 1.0),
+            (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, self._global_position_int, 0.2),
+            # Attitude and acceleration only on request, as many autopilots are delivered.
+            (dialect.MAVLINK_MSG_ID_ATTITUDE, self._attitude, math.inf),
+            (dialect.MAVLINK_MSG_ID_SCALED_IMU, self._scaled_imu, math.inf),
+        ):
+            self.streams[message], self.default_intervals[message] = make, interval
         self.commands |= {
             dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             dialect.MAV_CMD_DO_FLIGHTTERMINATION: self._terminate,

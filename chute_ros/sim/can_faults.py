@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.sim.faults import FaultKnobs, FaultyLink
+from chute_ros.sim.faults import FaultKnobs, FaultyLink, flip_a_byte
 
 _TOGGLE, _START, _END = 0x20, 0x80, 0x40
 #: A frame that is overtaken comes this much later, s.
@@ -24,12 +23,6 @@ class CanFaultKnobs(FaultKnobs):
     toggle: float = 0.0
     #: Only the first frame of a transfer comes.
     half: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("reorder", "toggle", "half"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 1")
 
 
 class CanFaultyLink(FaultyLink):
@@ -68,6 +61,4 @@ class CanFaultyLink(FaultyLink):
         """The frame with one byte of its data wrong, if it is its turn."""
         if self._random.random() >= self._can_knobs.corrupt:
             return frame
-        spoiled = bytearray(frame.data)
-        spoiled[self._random.randrange(len(spoiled))] ^= self._random.randrange(1, 256)
-        return replace(frame, data=bytes(spoiled))
+        return replace(frame, data=flip_a_byte(frame.data, self._random))

@@ -7,10 +7,10 @@ import contextlib
 import math
 import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from chute_ros.errors import ChuteError, ParameterError
 from chute_ros.plain_text import plain
@@ -29,7 +29,9 @@ from chute_ros.transport.wire_events import LoopFault, WireChange
 if TYPE_CHECKING:
     from chute_ros.sim.mavlink_device import MavlinkDevice
 
-
+#: What ends a simulator.
+_ENDS = (signal.SIGINT, signal.SIGTERM)
+KnobsT = TypeVar("KnobsT", bound=FaultKnobs)
 _FAULTS = (
     ("loss", "probability that a packet is lost, 0 to 1, each way"),
     ("duplicate", "probability that a packet is duplicated"),
@@ -118,29 +120,25 @@ def script_of(entries: list[str]) -> list[tuple[float, str]]:
 
 def number(name: str, lowest: int, highest: int) -> Any:
     """A converter for argparse: a whole number in this range, decimal or 0x..."""
-
-    def convert(text: str) -> int:
-        try:
-            value = int(text, 0)
-        except ValueError:
-            value = lowest - 1
-        if not lowest <= value <= highest:
-            raise argparse.ArgumentTypeError(f"{name} {text!r}: need {lowest} to {highest}")
-        return value
-
-    return convert
+    need = f"need {lowest} to {highest}"
+    return _converter(name, lambda text: int(text, 0), lowest, highest, need)
 
 
 def real(name: str, lowest: float, highest: float) -> Any:
     """The same for any number."""
+    return _converter(name, float, lowest, highest, f"need {lowest:g} to {highest:g}")
 
+
+def _converter(
+    name: str, kind: Callable[[str], float], lowest: float, highest: float, need: str
+) -> Any:
     def convert(text: str) -> float:
         try:
-            value = float(text)
+            value = kind(text)
         except ValueError:
             value = math.nan
         if not lowest <= value <= highest:
-            raise argparse.ArgumentTypeError(f"{name} {text!r}: need {lowest:g} to {highest:g}")
+            raise argparse.ArgumentTypeError(f"{name} {text!r}: {need}")
         return value
 
     return convert
@@ -160,34 +158,30 @@ class Acting(ProtocolLink, Protocol):
 
 def _check_script(device: Acting, options: argparse.Namespace) -> None:
     for _, action in script_of(options.at):
-        _check_action(device, action)
-
-
-def _check_action(device: Acting, action: str) -> None:
-    name, equals, argument = action.partition("=")
-    if name not in device.actions:
-        known = ", ".join(sorted(device.actions))
-        raise ParameterError(f"--at: action {name!r} is not known: need one of {known}")
-    taken = device.arguments.get(name)
-    if taken is None:
-        if equals:
+        name, equals, argument = action.partition("=")
+        if name not in device.actions:
+            known = ", ".join(sorted(device.actions))
+            raise ParameterError(f"--at: action {name!r} is not known: need one of {known}")
+        taken = device.arguments.get(name)
+        if taken is None and equals:
             raise ParameterError(f"--at: action {action!r}: {name} takes no argument")
-        return
-    try:
-        taken.convert(argument)
-    except (KeyError, ValueError):
-        text = f"--at: action {action!r}: {argument!r} is no argument of {name}"
-        raise ParameterError(f"{text}: need {name}={taken.need}") from None
+        if taken is None:
+            continue
+        try:
+            taken.convert(argument)
+        except (KeyError, ValueError):
+            text = f"--at: action {action!r}: {argument!r} is no argument of {name}"
+            raise ParameterError(f"{text}: need {name}={taken.need}") from None
 
 
 def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     """Run device on its wires until SIGINT or SIGTERM; ends with 2 on a user's mistake."""
     if options.signing_key_file:
         device.sign(*signing_from_file(options.signing_key_file, 0, "--signing-key-file"))
-    knobs = FaultKnobs(options.loss, options.duplicate, options.corrupt, options.delay)
-    link = FaultyLink(device, knobs, options.seed)
+    link = FaultyLink(device, _knobs(FaultKnobs, options), options.seed)
     wires = [make_wire(parse_address(text)) for text in _connections(options)]
-    _run_link(device, link, wires, options, _ended())
+    _hold_signals()
+    _run_link(device, link, wires, options)
 
 
 def run_on_can(
@@ -199,22 +193,13 @@ def run_on_can(
     # Here: the simulators on MAVLink do without the library of DroneCAN.
     from chute_ros.transport.can_wire import make_can_wire
 
-    knobs = CanFaultKnobs(
-        options.loss,
-        options.duplicate,
-        options.corrupt,
-        options.delay,
-        options.reorder,
-        options.toggle,
-        options.half,
-    )
-    link = CanFaultyLink(device, knobs, options.seed)
+    link = CanFaultyLink(device, _knobs(CanFaultKnobs, options), options.seed)
     wires: list[Wire] = [
         make_can_wire(parse_can_address(text, options.bitrate)) for text in _connections(options)
     ]
-    ended = _ended()
+    _hold_signals()
     with beside:
-        _run_link(device, link, wires, options, ended)
+        _run_link(device, link, wires, options)
 
 
 def run_on_pty(
@@ -226,7 +211,7 @@ def run_on_pty(
     # First, so that a mistake in it leaves no link behind.
     _check_script(device, options)
     # Whoever sees the link may end it at once.
-    ended = _ended()
+    _hold_signals()
     wire = PtyWire(options.link)
     try:
         wire.open()
@@ -235,19 +220,21 @@ def run_on_pty(
     if not options.quiet:
         print(wire.path + (f" linked from {options.link}" if options.link else ""), flush=True)
     with beside or contextlib.nullcontext():
-        _run_link(device, device, [wire], options, ended)
+        _run_link(device, device, [wire], options)
+
+
+def _knobs(kind: type[KnobsT], options: argparse.Namespace) -> KnobsT:
+    return kind(**{one.name: getattr(options, one.name) for one in fields(kind)})
 
 
 def _connections(options: argparse.Namespace) -> list[str]:
     return options.connection or [options.default_connection]
 
 
-def _ended() -> threading.Event:
-    """Set by SIGINT and SIGTERM, from now on."""
-    ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
-    return ended
+def _hold_signals() -> None:
+    """From now on a signal that ends it waits until _run_link takes it. A handler would run in the
+    middle of whatever the main thread does, and wait for a lock that this holds."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS)
 
 
 def _run_link(
@@ -255,7 +242,6 @@ def _run_link(
     link: ProtocolLink,
     wires: list[Wire],
     options: argparse.Namespace,
-    ended: threading.Event,
 ) -> None:
     _check_script(device, options)
     started = time.monotonic()
@@ -268,7 +254,7 @@ def _run_link(
 
     loop = WireLoop(link, WireBundle(wires), show)
     loop.start()
-    ended.wait()
+    signal.sigwait(_ENDS)
     loop.stop()
 
 

@@ -23,11 +23,10 @@ class FaultKnobs:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("loss", "duplicate", "corrupt"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ParameterError(f"{name} is {getattr(self, name)}: need 0 to 1")
-        if not 0.0 <= self.delay <= 60.0:
-            raise ParameterError(f"delay is {self.delay}: need 0 to 60 s")
+        for name, value in vars(self).items():
+            highest, need = (60.0, "0 to 60 s") if name == "delay" else (1.0, "0 to 1")
+            if not 0.0 <= value <= highest:
+                raise ParameterError(f"{name} is {value}: need {need}")
 
 
 def flip_a_byte(data: bytes, chance: random.Random) -> bytes:

@@ -144,24 +144,14 @@ class MavlinkDevice(Actor):
         if self.mute:
             return
         handler = self.commands.get(message.command)
-        if message.get_type() == "COMMAND_INT" and handler is not None:
-            self._acknowledge(frame, dialect.MAV_RESULT_COMMAND_LONG_ONLY)
-            return
         if handler is None:
-            self._acknowledge(frame, dialect.MAV_RESULT_UNSUPPORTED)
-            return
-        params: Params = (
-            message.param1,
-            message.param2,
-            message.param3,
-            message.param4,
-            message.param5,
-            message.param6,
-            message.param7,
-        )
-        if not all(map(math.isfinite, params[:2])):
+            result = dialect.MAV_RESULT_UNSUPPORTED
+        elif message.get_type() == "COMMAND_INT":
+            result = dialect.MAV_RESULT_COMMAND_LONG_ONLY
+        elif not math.isfinite(message.param1) or not math.isfinite(message.param2):
             result = dialect.MAV_RESULT_DENIED
         else:
+            params: Any = tuple(getattr(message, f"param{number}") for number in range(1, 8))
             result = handler(params)
         self._acknowledge(frame, result)
         for later in self._after_acknowledgement:

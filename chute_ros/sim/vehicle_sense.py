@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -39,7 +40,7 @@ class VehicleSense(MavlinkDevice):
     ) -> None:
         super().__init__(system_id, _COMPONENT_ID, [])
         self._felt, self._released = felt, released
-        self._values = {"height": 0.0, "speed": 0.0, "tilt": 0.0, "acceleration": 9.80665}
+        self._motion = Motion()
         self._heard = -math.inf
         self._asked = -math.inf
         self.streams = {
@@ -71,21 +72,18 @@ class VehicleSense(MavlinkDevice):
             return
         kind = message.get_type()
         if kind == "GLOBAL_POSITION_INT":
-            self._values["height"] = message.relative_alt / 1000.0
-            self._values["speed"] = -message.vz / 100.0
+            told = {"height": message.relative_alt / 1000.0, "vertical_speed": -message.vz / 100.0}
         elif kind == "ATTITUDE":
             self._heard = self.now
             upright = math.cos(message.roll) * math.cos(message.pitch)
-            self._values["tilt"] = math.acos(max(-1.0, min(1.0, upright)))
+            told = {"tilt": math.acos(max(-1.0, min(1.0, upright)))}
         elif kind == "SCALED_IMU":
             length = math.hypot(message.xacc, message.yacc, message.zacc)
-            self._values["acceleration"] = length * _MILLI_G
+            told = {"acceleration": length * _MILLI_G}
         else:
             return
-        values = self._values
-        self._felt(
-            Motion(values["height"], values["speed"], values["tilt"], values["acceleration"])
-        )
+        self._motion = replace(self._motion, **told)
+        self._felt(self._motion)
 
     def _heartbeat(self) -> object:
         return dialect.MAVLink_heartbeat_message(

@@ -11,25 +11,33 @@ from chute_ros.supervisor.turn import Turn
 
 #: What the health of the links can do; in flight nothing.
 _OF_LINKS = (Event.LINKS_UNHEALTHY, Event.LINKS_HEALTHY)
-#: Once `safety/arm` has armed the parachutes, their own status says so within this time, s.
+#: Once the parachutes were armed or disarmed, their own status says so within this time, s.
 ARMED_SHOWS = 2.0
 
 
 def check_armed(turn: Turn) -> None:
-    """ARMED is what the parachutes say: one may be disarmed past us, or start anew."""
+    """ARMED is what the parachutes say: one may be armed or disarmed past us, or start anew."""
     state = turn.state
-    if state.stage is not Stage.ARMED or turn.now < state.stage_since + ARMED_SHOWS:
+    if turn.now < state.stage_since + ARMED_SHOWS:
         return
-    said = [
-        status.armed
-        for link in turn.config.deploy_links
-        for status in state.evidence(link).devices.values()
-        if status.link_state is LinkState.OK
-    ]
-    if said and not any(said):
-        text = "no parachute says any more that it is armed"
-        turn.warn(text)
-        turn.move(Event.DISARMED, text)
+    if state.stage is Stage.READY:
+        _show_armed(turn)
+    elif state.stage is Stage.ARMED and not state.armed(turn.config):
+        told = [
+            status
+            for link in turn.config.deploy_links
+            for status in state.evidence(link).devices.values()
+            if status.link_state is LinkState.OK
+        ]
+        if told:
+            text = "no parachute says any more that it is armed"
+            turn.warn(text)
+            turn.move(Event.DISARMED, text)
+
+
+def _show_armed(turn: Turn) -> None:
+    if armed := turn.state.armed(turn.config):
+        turn.move(Event.ARMED, f"{', '.join(map(' '.join, armed))} says armed")
 
 
 def check_links(turn: Turn) -> None:
@@ -44,6 +52,9 @@ def check_links(turn: Turn) -> None:
     event = Event.LINKS_UNHEALTHY if reasons else Event.LINKS_HEALTHY
     if listed(stage, event):
         turn.move(event, "; ".join(reasons))
+        if not reasons:
+            # What was armed before a link was silent is armed still.
+            _show_armed(turn)
         if not reasons and (text := not_seen(turn.config, turn.state)):
             turn.log(f"not seen in flight: {text}")
 

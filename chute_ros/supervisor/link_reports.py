@@ -10,10 +10,14 @@ from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import flight
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.link_evidence import LinkEvidence
-from chute_ros.supervisor.machine import Event, Stage
+from chute_ros.supervisor.machine import ON_GROUND, Event, Stage
+from chute_ros.supervisor.preflight import RELEASED
 from chute_ros.supervisor.quick_replace import replace
 from chute_ros.supervisor.sending import pending_in, renew, slots
 from chute_ros.supervisor.turn import Turn
+
+#: Parachutes whose release is remembered: made-up names must not grow us.
+MOST_RELEASED = 64
 
 
 def take_heartbeat(turn: Turn, one: i.LinkHeartbeat) -> None:
@@ -72,6 +76,8 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
     # One that started anew has forgotten it, which takes nothing back.
     forgot = said is not None and status.uptime < said.uptime
     _set_evidence(turn, one.link, turn.state.evidence(one.link).with_status(status, turn.now))
+    if status.deployed and not was_out:
+        _note_release(turn, one.link, status.device)
     if alive and not status.deployed:
         before = turn.flight.released_before - {(one.link, status.device)}
         turn.flight = replace(turn.flight, released_before=before)
@@ -85,6 +91,18 @@ def take_parachute(turn: Turn, one: i.ParachuteReport) -> None:
                 turn.alarm(text)
                 turn.move(Event.TAKEN_BACK, text)
                 _unlatch_deploys(turn)
+
+
+def _note_release(turn: Turn, link: str, device: str) -> None:
+    """Whoever did it: nobody flies with it before a person has looked at it."""
+    if link not in turn.config.deploy_links:
+        return
+    since_reset = turn.state.released_since_reset
+    if len(since_reset) < MOST_RELEASED:
+        since_reset = since_reset | {(link, device)}
+    turn.state = replace(turn.state, released_since_reset=since_reset)
+    if not turn.flight.airborne and turn.state.stage in ON_GROUND:
+        turn.alarm(f"{link} {device} {RELEASED}")
 
 
 def _unlatch_deploys(turn: Turn) -> None:

@@ -28,6 +28,7 @@ _UNABLE = {
     6: "the autopilot reports MAV_STATE_EMERGENCY (need STANDBY or ACTIVE): read its own messages",
     8: "the autopilot reports MAV_STATE_FLIGHT_TERMINATION (need STANDBY or ACTIVE): reboot it",
 }
+RELEASED = "was released: repack or replace it, then call safety/reset"
 _EPOCH = datetime.date(1970, 1, 1).toordinal()
 #: A wall clock that says less was never set.
 _FIRST_DAY = datetime.date(2024, 1, 1).toordinal() - _EPOCH
@@ -103,6 +104,8 @@ def block_reasons(config: SupervisorConfig, state: State, now: float) -> tuple[s
         for rule in config.profile.rules
         if rule.action is Action.FLIGHT_BLOCK and state.rule(rule.name).latched
     ]
+    if state.stage is not Stage.LANDED:  # with motors armed it may have bounced, and fall on
+        reasons += [f"{' '.join(one)} {RELEASED}" for one in sorted(state.released_since_reset)]
     if config.require_vehicle_state and (text := _vehicle_problem(config, state, now)):
         reasons.append(text)
     if state.stage in (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT):

@@ -132,6 +132,7 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
             asks=MappingProxyType({}),
             # A device that still wants it asks again; one that was exchanged cannot.
             device_blocks=MappingProxyType({}),
+            released_since_reset=frozenset(),
         )
         turn.killing = replace(turn.killing, kill=None, killed_in_flight=False, kill_only=False)
         turn.deploying = replace(turn.deploying, deploys=())

@@ -6,6 +6,7 @@ have aged, and what no device has begun is decided anew under the next epoch.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 
 from chute_ros.errors import RecordError
@@ -31,6 +32,26 @@ _CODEC = Codec(Left)
 def worth_leaving(state: State) -> bool:
     """On the ground with nothing under way a start anew is as good, and clears alarms."""
     return state.flight.airborne or state.stage not in ON_GROUND
+
+
+def written_released(state: State) -> str:
+    """What was released since the last reset, as JSON text; empty: nothing was."""
+    released = sorted(state.released_since_reset)
+    return json.dumps(released) if released else ""
+
+
+def released_in(text: str) -> frozenset[tuple[str, str]]:
+    """What was written. RecordError: nothing that was."""
+    try:
+        told = json.loads(text)
+    except ValueError as error:
+        raise RecordError(str(error)) from error
+    listed = isinstance(told, list) and all(
+        isinstance(one, list) and [type(part) for part in one] == [str, str] for one in told
+    )
+    if not listed:
+        raise RecordError(f"no list of links and devices: {text[:80]!r}")
+    return frozenset((link, device) for link, device in told)
 
 
 def written(left: Left) -> str:

@@ -173,6 +173,9 @@ class State:
     block: Pending | None = None
     #: "link device" of those that asked to block flight and have not released it -> why.
     device_blocks: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    #: (link, device) that have reported released since the last reset, whoever released them. One
+    #: that starts anew and has forgotten it stays until a person resets.
+    released_since_reset: frozenset[tuple[str, str]] = frozenset()
     #: It was said that no more of them are remembered.
     block_refused: bool = False
     killing: Killing = field(default=Killing(), metadata=INLINE)
@@ -233,6 +236,15 @@ class State:
             for link in config.deploy_links
             for device in self.evidence(link).deployed
         )
+
+    def armed(self, config: SupervisorConfig) -> list[tuple[str, str]]:
+        """(link, device) of every parachute that is received and says that it is armed."""
+        return [
+            (link, device)
+            for link in config.deploy_links
+            for device, status in sorted(self.evidence(link).devices.items())
+            if status.armed and status.link_state is LinkState.OK
+        ]
 
     def newly_released(self, config: SupervisorConfig, now: float) -> frozenset[tuple[str, str]]:
         """Those that were not before the flight, on links that are heard."""

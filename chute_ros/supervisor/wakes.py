@@ -23,7 +23,7 @@ def next_deadline(config: SupervisorConfig, state: State, now: float) -> float:
         since = state.heard.vehicle_received - state.heard.vehicle.armed_age
         # Just after the limit, which still counts as young enough.
         deadlines.append(math.nextafter(since + config.vehicle_state_age, math.inf) + JUST_AFTER)
-    if state.stage is Stage.ARMED:
+    if state.stage in (Stage.READY, Stage.ARMED):
         deadlines.append(state.stage_since + ARMED_SHOWS)
     if state.stage is Stage.STARTUP:
         deadlines += [state.started_at + config.limits(one).startup_grace for one in config.links]

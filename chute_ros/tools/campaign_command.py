@@ -21,9 +21,8 @@ from chute_ros.campaign.judge import Count
 from chute_ros.campaign.page import page
 from chute_ros.campaign.picture import picture
 from chute_ros.campaign.rare import OfEach, rare
-from chute_ros.campaign.scenario import Scenario
+from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
-from chute_ros.campaign.sensor_sources import outlives
 from chute_ros.errors import RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
@@ -244,7 +243,7 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     up, truth, person, flies = flown.up, flown.truth, scenario.person, scenario.manoeuvre
     lines = [(at, f"said: {text}") for at, text in flown.said]
     for at, one in flown.decided:
-        what = f"decided {one.epoch}.{one.id} {one.action.name} by {one.rule!r}"
+        what = f"{one.named}: {one.action.name} by {one.rule!r}"
         lines.append((at, f"{what}: {'; '.join(one.reasons)}"))
     lines += [(act.at, f"{act.node} acts on {act.decision.action.name}") for act in flown.acted]
     for at, what in (

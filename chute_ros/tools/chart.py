@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+#: A moment, s, and the letter that stands for it.
+Mark = tuple[float, str]
+
 
 def chart(
-    points: list[tuple[float, float]], marks: list[tuple[float, str]], width: int, rows: int
+    points: list[tuple[float, float]], marks: list[Mark], width: int, rows: int
 ) -> list[str]:
-    """Lines of a chart of points (s, m), with marks (s, one letter) below the axis."""
+    """Lines of a chart of points (s, m), with marks below the axis."""
     start, end = points[0][0], points[-1][0]
     span = max(end - start, 1e-9)
     top = max(height for _, height in points) or 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -17,6 +18,7 @@ from chute_ros.errors import ChuteError
 from chute_ros.ros import messages, qos
 from chute_ros.ros.middleware import set_up_middleware
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.chart import Mark, chart
 from chute_ros.tools.processes import Processes
 
 
@@ -31,7 +33,8 @@ class Director:
         self._processes = processes
         self._started = time.monotonic()
         self._wall_ahead = time.time() - self._started
-        self._failure_at: float | None = None
+        #: From then on times count from the failure; NaN: it has not come.
+        self.failure_at = math.nan
         self.vehicle = VehicleState()
         #: The newest status of each link's parachute.
         self.parachutes: dict[str, ParachuteStatus] = {}
@@ -65,23 +68,27 @@ class Director:
 
     def failure_now(self) -> None:
         """From here on times count from the failure."""
-        self._failure_at = time.monotonic()
-
-    def clock(self) -> str:
-        """Time since the failure, or since the start before it."""
-        now = time.monotonic()
-        if self._failure_at is not None:
-            return f"T+{now - self._failure_at:6.2f} s"
-        return f"  {now - self._started:6.2f} s"
-
-    def since_failure(self, when: float) -> float:
-        """Seconds from the failure to when."""
-        assert self._failure_at is not None
-        return when - self._failure_at
+        self.failure_at = time.monotonic()
 
     def say(self, who: str, text: str) -> None:
-        """One line of the story."""
-        print(f"{self.clock()}  {who:<17} {text}", flush=True)
+        """One line of the story, with the time since the failure, or since the start before it."""
+        now = time.monotonic()
+        clock = f"  {now - self._started:6.2f} s"
+        if not math.isnan(self.failure_at):
+            clock = f"T+{now - self.failure_at:6.2f} s"
+        print(f"{clock}  {who:<17} {text}", flush=True)
+
+    def summarize(
+        self, steps: list[tuple[str, float]], since: str, heights: str, marks: list[Mark]
+    ) -> None:
+        """When each step came, since the failure, and the heights over time as a picture."""
+        print(f"\n  since the {since}")
+        for name, when in steps:
+            print(f"    {when - self.failure_at:7.3f} s  {name}")
+        print(f"\n  {heights}")
+        for line in chart(self.track, marks, width=64, rows=11):
+            print("  " + line)
+        print("\nDEMO PASSED: every step happened, the kill before the deploy")
 
     def _told(self, message: SafetyDecision | ActionReport | ParachuteStatus) -> float:
         """When its node told it. Messages of two topics reach us in either order."""
@@ -123,20 +130,25 @@ class Director:
         """Every link's parachute that was heard meets condition, and there is one."""
         return bool(self.parachutes) and all(map(condition, self.parachutes.values()))
 
-    def outcome(self, action: model.Action, outcome: model.Outcome) -> ActionReport | None:
-        """The first report of this outcome of this action."""
-        for _, report in self.reports:
-            if (report.action, report.outcome) == (action, outcome):
-                return report
-        return None
+    def reported(self, action: model.Action, outcome: model.Outcome) -> Callable[[], bool]:
+        """A link has reported this outcome of this action."""
+        return lambda: bool(self._when(action, outcome))
 
     def when(self, action: model.Action, outcome: model.Outcome) -> float:
-        """When that was reported."""
-        return next(
-            when
-            for when, report in self.reports
-            if (report.action, report.outcome) == (action, outcome)
-        )
+        """When that was first reported."""
+        return self._when(action, outcome)[0]
+
+    def _when(self, action: model.Action, outcome: model.Outcome) -> list[float]:
+        wanted = (action, outcome)
+        return [when for when, one in self.reports if (one.action, one.outcome) == wanted]
+
+    def decided(self, action: model.Action) -> Callable[[], bool]:
+        """The supervisor has decided this."""
+        return lambda: any(one.action == action for _, one in self.decisions)
+
+    def decision(self, action: model.Action) -> tuple[float, SafetyDecision]:
+        """The first that was, and when."""
+        return next((when, one) for when, one in self.decisions if one.action == action)
 
     def ask_arm(self) -> Any:
         """Call safety/arm; the future of its answer."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.processes import Processes
+from chute_ros.tools.processes import Processes, ros_arguments
 
 MAVLINK, UPF = "mavlink_parachute", "upf_can"
 #: Links that have the parachute, by the name of the rig.
@@ -19,7 +19,7 @@ KINDS: dict[str, tuple[str, ...]] = {
 FAULTS = {"parachute-silent": ("--at", "0:silent"), "parachute-mute": ("--at", "0:mute")}
 _LOCAL = "127.0.0.1"
 #: The operator arms it on the ground: nothing that would do so by itself is on.
-_BY_COMMAND = ("Enable Auto-Takeoff", "Enable Auto-Arm", "Enable Auto-Disarm", "Enable Auto-Land")
+BY_COMMAND = ("Enable Auto-Takeoff", "Enable Auto-Arm", "Enable Auto-Disarm", "Enable Auto-Land")
 
 
 @dataclass(frozen=True)
@@ -54,75 +54,47 @@ class Rig:
         """The parachute's own algorithm fires, not the operator."""
         return self.kind == "upf"
 
-    @property
-    def _node(self) -> tuple[str, ...]:
-        return ("--ros-args", "-r", f"__ns:={self.namespace}")
-
     def start_supervisor(self, name: str, *more: str, on: Sequence[str] = ()) -> None:
         """One supervisor. more: of its command line; on: the host, as for Processes.start."""
         links = ", ".join(dict.fromkeys((MAVLINK, *self.links)))
-        self.processes.start(
-            name,
-            "chute_ros.ros.safety_supervisor",
-            *self._node,
-            *_parameter("required_links", f"[{links}]"),
-            *_parameter("deploy_links", f"[{', '.join(self.links)}]"),
+        node = ros_arguments(
+            self.namespace,
+            required_links=f"[{links}]",
+            deploy_links=f"[{', '.join(self.links)}]",
             # Where the parachute decides by itself, nothing else shall.
-            *_parameter("profile", "by_hand" if self.automatic else "multirotor"),
-            *more,
-            on=on,
+            profile="by_hand" if self.automatic else "multirotor",
         )
+        self.processes.start(name, "chute_ros.ros.safety_supervisor", *node, *more, on=on)
 
     def start_vehicle(self) -> None:
         """The vehicle with the nodes of its links, but for the parachute."""
-        node, start = self._node, self.processes.start
-        start(
-            "mavlink",
-            "chute_ros.links.mavlink",
-            *node,
-            *_parameter("connection", f"udpin:{_LOCAL}:{self.node_port}"),
-            *_parameter("expect_parachute", str(MAVLINK in self.links).lower()),
+        start = self.processes.start
+        node = ros_arguments(
+            self.namespace,
+            connection=f"udpin:{_LOCAL}:{self.node_port}",
+            expect_parachute=str(MAVLINK in self.links).lower(),
         )
+        start("mavlink", "chute_ros.links.mavlink", *node)
         if UPF in self.links:
-            start(
-                "upf_can",
-                "chute_ros.links.upf",
-                *node,
-                *_parameter("connection", self._bus),
-                *_parameter("allocator", "false"),
-            )
-        start(
-            "autopilot",
-            "chute_ros.sim.sim_autopilot",
-            *(
-                "--connection",
-                self._network,
-                "--connection",
-                f"udpin:{_LOCAL}:{self.vehicle_port}",
-            ),
-        )
+            node = ros_arguments(self.namespace, connection=self._bus, allocator="false")
+            start("upf_can", "chute_ros.links.upf", *node)
+        listens = f"udpin:{_LOCAL}:{self.vehicle_port}"
+        wires = ("--connection", self._network, "--connection", listens)
+        start("autopilot", "chute_ros.sim.sim_autopilot", *wires)
 
     def start_parachute(self) -> None:
         """Plug it in."""
         fault = FAULTS.get(self.fault, ())
         if MAVLINK in self.links:
+            module = "chute_ros.links.mavlink.simulator.sim_mavlink_parachute"
             wires = ("--connection", self._network, "--connection", self.pilot)
-            self.processes.start(
-                "parachute",
-                "chute_ros.links.mavlink.simulator.sim_mavlink_parachute",
-                *wires,
-                *fault,
-            )
+            self.processes.start("parachute", module, *wires, *fault)
         if UPF in self.links:
-            off = [*_BY_COMMAND, *(() if self.automatic else ("Enable APS",))]
+            off = [*BY_COMMAND, *(() if self.automatic else ("Enable APS",))]
             parameters = [part for name in off for part in ("--parameter", f"{name}=false")]
-            self.processes.start(
-                "upf",
-                "chute_ros.links.upf.simulator.sim_upf",
-                *("--connection", self._bus, "--vehicle", self.pilot),
-                *parameters,
-                *fault,
-            )
+            wires = ("--connection", self._bus, "--vehicle", self.pilot)
+            module = "chute_ros.links.upf.simulator.sim_upf"
+            self.processes.start("upf", module, *wires, *parameters, *fault)
 
     @property
     def _network(self) -> str:
@@ -131,7 +103,3 @@ class Rig:
     @property
     def _bus(self) -> str:
         return f"mcast:0:{self.bus_port}"
-
-
-def _parameter(name: str, value: str) -> tuple[str, str]:
-    return ("-p", f"{name}:={value}")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Callable
 
 from chute_ros.model import Action, Outcome, TriggerFlags, flag_names
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.chart import chart
 from chute_ros.tools.demo_director import Director, StepFailedError
 from chute_ros.tools.demo_rig import Rig
 from chute_ros.tools.pilot import Pilot
@@ -80,13 +79,13 @@ def _climb(director: Director, pilot: Pilot) -> None:
     director.until("the supervisor sees the take-off", 10.0, director.stage(Stage.IN_FLIGHT))
     director.say("supervisor", "IN_FLIGHT")
     for height in (20.0, 40.0, FAILURE_HEIGHT - 0.5):
-
-        def reached(height: float = height) -> bool:
-            return bool(director.vehicle.height >= height)
-
-        director.until(f"{height:g} m", 20.0, reached)
+        director.until(f"{height:g} m", 20.0, _reached(director, height))
         state = director.vehicle
         director.say("vehicle", f"{state.height:5.1f} m, {state.vertical_speed:+5.1f} m/s")
+
+
+def _reached(director: Director, height: float) -> Callable[[], bool]:
+    return lambda: bool(director.vehicle.height >= height)
 
 
 def _fail(director: Director, pilot: Pilot) -> None:
@@ -101,29 +100,19 @@ def _supervisor_deploys(director: Director) -> None:
         (Action.KILL, (Outcome.SENT,)),
         (Action.DEPLOY, (Outcome.ACCEPTED, Outcome.CONFIRMED)),
     ):
-
-        def decided(action: Action = action) -> bool:
-            return any(decision.action == action for _, decision in director.decisions)
-
-        director.until(f"{action.name} is decided", 10.0, decided)
-        decision = next(one for _, one in director.decisions if one.action == action)
+        director.until(f"{action.name} is decided", 10.0, director.decided(action))
+        _, decision = director.decision(action)
         director.say("supervisor", f"{action.name} by rule '{decision.rule}':")
         for reason in decision.reasons:
             director.say("", f"  {reason}")
         for step in steps:
-
-            def reported(action: Action = action, step: Outcome = step) -> bool:
-                return director.outcome(action, step) is not None
-
-            director.until(f"the {action.name} is reported {step.name}", 10.0, reported)
+            what = f"the {action.name} is reported {step.name}"
+            director.until(what, 10.0, director.reported(action, step))
 
 
 def _automatic_deployment(director: Director) -> None:
     """The controller feels the fall, asks for the kill, and launches once it is done."""
-
-    def killed() -> bool:
-        return director.outcome(Action.KILL, Outcome.CONFIRMED) is not None
-
+    killed = director.reported(Action.KILL, Outcome.CONFIRMED)
     director.until("the parachute requests the kill, and gets it", 5.0, killed)
     director.say("upf_can", "the motors are off: the kill switch is answered with success")
     director.until("the parachute is out", 5.0, lambda: bool(director.deployed_at))
@@ -160,7 +149,7 @@ def _descend(director: Director) -> None:
 def _summary(director: Director, rig: Rig) -> None:
     """Times since the failure, and the flight as a picture."""
     steps = [
-        ("kill decided", _decided(director, Action.KILL)),
+        ("kill decided", director.decision(Action.KILL)[0]),
         ("kill on the wire", director.when(Action.KILL, Outcome.SENT)),
         ("kill confirmed", director.when(Action.KILL, Outcome.CONFIRMED)),
     ]
@@ -168,7 +157,7 @@ def _summary(director: Director, rig: Rig) -> None:
     if not rig.automatic:
         release = director.when(Action.DEPLOY, Outcome.SENT)
         steps += [
-            ("deploy decided", _decided(director, Action.DEPLOY)),
+            ("deploy decided", director.decision(Action.DEPLOY)[0]),
             ("release on the wire", release),
             ("release acknowledged", director.when(Action.DEPLOY, Outcome.ACCEPTED)),
         ]
@@ -177,16 +166,6 @@ def _summary(director: Director, rig: Rig) -> None:
     order = [times["kill on the wire"], times.get("deploy decided", release), release]
     if order != sorted(order):
         raise StepFailedError(f"the kill did not go before the deploy: {times}")
-    print("\n  since the failure")
-    for name, when in steps:
-        print(f"    {director.since_failure(when):7.3f} s  {name}")
-    marks = [(times["kill decided"], "K"), (release, "D")]
-    failure = time.monotonic() - director.since_failure(time.monotonic())
-    print("\n  height over time (F failure, K kill, D deploy)")
-    for line in chart(director.track, [(failure, "F"), *marks], width=64, rows=11):
-        print("  " + line)
-    print("\nDEMO PASSED: every step happened, the kill before the deploy")
-
-
-def _decided(director: Director, action: Action) -> float:
-    return next(when for when, decision in director.decisions if decision.action == action)
+    marks = [(director.failure_at, "F"), (times["kill decided"], "K"), (release, "D")]
+    heights = "height over time (F failure, K kill, D deploy)"
+    director.summarize(steps, "failure", heights, marks)

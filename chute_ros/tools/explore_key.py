@@ -114,6 +114,7 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         round(state.flight.armed_height, 3),
         _known(state.flight.took_off_height),
         tuple(sorted(state.flight.released_before)),
+        tuple(sorted(state.released_since_reset)),
         tuple(sorted(state.device_blocks)),
         (len(state.own.kill_tokens) > 0, len(state.own.deploy_tokens) > 0),
         (bool(state.alarming.alarms), math.isnan(state.alarming.alarm_at)),

@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from chute_ros.model import Action, Armed, Decision, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -92,6 +93,21 @@ class Memory:
         return self.kill_height - self.kill_sinking * passed - 9.81 / 2.0 * passed**2
 
 
+class Update(NamedTuple):
+    """One update of the core: the states around it, what came, what came out, monotonic s."""
+
+    before: State
+    after: State
+    inputs: tuple[i.Input, ...]
+    outputs: tuple[i.Output, ...]
+    now: float
+
+    @property
+    def decides(self) -> list[i.Decide]:
+        """The decisions that came out."""
+        return [one for one in self.outputs if isinstance(one, i.Decide)]
+
+
 @dataclass
 class Properties:
     """Checks every update; exercised: how often each property had something to say."""
@@ -99,20 +115,13 @@ class Properties:
     config: SupervisorConfig
     exercised: Counter[str] = field(default_factory=Counter)
 
-    def check(
-        self,
-        memory: Memory,
-        before: State,
-        after: State,
-        inputs: tuple[i.Input, ...],
-        outputs: tuple[i.Output, ...],
-        now: float,
-    ) -> Memory:
+    def check(self, memory: Memory, update: Update) -> Memory:
         """The memory after the update; ViolationError: a property does not hold."""
+        before, after, inputs = update.before, update.after, update.inputs
         self.exercised["raises"] += 1
         memory = self._reported(memory, inputs)
         if any(isinstance(one, i.VehicleReport) for one in inputs):
-            memory = self._told_after_kill(memory, after, now)
+            memory = self._told_after_kill(memory, after, update.now)
         reset = after.started_at != before.started_at
         took_off = after.stage is Stage.IN_FLIGHT and before.stage is not Stage.IN_FLIGHT
         if reset or took_off:
@@ -122,24 +131,21 @@ class Properties:
             memory = replace(memory, deploy_confirmed=False)
         if before.stage is Stage.DEPLOYED:
             kept = after.stage is Stage.DEPLOYED or reset or forced
-            kept = kept or self._taken_back(memory, before, after, inputs)
+            kept = kept or self._taken_back(memory, update)
             self._expect("deployed", kept, f"DEPLOYED became {after.stage.name}")
-        self._answers(before, after, inputs, outputs)
-        self._orders(memory, before, after, outputs, now)
+        self._answers(update)
+        self._orders(memory, update)
         if after.stage is Stage.IN_FLIGHT or before.stage is Stage.IN_FLIGHT:
-            self._at_once(before, after, outputs, now)
-        for output in outputs:
-            if isinstance(output, i.Decide):
-                self._mode(before, after, output)
-                memory = self._decision(memory, before, after, output, now)
+            self._at_once(update)
+        for output in update.decides:
+            self._mode(update, output)
+            memory = self._decision(memory, update, output)
         return memory
 
-    def _taken_back(
-        self, memory: Memory, before: State, after: State, inputs: tuple[i.Input, ...]
-    ) -> bool:
-        said = any(isinstance(o, i.ParachuteReport) and not o.status.deployed for o in inputs)
-        ordered = bool(memory.deploy_numbers)
-        return said and not ordered and before.flight.airborne and after.stage is Stage.IN_FLIGHT
+    def _taken_back(self, memory: Memory, update: Update) -> bool:
+        told = [one for one in update.inputs if isinstance(one, i.ParachuteReport)]
+        said = not all(one.status.deployed for one in told) and not memory.deploy_numbers
+        return said and update.before.flight.airborne and update.after.stage is Stage.IN_FLIGHT
 
     def _expect(self, name: str, holds: bool, what: str) -> None:
         self.exercised[name] += 1
@@ -167,39 +173,25 @@ class Properties:
             memory, kill_height=told.height, kill_sinking=max(-told.vertical_speed, 0.0)
         )
 
-    def _answers(
-        self,
-        before: State,
-        after: State,
-        inputs: tuple[i.Input, ...],
-        outputs: tuple[i.Output, ...],
-    ) -> None:
-        waiting = [*before.own.kill_tokens, *before.own.deploy_tokens]
-        waiting += [token for one in inputs if (token := getattr(one, "token", 0))]
-        for output in outputs:
+    def _answers(self, update: Update) -> None:
+        before, after = update.before.own, update.after.own
+        waiting = [*before.kill_tokens, *before.deploy_tokens]
+        waiting += [token for one in update.inputs if (token := getattr(one, "token", 0))]
+        for output in update.outputs:
             if isinstance(output, i.Finish):
                 self._expect("one answer", output.token in waiting, f"request {output.token}")
                 waiting.remove(output.token)
-        left = [*after.own.kill_tokens, *after.own.deploy_tokens]
+        left = [*after.kill_tokens, *after.deploy_tokens]
         self._expect("one answer", set(left) <= set(waiting), f"{left} wait of {waiting}")
 
-    def _orders(
-        self,
-        memory: Memory,
-        before: State,
-        after: State,
-        outputs: tuple[i.Output, ...],
-        now: float,
-    ) -> None:
+    def _orders(self, memory: Memory, update: Update) -> None:
         """A rule wants a deploy: it was ordered in this update, or in SHADOW said."""
+        before, after, now = update.before, update.after, update.now
         rules = {rule.name for rule in self.config.profile.rules}
         rule = after.deploying.deploy_rule
         ordered = rule in rules and before.deploying.deploy_rule != rule
-        said = any(
-            output.decision.action is Action.DEPLOY and output.decision.rule in rules
-            for output in outputs
-            if isinstance(output, i.Decide) and output.decision.shadow
-        )
+        shadowed = [one.decision for one in update.decides if one.decision.shadow]
+        said = any(one.action is Action.DEPLOY and one.rule in rules for one in shadowed)
         # Motors that were off before the kill are not its effect.
         killed = before.stage is Stage.KILLING and before.killing.killed_in_flight
         killed = killed and not memory.kill_standing
@@ -220,13 +212,12 @@ class Properties:
         elif before.flight.airborne and not falls and now - after.heard.vehicle_received > 1.0:
             self.exercised["silence"] += 1
 
-    def _at_once(
-        self, before: State, after: State, outputs: tuple[i.Output, ...], now: float
-    ) -> None:
+    def _at_once(self, update: Update) -> None:
+        before, after = update.before, update.after
         if after.mode is not i.Mode.ACTIVE or before.mode is not i.Mode.ACTIVE:
             return
         if before.stage is Stage.IN_FLIGHT and after.stage is Stage.KILLING:
-            actions = [one.decision.action for one in outputs if isinstance(one, i.Decide)]
+            actions = [one.decision.action for one in update.decides]
             self._expect("at once", Action.KILL in actions, "KILLING without a kill")
         if after.stage is not Stage.IN_FLIGHT:
             return
@@ -236,39 +227,41 @@ class Properties:
                 continue
             if rule.action is Action.KILL and evidence.latched:
                 continue  # it was acted on before the vehicle took off
-            fine = self._stands(after, now) or not self._sign_of_a_fall(after, now)
+            fine = self._stands(after, update.now)
+            fine = fine or not self._sign_of_a_fall(after, update.now)
             self._expect("at once", fine, f"{rule.name!r} is fulfilled, denied {evidence.denied}")
 
-    def _mode(self, before: State, after: State, output: i.Decide) -> None:
+    def _mode(self, update: Update, output: i.Decide) -> None:
         takes_back = output.decision.rule == "mode"
-        if before.mode is after.mode is i.Mode.SHADOW:
+        mode = update.after.mode
+        if update.before.mode is not mode:
+            return
+        if mode is i.Mode.SHADOW:
             fine = output.decision.shadow or takes_back
             self._expect("shadow", fine, output.decision.action.name)
-        elif before.mode is after.mode is i.Mode.INHIBITED:
+        elif mode is i.Mode.INHIBITED:
             self._expect("inhibited", takes_back, output.decision.action.name)
 
-    def _decision(
-        self, memory: Memory, before: State, after: State, output: i.Decide, now: float
-    ) -> Memory:
+    def _decision(self, memory: Memory, update: Update, output: i.Decide) -> Memory:
         decision = output.decision
         number = (decision.epoch, decision.id)
         if not output.again:
             self._expect("numbers", number > memory.newest, f"{number}, {memory.newest}")
             memory = replace(memory, newest=number)
-        if before.stage is after.stage is Stage.DEPLOYED:
+        if update.before.stage is update.after.stage is Stage.DEPLOYED:
             released = decision.action is Action.FLIGHT_BLOCK_RELEASE and decision.rule != "mode"
             wrong = released or decision.action is Action.DEPLOY
             self._expect("stays out", not wrong or decision.shadow, decision.action.name)
         if decision.shadow:
             return memory
         if decision.action is Action.KILL and not output.again:
-            return self._killed(memory, before, after, decision, now)
+            return self._killed(memory, update, decision)
         if decision.action is Action.DEPLOY:
             self._expect("kill first", memory.kill is not None, decision.rule)
             if not memory.deploy_numbers:
-                waited = now - memory.killed_at + _EPSILON
+                waited = update.now - memory.killed_at + _EPSILON
                 delays = [self.config.kill_to_deploy_delay]
-                low = self._low(after, now)
+                low = self._low(update.after, update.now)
                 delays += [self.config.low_kill_to_deploy_delay] if low else []
                 fine = memory.kill_confirmed or waited >= min(delays)
                 self._expect("delay", fine, f"{waited:.2f} s after the kill")
@@ -277,9 +270,8 @@ class Properties:
             return replace(memory, deploy_numbers=numbers)
         return memory
 
-    def _killed(
-        self, memory: Memory, before: State, after: State, decision: Decision, now: float
-    ) -> Memory:
+    def _killed(self, memory: Memory, update: Update, decision: Decision) -> Memory:
+        before, after, now = update.before, update.after, update.now
         number, known = (decision.epoch, decision.id), memory.kill
         again = (
             known is not None
@@ -290,20 +282,17 @@ class Properties:
             # The delay goes on counting from the first.
             return replace(memory, kill_numbers=memory.kill_numbers | {number})
         told, stands = after.heard.vehicle, self._stands(after, now)
-        new = Memory(
-            decision,
-            now,
-            frozenset({number}),
-            deploy_confirmed=memory.deploy_confirmed,
-            newest=memory.newest,
+        new = replace(
+            memory,
+            kill=decision,
+            killed_at=now,
+            kill_numbers=frozenset({number}),
+            kill_confirmed=False,
+            kill_standing=False,
+            deploy_numbers=frozenset(),
         )
         if before.stage is Stage.KILLING:
-            return replace(
-                new,
-                kill_height=memory.kill_height,
-                kill_sinking=memory.kill_sinking,
-                first_killed_at=memory.first_killed_at,
-            )
+            return new
         return replace(
             new,
             kill_standing=stands,
@@ -342,9 +331,5 @@ class Properties:
         told = state.heard.vehicle
         if not now - state.heard.vehicle_received <= 1.0 + _EPSILON:
             return False
-        signs = (
-            told.tilt > math.radians(45.0),
-            told.vertical_speed < -5.0,
-            told.acceleration < 4.0,
-        )
-        return any(signs)
+        falls = told.vertical_speed < -5.0 or told.acceleration < 4.0
+        return falls or told.tilt > math.radians(45.0)

@@ -63,7 +63,11 @@ def configuration(root: Path) -> SupervisorConfig:
 def steps() -> list[Step]:
     """The alphabet."""
     found = [Step(name, _told(vehicle)) for name, vehicle in VEHICLES.items()]
-    found += [Step(f"{name}, for {HELD:g} s", _told(VEHICLES[name]), HELD) for name in _LONG]
+    found += [
+        Step(f"{name}, for {HELD:g} s", _told(vehicle), HELD)
+        for name, vehicle in VEHICLES.items()
+        if name not in _BRIEF
+    ]
     found += [
         Step("nothing comes", lambda *_: (), silent=True),
         Step(f"nothing comes for {SILENCE:g} s", lambda *_: (), SILENCE, silent=True),
@@ -105,83 +109,68 @@ def _to(mode: i.Mode) -> Callable[[int], i.Input]:
     return lambda number: i.ModeRequest(number, mode, True)
 
 
+_LEVEL = VehicleState(
+    link_state=LinkState.OK,
+    armed=Armed.ARMED,
+    armed_age=0.0,
+    landed_state=LandedState.IN_AIR,
+    landed_state_age=0.0,
+    height=50.0,
+    height_age=0.0,
+    vertical_speed_age=0.0,
+    attitude_age=0.0,
+    acceleration=9.8,
+    acceleration_age=0.0,
+    latitude=48.0,
+    longitude=11.0,
+    position_age=0.0,
+    battery_remaining=0.8,
+    battery_age=0.0,
+    system_status=4,
+)
+
+
 def _vehicle(
-    armed: Armed = Armed.ARMED,
-    landed: LandedState = LandedState.IN_AIR,
-    link_state: LinkState = LinkState.OK,
-    tilt: float = 5.0,
-    sink: float = 0.0,
-    force: float = 9.8,
-    height: float = 50.0,
-    status: int = 4,
-    restarts: int = 0,
+    tilt: float = 5.0, sink: float = 0.0, restarts: int = 0, **other: Any
 ) -> VehicleState:
-    return VehicleState(
-        link_state=link_state,
-        armed=armed,
-        armed_age=0.0,
-        landed_state=landed,
-        landed_state_age=0.0,
-        height=height,
-        height_age=0.0,
-        vertical_speed=-sink,
-        vertical_speed_age=0.0,
+    """Degrees, m/s downwards, and what is other than in level flight."""
+    return replace(
+        _LEVEL,
         tilt=math.radians(tilt),
-        attitude_age=0.0,
-        acceleration=force,
-        acceleration_age=0.0,
-        latitude=48.0,
-        longitude=11.0,
-        position_age=0.0,
-        battery_remaining=0.8,
-        battery_age=0.0,
-        system_status=status,
+        vertical_speed=-sink,
         reboot_count=restarts,
         rebooted_in_flight=restarts > 0,
+        **other,
     )
 
 
-_OFF, _DOWN = Armed.DISARMED, LandedState.ON_GROUND
+_OFF = {"armed": Armed.DISARMED}
+_DOWN = {"landed_state": LandedState.ON_GROUND}
 #: What the vehicle can say; each number just over the limit of a rule of the profile.
 VEHICLES = {
     "flies level": _vehicle(),
-    "stands disarmed": _vehicle(_OFF, _DOWN, height=0.1),
-    "stands armed": _vehicle(Armed.ARMED, _DOWN, height=0.1),
-    "lies on its side disarmed": _vehicle(_OFF, _DOWN, tilt=61.0, height=0.1),
-    "lies on its side armed": _vehicle(Armed.ARMED, _DOWN, tilt=61.0, height=0.1),
+    "stands disarmed": _vehicle(**_OFF, **_DOWN, height=0.1),
+    "stands armed": _vehicle(**_DOWN, height=0.1),
+    "lies on its side disarmed": _vehicle(61.0, **_OFF, **_DOWN, height=0.1),
+    "lies on its side armed": _vehicle(61.0, **_DOWN, height=0.1),
     "tips over": _vehicle(tilt=61.0, sink=3.1),
     "tips over below the minimum height": _vehicle(tilt=61.0, sink=3.1, height=9.9),
     "tips over at the ground": _vehicle(tilt=61.0, height=0.5),
-    "on its side disarmed in an emergency": _vehicle(_OFF, tilt=61.0, status=6),
+    "on its side disarmed in an emergency": _vehicle(61.0, **_OFF, system_status=6),
     "sinks": _vehicle(sink=12.1),
-    "falls freely": _vehicle(sink=3.0, force=1.9),
-    "falls and says landed": _vehicle(Armed.ARMED, _DOWN, sink=12.1),
-    "falls and says disarmed": _vehicle(_OFF, LandedState.UNKNOWN, sink=3.0, force=1.9),
+    "falls freely": _vehicle(sink=3.0, acceleration=1.9),
+    "falls and says landed": _vehicle(sink=12.1, **_DOWN),
+    "falls and says disarmed": _vehicle(
+        sink=3.0, **_OFF, landed_state=LandedState.UNKNOWN, acceleration=1.9
+    ),
     "sinks after a restart": _vehicle(sink=5.1, restarts=1),
     "flies level after a restart": _vehicle(restarts=1),
-    "sinks in an emergency": _vehicle(sink=6.1, status=6),
+    "sinks in an emergency": _vehicle(sink=6.1, system_status=6),
     "autopilot LOST, level": _vehicle(link_state=LinkState.LOST),
     "autopilot LOST, sinks": _vehicle(link_state=LinkState.LOST, sink=6.1),
 }
-#: Those of which a step lasts HELD as well.
-_LONG = (
-    "flies level",
-    "stands disarmed",
-    "stands armed",
-    "lies on its side disarmed",
-    "lies on its side armed",
-    "tips over",
-    "tips over below the minimum height",
-    "tips over at the ground",
-    "on its side disarmed in an emergency",
-    "sinks",
-    "falls and says landed",
-    "falls and says disarmed",
-    "sinks after a restart",
-    "sinks in an emergency",
-    "autopilot LOST, level",
-    "autopilot LOST, sinks",
-)
+#: A step lasts HELD as well with all but these.
+_BRIEF = ("falls freely", "flies level after a restart")
 
 
 def _beats(differs: dict[str, dict[str, Any]] | None = None) -> Make:

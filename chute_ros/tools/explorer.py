@@ -18,7 +18,13 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.wakes import next_deadline
 from chute_ros.tools.explore_key import canonical
-from chute_ros.tools.explore_properties import PROPERTIES, Memory, Properties, ViolationError
+from chute_ros.tools.explore_properties import (
+    PROPERTIES,
+    Memory,
+    Properties,
+    Update,
+    ViolationError,
+)
 from chute_ros.tools.explore_steps import (
     FIRST,
     HELD,
@@ -146,7 +152,7 @@ class Explorer:
                 return None
             try:
                 after, outputs = self._updated(state, inputs, now)
-                memory = self.properties.check(memory, state, after, inputs, outputs, now)
+                memory = self.properties.check(memory, Update(state, after, inputs, outputs, now))
             except ViolationError:
                 self.found.story = [*node.story(), step.name]
                 raise

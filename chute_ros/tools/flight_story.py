@@ -12,8 +12,7 @@ from chute_ros.model import Action, Decision
 from chute_ros.ros.messages import decision_from
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.recording import Recording
-from chute_ros.tools.stage_tones import ACTION_TONES, OUTCOME_TONES
-from chute_ros.tools.timeline_rows import Mark
+from chute_ros.tools.timeline_rows import ACTION_TONES, OUTCOME_TONES, Mark
 
 DECISION = "safety/decision"
 #: The inputs by which somebody asks for something.

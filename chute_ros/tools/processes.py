@@ -18,6 +18,12 @@ class ProcessEndedError(ChuteError):
     """A child ended by itself. The text shows the end of what it wrote."""
 
 
+def ros_arguments(namespace: str, **parameters: object) -> list[str]:
+    """The end of a node's command line: where it is, and its parameters, as YAML."""
+    given = [part for name, value in parameters.items() for part in ("-p", f"{name}:={value}")]
+    return ["--ros-args", "-r", f"__ns:={namespace}", *given]
+
+
 class Processes:
     """Modules of ours, each in a Python of its own."""
 
@@ -37,11 +43,7 @@ class Processes:
             self._running[name] = subprocess.Popen(
                 [*on, sys.executable, "-m", module, *arguments],
                 # Buffered, the last words of one that crashes would come before what led to them.
-                env={
-                    **os.environ,
-                    "PYTHONUNBUFFERED": "1",
-                    "ROS_HOME": str(self.ros_home),
-                },
+                env={**os.environ, "PYTHONUNBUFFERED": "1", "ROS_HOME": str(self.ros_home)},
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

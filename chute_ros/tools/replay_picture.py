@@ -8,9 +8,19 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.state import State
 from chute_ros.tools.recording import Recording
 from chute_ros.tools.replaying import Outputs, told
-from chute_ros.tools.stage_tones import ACTION_TONES, STAGE_TONES
 from chute_ros.tools.timeline import close_up, draw
-from chute_ros.tools.timeline_rows import STYLE, Band, Curve, Mark, Marks, Row, Segment, Window
+from chute_ros.tools.timeline_rows import (
+    ACTION_TONES,
+    STAGE_TONES,
+    STYLE,
+    Band,
+    Curve,
+    Mark,
+    Marks,
+    Row,
+    Segment,
+    Window,
+)
 
 _FIRED = ("KILL", "DEPLOY")
 

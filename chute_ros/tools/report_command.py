@@ -8,21 +8,29 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
+from builtin_interfaces.msg import Time
 from chute_msgs.msg import SafetyDecision, SafetyState
 
 from chute_ros.errors import ChuteError
+from chute_ros.ros.supervisor_messages import state_message
+from chute_ros.runtime.topics import SafetyTold
 from chute_ros.tools.flight_story import DECISION, tell
-from chute_ros.tools.recording import files_of, read
+from chute_ros.tools.progress import Progress
+from chute_ros.tools.recording import Recording, files_of, read
 from chute_ros.tools.recording_options import complain, recording_options
 from chute_ros.tools.replay_picture import vehicle_curves
-from chute_ros.tools.replayed_states import replayed_states
+from chute_ros.tools.replaying import Replayer
 from chute_ros.tools.report_page import page
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline import close_up, draw
 from chute_ros.tools.timeline_rows import Marks, Row, Window
 
 STATE = "safety/state"
+#: Pictures between which nothing came out of the core are this far apart, s; but never so many
+#: that nobody could see them all.
+_APART, _MOST = 0.05, 20_000
 
 
 def main() -> None:
@@ -72,3 +80,23 @@ def report(files: list[Path]) -> str:
     if len(files) > 1:
         title += f" and {len(files) - 1} more"
     return page(title, recording, story, rules_of(states), draw(rows, windows, title))
+
+
+def replayed_states(recording: Recording) -> list[tuple[float, Any]]:
+    """(s from the start, SafetyState) by deciding once more what was recorded; nothing from what
+    cannot be replayed."""
+    core = Replayer()
+    apart = max(_APART, recording.seconds(recording.turns[-1].wall) / _MOST)
+    progress = Progress("replaying", len(recording.turns))
+    pictures: list[tuple[float, Any]] = []
+    for number, turn in enumerate(recording.turns):
+        progress.at(number)
+        outputs = core.step(turn)
+        if outputs is None or core.state is None or core.config is None:
+            continue
+        at = recording.seconds(turn.wall)
+        if outputs or not pictures or not 0.0 <= at - pictures[-1][0] < apart:
+            told = SafetyTold("", core.state, {}, turn.turn.now)
+            picture = state_message(core.config, told, Time())
+            pictures.append((at, picture))
+    return pictures

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 
 from chute_ros.supervisor.record import CODEC
 from chute_ros.tools.flight_story import Decided, FlightStory
-from chute_ros.tools.plain_text import escaped
 from chute_ros.tools.recording import Recording
-from chute_ros.tools.stage_tones import OUTCOME_TONES
 from chute_ros.tools.state_rows import RuleTold
+from chute_ros.tools.timeline import escaped
+from chute_ros.tools.timeline_rows import OUTCOME_TONES
 from chute_ros.tools.timeline_rows import STYLE as TIMELINE_STYLE
 
 STYLE = """
@@ -112,7 +112,7 @@ def _decisions(decisions: Sequence[Decided]) -> str:
 
 
 def _besides(one: Decided) -> str:
-    text = f"{one.decision.epoch}.{one.decision.id}"
+    text = one.decision.named
     if one.decision.shadow:
         text += ", SHADOW: not sent"
     return f'<br><span class="dim">{escaped(text)}</span>'

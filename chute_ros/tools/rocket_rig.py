@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chute_ros.tools.demo_rig import FAULTS
-from chute_ros.tools.processes import Processes
+from chute_ros.tools.processes import Processes, ros_arguments
 
 UMBILICAL = "umbilical"
 #: Simulated seconds in one real second.
@@ -24,24 +24,22 @@ class RocketRig:
 
     def start_ground(self) -> None:
         """The nodes: everything but the rocket."""
-        node = ("--ros-args", "-r", f"__ns:={self.namespace}")
-        links = f"[{UMBILICAL}]"
-        supervisor = [
-            part
-            for name in ("required_links", "kill_links", "deploy_links")
-            for part in ("-p", f"{name}:={links}")
-        ]
-        supervisor += ["-p", "profile:=rocket"]
-        start = self.processes.start
-        start("supervisor", "chute_ros.ros.safety_supervisor", *node, *supervisor)
-        start(
-            UMBILICAL,
-            "chute_ros.links.umbilical",
-            *node,
-            *("-p", f"connection:=serial:{self._port}"),
-            *("-p", "publish_vehicle_state:=true"),
-            *("-p", f"dump_folder:={self.folder}"),
+        start, links = self.processes.start, f"[{UMBILICAL}]"
+        supervisor = ros_arguments(
+            self.namespace,
+            required_links=links,
+            kill_links=links,
+            deploy_links=links,
+            profile="rocket",
         )
+        start("supervisor", "chute_ros.ros.safety_supervisor", *supervisor)
+        umbilical = ros_arguments(
+            self.namespace,
+            connection=f"serial:{self._port}",
+            publish_vehicle_state="true",
+            dump_folder=self.folder,
+        )
+        start(UMBILICAL, "chute_ros.links.umbilical", *umbilical)
 
     def plug_cable_in(self) -> None:
         """The rocket, whose drogue will not come out by itself."""

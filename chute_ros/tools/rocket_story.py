@@ -11,7 +11,6 @@ from chute_msgs.srv import UmbilicalCommand
 from chute_ros.model import Action, Outcome
 from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.chart import chart
 from chute_ros.tools.demo_director import Director, StepFailedError
 from chute_ros.tools.rocket_rig import SPEED, UMBILICAL, RocketRig
 
@@ -129,14 +128,8 @@ class RocketStory:
         times = [when for _, when in steps]
         if times != sorted(times):
             raise StepFailedError(f"the kill did not go before the deploy: {steps}")
-        print("\n  since the launch")
-        for name, when in steps:
-            print(f"    {director.since_failure(when):7.3f} s  {name}")
         marks = [(times[0], "K"), (times[2], "D")]
-        print("\n  altitude over time (K kill, D deploy)")
-        for line in chart(director.track, marks, width=64, rows=11):
-            print("  " + line)
-        print("\nDEMO PASSED: every step happened, the kill before the deploy")
+        director.summarize(steps, "launch", "altitude over time (K kill, D deploy)", marks)
 
     # -- what they are made of -------------------------------------------------------------------
 

@@ -10,8 +10,7 @@ from typing import Any
 from chute_ros.model import Action, LinkState
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.stage_tones import LINK_TONES, STAGE_TONES
-from chute_ros.tools.timeline_rows import Band, Level, Row, Segment
+from chute_ros.tools.timeline_rows import LINK_TONES, STAGE_TONES, Band, Level, Row, Segment
 
 #: Each with its time, s from the start.
 States = list[tuple[float, Any]]

@@ -3,10 +3,11 @@ below the other over one axis of time. Nothing in it moves or is fetched from el
 
 from __future__ import annotations
 
+import html
 import math
 from collections.abc import Sequence
 
-from chute_ros.tools.plain_text import escaped
+from chute_ros.plain_text import plain
 from chute_ros.tools.timeline_axis import (
     is_long,
     label_of,
@@ -49,6 +50,11 @@ def draw(rows: Sequence[Row], windows: Sequence[Window], about: str) -> str:
             "</svg>",
         ]
     )
+
+
+def escaped(text: object) -> str:
+    """Words that came over a wire: plain, and as HTML and SVG need them, in text and in quotes."""
+    return html.escape(plain(text), quote=True)
 
 
 def close_up(moments: Sequence[float], end: float) -> list[Window]:

@@ -8,8 +8,7 @@ import pytest
 from campaign_bench import scenario
 
 from chute_ros.campaign.channel import Spell
-from chute_ros.campaign.scenario import Failure, Stop, WayFault
-from chute_ros.campaign.sensor_sources import may_count, outlives
+from chute_ros.campaign.scenario import Failure, Stop, WayFault, may_count, outlives
 from chute_ros.campaign.sensors import SensorFault
 from chute_ros.protocol.vehicle_merge import IMU, VEHICLE_STATE
 

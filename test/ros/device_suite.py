@@ -155,6 +155,19 @@ class NodeSuite:
         self.bench.until(lambda: len(self.beats) > told, "it is received again")
         self.await_link(self.alive)
 
+    def test_a_node_that_has_just_started_is_not_told_to_hang(
+        self, device: SimulatedDevice, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        self.bench.until(lambda: self.beats, "its link runs")
+        node = next(one for one in self.bench.nodes if one.get_name() == self.name)
+        told: list[DiagnosticStatus] = []
+        monkeypatch.setattr(
+            node.diagnostics_publisher, "publish", lambda _, each: told.extend(each)
+        )
+        monkeypatch.setattr(node.runtime, "summary", None)  # as before its first heartbeat
+        node._diagnose()
+        assert told == []
+
     def test_a_decision_to_deploy_is_carried_out_and_each_step_reported(
         self, device: SimulatedDevice
     ) -> None:

@@ -6,15 +6,18 @@ import signal
 import stat
 
 import pytest
-from chute_msgs.msg import SafetyState
+from chute_msgs.msg import ParachuteStatus, SafetyState
 from chute_msgs.srv import Deploy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Quaternion, Vector3
+from node_bench import stamped
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import Imu
+from std_srvs.srv import Trigger
 from supervisor_bench import Scene
 
-from chute_ros.model import Action, Outcome
+from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.ros import qos
 
 ALONE = {"hot_standby": False, "kill_to_deploy_delay": 3.0}
 
@@ -144,3 +147,47 @@ def test_where_nothing_can_be_written_diagnostics_say_so(bench, monkeypatch):
     task = bench.until(warned, "it is told")[-1]
     assert task.message.startswith("a restart in flight would lose it: [Errno 17]")
     assert str(nowhere) in task.message
+
+
+RELEASED = "mavlink_parachute 1/161 was released: repack or replace it, then call safety/reset"
+
+
+def tells(pair, deployed, stage):
+    """Its parachute says so, until the supervisor is there."""
+    client, topic = pair.bench.client, f"{pair.bench.namespace}/parachute/status"
+    publisher = client.create_publisher(ParachuteStatus, topic, qos.STATUS)
+    message = ParachuteStatus(
+        link="mavlink_parachute", device="1/161", link_state=int(LinkState.OK), deployed=deployed
+    )
+
+    def there():
+        publisher.publish(stamped(client, message))
+        return pair.states and pair.states[-1].state == stage
+
+    pair.bench.until(there, f"the stage is {stage}")
+    client.destroy_publisher(publisher)
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_what_was_released_on_the_ground_outlives_every_restart_until_a_reset(pair, damaged):
+    pair.start("a", 0, **ALONE)
+    pair.await_stage(SafetyState.READY)
+    tells(pair, True, SafetyState.BLOCKED)
+    folder = pair.processes.ros_home / "chute_ros" / "released"
+    path = pair.bench.until(lambda: list(folder.glob("*.json")), "it is kept")[0]
+    pair.send_signal("a", signal.SIGSTOP)
+    if damaged:
+        path.write_text("[[")
+    # Given a module that started anew too, and a supervisor that was set otherwise
+    kill_and_start_again(pair, deploy_timeout=19.0)
+    pair.states.clear()
+    tells(pair, False, SafetyState.BLOCKED)
+    (reason,) = pair.states[-1].block_reasons
+    if damaged:
+        assert str(path) in reason
+        assert "cannot read what was released before this start" in pair.processes.tail("a", 40)
+    else:
+        assert reason == RELEASED
+    assert pair.bench.call(Trigger, "safety/reset").success
+    tells(pair, False, SafetyState.READY)
+    pair.bench.until(lambda: not path.exists(), "it is forgotten")

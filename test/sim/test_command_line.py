@@ -280,6 +280,40 @@ def test_quiet_it_prints_nothing(start):
     assert running.lines == []
 
 
+#: Interrupts itself where the main thread, about to wait, holds the lock of what it waits for.
+EARLY = """
+import os
+import signal
+import sys
+import threading
+
+wait = threading.Condition.wait
+
+
+def interrupted(self, timeout=None):
+    starts = sys._getframe(2).f_code.co_name == "start"
+    if threading.current_thread() is threading.main_thread() and not starts:
+        os.kill(os.getpid(), signal.SIGINT)
+    return wait(self, timeout)
+
+
+threading.Condition.wait = interrupted
+"""
+
+
+def test_it_ends_however_early_the_signal_comes(start, tmp_path):
+    """What happened now and then: the handler waited for a lock that its own thread held."""
+    with (tmp_path / "sitecustomize.py").open("a") as file:
+        file.write(EARLY)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind((LOCAL, 0))
+        station.settimeout(20.0)
+        where = f"udpout:{LOCAL}:{station.getsockname()[1]}"
+        running = start(AUTOPILOT, "--quiet", "--connection", where)
+        assert station.recv(300)
+    assert running.end() == 0
+
+
 @BOTH
 def test_help_names_every_action_and_form(simulator, environment):
     done = subprocess.run(

@@ -77,3 +77,47 @@ def test_it_stays_armed_while_one_says_so_or_nobody_knows(
     story = armed(deploy_links=(LINK, UPF), required_links=(LINK,))
     keeps_saying(story, 5.0, *told)
     assert story.state.stage is Stage.ARMED
+
+
+# -- armed past the supervisor, or before a link was silent --------------------------------------
+
+
+def test_one_that_is_armed_past_the_supervisor_is_armed() -> None:
+    story = Story().ready()
+    keeps_saying(story, 1.9, says(True))
+    assert story.state.stage is Stage.READY
+    keeps_saying(story, 2.1, says(True))
+    assert story.state.stage is Stage.ARMED
+    assert f"READY -> ARMED: the parachute was armed ({LINK} 1/161 says armed)" in story.said()
+
+
+def test_after_it_was_disarmed_its_status_has_two_seconds_to_show_it() -> None:
+    story = armed()
+    keeps_saying(story, 3.0, says(True))
+    story.at(3.05, i.ArmDone(2, False, True, "disarmed"))
+    keeps_saying(story, 4.5, says(True))
+    assert story.state.stage is Stage.READY
+    assert next_deadline(story.config, story.state, START + 4.9) == START + 5.05
+    keeps_saying(story, 9.0, says(False))
+    assert story.state.stage is Stage.READY
+
+
+@pytest.mark.parametrize(("told", "stage"), [(True, Stage.ARMED), (False, Stage.READY)])
+def test_when_a_link_is_whole_again_it_is_armed_again_if_it_still_says_so(
+    told: bool, stage: Stage
+) -> None:
+    story = armed()
+    keeps_saying(story, 3.0, says(True))
+    while story.t < 4.5:
+        story.at(story.t + 0.1, i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.BLOCKED
+    keeps_saying(story, 5.0, says(told))
+    assert story.state.stage is Stage.BLOCKED, "heard again, not for long enough"
+    keeps_saying(story, 6.0, says(told))
+    assert story.state.stage is stage
+
+
+def test_while_its_status_is_old_it_says_nothing_of_it() -> None:
+    story = Story().ready()
+    keeps_saying(story, 5.0, says(True, alive=False))
+    assert story.state.stage is Stage.READY

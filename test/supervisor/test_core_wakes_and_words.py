@@ -428,8 +428,9 @@ def test_what_was_out_on_the_ground_says_nothing_of_the_flight_where_it_is_known
     story = Story(SupervisorConfig(require_vehicle_state=False))
     standing = [i.VehicleReport(STANDING)] if known else []
     story.at(0.0, story.heartbeat(), parachute(deployed=True), *standing)
-    assert story.state.stage is Stage.READY
-    story.at(0.1, story.heartbeat(), i.VehicleReport(FLYING))
+    story.at(10.0, story.heartbeat(), *standing)
+    assert story.state.stage is Stage.BLOCKED
+    story.at(10.1, story.heartbeat(), i.VehicleReport(FLYING))
     assert story.state.stage is (Stage.IN_FLIGHT if known else Stage.DEPLOYED)
 
 

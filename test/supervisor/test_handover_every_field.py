@@ -106,6 +106,7 @@ def leader(clock: float) -> State:
             still_since=clock - 0.5,
             faults_told=("slow",),
         ),
+        released_since_reset=frozenset({("upf_can", "34")}),
         flight=ThisFlight(
             home_altitude=480.0,
             ground_pressure_altitude=490.0,

@@ -105,7 +105,6 @@ def test_when_all_is_well_it_arms() -> None:
         ({"state": ParachuteState.NOT_READY}, "its state is NOT_READY (need READY, TAKEOFF or"),
         ({"state": ParachuteState.UNKNOWN}, "its state is UNKNOWN"),
         ({"state": ParachuteState.ABNORMAL}, "its state is ABNORMAL"),
-        ({"deployed": True}, "it is released"),
         (
             {"error_flags": ErrorFlags.LOW_POWER | ErrorFlags.IMU_ERROR, "faults": ("IMU_ERROR",)},
             "errors IMU_ERROR, LOW_POWER (need none)",
@@ -127,6 +126,14 @@ def test_what_is_wrong_with_a_device_is_said_in_words(changes: dict[str, Any], w
     told = reasons(with_device(**changes))
     assert len(told) == 1
     assert told[0].startswith(f"{LINK} 1/161: {words}")
+
+
+def test_one_that_is_released_is_and_was() -> None:
+    assert reasons(with_device(deployed=True)) == (
+        f"{LINK} 1/161 was released: repack or replace it, then call safety/reset",
+        "the vehicle is BLOCKED (need READY)",
+        f"{LINK} 1/161: it is released",
+    )
 
 
 @pytest.mark.parametrize(

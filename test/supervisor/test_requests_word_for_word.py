@@ -335,7 +335,8 @@ def test_a_parachute_that_is_tried_after_a_reset_was_out_before_the_flight() -> 
     story = killed_and_down()
     story.at(2.0, story.heartbeat(), story.told(**DOWN), i.ResetRequest(2))
     story.at(2.1, story.heartbeat(), story.told(**DOWN), parachute(deployed=True))
-    story.at(2.2, story.heartbeat(), story.told())
+    story.at(2.15, story.heartbeat(), i.VehicleReport(IDLING))
+    story.at(2.2, story.heartbeat(), story.told(height=55.0))
     assert story.state.stage is Stage.IN_FLIGHT
     assert story.fired() == ["KILL"]
 

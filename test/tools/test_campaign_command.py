@@ -172,6 +172,26 @@ def test_the_code_that_flies_is_told_apart(tmp_path, monkeypatch, changed):
     assert code_that_flies(tmp_path / "profiles") != before
 
 
+@pytest.mark.parametrize(
+    ("changed", "flies"),
+    [
+        ("settings.py", True),
+        ("runtime/device.py", True),
+        ("links/mavlink/virtual.py", True),
+        ("supervisor/core.py", True),
+        ("ros/qos.py", False),
+        ("tools/demo.py", False),
+    ],
+)
+def test_all_code_of_a_flight_counts_and_no_other(tmp_path, monkeypatch, changed, flies):
+    monkeypatch.setattr(checkpoint.chute_ros, "__file__", str(tmp_path / "__init__.py"))
+    (tmp_path / changed).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / changed).write_text("a")
+    before = code_that_flies(tmp_path / "profiles")
+    (tmp_path / changed).write_text("b")
+    assert (code_that_flies(tmp_path / "profiles") != before) is flies
+
+
 @pytest.fixture
 def all_missed(monkeypatch):
     """A campaign whose every flight is judged as missed."""

@@ -14,7 +14,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report_command as report
 from chute_ros.tools.recording import read
-from chute_ros.tools.replayed_states import replayed_states
+from chute_ros.tools.report_command import replayed_states
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline_rows import Band, Level
 
@@ -116,7 +116,7 @@ def test_what_was_decided_at_a_takeover_is_told_as_it_was_published(tmp_path):
     flight.turn(report_of_it)
     flight.land()
     told = section(report.report(flight.files()), "Decisions")
-    row = next(row for row in told.split("<tr>") if "9.1" in row)
+    row = next(row for row in told.split("<tr>") if "decision 1 of epoch 9" in row)
     assert "another took over" in row
     assert "upf_can" in row
 

@@ -11,11 +11,20 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import NAN, LinkState, flag_names
+from chute_ros.protocol.mavlink.frames import UNKNOWN_MESSAGE
 from chute_ros.ros import diagnostics
 
 #: Task, level, text, values and device: diagnostics.status makes a message of it.
 Task = tuple[str, bytes, str, Mapping[str, object], str]
 _NEVER: tuple[bytes, str, dict[str, object], str] = (diagnostics.STALE, "never received", {}, "")
+
+#: Reasons for which something is dropped that could be read.
+READABLE = (
+    UNKNOWN_MESSAGE,
+    "frames with our own system and component id",
+    "acknowledgements for another component",
+    "duplicate acknowledgements",
+)
 
 
 @dataclass(frozen=True)
@@ -57,7 +66,7 @@ def link_task(
     """The wire, and what was dropped on it."""
     values = {**traffic, **details.useless}
     return diagnostics.wire_task(
-        name, wire, details.doubts, details.received, values, details.dropped
+        name, wire, details.doubts, details.received, values, details.dropped, READABLE
     )
 
 

@@ -14,7 +14,8 @@ from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.settings import nested, parameter
 
 #: How a flight block is reported by a node that must leave arming alone.
-_NOT_UNDONE = "noted; arming is not undone (disarm_when_blocked is false)"
+_LEFT_ALONE = "noted; a vehicle that arms is not disarmed (disarm_when_blocked is false)"
+_DISARMED = "a vehicle that arms on the ground is disarmed from now on; in the air nothing is done"
 
 _NO_PARACHUTE = (
     "no parachute was received: check its power and wiring, parachute_system_id, and that its "
@@ -85,8 +86,8 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
             )
         elif decision.action is not Action.NONE:
             undone = self.settings.link.disarm_when_blocked
-            blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
-            self.carry_out_flight_block(decision, blocked, "arming is not undone")
+            blocked = _DISARMED if undone else _LEFT_ALONE
+            self.carry_out_flight_block(decision, blocked, "a vehicle that arms is left alone")
 
 
 def _why_unhealthy(one: ParachuteTracker, now: float) -> list[str]:

@@ -10,11 +10,24 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
+from chute_ros.links.umbilical.protocol.decoder import NOT_YET
+from chute_ros.links.umbilical.protocol.line_parser import UNKNOWN_LINE
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.ros import diagnostics
 
 #: Task, level, text, values and device: diagnostics.status makes a message of it.
 Task = tuple[str, bytes, str, Mapping[str, object], str]
+
+#: Reasons for which something is dropped that could be read, or that a beginning brings along.
+READABLE = (
+    UNKNOWN_LINE,
+    NOT_YET,
+    "record held until the next one agrees",
+    "first line after the opening",
+    "bytes right after the opening",
+    "lines for the log beyond fifty a second",
+    "mark of a dump that was not under way",
+)
 
 
 @dataclass(frozen=True)
@@ -62,7 +75,7 @@ def port_task(
         **traffic,
         **details.commands,
     }
-    return diagnostics.wire_task(name, wire, troubles, received, values, details.dropped)
+    return diagnostics.wire_task(name, wire, troubles, received, values, details.dropped, READABLE)
 
 
 def memory_task(name: str, details: Details, progress: str) -> DiagnosticStatus:

@@ -22,6 +22,15 @@ _NO_CONTROLLER = (
     "or 0; without_controller: true where the vehicle has none)"
 )
 
+#: Reasons for which something is dropped that could be read.
+READABLE = (
+    "transfers of unknown types",
+    "messages that a newer one has overtaken",
+    "duplicate transfers",
+    "requests that this node does not serve",
+    "status of devices not followed",
+)
+
 
 @dataclass(frozen=True)
 class Details:
@@ -71,7 +80,7 @@ def bus_task(
     """The bus, who is on it, and what was dropped on it."""
     values = {**traffic, **details.bus}
     return diagnostics.wire_task(
-        name, wire, details.troubles, details.received, values, details.dropped
+        name, wire, details.troubles, details.received, values, details.dropped, READABLE
     )
 
 

@@ -73,7 +73,7 @@ def _block_text(settings: AutopilotSettings, system_id: int) -> str:
     """How a flight block is kept, for a person before flight."""
     if _asks(settings, system_id):
         return "the autopilot asks us before it arms"
-    return "arming on the ground is undone"
+    return "a vehicle that arms on the ground is disarmed"
 
 
 def _block_warning(settings: AutopilotSettings, system_id: int) -> str:

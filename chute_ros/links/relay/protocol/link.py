@@ -14,7 +14,7 @@ from typing import Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, Outcome, ParachuteStatus
-from chute_ros.protocol.events import EventLog, ParachuteChanged, ended
+from chute_ros.protocol.events import Ask, AskSupervisor, EventLog, ParachuteChanged, ended
 from chute_ros.settings import Settings, parameter
 
 #: The one device of an output.
@@ -22,6 +22,7 @@ DEVICE = "output"
 #: Between two pictures of it, s.
 _PICTURES = 1.0
 _SENT = "sent; a relay output confirms nothing"
+_FIRED = "its output was switched: repack or replace the parachute, then call safety/reset"
 
 
 @dataclass(frozen=True)
@@ -192,6 +193,8 @@ class RelayLink(EventLog):
         self.fired += 1
         self.fired_at = self._now
         self._fires_until = self._now + self.config.pulse_time
+        # Nothing ever reports that the parachute is out: a person has to look.
+        self._events.append(AskSupervisor(Ask.FLIGHT_BLOCK, DEVICE, _FIRED))
         waiting, self._waiting = self._waiting, {}
         for token in waiting:
             self._end(token, Outcome.SENT, _SENT)
