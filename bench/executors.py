@@ -15,7 +15,8 @@ from bench.command import Children, at_least, run, with_children
 from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
 from bench.on_executor import EXECUTORS
 from bench.process_cost import cpu_time
-from bench.report import load, summary, table
+from bench.report import load, summary
+from chute_ros.tools.markdown import table
 
 HEADING = "Executors"
 

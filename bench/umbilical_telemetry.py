@@ -15,9 +15,10 @@ from dataclasses import dataclass, field
 
 from bench.command import Children, at_least, run, with_children
 from bench.flight_lines import REAL_RATE, FlightLines
-from bench.report import load, ratios, summary, table
+from bench.report import COMPARED, compared, load
 from bench.umbilical_ends import LATE, Ends, Step, Subscriber
 from chute_ros.links.umbilical.layout_files import load_layouts
+from chute_ros.tools.markdown import table
 from chute_ros.tools.processes import ros_arguments
 
 HEADING = "Umbilical telemetry"
@@ -186,24 +187,12 @@ def _latency(peers: list[Peer]) -> str:
         peer.name: [delay for step in peer.turns[REAL_RATE] for delay in step.delays]
         for peer in peers
     }
-    base = summary(delays[BARE])
     rows = []
     for peer in peers:
-        numbers = summary(delays[peer.name])
-        lost = sum(step.lost for step in peer.turns[REAL_RATE])
-        told = (f"{number:.2f} ms" for number in numbers)
-        values = (*told, *ratios(numbers, base), str(lost))
-        rows.append((f"at {REAL_RATE:g} lines/s: {peer.name}", *values))
-    head = (
-        "from writing a line to the subscriber",
-        "median",
-        "99th percentile",
-        "largest",
-        "ratio of medians",
-        "of 99th percentiles",
-        "lost",
-    )
-    return table(head, rows)
+        cells = compared(delays[peer.name], delays[BARE], "{:.2f} ms")
+        lost = str(sum(step.lost for step in peer.turns[REAL_RATE]))
+        rows.append((f"at {REAL_RATE:g} lines/s: {peer.name}", *cells, lost))
+    return table(("from writing a line to the subscriber", *COMPARED, "lost"), rows)
 
 
 def _cpu(peers: list[Peer]) -> str:

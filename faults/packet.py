@@ -17,12 +17,13 @@ from pathlib import Path
 
 from chute_ros.ros.memory_limit import VARIABLE
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools import markdown
 from chute_ros.tools.demo_director import StepFailedError
 from faults.flight import Flight
 from faults.gap_packet import Stranger, gap_packet
 from faults.network import Network
 from faults.respawned import RESPAWN_DELAY, RespawnedProcesses
-from faults.stories import flown, fly_stories
+from faults.stories import flown, fly_stories, in_seconds
 
 VEHICLE, STRANGER = "vehicle", "stranger"
 HOSTS = (VEHICLE, STRANGER)
@@ -267,20 +268,17 @@ def _watch(scene: Scene, told: Told) -> None:
 
 def table(every: list[Told]) -> str:
     """As Markdown."""
-    lines = [
-        "| who gets it | then | its process | memory | ends after | back after | out after | |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for told in every:
-        times = (told.ended, told.back, told.released)
-        ended, back, out = ("-" if one != one else f"{one:.2f} s" for one in times)
+        ended, back, out = map(in_seconds, (told.ended, told.back, told.released))
         then = "-" if told.story.unbounded else told.story.fails.value
         if told.story.may_miss and told.released != told.released:
             out = "**stays in**"
         peak = "-" if told.peak != told.peak else f"{told.peak:.0f} MB"
         name, how, end = told.story.name, told.how or "-", told.wrong or "correct"
-        lines.append(f"| {name} | {then} | {how} | {peak} | {ended} | {back} | {out} | {end} |")
-    return "\n".join(lines)
+        rows.append((name, then, how, peak, ended, back, out, end))
+    head = ("who gets it", "then", "its process", "memory")
+    return markdown.table((*head, "ends after", "back after", "out after", ""), rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from chute_ros.supervisor import lease, machine
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.markdown import table
 from chute_ros.tools.state_drawing import drawing
 
 _State = TypeVar("_State", bound=enum.Enum)
@@ -49,11 +50,11 @@ def states_text() -> str:
         _HEAD,
         _mermaid(machine.TRANSITIONS, first=Stage.STARTUP.name),
         _table(machine.Stage, machine.Event, machine.TRANSITIONS),
-        _meanings(machine.Event, "event"),
+        _meanings(machine.Event),
         _LEASE,
         _mermaid(lease.TRANSITIONS),
         _table(lease.Role, lease.Event, lease.TRANSITIONS),
-        _meanings(lease.Event, "event"),
+        _meanings(lease.Event),
     ]
     return "\n".join(parts)
 
@@ -102,19 +103,15 @@ def _table(
     transitions: Mapping[tuple[_State, _Event], _State],
 ) -> str:
     """One row an event, one column a state; a dash: the pair is not listed."""
-    names = [state.name for state in states]
-    lines = [f"| | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
+    rows = []
     for event in events:
         after = [transitions.get((state, event)) for state in states]
-        cells = [one.name if one is not None else "-" for one in after]
-        lines.append(f"| {event.name} | {' | '.join(cells)} |")
-    return "\n".join([*lines, ""])
+        rows.append((event.name, *(one.name if one is not None else "-" for one in after)))
+    return table(("", *(state.name for state in states)), rows) + "\n"
 
 
-def _meanings(events: type[_Event], what: str) -> str:
-    lines = [f"| {what} | meaning |", "|---|---|"]
-    lines += [f"| {one.name} | {one.value} |" for one in events]
-    return "\n".join([*lines, ""])
+def _meanings(events: type[_Event]) -> str:
+    return table(("event", "meaning"), [(one.name, one.value) for one in events]) + "\n"
 
 
 if __name__ == "__main__":
