@@ -9,7 +9,7 @@ from typing import Protocol
 
 from bench.report import COMPARED, compared
 from chute_ros.errors import ChuteError
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 
 
 class Peer(Protocol):

@@ -16,7 +16,7 @@ from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
 from bench.on_executor import EXECUTORS
 from bench.process_cost import cpu_time
 from bench.report import load, summary
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 
 HEADING = "Executors"
 

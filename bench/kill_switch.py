@@ -20,7 +20,7 @@ from bench.report import COMPARED, compared, load
 from bench.wire_ends import NOMINAL_RATE, Round, RoundFailedError, WireEnds, WrongOrderError
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 from chute_ros.tools.processes import Processes, ros_arguments
 from chute_ros.transport.data_types import load_data_types
 

@@ -18,7 +18,7 @@ from bench.flight_lines import REAL_RATE, FlightLines
 from bench.report import COMPARED, compared, load
 from bench.umbilical_ends import LATE, Ends, Step, Subscriber
 from chute_ros.links.umbilical.layout_files import load_layouts
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 from chute_ros.tools.processes import ros_arguments
 
 HEADING = "Umbilical telemetry"

@@ -22,7 +22,7 @@ from chute_ros.errors import ChuteError
 from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.links.registered import module_of
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 from chute_ros.tools.processes import ros_arguments
 
 HEADING = "A vehicle"

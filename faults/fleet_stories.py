@@ -11,7 +11,7 @@ from pathlib import Path
 
 from chute_ros.errors import ChuteError
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools import markdown
+from chute_ros.tools import pages
 from faults.discovery_server import DiscoveryServers
 from faults.fleet import GROUND, HEIGHT, Fleet, hosts_for, name_of, newest_states, until
 from faults.fleet_load import Usage, busy, usage
@@ -228,7 +228,7 @@ def table(every: Sequence[Flown]) -> str:
         "the operator deploys: out after",
         "",
     )
-    return markdown.table(head, [_cells(flown) for flown in every])
+    return pages.table(head, [_cells(flown) for flown in every])
 
 
 def _cells(flown: Flown) -> list[str]:

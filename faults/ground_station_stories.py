@@ -16,7 +16,7 @@ from pathlib import Path
 from chute_ros.errors import ChuteError
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools import markdown
+from chute_ros.tools import pages
 from faults.ground_station_flight import (
     CAREFUL,
     GROUND,
@@ -214,7 +214,7 @@ def table(every: Sequence[tuple[Story, Seen]]) -> str:
         times = map(in_seconds, (seen.wire, seen.answer, seen.again))
         rows.append((story.name, *times, seen.wrong or seen.known or "correct"))
     head = ("disturbance", "on the wire", "answered", "seen (again)", "")
-    return markdown.table(head, rows)
+    return pages.table(head, rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[tuple[Story, Seen]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chute_ros.tools import markdown
+from chute_ros.tools import pages
 from chute_ros.tools.machine import machine
 
 _HEAD = """\
@@ -76,6 +76,4 @@ process, and until its flight continues; from the motor's failure to the parachu
 def with_part(page: str, part: str, table: str, load: float) -> str:
     """The page with this part written anew; the others as page has them, if it has them."""
     text = f"{PARTS[part]}\nLoad before the run: {load:.1f} (of the last minute).\n\n{table}"
-    return (
-        f"{_HEAD.format(machine=machine())}\n{markdown.with_part(page, 'part', part, text, PARTS)}"
-    )
+    return f"{_HEAD.format(machine=machine())}\n{pages.with_part(page, 'part', part, text, PARTS)}"

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from chute_ros.ros.memory_limit import VARIABLE
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools import markdown
+from chute_ros.tools import pages
 from chute_ros.tools.demo_director import StepFailedError
 from faults.flight import Flight
 from faults.gap_packet import Stranger, gap_packet
@@ -278,7 +278,7 @@ def table(every: list[Told]) -> str:
         name, how, end = told.story.name, told.how or "-", told.wrong or "correct"
         rows.append((name, then, how, peak, ended, back, out, end))
     head = ("who gets it", "then", "its process", "memory")
-    return markdown.table((*head, "ends after", "back after", "out after", ""), rows)
+    return pages.table((*head, "ends after", "back after", "out after", ""), rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:

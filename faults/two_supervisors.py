@@ -15,7 +15,7 @@ from chute_msgs.msg import SupervisorLease
 from chute_ros.model import Action, Outcome
 from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools import markdown
+from chute_ros.tools import pages
 from faults.flight import Flight
 from faults.network import Network
 from faults.stories import flown, fly_stories, in_seconds
@@ -193,7 +193,7 @@ def table(every: list[Told]) -> str:
         times = map(in_seconds, (told.taken_over, told.killed, told.released, told.healed))
         rows.append((told.story.name, *times, told.wrong or "correct"))
     head = ("disturbance", "takeover", "kill on the wire", "parachute out", "one leads again", "")
-    return markdown.table(head, rows)
+    return pages.table(head, rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:

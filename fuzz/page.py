@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.tools.machine import machine
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 from fuzz.run import Outcome
 from fuzz.stored import stored
 from fuzz.targets import NAMES, target_of

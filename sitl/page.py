@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from chute_ros.tools import markdown
+from chute_ros.tools import pages
 from chute_ros.tools.machine import machine
 from sitl.autopilots import KINDS
 from sitl.judge import Verdict
@@ -51,7 +51,7 @@ class Flown:
 
 def with_autopilot(page: str, flown: Sequence[Flown]) -> str:
     """The page with the part of this autopilot written anew; the others as page has them."""
-    parts = markdown.with_part(page, "autopilot", flown[0].kind, _part(flown), KINDS)
+    parts = pages.with_part(page, "autopilot", flown[0].kind, _part(flown), KINDS)
     return f"{_HEAD.format(machine=machine())}\n{parts}"
 
 
@@ -63,7 +63,7 @@ def _part(flown: Sequence[Flown]) -> str:
         f"{min(loads):.1f} to {max(loads):.1f} (of a minute)."
     )
     rows = [_row([one for one in flown if one.story == name]) for name in _names(flown)]
-    table = markdown.table(("story", "runs", "what happened", "times", ""), rows)
+    table = pages.table(("story", "runs", "what happened", "times", ""), rows)
     return f"## {flown[0].kind} {flown[-1].version}\n\n{told}\n\n{table}"
 
 

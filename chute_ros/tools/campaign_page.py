@@ -13,7 +13,7 @@ from chute_ros.campaign.rare import OfEach
 from chute_ros.campaign.scenario import MOST_FAULTS
 from chute_ros.protocol.vehicle_merge import FRESH
 from chute_ros.tools.campaign_picture import groups_of
-from chute_ros.tools.markdown import table
+from chute_ros.tools.pages import table
 
 #: So many wrong flights are named, and so many causes.
 _MOST_NAMED = 50
