@@ -254,3 +254,8 @@ class Decision:
     shadow: bool = False
     #: Which device on the link a deploy is for; empty: the one that the node chooses.
     device: str = ""
+
+    @property
+    def named(self) -> str:
+        """Its number in words: an epoch is made of a time, and would be read as one."""
+        return f"decision {self.id} of epoch {self.epoch}"

@@ -6,14 +6,17 @@ ros2 launch chute_ros vehicle.launch.py namespace:=rocket parachute:=umbilical
 """
 
 import os
+from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from chute_ros.links.api import SUPERVISOR
 from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
+from chute_ros.tools.launch_checks import check_arguments, check_file, checked
 from launch import LaunchContext, LaunchDescription
 
 #: A node that dies is started again: a supervisor goes on where it stopped, and sends a device
@@ -30,6 +33,8 @@ def _nodes(context: LaunchContext) -> list:
     namespace = LaunchConfiguration("namespace").perform(context)
     # An enclave has the name of its node, with the namespace.
     place = "/".join(["", *filter(None, namespace.split("/"))])
+    names = [*vehicles()[parachute].links, SUPERVISOR]
+    checked("vehicle.launch.py", lambda: check_file(Path(config), place, names))
     secured = LaunchConfiguration("enclaves").perform(context) == "true"
     nodes = []
     for link in vehicles()[parachute].links:
@@ -65,46 +70,60 @@ def _range() -> str:
     return os.environ.get(RANGE) or ("SUBNET" if elsewhere else "LOCALHOST")
 
 
+def _look(context: LaunchContext) -> list:
+    """Before the defaults are set: what is there was given."""
+    known = [one.name for one in _arguments()]
+    checked("vehicle.launch.py", lambda: check_arguments(context.launch_configurations, known))
+    return []
+
+
+def _arguments() -> list:
+    return [
+        DeclareLaunchArgument(
+            "range",
+            default_value=_range(),
+            choices=["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF"],
+            description=(
+                "computers that receive the nodes: LOCALHOST, this computer alone; "
+                "SUBNET, others as well, such as a ground station; docs/guide/security.md"
+            ),
+        ),
+        DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
+        DeclareLaunchArgument(
+            "parachute",
+            default_value="mavlink",
+            choices=list(vehicles()),
+            description="kind of parachute",
+        ),
+        DeclareLaunchArgument(
+            "config",
+            default_value="",
+            description="parameter file of all nodes; empty: the one of this parachute",
+        ),
+        *(
+            DeclareLaunchArgument(
+                kind.argument.name,
+                default_value="",
+                description=f"{kind.argument.description}; empty: from the parameter file",
+            )
+            for kind in links().values()
+        ),
+        DeclareLaunchArgument(
+            "enclaves",
+            default_value="false",
+            choices=["true", "false"],
+            description="each node in its own SROS 2 enclave; docs/guide/security.md",
+        ),
+    ]
+
+
 def generate_launch_description() -> LaunchDescription:
     """The arguments, and the nodes that they describe."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "range",
-                default_value=_range(),
-                choices=["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF"],
-                description=(
-                    "computers that receive the nodes: LOCALHOST, this computer alone; "
-                    "SUBNET, others as well, such as a ground station; docs/guide/security.md"
-                ),
-            ),
+            OpaqueFunction(function=_look),
+            *_arguments(),
             SetEnvironmentVariable(RANGE, LaunchConfiguration("range")),
-            DeclareLaunchArgument("namespace", default_value="", description="of the vehicle"),
-            DeclareLaunchArgument(
-                "parachute",
-                default_value="mavlink",
-                choices=list(vehicles()),
-                description="kind of parachute",
-            ),
-            DeclareLaunchArgument(
-                "config",
-                default_value="",
-                description="parameter file of all nodes; empty: the one of this parachute",
-            ),
-            *(
-                DeclareLaunchArgument(
-                    kind.argument.name,
-                    default_value="",
-                    description=f"{kind.argument.description}; empty: from the parameter file",
-                )
-                for kind in links().values()
-            ),
-            DeclareLaunchArgument(
-                "enclaves",
-                default_value="false",
-                choices=["true", "false"],
-                description="each node in its own SROS 2 enclave; docs/guide/security.md",
-            ),
             OpaqueFunction(function=_nodes),
         ]
     )

@@ -94,7 +94,7 @@ def _never(flown: Flown) -> Judged | None:
         return Judged(Count.DOUBLED, f"{flown.ordered_again} orders after it was known to be out")
     for one in fired:
         if not one.decision.rule or not one.decision.reasons:
-            return Judged(Count.UNEXPLAINED, f"decision {one.decision.epoch}.{one.decision.id}")
+            return Judged(Count.UNEXPLAINED, one.decision.named)
     return None
 
 

@@ -63,6 +63,12 @@ def flown_vehicles() -> tuple[VehicleKind, ...]:
     return tuple(v for v in vehicles().values() if all(kinds[one].part for one in v.links))
 
 
+#: Their names, for who writes a scenario by hand: Vehicle.MAVLINK is "mavlink".
+Vehicle = enum.Enum(  # type: ignore[misc]  # mypy knows only members that are written here
+    "Vehicle", {one.name.upper(): one.name for one in flown_vehicles()}, type=str
+)
+
+
 def ways_of(vehicle: str) -> tuple[str, ...]:
     """The ways that a spell can lie on."""
     kind = vehicles()[vehicle]

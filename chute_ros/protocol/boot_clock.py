@@ -51,24 +51,20 @@ class BootClock:
 
         now: monotonic s, where a message may be damaged; infinity: it has a checksum."""
         last = self.newest
-        wrapped = (
-            last is not None and last > _WRAP_MS - _WRAP_MARGIN_MS and boot_ms < _WRAP_MARGIN_MS
-        )
-        goes_on = (
-            last is not None
-            and boot_ms >= last
-            and not _leaps(last, self._newest_at, boot_ms, now)
-        )
-        if last is None or goes_on or wrapped:
-            self._sure = last is not None
+        if last is None:
+            self._sure = False
+            return self._accept(boot_ms, now, Age.NEW)
+        wrapped = last > _WRAP_MS - _WRAP_MARGIN_MS and boot_ms < _WRAP_MARGIN_MS
+        if wrapped or (boot_ms >= last and not _leaps(last, self._newest_at, boot_ms, now)):
+            self._sure = True
             return self._accept(boot_ms, now, Age.NEW)
         if boot_ms == 0:
             return Age.NEW
         if 0 <= last - boot_ms <= REBOOT_JUMP_MS:
             return Age.OLD
-        doubtful = self._doubtful
-        agrees = doubtful is not None and boot_ms >= doubtful
-        if agrees and not _leaps(doubtful, self._doubtful_at, boot_ms, now):
+        before = self._doubtful
+        agrees = before is not None and boot_ms >= before
+        if agrees and not _leaps(before, self._doubtful_at, boot_ms, now):
             # Of the very first, a damaged one says as little as of a restart.
             ran_back = boot_ms < last and (self._sure or now == math.inf)
             self._sure = True

@@ -23,24 +23,21 @@ from chute_ros.protocol.goal import (
 )
 from chute_ros.transitions import after
 
-__all__ = [
-    "NO_ANSWER",
-    "Answer",
-    "ConfirmedCommand",
-    "EffectFinished",
-    "EffectLimits",
-    "EffectLoop",
-    "Report",
-]
-
 
 class EffectLoop(Generic[CommandT]):
     """One goal on its way. The owner sends what take_commands gives and feeds back what comes."""
 
     def __init__(
-        self, token: int, goal: ConfirmedCommand[CommandT], limits: EffectLimits, now: float
+        self,
+        token: int,
+        goal: ConfirmedCommand[CommandT],
+        limits: EffectLimits,
+        now: float,
+        family: int = 0,
     ) -> None:
         self.token = token
+        #: Marks the tries of this goal among the commands.
+        self.family = family
         self.goal = goal
         self.phase = Phase.WAIT_ACKNOWLEDGEMENT
         self.finished: EffectFinished | None = None
@@ -50,7 +47,8 @@ class EffectLoop(Generic[CommandT]):
         #: When to look at the status, the soonest first.
         self._looks: list[float] = []
         self._patience_until = math.inf
-        self._hampered = False
+        #: It was refused, not answered in time, or shows no effect: another way is due.
+        self.hampered = False
         self._accepted_after = math.nan
         self._sends = 0
         self._result = NO_ANSWER
@@ -74,11 +72,6 @@ class EffectLoop(Generic[CommandT]):
     def is_sent(self) -> bool:
         """Its command left at least once."""
         return self._sends > 0
-
-    @property
-    def hampered(self) -> bool:
-        """It was refused, not answered in time, or shows no effect: another way is due."""
-        return self._hampered
 
     @property
     def answer(self) -> str:
@@ -121,15 +114,16 @@ class EffectLoop(Generic[CommandT]):
         elif not self._worth_another_try(answer):
             self._take(Happening.REFUSED)
             self._end(False, f"{self.goal.name} {self._answer}")
-            self._hampered = True
+            self.hampered = True
         else:
             self._take(Happening.NOT_NOW)
             self._deadline = now + self._limits.retry_interval
-            self._hampered = True
-            if answer.result != NO_ANSWER and not answer.superseded:
+            self.hampered = True
+            refused = answer.result != NO_ANSWER and not answer.superseded
+            if refused:
                 # It may have done so already, which its status would show.
                 self._plan_looks(now)
-            if answer.result != NO_ANSWER and not answer.superseded and not self._refused:
+            if refused and not self._refused:
                 self._refused = True
                 detail = f"{self.goal.name} {self._answer}; tried again"
                 self._reports.append(Report(self.token, Outcome.REFUSED, detail))
@@ -148,18 +142,16 @@ class EffectLoop(Generic[CommandT]):
         if shown is not None and not shown():
             return
         self._take(Happening.EFFECT_SHOWN)
-        seconds = now - self._started
-        acknowledged = (
-            "not acknowledged"
-            if math.isnan(self._accepted_after)
-            else f"acknowledged after {self._accepted_after:.2f} s"
-        )
+        acknowledged = "not acknowledged"
         if self.goal.unacknowledged:
             acknowledged = self._sent_text()
+        elif not math.isnan(self._accepted_after):
+            acknowledged = f"acknowledged after {self._accepted_after:.2f} s"
         if shown is None:
             self._end(True, f"{self.goal.name} {acknowledged}")
         else:
-            self._end(True, f"{self.goal.effect} after {seconds:.2f} s; {acknowledged}")
+            waited = now - self._started
+            self._end(True, f"{self.goal.effect} after {waited:.2f} s; {acknowledged}")
 
     def _shown_by_another(self, now: float) -> None:
         """The effect came while this one waited for its turn: it is not sent a second time."""
@@ -188,12 +180,12 @@ class EffectLoop(Generic[CommandT]):
             self._end(False, self._what_did_not_come(now))
             return
         if now >= self._patience_until:
-            self._patience_until, self._hampered = math.inf, True
+            self._patience_until, self.hampered = math.inf, True
         self._look(now)
         if now < self._deadline:
             return
         if self.phase is Phase.WAIT_EFFECT:
-            self._hampered = True
+            self.hampered = True
             self._take(Happening.EFFECT_LATE)
         self._take(Happening.RETRY_DUE)
         self._send()
@@ -246,25 +238,21 @@ class EffectLoop(Generic[CommandT]):
 
     def _what_did_not_come(self, now: float) -> str:
         text = f"{self.goal.name} given up after {now - self._started:.1f} s: "
+        not_shown = f"the device's own status never showed that {self.goal.effect}"
         if not math.isnan(self._accepted_after):
             newest = "" if self._newest_accepted else f"; newest answer: {self._answer}"
-            return text + (
-                f"acknowledged after {self._accepted_after:.2f} s, "
-                f"but the device's own status never showed that {self.goal.effect}{newest}"
-            )
+            acknowledged = f"acknowledged after {self._accepted_after:.2f} s"
+            return f"{text}{acknowledged}, but {not_shown}{newest}"
         if not self._sends and self.goal.unacknowledged:
             return f"{text}never sent: its turn did not come, or the wire is closed"
         if not self._sends:
             return f"{text}never sent: an earlier command of the same number was under way"
         if self.goal.unacknowledged:
-            return (
-                f"{text}{self._sent_text()}, "
-                f"but the device's own status never showed that {self.goal.effect}"
-            )
+            return f"{text}{self._sent_text()}, but {not_shown}"
         answer = self._answer or "no acknowledgement came"
         if self.goal.shown is None or self.goal.shown():
             return text + answer
-        return f"{text}{answer}, and the device's own status never showed that {self.goal.effect}"
+        return f"{text}{answer}, and {not_shown}"
 
     def _sent_text(self) -> str:
         return "sent once" if self._sends == 1 else f"sent {self._sends} times"
@@ -274,7 +262,7 @@ class EffectLoop(Generic[CommandT]):
 
     def _end(self, success: bool, message: str) -> None:
         # What was given up, or has come, needs no other way.
-        self._hampered = False
+        self.hampered = False
         if not success and (hint := self.goal.hint()):
             message = f"{message}; {hint}"
         if remark := self.goal.remark():

@@ -6,8 +6,8 @@ import enum
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.model import ParachuteStatus, VehicleState
-from chute_ros.protocol.effect import EffectFinished, Report
+from chute_ros.model import Outcome, ParachuteStatus, VehicleState
+from chute_ros.protocol.goal import NO_ANSWER, EffectFinished, Report
 from chute_ros.protocol.liveness import LinkChange
 
 
@@ -90,3 +90,17 @@ Event = (
     | Notice
     | AskSupervisor
 )
+
+
+def ended(
+    token: int, outcome: Outcome, text: str, sent: bool = False, shown: bool = False
+) -> tuple[RequestReport, RequestFinished]:
+    """What is told of the end of a request that no loop (effect.py) carried through."""
+    success = outcome is Outcome.CONFIRMED
+    finished = EffectFinished(token, success, False, NO_ANSWER, text, sent, shown)
+    return RequestReport(Report(token, outcome, text)), RequestFinished(finished)
+
+
+def failed_request(token: int, why: str) -> RequestFinished:
+    """The end of a request that could not be begun."""
+    return ended(token, Outcome.FAILED, why)[1]

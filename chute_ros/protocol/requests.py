@@ -7,16 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import (
-    NO_ANSWER,
-    Answer,
-    ConfirmedCommand,
-    EffectFinished,
-    EffectLimits,
-    EffectLoop,
-    Report,
-)
-from chute_ros.protocol.events import Event, RequestFinished, RequestReport
+from chute_ros.protocol.effect import EffectLoop
+from chute_ros.protocol.events import Event, RequestFinished, RequestReport, ended
+from chute_ros.protocol.goal import ConfirmedCommand, EffectFinished, EffectLimits
 
 
 class Watch(Protocol):
@@ -28,18 +21,6 @@ class Watch(Protocol):
 
     def offer(self, *said: Any) -> None:
         """A device said something, in the link's own terms: keep it if it is the one."""
-
-
-class Finished(Answer, Protocol):
-    """The end of a transaction, with what it belongs to."""
-
-    @property
-    def token(self) -> int:
-        """Number of the transaction."""
-
-    @property
-    def command(self) -> Any:
-        """What was sent."""
 
 
 class Send(Protocol):
@@ -76,7 +57,7 @@ class Transactions(Protocol[SendT]):
         """When update has something to do; infinity: never."""
 
     def take_finished(self) -> list[Any]:
-        """The ended ones (Finished); each is handed out once."""
+        """The ended ones: an Answer each, with its token and command; each is handed out once."""
 
     def take_output(self) -> list[SendT]:
         """What is to be sent; each is handed out once."""
@@ -86,27 +67,13 @@ TransactionsT = TypeVar("TransactionsT", bound=Transactions[Any])
 
 
 @dataclass(frozen=True)
-class _Way:
-    """One goal on its way to the effect that the request is for."""
-
-    loop: EffectLoop[Any]
-    #: Marks the tries of this goal among the commands.
-    family: int
-
-
-@dataclass(frozen=True)
 class _Running:
-    #: The goal, and those that were begun beside it (Goal.otherwise).
-    ways: list[_Way]
+    #: Of the goal, and of those that were begun beside it (ConfirmedCommand.otherwise).
+    loops: list[EffectLoop[Any]]
     watch: Watch | None
     follow_up: tuple[ConfirmedCommand[Any], Watch] | None
     #: How the goal before this follow-up ended.
     first_end: EffectFinished | None = None
-
-    @property
-    def loops(self) -> list[EffectLoop[Any]]:
-        """The loops of all its goals."""
-        return [way.loop for way in self.ways]
 
     def end(self) -> EffectLoop[Any] | None:
         """The loop that tells how the request ended; None: it goes on."""
@@ -122,7 +89,7 @@ class _Running:
     def text(self, end: EffectLoop[Any]) -> str:
         """What came of the request: of the way that tells it, and of those beside it."""
         assert end.finished is not None
-        if len(self.ways) == 1:
+        if len(self.loops) == 1:
             return end.finished.message
         others = [f"{loop.goal.name}: {loop.answer}" for loop in self.loops if loop is not end]
         return "; ".join([f"{end.goal.name}: {end.finished.message}", *others])
@@ -162,7 +129,7 @@ class Requests(Generic[TransactionsT]):
     ) -> None:
         """Go for goal. watch: the message to hand over at the end. follow_up: what to ask after
         success; it adds its message to the answer, but cannot turn success into failure."""
-        self._running[token] = _Running([self._way(token, goal, now)], watch, follow_up)
+        self._running[token] = _Running([self._loop(token, goal, now)], watch, follow_up)
 
     def abandon(self, token: int, why: str, now: float) -> None:
         """End a request, if it is under way; nothing more is sent for it."""
@@ -189,9 +156,7 @@ class Requests(Generic[TransactionsT]):
 
     def refuse(self, token: int, why: str) -> None:
         """End a request before anything was sent."""
-        self._events.append(RequestReport(Report(token, Outcome.FAILED, why)))
-        finished = EffectFinished(token, False, False, NO_ANSWER, why)
-        self._events.append(RequestFinished(finished))
+        self._events += ended(token, Outcome.FAILED, why)
 
     def heard(self, *said: Any) -> None:
         """A device said something: is it what a request waits for?"""
@@ -227,8 +192,8 @@ class Requests(Generic[TransactionsT]):
                     loop.command_finished(finished, now)
             for token, running in self._running.items():
                 self._try_otherwise(token, running, now)
-                for way in running.ways:
-                    self._start_commands(way, now)
+                for loop in running.loops:
+                    self._start_commands(loop, now)
             for out in self.commands.take_output():
                 loop = None if out.token is None else self._owners.get(out.token)
                 if loop is not None:
@@ -263,8 +228,8 @@ class Requests(Generic[TransactionsT]):
     def _loops(self) -> list[EffectLoop[Any]]:
         return [loop for running in self._running.values() for loop in running.loops]
 
-    def _way(self, token: int, goal: ConfirmedCommand[Any], now: float) -> _Way:
-        return _Way(EffectLoop(token, goal, self._limits, now), self._number())
+    def _loop(self, token: int, goal: ConfirmedCommand[Any], now: float) -> EffectLoop[Any]:
+        return EffectLoop(token, goal, self._limits, now, self._number())
 
     def _try_otherwise(self, token: int, running: _Running, now: float) -> None:
         end, newest = running.end(), running.loops[-1]
@@ -272,14 +237,14 @@ class Requests(Generic[TransactionsT]):
         if newest.hampered and not done:
             goal = newest.goal.otherwise()
             if goal is not None:
-                running.ways.append(self._way(token, goal, now))
+                running.loops.append(self._loop(token, goal, now))
 
-    def _start_commands(self, way: _Way, now: float) -> None:
-        for command in way.loop.take_commands():
+    def _start_commands(self, loop: EffectLoop[Any], now: float) -> None:
+        for command in loop.take_commands():
             number = self._number()
-            self._owners[number] = way.loop
-            self.commands.start(number, command, now, way.loop.goal.urgent, way.family)
-        for command in way.loop.take_refreshes():
+            self._owners[number] = loop
+            self.commands.start(number, command, now, loop.goal.urgent, loop.family)
+        for command in loop.take_refreshes():
             self.commands.send_once(command, now)
 
     def _tell_reports(self, running: _Running, end: EffectLoop[Any] | None) -> None:
@@ -303,8 +268,8 @@ class Requests(Generic[TransactionsT]):
             self.commands.cancel(number, now)
         if running.follow_up is not None and finished.success:
             goal, watch = running.follow_up
-            self.begin(token, goal, now, watch)
-            self._running[token] = replace(self._running[token], first_end=finished)
+            loop = self._loop(token, goal, now)
+            self._running[token] = _Running([loop], watch, None, first_end=finished)
             return
         first = running.first_end
         if first is not None:

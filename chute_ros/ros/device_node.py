@@ -67,6 +67,7 @@ class DeviceNode(SuiteNode, ABC):
         self._received_at = (0, 0.0)
         self._loop_faults = 0
         self._useless_wire = UselessWire()
+        self._drops = diagnostics.RecentDrops()
         #: Who follows what the runtime publishes: (it, its stamp).
         self._followers: dict[type, Callable[[Any, Time], None]] = {}
         self._status_publisher = self.create_publisher(
@@ -153,7 +154,12 @@ class DeviceNode(SuiteNode, ABC):
         assert self.loop is not None
         connection = self.values["connection"]
         return diagnostics.WirePicture(
-            self.loop.wire.is_open, self.wire_text, connection, self.wire_trouble
+            self.loop.wire.is_open,
+            self.wire_text,
+            connection,
+            time.monotonic(),
+            self._drops,
+            self.wire_trouble,
         )
 
     # -- the runtime's shell ---------------------------------------------------------------------

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import Counter, deque
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from builtin_interfaces.msg import Time
@@ -21,6 +22,8 @@ OK, WARN, ERROR, STALE = (
     DiagnosticStatus.ERROR,
     DiagnosticStatus.STALE,
 )
+#: For so long (s) drops are counted; so many are few; such a share of all is usual on a bad line.
+_RECENTLY, _FEW_DROPS, _USUAL_SHARE = 10.0, 20, 0.2
 
 
 def status(
@@ -36,14 +39,40 @@ def status(
     )
 
 
+class RecentDrops:
+    """Says when much of what comes cannot be read, while something else can: as of a line with
+    noise on it, a second sender or another key."""
+
+    def __init__(self) -> None:
+        #: (s, messages received, dropped by reason), the oldest first.
+        self._looks: deque[tuple[float, int, Counter[str]]] = deque()
+
+    def look(self, received: int, dropped: Mapping[str, int], now: float) -> str:
+        """In words; empty: it is not much. received, dropped: since the start; now: s."""
+        self._looks.append((now, received, Counter(dropped)))
+        while len(self._looks) > 2 and self._looks[1][0] <= now - _RECENTLY:
+            self._looks.popleft()
+        since, received_before, dropped_before = self._looks[0]
+        new = Counter(dropped) - dropped_before
+        least = max(_FEW_DROPS, _USUAL_SHARE * (received - received_before + new.total()))
+        if new.total() <= least:
+            return ""
+        reason, count = new.most_common(1)[0]
+        return (
+            f"in the last {now - since:.0f} s much could not be read, mostly: {reason} ({count})"
+        )
+
+
 @dataclass(frozen=True)
 class WirePicture:
-    """The wire of a link: is it open, what was last said of it, where it goes, and what is wrong
-    with it though it is open (empty: nothing)."""
+    """The wire of a link: is it open, what was last said of it, where it goes, what is wrong with
+    it though it is open (empty: nothing), and now (s)."""
 
     is_open: bool
     text: str
     connection: str
+    now: float
+    drops: RecentDrops
     trouble: str = ""
 
 
@@ -54,9 +83,13 @@ def wire_task(
     received: int,
     values: Mapping[str, object],
     dropped: Mapping[str, int],
+    for_others: Collection[str] = (),
 ) -> DiagnosticStatus:
-    """The wire, what is doubtful on it while it is open, and what was dropped on it, by reason."""
+    """The wire, what is doubtful on it while it is open, and what was dropped on it, by reason.
+    for_others: reasons of what could be read."""
     level, text = (OK if wire.is_open else ERROR), wire.text
+    unread = {reason: n for reason, n in dropped.items() if reason not in for_others}
+    much = wire.drops.look(received, unread, wire.now)
     troubles = [*([wire.trouble] if wire.trouble else []), *troubles]
     if wire.is_open and troubles:
         level, text = ERROR, "; ".join(troubles)
@@ -67,6 +100,8 @@ def wire_task(
         text += f"; the received data cannot be read, mostly: {most} ({dropped[most]})"
     elif wire.is_open and not received:
         level, text = WARN, f"{text}, nothing received yet"
+    elif wire.is_open and much:
+        level, text = WARN, f"{text}; {much}"
     every = {**values, **{f"dropped: {reason}": n for reason, n in sorted(dropped.items())}}
     return status(node, "link", level, text, every, wire.connection)
 

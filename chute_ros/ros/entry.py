@@ -50,7 +50,8 @@ def run(name: str, place: str) -> None:
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
         executor = new_executor()
         with ctrl_c.held():
-            node = node_class()
+            node = node_class(started_with=sys.argv[1:])
+        node.get_logger().info(node.settings_taken)
         executor.add_node(node)
         # What is there now stays; to go over all of it once more would hold up a decision by
         # 30 ms.
@@ -103,7 +104,10 @@ def _look_at_arguments(name: str) -> None:
     """What is not for ROS is for nobody: a node has parameters alone."""
     from rclpy.utilities import remove_ros_args
 
-    others = remove_ros_args(sys.argv)[1:]
+    try:
+        others = remove_ros_args(sys.argv)[1:]
+    except RuntimeError as error:
+        _refused(name, error)
     usage = f"{name} --ros-args [-p PARAMETER:=VALUE] [--params-file FILE] [-r OLD:=NEW] ..."
     if "--help" in others or "-h" in others:
         print(f"usage: {usage}\nIts parameters, topics and services: docs/reference/")

@@ -7,7 +7,7 @@ allowed. Parameters are read-only unless a change in flight cannot be dangerous.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -19,6 +19,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 
 from chute_ros.errors import ParameterError
+from chute_ros.ros.parameter_file import taken
 from chute_ros.settings import Parameter
 
 
@@ -71,6 +72,12 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
         values[parameter.name] = value
     _tell_unknown(node, [parameter.name for parameter in parameters])
     return values
+
+
+def settings_taken(node: Node, names: Iterable[str], arguments: Sequence[str]) -> str:
+    """How many of its parameters a node takes from where, in words. arguments: of its process.
+    ParameterError: a file has nothing for it."""
+    return taken(arguments, node.get_fully_qualified_name(), names, node._parameter_overrides)
 
 
 def _tell_unknown(node: Node, known: list[str]) -> None:

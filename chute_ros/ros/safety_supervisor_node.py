@@ -16,7 +16,13 @@ from itertools import count
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyState, SupervisorLease
+from chute_msgs.msg import (
+    LinkHeartbeat,
+    SafetyDecision,
+    SafetyState,
+    SafetySummary,
+    SupervisorLease,
+)
 from chute_msgs.srv import Arm
 from rclpy.task import Future
 
@@ -30,7 +36,12 @@ from chute_ros.ros.suite_node import SuiteNode
 from chute_ros.ros.supervisor_health import Health
 from chute_ros.ros.supervisor_inputs import SupervisorInputs
 from chute_ros.ros.supervisor_memory import Memory
-from chute_ros.ros.supervisor_messages import MODES, decisions_task, state_message
+from chute_ros.ros.supervisor_messages import (
+    MODES,
+    decisions_task,
+    state_message,
+    summary_message,
+)
 from chute_ros.ros.supervisor_parameters import (
     PARAMETERS,
     blind_rules,
@@ -89,6 +100,9 @@ class SafetySupervisorNode(SuiteNode):
             SafetyDecision, "safety/decision", qos.DECISION
         )
         self._state_publisher = self.create_publisher(SafetyState, "safety/state", qos.LATCHED)
+        self._summary_publisher = self.create_publisher(
+            SafetySummary, "safety/summary", qos.LATCHED
+        )
         self._lease_publisher = self.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
         self._carriers: dict[type, Callable[[Any, Time], None]] = {
             model.Decision: self._publish_decision,
@@ -109,9 +123,9 @@ class SafetySupervisorNode(SuiteNode):
             before=self.runtime.state.heard.vehicle.link_state,
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
-            self.get_logger().warning(
-                f"rule '{rule}' can never be fulfilled: the autopilot is the only source of "
-                "measurements; add imu or odometry to vehicle_sources"
+            self.get_logger().info(
+                f"rule '{rule}' is not used: it needs a source besides the autopilot (imu or "
+                "odometry in vehicle_sources)"
             )
         mode = self.runtime.state.mode
         if mode in MODES:
@@ -245,6 +259,7 @@ class SafetySupervisorNode(SuiteNode):
     def _publish_state(self, told: SafetyTold, stamp: Time) -> None:
         message = state_message(self.config, told, stamp)
         self._state_publisher.publish(message)
+        self._summary_publisher.publish(summary_message(self.config, told, message))
         self._recorder.message("safety/state", message)
 
     def _publish_claim(self, told: LeaseClaim, stamp: Time) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -10,7 +11,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from chute_ros.ros import diagnostics, messages, qos
-from chute_ros.ros.parameters import declare
+from chute_ros.ros.parameters import declare, settings_taken
 from chute_ros.ros.plain_border import (
     PlainLogger,
     PlainPublisher,
@@ -22,15 +23,26 @@ from chute_ros.settings import Parameter
 
 
 class SuiteNode(Node):
-    """Base of all nodes. The subclass closes at_end when it is destroyed."""
+    """Base of all nodes. The subclass closes at_end when it is destroyed. started_with: the
+    arguments of its process, where it has one of its own."""
 
-    def __init__(self, name: str, parameters: tuple[Parameter, ...], **options: Any) -> None:
+    def __init__(
+        self,
+        name: str,
+        parameters: tuple[Parameter, ...],
+        started_with: Sequence[str] = (),
+        **options: Any,
+    ) -> None:
         #: What is done at its end. Before ROS knows the node: Kilted destroys what it knows, also
         #: one that a parameter keeps from being built.
         self.at_end = ExitStack()
         super().__init__(name, **options)
         self._logger = PlainLogger(self.get_logger().name)
+        #: What it took from where, in words.
+        self.settings_taken = settings_taken(self, [one.name for one in parameters], started_with)
         self.values = declare(self, parameters)
+        if profile := self.values.get("profile"):
+            self.settings_taken += f"; profile {profile}"
         # The wall clock only stamps, whatever use_sim_time says.
         self.wall = Clock(clock_type=ClockType.SYSTEM_TIME)
         self.steady = Clock(clock_type=ClockType.STEADY_TIME)

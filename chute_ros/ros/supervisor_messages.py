@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import RuleState, SafetyState
+from chute_msgs.msg import RuleState, SafetyState, SafetySummary
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.ros import diagnostics, messages
@@ -12,7 +12,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import ON_GROUND, Stage
 from chute_ros.supervisor.policy import judge
-from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.preflight import block_reasons, link_problem
 from chute_ros.supervisor.readings import doubt, measured, unusable
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
@@ -59,6 +59,29 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         message.decision_action = int(state.newest.action)
         message.decision_rule = state.newest.rule
     return message
+
+
+def summary_message(
+    config: SupervisorConfig, told: SafetyTold, whole: SafetyState
+) -> SafetySummary:
+    """safety/summary. whole: the message of the same for safety/state."""
+    state = told.state
+    return SafetySummary(
+        header=whole.header,
+        supervisor=whole.supervisor,
+        state=whole.state,
+        state_name=state.stage.name,
+        text=whole.state_text,
+        mode=whole.mode,
+        flight_blocked=whole.flight_blocked,
+        armed=[" ".join(one) for one in state.armed(config)],
+        released=[" ".join(one) for one in sorted(state.released_since_reset)],
+        links_ok=sum(
+            not link_problem(config, one, state.evidence(one), told.now) for one in config.links
+        ),
+        links=len(config.links),
+        alarms=len(whole.alarms),
+    )
 
 
 def decisions_task(

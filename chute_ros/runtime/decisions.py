@@ -63,7 +63,7 @@ class DecisionCarrier:
         counts: dict[str, object] = {
             f"decisions: {verdict.value}": n for verdict, n in self.verdicts.items()
         }
-        counts["newest decision"] = f"{self._gate.newest_epoch}.{self._gate.newest_id}"
+        counts["newest decision"] = f"{self._gate.newest_id} of epoch {self._gate.newest_epoch}"
         return counts
 
     def _judge(self, decision: Decision, age: float, now: float) -> None:
@@ -95,4 +95,4 @@ class DecisionCarrier:
 
 
 def _name(decision: Decision) -> str:
-    return f"decision {decision.epoch}.{decision.id} {decision.action.name}"
+    return f"{decision.named}, {decision.action.name}"

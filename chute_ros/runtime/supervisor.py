@@ -281,7 +281,7 @@ def _told(decision: Decision) -> str:
     shadow = " (SHADOW, not sent)" if decision.shadow else ""
     device = f" device {decision.device}" if decision.device else ""
     return (
-        f"decision {decision.epoch}.{decision.id} {decision.action.name}{shadow} by rule "
+        f"{decision.named}: {decision.action.name}{shadow} by rule "
         f"'{decision.rule}' to {', '.join(decision.targets)}{device}: "
         f"{'; '.join(decision.reasons)}"
     )

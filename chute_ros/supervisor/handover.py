@@ -50,7 +50,7 @@ def check_numbers(state: State) -> None:
         numbers.append((state.newest.epoch, state.newest.id))
     for epoch, number in numbers:
         if not (1 <= epoch <= LARGEST_EPOCH and 1 <= number <= _LARGEST_ID):
-            raise RecordError(f"no decision has the number {epoch}.{number}")
+            raise RecordError(f"there is no decision {number} of epoch {epoch}")
 
 
 def _moved(value: T, by: float) -> T:

@@ -243,7 +243,7 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
     up, truth, person, flies = flown.up, flown.truth, scenario.person, scenario.manoeuvre
     lines = [(at, f"said: {text}") for at, text in flown.said]
     for at, one in flown.decided:
-        what = f"decided {one.epoch}.{one.id} {one.action.name} by {one.rule!r}"
+        what = f"{one.named}: {one.action.name} by {one.rule!r}"
         lines.append((at, f"{what}: {'; '.join(one.reasons)}"))
     lines += [(act.at, f"{act.node} acts on {act.decision.action.name}") for act in flown.acted]
     for at, what in (

@@ -139,7 +139,7 @@ def told(output: i.Output | None) -> str:
         shadow = " (SHADOW)" if decision.shadow else ""
         targets = ", ".join(decision.targets) or "nobody"
         return (
-            f"{decision.action.name}{shadow}{again} {decision.epoch}.{decision.id} by "
+            f"{decision.action.name}{shadow}{again}, {decision.named}, by "
             f"'{decision.rule}' to {targets}"
         )
     if isinstance(output, i.LogMessage):

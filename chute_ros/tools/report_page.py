@@ -112,7 +112,7 @@ def _decisions(decisions: Sequence[Decided]) -> str:
 
 
 def _besides(one: Decided) -> str:
-    text = f"{one.decision.epoch}.{one.decision.id}"
+    text = one.decision.named
     if one.decision.shadow:
         text += ", SHADOW: not sent"
     return f'<br><span class="dim">{escaped(text)}</span>'

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.data_types import DataTypes
@@ -46,13 +45,10 @@ def load_data_types(folder: str, named: str) -> DataTypes:
         if not (file.is_file() or file.is_dir()):
             raise ParameterError(f"{named} is {folder!r}: {file} is no regular file")
     standard = [one for name, one in dronecan.TYPENAMES.items() if name.startswith(_STANDARD)]
+    # Where types of the vendor find the standard ones that they are made of.
+    specs = Path(dronecan.__file__).parent / "dsdl_specs" / "uavcan"
     try:
-        own = parse_namespaces([str(path)], [str(_standard_folder(dronecan))])
+        own = parse_namespaces([str(path)], [str(specs)])
         return DataTypes([*standard, *own])
     except (DsdlException, ParameterError) as error:
         raise ParameterError(f"{named} is {folder!r}: {error}") from None
-
-
-def _standard_folder(library: Any) -> Path:
-    """Where types of the vendor find the standard ones that they are made of."""
-    return Path(library.__file__).parent / "dsdl_specs" / "uavcan"

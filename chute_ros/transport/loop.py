@@ -17,9 +17,8 @@ from contextlib import contextmanager
 from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.transport.lateness import Lateness
-from chute_ros.transport.wire import Wire
+from chute_ros.transport.wire import Wire, WireWatch
 from chute_ros.transport.wire_events import LoopFault, WireChange
-from chute_ros.transport.wire_watch import WireWatch
 
 REOPEN_INTERVAL = 0.5  # s
 #: The loop runs at least this often (s), so that a hung one can be told from an idle one.

@@ -107,9 +107,10 @@ class PortUsers:
     def trouble(self, now: float) -> str:
         """Other readers of the port, in words; empty: none known. now: monotonic s."""
         names, when = self._seen
+        certain = len(self._signs) == _CERTAIN and now - self._signs[0] < _SIGN_LASTS
         if names and now - when < _SIGN_LASTS:
             who = ", ".join(names)
-        elif self._certain(now) and self._looked > self._first_sign:
+        elif certain and self._looked > self._first_sign:
             who = f"a program that cannot be seen from this user (sudo fuser -v {self._path})"
         else:
             return ""
@@ -121,9 +122,6 @@ class PortUsers:
     def stop(self) -> None:
         """Look no more; one that is under way ends by itself, and touches no descriptor."""
         self._stopping.set()
-
-    def _certain(self, now: float) -> bool:
-        return len(self._signs) == _CERTAIN and now - self._signs[0] < _SIGN_LASTS
 
     def _run(self) -> None:
         wait = min(LOOK_SOON, self._look_each)

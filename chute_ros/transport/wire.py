@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from typing import Protocol
+from collections.abc import Callable, Hashable
+from typing import Any, Protocol, runtime_checkable
 
 from chute_ros.transport.address import Address
-from chute_ros.transport.serial_ports import find_usb_port
-from chute_ros.transport.serial_wire import SerialWire
+from chute_ros.transport.serial_wire import SerialWire, find_usb_port
 from chute_ros.transport.tcp import TcpClientWire, TcpServerWire
 from chute_ros.transport.udp import UdpWire
+from chute_ros.transport.wire_events import WireTrouble
 
 USB_BAUD = 115200
 
@@ -41,6 +41,57 @@ class Wire(Protocol):
 
     def describe(self) -> str:
         """Address of the wire, with the port that was really bound."""
+
+
+@runtime_checkable
+class WatchfulWire(Protocol):
+    """A wire that can be in trouble while it is open."""
+
+    def look(self, now: float) -> str:
+        """Look at the clock. Returns what is wrong, in words; empty: nothing is."""
+
+
+@runtime_checkable
+class ServingWire(Protocol):
+    """A wire that keeps places for clients."""
+
+    def frame_heard(self, stream: Hashable, now: float) -> None:
+        """What this stream sent held a frame."""
+
+
+class WireWatch:
+    """Troubles of one open wire, and its clients that send frames.
+
+    frames: how many frames the protocol has taken; None: all that comes counts.
+    deliver: gets a WireTrouble whenever it changes."""
+
+    def __init__(
+        self, wire: Wire, frames: Callable[[], int] | None, deliver: Callable[[list[Any]], None]
+    ) -> None:
+        self._watchful = wire if isinstance(wire, WatchfulWire) else None
+        self._serving = wire if isinstance(wire, ServingWire) else None
+        self._frames = frames
+        self._before = 0
+        self._deliver = deliver
+        self._trouble = ""
+
+    def before_data(self) -> None:
+        """Data is about to be given to the protocol."""
+        if self._frames is not None:
+            self._before = self._frames()
+
+    def data_heard(self, stream: Hashable, now: float) -> None:
+        """The protocol has data of this stream."""
+        framed = self._frames is None or self._frames() > self._before
+        if self._serving is not None and framed:
+            self._serving.frame_heard(stream, now)
+
+    def look(self, now: float) -> None:
+        """Look at the clock."""
+        text = "" if self._watchful is None else self._watchful.look(now)
+        if text != self._trouble:
+            self._trouble = text
+            self._deliver([WireTrouble(text)])
 
 
 def make_wire(address: Address) -> Wire:

@@ -44,6 +44,7 @@ PUBLISHED = {
         "safety/decision": ("SafetyDecision", DECISION),
         "safety/lease": ("SupervisorLease", STATUS),
         "safety/state": ("SafetyState", (1, LATCHED)),
+        "safety/summary": ("SafetySummary", (1, LATCHED)),
         "/diagnostics": ("DiagnosticArray", STATUS),
         "diagnostics": ("DiagnosticArray", STATUS),
     },

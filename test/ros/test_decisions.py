@@ -203,7 +203,10 @@ def test_a_flight_block_never_touches_a_vehicle_in_the_air(bench, supervisor):
 def test_a_flight_block_only_says_so_where_it_may_not_disarm(bench, supervisor):
     autopilot = grounded(bench, supervisor, disarm_when_blocked=False)
     report = supervisor.report(supervisor.decide(Action.FLIGHT_BLOCK), Outcome.CONFIRMED)
-    assert report.detail == "noted; arming is not undone (disarm_when_blocked is false)"
+    assert (
+        report.detail
+        == "noted; a vehicle that arms is not disarmed (disarm_when_blocked is false)"
+    )
     arm(bench, autopilot)
     supervisor.sees(armed=VehicleState.ARMED)
     beats = len(supervisor.vehicle)

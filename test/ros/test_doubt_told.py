@@ -8,16 +8,17 @@ from types import MappingProxyType
 
 import pytest
 from builtin_interfaces.msg import Time
+from chute_msgs.msg import SafetySummary
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.model import Armed, LinkState, ParachuteStatus, VehicleState
-from chute_ros.ros.supervisor_messages import decisions_task, state_message
+from chute_ros.ros.supervisor_messages import decisions_task, state_message, summary_message
 from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import Measured
-from chute_ros.supervisor.state import HeardHere, State
+from chute_ros.supervisor.state import Alarms, HeardHere, State
 
 NOW = 100.0
 CONFIG = config_from({parameter.name: parameter.default for parameter in PARAMETERS})
@@ -86,3 +87,27 @@ def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(
     told = state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text
     assert told == text.format(f"{link} 1/161")
     assert decisions_task("safety_supervisor", CONFIG, state, NOW).message.endswith(told)
+
+
+def test_the_summary_is_the_same_in_a_few_fields() -> None:
+    state, (link,) = known(), CONFIG.links
+    armed = replace(WELL, devices=MappingProxyType({"1/161": ARMED}))
+    state = replace(
+        state,
+        stage=Stage.BLOCKED,
+        heard=replace(state.heard, links=MappingProxyType({link: armed})),
+        released_since_reset=frozenset({(link, "1/162")}),
+        alarming=Alarms(alarms=("one", "two")),
+    )
+    told = SafetyTold("supervisor", state, {}, NOW)
+    whole = state_message(CONFIG, told, Time(sec=5))
+    summary = summary_message(CONFIG, told, whole)
+    assert (summary.header.stamp.sec, summary.supervisor) == (5, "supervisor")
+    assert (summary.state, summary.state_name) == (SafetySummary().state + 1, "BLOCKED")
+    assert summary.text == whole.state_text
+    assert summary.text.startswith(f"BLOCKED: {link} 1/162 was released")
+    assert not summary.flight_blocked, "it was not sent yet"
+    assert (summary.armed, summary.released) == ([f"{link} 1/161"], [f"{link} 1/162"])
+    assert (summary.links_ok, summary.links, summary.alarms) == (1, 1, 2)
+    silent = replace(state, heard=replace(state.heard, links=MappingProxyType({})))
+    assert summary_message(CONFIG, replace(told, state=silent), whole).links_ok == 0

@@ -5,12 +5,11 @@ import importlib.util
 import itertools
 import subprocess
 import sys
-import types
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import ClassVar
 
 import pytest
+from launch_files import LAUNCH, Recorded, loaded, made_by
 
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
@@ -20,7 +19,7 @@ from chute_ros.links.upf.simulator.sim_upf import _parameters
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = sorted((ROOT / "launch").glob("*.launch.py"))
+FILES = sorted(LAUNCH.glob("*.launch.py"))
 EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 
 
@@ -105,20 +104,6 @@ def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
         assert "config" in node["parameters"]
 
 
-class Recorded:
-    """Stands for whatever a launch file imports: remembers what it was made with."""
-
-    made: ClassVar[list] = []
-    chosen: ClassVar[dict] = {}
-
-    def __init__(self, *args, **options):
-        self.args, self.options = args, options
-        Recorded.made.append(self)
-
-    def perform(self, context):
-        return Recorded.chosen.get(self.args[0], "")
-
-
 #: Parachute -> what vehicle.launch.py starts for it, and simulation.launch.py beside that.
 STARTED = {
     "mavlink": ({"mavlink_parachute"}, {"sim_autopilot", "sim_mavlink_parachute"}),
@@ -129,31 +114,6 @@ STARTED = {
     ),
     "umbilical": ({"umbilical"}, {"sim_flight_computer"}),
 }
-
-
-def loaded(file, monkeypatch):
-    """What is in a launch file: run for real, with stand-ins for `launch`."""
-    for name in {"launch", "launch.actions", "launch.substitutions", "launch_ros.actions"} | {
-        "launch.launch_description_sources",
-        "launch_ros",
-        "launch_ros.substitutions",
-    }:
-        module = types.ModuleType(name)
-        module.__getattr__ = lambda wanted: type(wanted, (Recorded,), {})
-        monkeypatch.setitem(sys.modules, name, module)
-    space = {}
-    exec(compile(file.read_text(), str(file), "exec"), space)
-    return space
-
-
-def made_by(file, monkeypatch, **arguments):
-    """What the function of a launch file makes."""
-    space = loaded(file, monkeypatch)
-    Recorded.made.clear()
-    monkeypatch.setattr(Recorded, "chosen", {"port": "14600", **arguments})
-    function = space.get("_nodes") or space["_vehicle"]
-    function(context=None)
-    return list(Recorded.made)
 
 
 @pytest.mark.parametrize("parachute", STARTED)

@@ -203,5 +203,5 @@ def test_what_cannot_be_decided_nor_told_is_not_followed(fields: dict[str, objec
 def test_a_decision_under_way_whose_number_no_message_holds_is_not_followed() -> None:
     kill = json.loads(spoilt())["kill"]
     kill["decision"]["id"] = 2**64
-    with pytest.raises(RecordError, match="no decision has the number"):
+    with pytest.raises(RecordError, match="there is no decision"):
         handover.followed(follower(), spoilt(kill=kill), START)

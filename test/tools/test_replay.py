@@ -48,7 +48,7 @@ def test_the_same_settings_give_the_same_decisions(flight, monkeypatch, capsys):
     out = capsys.readouterr().out
     assert f"{round(END / STEP)} turns replayed" in out
     assert "0 different" in out
-    assert re.search(rf"{DEPLOY_AT:.3f} s  KILL 7\.\d+ by 'operator'", out)
+    assert re.search(rf"{DEPLOY_AT:.3f} s  KILL, decision \d+ of epoch 7, by 'operator'", out)
     assert list(flight.folder.glob("*.svg")) == [], "nothing to show"
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 from loop_bench import point, running
 
-from chute_ros.transport import serial_ports
+from chute_ros.transport import serial_wire
 
 #: The user "nobody".
 NOBODY = 65534
@@ -152,7 +152,7 @@ def plugged_in(monkeypatch):
         names = ("device", "vid", "pid", "serial_number")
         return [SimpleNamespace(**dict(zip(names, port, strict=True))) for port in ports]
 
-    monkeypatch.setattr(serial_ports.list_ports, "comports", comports)
+    monkeypatch.setattr(serial_wire.list_ports, "comports", comports)
     return ports
 
 

@@ -8,60 +8,55 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from chute_ros import model
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
-from chute_ros.links.mavlink.protocol.setup_check import Setup
+from chute_ros.model import NAN, LinkState, flag_names
+from chute_ros.protocol.mavlink.frames import UNKNOWN_MESSAGE
 from chute_ros.ros import diagnostics
 
+#: Task, level, text, values and device: diagnostics.status makes a message of it.
+Task = tuple[str, bytes, str, Mapping[str, object], str]
+_NEVER: tuple[bytes, str, dict[str, object], str] = (diagnostics.STALE, "never received", {}, "")
 
-@dataclass(frozen=True)
-class ParachuteDetails:
-    """One parachute: its picture, s between its statuses, and how well it is heard."""
-
-    status: model.ParachuteStatus
-    status_interval: float
-    liveness: Mapping[str, object]
+#: Reasons for which something is dropped that could be read.
+READABLE = (
+    UNKNOWN_MESSAGE,
+    "frames with our own system and component id",
+    "acknowledgements for another component",
+    "duplicate acknowledgements",
+)
 
 
 @dataclass(frozen=True)
 class Details:
     """A picture of the link, made in its thread and read in the executor's."""
 
-    parachutes: tuple[ParachuteDetails, ...]
-    vehicle: model.VehicleState
-    #: Of each message that is read of the autopilot, Hz.
-    rates: Mapping[str, float]
-    #: How long the autopilot takes to answer, s; NaN: it does not.
-    round_trip: float
     doubts: tuple[str, ...]
     received: int
     sent: int
+    #: What came, and was of no use.
+    useless: Mapping[str, object]
     dropped: Counter[str]
-    late_acknowledgements: int
-    not_followed: int
-    setup: Setup | None
+    parachutes: tuple[Task, ...]
+    autopilot: Task
+    kill: Task
 
 
 def details_of(link: MavlinkLink, now: float) -> Details:
-    """In the link's turn: all that the tasks below say."""
-
-    def parachute(one: ParachuteTracker) -> ParachuteDetails:
-        values = diagnostics.liveness_values(one.liveness, now)
-        return ParachuteDetails(one.status(now), one.status_interval, values)
-
+    """In the link's turn: all that the tasks say."""
+    refused = link.parachutes.refused_count + link.autopilots.refused_count
     return Details(
-        tuple(map(parachute, link.parachutes.all())),
-        link.vehicle_state(now),
-        link.autopilot_rates(now),
-        link.autopilot_round_trip(now),
         tuple(link.doubts(now)),
         link.received_count,
         link.sent_count,
+        {
+            "late acknowledgements": link.requests.commands.late_count,
+            "heartbeats of devices beyond the limit of sixteen": refused,
+        },
         Counter(link.counts),
-        link.requests.commands.late_count,
-        link.parachutes.refused_count + link.autopilots.refused_count,
-        link.setup(),
+        tuple(_parachute(one, now) for one in link.parachutes.all()),
+        _autopilot(link, now),
+        _kill(link),
     )
 
 
@@ -69,51 +64,47 @@ def link_task(
     name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
 ) -> DiagnosticStatus:
     """The wire, and what was dropped on it."""
-    values = {
-        **traffic,
-        "late acknowledgements": details.late_acknowledgements,
-        "heartbeats of devices beyond the limit of sixteen": details.not_followed,
-    }
+    values = {**traffic, **details.useless}
     return diagnostics.wire_task(
-        name, wire, details.doubts, details.received, values, details.dropped
+        name, wire, details.doubts, details.received, values, details.dropped, READABLE
     )
 
 
-def parachute_tasks(name: str, details: Details, expected: bool) -> list[DiagnosticStatus]:
-    """One task for each parachute of ours."""
-    if not details.parachutes and expected:
-        return [diagnostics.never_heard(name)]
-    return [_parachute_task(name, one) for one in details.parachutes]
+def tasks(name: str, details: Details, expects_parachute: bool) -> list[DiagnosticStatus]:
+    """Each parachute of ours, the autopilot on the same network, and how it is killed."""
+    parachutes = details.parachutes
+    if not parachutes and expects_parachute:
+        parachutes = (("parachute", *_NEVER),)
+    told = (*parachutes, details.autopilot, details.kill)
+    return [diagnostics.status(name, *task) for task in told]
 
 
-def _parachute_task(name: str, one: ParachuteDetails) -> DiagnosticStatus:
-    status = one.status
-    return diagnostics.status(
-        name,
-        f"parachute {status.device}",
-        diagnostics.OK if status.healthy else diagnostics.ERROR,
-        "; ".join(status.faults) or status.state.name,
-        {
-            **one.liveness,
-            "PARACHUTE_STATUS interval (s)": one.status_interval,
-            "state": status.state.name,
-            "armed triggers": ", ".join(model.flag_names(status.armed_triggers)),
-            "errors": ", ".join(model.flag_names(status.error_flags)),
-            "safety": ", ".join(model.flag_names(status.safety_flags)),
-            "packed date": status.packed_date,
-            "uptime (s)": status.uptime,
-        },
-        status.device,
-    )
+def _parachute(one: ParachuteTracker, now: float) -> Task:
+    status = one.status(now)
+    values = {
+        **diagnostics.liveness_values(one.liveness, now),
+        "PARACHUTE_STATUS interval (s)": one.status_interval,
+        "state": status.state.name,
+        "armed triggers": ", ".join(flag_names(status.armed_triggers)),
+        "errors": ", ".join(flag_names(status.error_flags)),
+        "safety": ", ".join(flag_names(status.safety_flags)),
+        "packed date": status.packed_date,
+        "uptime (s)": status.uptime,
+    }
+    level = diagnostics.OK if status.healthy else diagnostics.ERROR
+    text = "; ".join(status.faults) or status.state.name
+    return f"parachute {status.device}", level, text, values, status.device
 
 
-def autopilot_task(name: str, details: Details) -> DiagnosticStatus:
-    """The autopilot on the same network."""
-    vehicle = details.vehicle
+def _autopilot(link: MavlinkLink, now: float) -> Task:
+    vehicle, autopilot = link.vehicle_state(now), link.chosen_autopilot()
+    rates, round_trip = {}, NAN
+    if autopilot is not None:
+        rates, round_trip = autopilot.rates(now), autopilot.round_trip.seconds(now)
     level, text = diagnostics.OK, f"{vehicle.armed.name}, {vehicle.landed_state.name}"
-    if vehicle.link_state is model.LinkState.NEVER_SEEN:
+    if vehicle.link_state is LinkState.NEVER_SEEN:
         level, text = diagnostics.STALE, "never received"
-    elif vehicle.link_state is not model.LinkState.OK:
+    elif vehicle.link_state is not LinkState.OK:
         level, text = diagnostics.ERROR, f"heartbeat {vehicle.link_state.name}"
     elif vehicle.rebooted_in_flight:
         level, text = diagnostics.ERROR, "restarted in flight"
@@ -129,11 +120,11 @@ def autopilot_task(name: str, details: Details) -> DiagnosticStatus:
         "landed state age (s)": vehicle.landed_state_age,
         "battery (V)": vehicle.battery_voltage,
         "restarts": vehicle.reboot_count,
-        "rates (Hz)": ", ".join(f"{kind} {hz:.1f}" for kind, hz in sorted(details.rates.items())),
-        "answers after (s, TIMESYNC)": details.round_trip,
-        "not detected": "; ".join(not_seen(details.rates)),
+        "rates (Hz)": ", ".join(f"{kind} {hz:.1f}" for kind, hz in sorted(rates.items())),
+        "answers after (s, TIMESYNC)": round_trip,
+        "not detected": "; ".join(not_seen(rates)),
     }
-    return diagnostics.status(name, "autopilot", level, text, values, vehicle.source)
+    return "autopilot", level, text, values, vehicle.source
 
 
 #: Messages, one of which at least is needed for what the text says.
@@ -146,10 +137,7 @@ _SIGHTS = (
         ("SCALED_IMU2", "SCALED_IMU3"),
         "no SCALED_IMU2: a wrong accelerometer is not contradicted by another",
     ),
-    (
-        ("ATTITUDE_TARGET",),
-        "no ATTITUDE_TARGET: a commanded attitude looks like an accident",
-    ),
+    (("ATTITUDE_TARGET",), "no ATTITUDE_TARGET: a commanded attitude looks like an accident"),
     (
         ("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED", "NAV_CONTROLLER_OUTPUT"),
         "no targets: an uncommanded level sink raises only an alarm",
@@ -162,14 +150,15 @@ def not_seen(rates: Mapping[str, float]) -> list[str]:
     return [text for kinds, text in _SIGHTS if not any(kind in rates for kind in kinds)]
 
 
-def kill_task(name: str, setup: Setup | None) -> DiagnosticStatus:
+def _kill(link: MavlinkLink) -> Task:
     """Which way a kill goes, whether the autopilot's settings allow it, and the flight block."""
+    setup = link.setup()
     if setup is None:
-        return diagnostics.never_heard(name, "kill")
+        return ("kill", *_NEVER)
     level, told = diagnostics.OK, [f"{setup.firmware}: {setup.kill}"]
     if setup.fault:
         level, told = diagnostics.ERROR, [f"forbids take-off: {setup.fault}"]
     elif setup.warnings:
         level = diagnostics.WARN
     values = {"kill": setup.kill, "flight block": setup.block, **setup.settings}
-    return diagnostics.status(name, "kill", level, "; ".join([*told, *setup.warnings]), values, "")
+    return "kill", level, "; ".join([*told, *setup.warnings]), values, ""

@@ -16,14 +16,7 @@ from chute_msgs.srv import (
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
-from chute_ros.links.mavlink.diagnostics import (
-    Details,
-    autopilot_task,
-    details_of,
-    kill_task,
-    link_task,
-    parachute_tasks,
-)
+from chute_ros.links.mavlink.diagnostics import Details, details_of, link_task, tasks
 from chute_ros.links.mavlink.parameters import PARAMETERS, MavlinkParameters
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import component_information
@@ -63,8 +56,7 @@ class MavlinkParachuteNode(DeviceNode):
         )
         vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
         self.follow(
-            VehicleReport,
-            lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at)),
+            VehicleReport, lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at))
         )
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
@@ -93,12 +85,9 @@ class MavlinkParachuteNode(DeviceNode):
             "frames sent": details.sent,
             "send errors": self.loop.send_errors,
         }
-        wire = self.wire_picture()
         return [
-            link_task(name, details, traffic, wire),
-            *parachute_tasks(name, details, self.values["expect_parachute"]),
-            autopilot_task(name, details),
-            kill_task(name, details.setup),
+            link_task(name, details, traffic, self.wire_picture()),
+            *tasks(name, details, self.values["expect_parachute"]),
             self._signing.task(name),
         ]
 
@@ -111,12 +100,11 @@ class MavlinkParachuteNode(DeviceNode):
 
     async def _set_triggers(self, request: Any, response: Any) -> Any:
         if not 1 <= request.select <= 255 or request.arm > 255:
-            response.result = dialect.MAV_RESULT_DENIED
-            response.message = (
+            why = (
                 f"arm {request.arm}, select {request.select}: arm is a mask from 0 to 255, "
                 "select from 1 to 255 (ParachuteStatus.TRIGGER_*); nothing was sent"
             )
-            return response
+            return _denied(response, why)
         end = await self.request(
             lambda link, token, now: link.set_triggers(
                 token, request.arm, request.select, request.device, now
@@ -127,9 +115,8 @@ class MavlinkParachuteNode(DeviceNode):
 
     async def _parachute_action(self, request: Any, response: Any) -> Any:
         if request.action > dialect.PARACHUTE_RELEASE:
-            response.result = dialect.MAV_RESULT_DENIED
-            response.message = f"action {request.action}: need DISABLE 0, ENABLE 1 or RELEASE 2"
-            return response
+            why = f"action {request.action}: need DISABLE 0, ENABLE 1 or RELEASE 2"
+            return _denied(response, why)
         self.get_logger().warning(
             f"~/parachute_action {request.action} called: {request.reason!r}"
         )
@@ -149,11 +136,8 @@ class MavlinkParachuteNode(DeviceNode):
 
     async def _set_interval(self, request: Any, response: Any) -> Any:
         if request.interval_us < -1:
-            response.result = dialect.MAV_RESULT_DENIED
-            response.message = (
-                f"interval_us {request.interval_us}: need microseconds, -1 (off) or 0 (default)"
-            )
-            return response
+            why = f"interval_us {request.interval_us}: need microseconds, -1 (off) or 0 (default)"
+            return _denied(response, why)
         end = await self.request(
             lambda link, token, now: link.set_message_interval(
                 token, request.message_id, request.interval_us, request.device, now
@@ -168,15 +152,8 @@ class MavlinkParachuteNode(DeviceNode):
         response.success, response.message = end.finished.success, end.finished.message
         response.uptime = model.NAN
         if end.data is not None:
-            information = component_information(end.data)
-            response.vendor_name = information.vendor_name
-            response.model_name = information.model_name
-            response.software_version = information.software_version
-            response.hardware_version = information.hardware_version
-            response.serial_number = information.serial_number
-            response.manufacture_date = information.manufacture_date
-            response.capabilities = information.capabilities
-            response.uptime = information.uptime
+            for name, value in vars(component_information(end.data)).items():
+                setattr(response, name, value)
         return response
 
     def _message(self, message_id: int, device: str) -> Any:
@@ -194,9 +171,13 @@ class MavlinkParachuteNode(DeviceNode):
         return next((int(status.armed_triggers) for status in (*heard, *told)), 0)
 
 
+def _denied(response: Any, why: str) -> Any:
+    response.result, response.message = dialect.MAV_RESULT_DENIED, why
+    return response
+
+
 def _fill(response: Any, end: RequestFinished) -> Any:
     """The fields that all answers to a command share."""
-    response.success = end.finished.success
+    response.success, response.message = end.finished.success, end.finished.message
     response.result = end.finished.result
-    response.message = end.finished.message
     return response

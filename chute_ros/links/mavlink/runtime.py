@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from chute_ros.links.mavlink.health import health
-from chute_ros.links.mavlink.protocol import results
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
-from chute_ros.model import Action, Decision
-from chute_ros.protocol.effect import EffectFinished
-from chute_ros.protocol.events import RequestFinished
+from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
+from chute_ros.model import NAN, Action, Armed, Decision, LinkState, VehicleState
+from chute_ros.protocol.events import RequestFinished, failed_request
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.settings import nested, parameter
 
 #: How a flight block is reported by a node that must leave arming alone.
-_NOT_UNDONE = "noted; arming is not undone (disarm_when_blocked is false)"
+_LEFT_ALONE = "noted; a vehicle that arms is not disarmed (disarm_when_blocked is false)"
+_DISARMED = "a vehicle that arms on the ground is disarmed from now on; in the air nothing is done"
+
+_NO_PARACHUTE = (
+    "no parachute was received: check its power and wiring, parachute_system_id, and that its "
+    "HEARTBEAT (type MAV_TYPE_PARACHUTE, 43) reaches this connection"
+)
+_HEARTBEATS_ALONE = (
+    "sends heartbeats but no PARACHUTE_STATUS (430), although requested: check its "
+    "firmware, and that every router on the way passes it on (ArduPilot does with "
+    "MAVn_OPTIONS bit 3; PX4 does not)"
+)
+_NO_AUTOPILOT = (
+    "no autopilot was received to send a kill to: check its wiring, "
+    "autopilot_system_id and autopilot_component_id"
+)
 
 
 @dataclass(frozen=True)
@@ -38,12 +52,24 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
 
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         vehicle = link.vehicle_state(now)
-        state, age, reasons = health(link, vehicle, self.settings.expect_parachute, now)
-        return Summary(state, not reasons, age, reasons)
+        # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
+        doubts = [] if vehicle.armed is Armed.ARMED else link.doubts(now)
+        autopilot = _why_no_kill(vehicle)
+        if not self.settings.expect_parachute:
+            reasons = [*autopilot, *doubts]
+            return Summary(vehicle.link_state, not reasons, vehicle.armed_age, tuple(reasons))
+        chosen = link.chosen_parachute()
+        state, age, reasons = LinkState.NEVER_SEEN, NAN, [_NO_PARACHUTE]
+        if chosen is not None:
+            state, age = chosen.liveness.state, chosen.liveness.age(now)
+            reasons = _why_unhealthy(chosen, now)
+        reasons += doubts
+        if reasons:
+            reasons += autopilot
+        return Summary(state, not reasons, age, tuple(reasons))
 
     def failed_end(self, token: int, text: str) -> RequestFinished:
-        finished = EffectFinished(token, False, False, results.NO_ACKNOWLEDGEMENT, text)
-        return RequestFinished(finished)
+        return failed_request(token, text)
 
     def carry_out(self, decision: Decision) -> None:
         if decision.action is Action.KILL:
@@ -60,5 +86,29 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
             )
         elif decision.action is not Action.NONE:
             undone = self.settings.link.disarm_when_blocked
-            blocked = "arming on the ground is undone" if undone else _NOT_UNDONE
-            self.carry_out_flight_block(decision, blocked, "arming is not undone")
+            blocked = _DISARMED if undone else _LEFT_ALONE
+            self.carry_out_flight_block(decision, blocked, "a vehicle that arms is left alone")
+
+
+def _why_unhealthy(one: ParachuteTracker, now: float) -> list[str]:
+    """In words that say what a person can do; empty: it is healthy."""
+    status = one.status(now)
+    if status.healthy:
+        return []
+    reasons = [f"{one.device} {fault}" for fault in status.faults]
+    if math.isnan(one.status_received) and status.link_state is LinkState.OK:
+        # Its own fault says so too, in fewer words.
+        reasons = [f"{one.device} {_HEARTBEATS_ALONE}"]
+    if status.deployed:
+        reasons.append(f"{one.device} is released")
+    return reasons or [f"{one.device} is {status.state.name}"]
+
+
+def _why_no_kill(vehicle: VehicleState) -> list[str]:
+    """Why the autopilot cannot be told to kill; empty: it can."""
+    if vehicle.link_state is LinkState.NEVER_SEEN:
+        return [_NO_AUTOPILOT]
+    if vehicle.link_state is LinkState.OK:
+        return []
+    state, age = vehicle.link_state.name, vehicle.armed_age
+    return [f"autopilot {vehicle.source} is {state}: its heartbeat is {age:.1f} s old"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from chute_ros.links.relay.protocol.link import RelayConfig, RelayLink
 from chute_ros.model import NAN, Action, Decision, LinkState, Outcome
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
-from chute_ros.protocol.events import RequestFinished
+from chute_ros.protocol.events import AskSupervisor, RequestFinished, failed_request
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+from chute_ros.runtime.topics import DeviceRequest
 from chute_ros.settings import nested
 
 _UNMONITORED = "nothing comes back from a relay output: what its parachute is can only be hoped"
@@ -32,7 +33,13 @@ class RelayRuntime(DeviceRuntime[RelaySettings]):
         return Summary(link.state, False, NAN, (_UNMONITORED if unmonitored else _NOT_WRITTEN,))
 
     def failed_end(self, token: int, text: str) -> RequestFinished:
-        return RequestFinished(EffectFinished(token, False, False, NO_ANSWER, text))
+        return failed_request(token, text)
+
+    def event(self, event: Any) -> None:
+        if isinstance(event, AskSupervisor):
+            self.shell.publish(DeviceRequest(self.name, event.device, event.ask, event.reason))
+        else:
+            super().event(event)
 
     def carry_out(self, decision: Decision) -> None:
         if decision.action is Action.DEPLOY and decision.device:

@@ -10,56 +10,54 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
+from chute_ros.links.umbilical.protocol.decoder import NOT_YET
+from chute_ros.links.umbilical.protocol.line_parser import UNKNOWN_LINE
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.ros import diagnostics
+
+#: Task, level, text, values and device: diagnostics.status makes a message of it.
+Task = tuple[str, bytes, str, Mapping[str, object], str]
+
+#: Reasons for which something is dropped that could be read, or that a beginning brings along.
+READABLE = (
+    UNKNOWN_LINE,
+    NOT_YET,
+    "record held until the next one agrees",
+    "first line after the opening",
+    "bytes right after the opening",
+    "lines for the log beyond fifty a second",
+    "mark of a dump that was not under way",
+)
 
 
 @dataclass(frozen=True)
 class Details:
-    """A picture of the link, made in its thread and read in the executor's."""
+    """A picture of the link, made in its thread and read in the executor's. work: a dump or a wipe
+    that is under way, in words."""
 
-    status: model.ParachuteStatus
-    received_bytes: int
+    received: int
     records: int
     layout: str
-    counts: Counter[str]
-    liveness: Mapping[str, object]
-    record_age: float
-    interval: float
-    mode: str
-    restarts: int
-    commands_sent: int
-    waiting: int
-    heartbeats: int
-    heartbeat_age: float
-    latest_heartbeat: float
-    heartbeats_held: bool
+    commands: Mapping[str, object]
+    dropped: Counter[str]
+    computer: Task
+    heartbeat: Task
     work: str
 
 
 def details_of(link: UmbilicalLink, now: float) -> Details:
-    """In the link's turn: all that the tasks below say."""
-    computer, scheduler = link.computer, link.scheduler
-    record, layout = computer.record, link.decoder.layout
-    mode = computer.mode
+    """In the link's turn: all that the tasks say."""
+    layout = link.decoder.layout
+    scheduler = link.scheduler
     return Details(
-        status=computer.status(now, link.pause),
-        received_bytes=link.received_bytes,
-        records=computer.records,
-        layout="not recognised yet" if layout is None else layout.name,
-        counts=Counter(link.counts),
-        liveness=diagnostics.liveness_values(computer.liveness, now),
-        record_age=math.nan if record is None else now - record.received,
-        interval=computer.interval,
-        mode="not known" if mode is None else mode.label,
-        restarts=computer.restarts,
-        commands_sent=scheduler.commands_sent,
-        waiting=scheduler.waiting,
-        heartbeats=scheduler.heartbeats_sent,
-        heartbeat_age=now - scheduler.last_heartbeat,
-        latest_heartbeat=scheduler.limits.latest_heartbeat,
-        heartbeats_held=scheduler.heartbeats_held,
-        work=link.pause,
+        link.received_bytes,
+        link.computer.records,
+        "not recognised yet" if layout is None else layout.name,
+        {"commands sent": scheduler.commands_sent, "commands waiting": scheduler.waiting},
+        Counter(link.counts),
+        _computer(link, now),
+        _heartbeat(link, now),
+        link.pause,
     )
 
 
@@ -67,58 +65,17 @@ def port_task(
     name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
 ) -> DiagnosticStatus:
     """The port, and what was dropped on it."""
-    troubles = []
-    if details.received_bytes and not details.records:
-        troubles.append("bytes are received, but no telemetry record yet")
+    received, records = details.received, details.records
+    waits = received and not records
+    troubles = ["bytes are received, but no telemetry record yet"] if waits else []
     values = {
-        "bytes received": details.received_bytes,
-        "records": details.records,
+        "bytes received": received,
+        "records": records,
         "layout": details.layout,
         **traffic,
-        "commands sent": details.commands_sent,
-        "commands waiting": details.waiting,
+        **details.commands,
     }
-    received = details.received_bytes
-    return diagnostics.wire_task(name, wire, troubles, received, values, details.counts)
-
-
-def computer_task(name: str, details: Details) -> DiagnosticStatus:
-    """The flight computer by its telemetry."""
-    status = details.status
-    if not status.device:
-        return diagnostics.never_heard(name)
-    values = {
-        **details.liveness,
-        "telemetry age (s)": details.record_age,
-        "telemetry interval (s)": details.interval,
-        "flight mode": details.mode,
-        "state": status.state.name,
-        "deployed": status.deployed,
-        "altitude (m)": status.height,
-        "restarts": details.restarts,
-        "uptime (s)": status.uptime,
-    }
-    paused = status.link_state is model.LinkState.OK and details.work
-    level = diagnostics.OK if not status.faults else diagnostics.ERROR
-    level = diagnostics.WARN if paused else level
-    text = "; ".join(status.faults) or f"{details.mode}, {status.state.name}"
-    return diagnostics.status(name, "parachute", level, text, values, status.device)
-
-
-def heartbeat_task(name: str, details: Details, is_open: bool) -> DiagnosticStatus:
-    """Our heartbeat to the flight computer, without which it takes the umbilical for lost."""
-    age = details.heartbeat_age
-    level, text = diagnostics.OK, "sent"
-    if not is_open:
-        level, text = diagnostics.ERROR, "not sent: the port is closed"
-    elif details.heartbeats_held:
-        text = "not sent in flight (parameter heartbeat_in_flight)"
-    elif math.isnan(age):
-        level, text = diagnostics.STALE, "none sent yet"
-    elif age > details.latest_heartbeat:
-        level, text = diagnostics.ERROR, f"the newest was sent {age:.1f} s ago"
-    values = {"sent": details.heartbeats, "newest (s ago)": age}
-    return diagnostics.status(name, "umbilical heartbeat", level, text, values, "")
+    return diagnostics.wire_task(name, wire, troubles, received, values, details.dropped, READABLE)
 
 
 def memory_task(name: str, details: Details, progress: str) -> DiagnosticStatus:
@@ -126,3 +83,45 @@ def memory_task(name: str, details: Details, progress: str) -> DiagnosticStatus:
     text = details.work or "no dump or wipe under way"
     level = diagnostics.WARN if details.work else diagnostics.OK
     return diagnostics.status(name, "memory", level, text, {"newest progress": progress}, "")
+
+
+def _computer(link: UmbilicalLink, now: float) -> Task:
+    """The flight computer by its telemetry."""
+    computer, record = link.computer, link.computer.record
+    if record is None:
+        return "parachute", diagnostics.STALE, "never received", {}, ""
+    status = computer.status(now, link.pause)
+    mode = "not known" if computer.mode is None else computer.mode.label
+    values = {
+        **diagnostics.liveness_values(computer.liveness, now),
+        "telemetry age (s)": now - record.received,
+        "telemetry interval (s)": computer.interval,
+        "flight mode": mode,
+        "state": status.state.name,
+        "deployed": status.deployed,
+        "altitude (m)": status.height,
+        "restarts": computer.restarts,
+        "uptime (s)": status.uptime,
+    }
+    level = diagnostics.OK if not status.faults else diagnostics.ERROR
+    if status.link_state is model.LinkState.OK and link.pause:
+        level = diagnostics.WARN
+    text = "; ".join(status.faults) or f"{mode}, {status.state.name}"
+    return "parachute", level, text, values, status.device
+
+
+def _heartbeat(link: UmbilicalLink, now: float) -> Task:
+    """Our heartbeat to the flight computer, without which it takes the umbilical for lost."""
+    scheduler = link.scheduler
+    age = now - scheduler.last_heartbeat
+    level, text = diagnostics.OK, "sent"
+    if not scheduler.is_open:
+        level, text = diagnostics.ERROR, "not sent: the port is closed"
+    elif scheduler.heartbeats_held:
+        text = "not sent in flight (parameter heartbeat_in_flight)"
+    elif math.isnan(age):
+        level, text = diagnostics.STALE, "none sent yet"
+    elif age > scheduler.limits.latest_heartbeat:
+        level, text = diagnostics.ERROR, f"the newest was sent {age:.1f} s ago"
+    values = {"sent": scheduler.heartbeats_sent, "newest (s ago)": age}
+    return "umbilical heartbeat", level, text, values, ""

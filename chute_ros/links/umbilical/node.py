@@ -10,13 +10,7 @@ from chute_msgs.msg import Telem, VehicleState
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.errors import ParameterError
-from chute_ros.links.umbilical.diagnostics import (
-    computer_task,
-    details_of,
-    heartbeat_task,
-    memory_task,
-    port_task,
-)
+from chute_ros.links.umbilical.diagnostics import details_of, memory_task, port_task
 from chute_ros.links.umbilical.dump_files import DumpFiles
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.parameters import PARAMETERS, UmbilicalParameters
@@ -27,7 +21,7 @@ from chute_ros.links.umbilical.runtime import UmbilicalRuntime
 from chute_ros.links.umbilical.services import UmbilicalServices
 from chute_ros.links.umbilical.telem_message import telem, unfit, without_place
 from chute_ros.protocol.events import Notice
-from chute_ros.ros import messages, qos
+from chute_ros.ros import diagnostics, messages, qos
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.ros.link_log import log_notice
 from chute_ros.runtime.device import Summary
@@ -61,7 +55,7 @@ class UmbilicalNode(DeviceNode):
         )
         self._progress = ""
         # The flight computer's own log, told apart from ours by the logger's name.
-        self._its_log = self.get_logger().get_child("flight_computer")
+        its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
         if settings.publish_vehicle_state:
             vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
@@ -71,9 +65,9 @@ class UmbilicalNode(DeviceNode):
             )
         for kind, follower in (
             (events.TelemetryReceived, self._telemetry),
-            (LogLine, self._log_line),
+            (LogLine, lambda one, at: log_notice(its_log, Notice(one.severity, one.text))),
             (events.Progress, self._progressed),
-            (events.DumpData, self._dump_data),
+            (events.DumpData, lambda one, at: self.files.write(one.data)),
             (events.DumpStarted, self._dump_started),
             (events.DumpFinished, self._dump_finished),
         ):
@@ -93,15 +87,9 @@ class UmbilicalNode(DeviceNode):
     def _telemetry(self, event: events.TelemetryReceived, stamp: Time) -> None:
         self._telem_publisher.publish(telem(event.record, event.sequence, stamp))
 
-    def _log_line(self, event: LogLine, stamp: Time) -> None:
-        log_notice(self._its_log, Notice(event.severity, event.text))
-
     def _progressed(self, event: events.Progress, stamp: Time) -> None:
         self._progress = event.text
         self.get_logger().info(event.text, throttle_duration_sec=1.0)
-
-    def _dump_data(self, event: events.DumpData, stamp: Time) -> None:
-        self.files.write(event.data)
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:
         assert self.loop is not None
@@ -110,11 +98,10 @@ class UmbilicalNode(DeviceNode):
             "records per s": self.rate(details.records),
             "writes that failed": self.loop.send_errors,
         }
-        wire = self.wire_picture()
         return [
-            port_task(name, details, traffic, wire),
-            computer_task(name, details),
-            heartbeat_task(name, details, wire.is_open),
+            port_task(name, details, traffic, self.wire_picture()),
+            diagnostics.status(name, *details.computer),
+            diagnostics.status(name, *details.heartbeat),
             memory_task(name, details, self._progress),
         ]
 

@@ -10,10 +10,8 @@ from chute_ros.links.umbilical.protocol.config import UmbilicalConfig
 from chute_ros.links.umbilical.protocol.events import TelemetryReceived
 from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
-from chute_ros.links.umbilical.protocol.reasons import reasons_of
-from chute_ros.model import NAN, Action, Decision
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished
-from chute_ros.protocol.events import RequestFinished, VehicleChanged
+from chute_ros.model import NAN, Action, Decision, LinkState, ParachuteStatus
+from chute_ros.protocol.events import RequestFinished, VehicleChanged, failed_request
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary, block_reason
 from chute_ros.settings import nested, parameter
 
@@ -42,7 +40,7 @@ class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
         return Summary(computer.liveness.state, status.healthy, age, reasons)
 
     def failed_end(self, token: int, text: str) -> RequestFinished:
-        return RequestFinished(EffectFinished(token, False, False, NO_ANSWER, text))
+        return failed_request(token, text)
 
     def take(self, event: Any, now: float) -> None:
         if not isinstance(event, VehicleChanged) or self.settings.publish_vehicle_state:
@@ -72,3 +70,20 @@ class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
             self.carry_out_flight_block(
                 decision, "launch is refused", "launch is left to the gate"
             )
+
+
+def reasons_of(
+    status: ParachuteStatus, received_bytes: int, stale_after: float
+) -> tuple[str, ...]:
+    """Why it is not healthy, in words: what is so, and what is needed. stale_after: s."""
+    if status.healthy:
+        return ()
+    if status.link_state is LinkState.NEVER_SEEN:
+        heard = f"{received_bytes} bytes received, no $TELEM record"
+        return (f"the flight computer was never received: {heard}, need one",)
+    found = [
+        f"{fault}, need younger than {stale_after:g} s" if fault.endswith(" s old") else fault
+        for fault in status.faults
+    ]
+    out = ", the parachute is out" if status.deployed else ""
+    return (*found, f"flight computer: state {status.state.name}{out}, need READY or ARMED")

@@ -53,11 +53,7 @@ _LACKING = {"flight_mode": Telem.FLIGHT_MODE_UNKNOWN}
 _LACKING |= dict.fromkeys(("blims_phase_id", "blims_loiter_step"), -32768)
 
 #: What Telem's whole numbers hold.
-_RANGES = {
-    "uint8": (0, 2**8 - 1),
-    "int8": (-(2**7), 2**7 - 1),
-    "int16": (-(2**15), 2**15 - 1),
-}
+_RANGES = {"uint8": (0, 2**8 - 1), "int8": (-(2**7), 2**7 - 1), "int16": (-(2**15), 2**15 - 1)}
 _CONVERT: dict[str, Callable[[Any], Any]] = {
     "flight_mode": lambda value: value if 0 <= value < 2**8 else Telem.FLIGHT_MODE_UNKNOWN,
     "device_uptime": lambda value: value / 1000.0,

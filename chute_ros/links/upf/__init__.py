@@ -55,7 +55,7 @@ LINK = LinkKind(
                     "required_links": _BOTH,
                     "deploy_links": _BOTH,
                     "deploy_ladder": [*_BOTH, f"{_NAME}:trigger"],
-                },
+                }
             },
             often=2,
         ),

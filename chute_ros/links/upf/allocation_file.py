@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 
 from chute_ros.errors import ParameterError
 from chute_ros.protocol.dronecan.allocation import HIGHEST, LOWEST, UNIQUE_ID_LENGTH
@@ -18,7 +17,8 @@ class AllocationFile:
 
     def __init__(self, path: str, node_name: str) -> None:
         named = "parameter allocation_table_file"
-        self.path = given_path(path, named) if path else _default_path(node_name)
+        own = f"{node_name.strip('/').replace('/', '.')}.node_ids.json"
+        self.path = given_path(path, named) if path else ros_home() / own
 
     def load(self) -> dict[bytes, int]:
         """The table; empty if there is no file. ParameterError if it cannot be believed: to begin
@@ -59,7 +59,3 @@ class AllocationFile:
             f"parameter allocation_table_file: {self.path} cannot be used: {why}; repair it, or "
             "move it away and start with no device on the bus"
         )
-
-
-def _default_path(node_name: str) -> Path:
-    return ros_home() / f"{node_name.strip('/').replace('/', '.')}.node_ids.json"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,69 +15,62 @@ from chute_ros.links.upf.protocol.devices import Controller, Device
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.ros import diagnostics
 
+#: Task, level, text, values and device: diagnostics.status makes a message of it.
+Task = tuple[str, bytes, str, Mapping[str, object], str]
+_NO_CONTROLLER = (
+    "never received, and without it this link has no parachute (controller_node_id: its node id, "
+    "or 0; without_controller: true where the vehicle has none)"
+)
 
-@dataclass(frozen=True)
-class DeviceDetails:
-    """One controller or trigger, ready to be told."""
-
-    kind: str
-    task: str
-    device: str
-    healthy: bool
-    text: str
-    values: Mapping[str, object]
+#: Reasons for which something is dropped that could be read.
+READABLE = (
+    "transfers of unknown types",
+    "messages that a newer one has overtaken",
+    "duplicate transfers",
+    "requests that this node does not serve",
+    "status of devices not followed",
+)
 
 
 @dataclass(frozen=True)
 class Details:
     """A picture of the link, made in its thread and read in the executor's."""
 
-    devices: tuple[DeviceDetails, ...]
     troubles: tuple[str, ...]
     received: int
     sent: int
     dropped: Counter[str]
-    bus_off_count: int
-    nodes: Mapping[str, str]
-    asked: Counter[str]
-    newest_answer: str
+    bus: Mapping[str, object]
+    #: Of the devices and of the vehicle service.
+    tasks: tuple[Task, ...]
     given: Mapping[str, str]
     refusal: str
     allocation_left_to: int
-    time_master: bool
-    data_types: Mapping[str, str]
 
 
 def details_of(link: UpfLink, now: float) -> Details:
-    """In the link's turn: all that the tasks below say."""
+    """In the link's turn: all that the tasks say."""
     bus = link.bus
+    nodes = {
+        f"node {node.node_id}": f"{node.name or 'not known'} {node.unique_id.hex()}".strip()
+        for node in bus.nodes.all()
+    }
     return Details(
-        devices=(
-            *(_controller(link, one, now) for one in link.devices.controllers.values()),
-            *(
-                _details(one, one.state, one.faults(now), {"has fired": one.launched}, now)
-                for one in link.devices.triggers.values()
-            ),
-        ),
         troubles=tuple(bus.troubles()),
         received=bus.endpoint.received_count,
         sent=bus.endpoint.sent_count,
         dropped=bus.counts + link.requests.commands.counts + link.devices.counts,
-        bus_off_count=bus.endpoint.bus_off_count,
-        nodes={
-            f"node {node.node_id}": f"{node.name or 'not known'} {node.unique_id.hex()}".strip()
-            for node in bus.nodes.all()
-        },
-        asked=Counter(link.vehicle_service.counts),
-        newest_answer=link.vehicle_service.newest_answer,
-        given={f"node {n}": key.hex() for key, n in bus.allocator.table.items()},
-        refusal=bus.allocator.refusal,
-        allocation_left_to=bus.allocator.left_to,
-        time_master=bus.time.is_master(now),
-        data_types={
+        bus={
+            "times bus-off": bus.endpoint.bus_off_count,
+            "time master": bus.time.is_master(now),
+            **nodes,
             "fields missing here": ", ".join(link.definitions.absent),
             "fields new here": ", ".join(link.definitions.new),
         },
+        tasks=(*_devices(link, now), _vehicle_service(link)),
+        given={f"node {n}": key.hex() for key, n in bus.allocator.table.items()},
+        refusal=bus.allocator.refusal,
+        allocation_left_to=bus.allocator.left_to,
     )
 
 
@@ -85,47 +78,10 @@ def bus_task(
     name: str, details: Details, traffic: Mapping[str, object], wire: diagnostics.WirePicture
 ) -> DiagnosticStatus:
     """The bus, who is on it, and what was dropped on it."""
-    values = {
-        **traffic,
-        "times bus-off": details.bus_off_count,
-        "time master": details.time_master,
-        **details.nodes,
-        **details.data_types,
-    }
+    values = {**traffic, **details.bus}
     return diagnostics.wire_task(
-        name, wire, details.troubles, details.received, values, details.dropped
+        name, wire, details.troubles, details.received, values, details.dropped, READABLE
     )
-
-
-def device_tasks(name: str, details: Details, without_controller: bool) -> list[DiagnosticStatus]:
-    """One task for each controller and trigger, and one for a controller that is missing."""
-    if not details.devices:
-        return [diagnostics.never_heard(name)]
-    heard = [
-        diagnostics.status(
-            name,
-            one.task,
-            diagnostics.OK if one.healthy else diagnostics.ERROR,
-            one.text,
-            one.values,
-            one.device,
-        )
-        for one in details.devices
-    ]
-    if without_controller or any(one.kind == Controller.kind for one in details.devices):
-        return heard
-    told = "never received, and without it this link has no parachute (controller_node_id: "
-    told += "its node id, or 0; without_controller: true where the vehicle has none)"
-    return [diagnostics.status(name, Controller.kind, diagnostics.ERROR, told, {}, ""), *heard]
-
-
-def vehicle_service_task(name: str, details: Details) -> DiagnosticStatus:
-    """Requests of devices to the vehicle, and their answers."""
-    failed = details.newest_answer.endswith(("FAILED", "BAD_MAGIC_NUMBER"))
-    level = diagnostics.WARN if failed else diagnostics.OK
-    text = details.newest_answer or "nothing was requested yet"
-    values = dict(sorted(details.asked.items()))
-    return diagnostics.status(name, "vehicle service", level, text, values, "")
 
 
 def allocation_task(name: str, details: Details, path: str) -> DiagnosticStatus:
@@ -137,34 +93,54 @@ def allocation_task(name: str, details: Details, path: str) -> DiagnosticStatus:
     return diagnostics.status(name, "node ids", level, text, {**details.given, "file": path}, "")
 
 
-def _controller(link: UpfLink, one: Controller, now: float) -> DeviceDetails:
-    values: dict[str, object] = {
+def _devices(link: UpfLink, now: float) -> Iterator[Task]:
+    """One task for each controller and trigger, and one for a controller that is missing."""
+    controllers, triggers = link.devices.controllers, link.devices.triggers
+    if not controllers and not triggers:
+        yield "parachute", diagnostics.STALE, "never received", {}, ""
+    elif not controllers and not link.config.without_controller:
+        yield Controller.kind, diagnostics.ERROR, _NO_CONTROLLER, {}, ""
+    for controller in controllers.values():
+        values = _of_controller(controller, now)
+        yield _device(controller, controller.state.name, controller.faults(now), values, now)
+    for trigger in triggers.values():
+        values = {"has fired": trigger.launched}
+        yield _device(trigger, trigger.state, trigger.faults(now), values, now)
+
+
+def _of_controller(one: Controller, now: float) -> dict[str, object]:
+    return {
         "state": one.state.name,
         "in this state for (s)": now - one.state_since,
         "changes of state that are not in the document": one.unknown_jumps,
         "newest such change": one.newest_unknown_jump,
         "height (m)": one.number("height_of_home"),
         "backup supply (V)": one.number("backup_power_voltage"),
+        **{name: p.words(value) for name, value in one.parameters.items()},
     }
-    values |= {name: p.words(value) for name, value in one.parameters.items()}
-    return _details(one, one.state.name, one.faults(now), values, now)
 
 
-def _details(
-    one: Device, state: str, faults: list[str], values: Mapping[str, Any], now: float
-) -> DeviceDetails:
-    return DeviceDetails(
-        one.kind,
-        f"{one.kind} {one.node_id}",
-        one.device,
-        one.liveness.state is model.LinkState.OK and not faults,
-        "; ".join(faults) or state or "state not known",
-        {
-            **diagnostics.liveness_values(one.liveness, now),
-            "status interval (s)": one.status_interval,
-            "restarts": one.restart_count,
-            "uptime (s)": one.uptime,
-            **values,
-            **{f"new field {name}": value for name, value in one.unknown_fields.items()},
-        },
-    )
+def _device(
+    one: Device, state: str, faults: list[str], special: Mapping[str, Any], now: float
+) -> Task:
+    healthy = one.liveness.state is model.LinkState.OK and not faults
+    values = {
+        **diagnostics.liveness_values(one.liveness, now),
+        "status interval (s)": one.status_interval,
+        "restarts": one.restart_count,
+        "uptime (s)": one.uptime,
+        **special,
+        **{f"new field {name}": value for name, value in one.unknown_fields.items()},
+    }
+    level = diagnostics.OK if healthy else diagnostics.ERROR
+    text = "; ".join(faults) or state or "state not known"
+    return f"{one.kind} {one.node_id}", level, text, values, one.device
+
+
+def _vehicle_service(link: UpfLink) -> Task:
+    """Requests of devices to the vehicle, and their answers."""
+    answer = link.vehicle_service.newest_answer
+    failed = answer.endswith(("FAILED", "BAD_MAGIC_NUMBER"))
+    level = diagnostics.WARN if failed else diagnostics.OK
+    values = dict(sorted(link.vehicle_service.counts.items()))
+    return "vehicle service", level, answer or "nothing was requested yet", values, ""

@@ -10,13 +10,7 @@ from chute_msgs.msg import ActionReport, TriggerStatus, VehicleState
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros.links.upf.allocation_file import AllocationFile
-from chute_ros.links.upf.diagnostics import (
-    allocation_task,
-    bus_task,
-    details_of,
-    device_tasks,
-    vehicle_service_task,
-)
+from chute_ros.links.upf.diagnostics import allocation_task, bus_task, details_of
 from chute_ros.links.upf.parameters import PARAMETERS, UpfParameters, config_from
 from chute_ros.links.upf.protocol.config import AllocatorUse
 from chute_ros.links.upf.protocol.events import TriggerChanged
@@ -24,7 +18,7 @@ from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.links.upf.runtime import UpfRuntime
 from chute_ros.links.upf.services import UpfServices
 from chute_ros.protocol.dronecan.allocation import KeepTable
-from chute_ros.ros import messages, qos
+from chute_ros.ros import diagnostics, messages, qos
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.ros.kept_file import Newest
 from chute_ros.runtime.device import Summary
@@ -95,28 +89,17 @@ class UpfCanNode(DeviceNode):
             "frames that could not be sent": self.loop.send_errors,
             **{f"bad packets: {why}": n for why, n in sorted(self._wire.counts.items())},
         }
-        wire = self.wire_picture()
         return [
-            bus_task(name, details, traffic, wire),
-            *device_tasks(name, details, self.values["without_controller"]),
-            vehicle_service_task(name, details),
+            bus_task(name, details, traffic, self.wire_picture()),
+            *(diagnostics.status(name, *task) for task in details.tasks),
             allocation_task(name, details, str(self._file.path)),
         ]
 
     # -- inside ---------------------------------------------------------------------------------
 
     def _publish_trigger(self, event: TriggerChanged, stamp: Time) -> None:
-        picture = event.picture
-        message = TriggerStatus(
-            link=self.get_name(),
-            node_id=picture["node_id"],
-            link_state=int(picture["link_state"]),
-            state=_TRIGGER_STATES.get(picture["state"], TriggerStatus.UNKNOWN),
-            launched=picture["launched"],
-            supply_voltage=picture["supply_voltage"],
-            error_flags=picture["error_flags"],
-            faults=list(picture["faults"]),
-        )
+        state = _TRIGGER_STATES.get(event.picture["state"], TriggerStatus.UNKNOWN)
+        message = TriggerStatus(link=self.get_name(), **{**event.picture, "state": state})
         message.header.stamp = stamp
         self._trigger_publisher.publish(message)
 

@@ -22,8 +22,7 @@ class UpfParameters(Settings):
         0, "bit rate of the bus; 0: as the interface is set up", 0, 8_000_000, "bit/s"
     )
     dsdl_path: str = parameter(
-        "",
-        "folder flyfire with the vendor's own data types (*.uavcan); empty: the shipped ones",
+        "", "folder flyfire with the vendor's own data types (*.uavcan); empty: the shipped ones"
     )
     allocation_table_file: str = parameter(
         "",

@@ -58,14 +58,13 @@ class UpfServices:
         end = await self._node.request(
             lambda link, token, now: link.service(token, type_name, request.node_id, now)
         )
-        response.success, response.message = end.finished.success, end.finished.message
-        return response
+        return _fill(response, end.finished)
 
     async def _get_param(self, request: Any, response: Any) -> Any:
         done = await self._errand(
             request, lambda node_id: errands.get_parameter(node_id, request.name)
         )
-        response.success, response.message = done.success, done.message
+        _fill(response, done)
         for one in done.parameters:
             response.value, response.type = p.words(one.value), one.kind
             response.minimum, response.maximum = p.words(one.minimum), p.words(one.maximum)
@@ -81,14 +80,14 @@ class UpfServices:
                 token, request.node_id, request.name, request.value, request.force, now
             )
         )
-        response.success, response.message = end.done.success, end.done.message
+        _fill(response, end.done)
         for one in end.done.parameters:
             response.value_read_back = p.words(one.value)
         return response
 
     async def _list_params(self, request: Any, response: Any) -> Any:
         done = await self._errand(request, errands.list_parameters)
-        response.success, response.message = done.success, done.message
+        _fill(response, done)
         response.names = [one.name for one in done.parameters]
         response.values = [p.words(one.value) for one in done.parameters]
         return response
@@ -98,8 +97,7 @@ class UpfServices:
         done = await self._errand(
             request, lambda node_id: errands.execute_opcode(node_id, errands.OPCODE_SAVE)
         )
-        response.success, response.message = done.success, done.message
-        return response
+        return _fill(response, done)
 
     async def _erase(self, request: Any, response: Any) -> Any:
         def make(node_id: int) -> errands.Errand:
@@ -112,15 +110,14 @@ class UpfServices:
 
     async def _transport_stats(self, request: Any, response: Any) -> Any:
         done = await self._errand(request, errands.transport_stats)
-        response.success, response.message = done.success, done.message
-        response.transfers_tx = done.values.get("transfers_tx", 0)
-        response.transfers_rx = done.values.get("transfers_rx", 0)
-        response.transfer_errors = done.values.get("transfer_errors", 0)
+        _fill(response, done)
+        for name in ("transfers_tx", "transfers_rx", "transfer_errors"):
+            setattr(response, name, done.values.get(name, 0))
         return response
 
     async def _node_info(self, request: Any, response: Any) -> Any:
         done = await self._errand(request, errands.node_info)
-        response.success, response.message = done.success, done.message
+        _fill(response, done)
         if not done.values:
             return response
         software, hardware = done.values["software_version"], done.values["hardware_version"]
@@ -146,9 +143,14 @@ class UpfServices:
         end = await self._node.request(
             lambda link, token, now: link.disturb(token, request.node_id, request.force, make, now)
         )
-        response.success, response.message = end.done.success, end.done.message
-        return response
+        return _fill(response, end.done)
 
     def _record(self, what: str, request: Any) -> None:
         """Who wants it and why, in the log."""
         self._node.get_logger().warning(f"~/{what} called: {request.reason!r}")
+
+
+def _fill(response: Any, end: Any) -> Any:
+    """The fields that all answers share."""
+    response.success, response.message = end.success, end.message
+    return response

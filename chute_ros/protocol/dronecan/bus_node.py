@@ -8,18 +8,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from chute_ros.errors import MessageError
+from chute_ros.errors import MessageError, ParameterError
 from chute_ros.protocol.dronecan import allocation, time_sync
-from chute_ros.protocol.dronecan.allocation import Allocator, KeepTable
-from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
-from chute_ros.protocol.dronecan.calls import Call, CallFinished, SendCall
+from chute_ros.protocol.dronecan.allocation import UNIQUE_ID_LENGTH, Allocator, KeepTable
+from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits, SendCall
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
 from chute_ros.protocol.dronecan.scripts import Script, Scripts
 from chute_ros.protocol.dronecan.time_sync import TimeMaster
-from chute_ros.protocol.dronecan.transfer import Kind
+from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind
 from chute_ros.protocol.events import Notice, Severity
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
@@ -31,7 +32,39 @@ LISTEN_TIME = 1.2
 #: Somebody who sent under our node id so lately (s) is there.
 _OWN_ID_WINDOW = 5.0
 _SOFTWARE_VERSION = (0, 1)
+#: Bytes of a node's name (uavcan.protocol.GetNodeInfo).
+MOST_NAME_BYTES = 80
 _REFUSED = ("uavcan.protocol.RestartNode", "uavcan.protocol.param.ExecuteOpcode")
+
+
+@dataclass(frozen=True)
+class BusNodeConfig:
+    """Who we are on the bus, and which of its offices we hold."""
+
+    node_id: int
+    name: str
+    unique_id: bytes
+    calls: CallLimits = field(default=CallLimits())
+    allocator: bool = True
+    #: To another allocator, and until it is known that there is none.
+    allocator_yields: bool = False
+    table: Mapping[bytes, int] = field(default_factory=dict)
+    #: Node ids that are never given out, besides our own.
+    never: tuple[int, ...] = ()
+    time_master: bool = True
+    utc_offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.node_id <= HIGHEST_NODE_ID:
+            raise ParameterError(f"node_id is {self.node_id}: need 1 to {HIGHEST_NODE_ID}")
+        if not 1 <= len(self.name.encode()) <= MOST_NAME_BYTES:
+            raise ParameterError(f"name is {self.name!r}: need 1 to {MOST_NAME_BYTES} bytes")
+        if len(self.unique_id) != UNIQUE_ID_LENGTH:
+            raise ParameterError(
+                f"unique_id has {len(self.unique_id)} bytes: need {UNIQUE_ID_LENGTH}"
+            )
+        if not math.isfinite(self.utc_offset):
+            raise ParameterError(f"utc_offset is {self.utc_offset}: need a number of seconds")
 
 
 class BusNode:

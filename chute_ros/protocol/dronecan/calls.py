@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, TRANSFER_TIMEOUT
-from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.protocol.goal import NO_ANSWER
 from chute_ros.settings import Settings, parameter
 
 #: Calls to one server and service that wait at the same time, urgent ones aside.

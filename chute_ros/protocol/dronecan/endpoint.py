@@ -7,20 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.protocol.dronecan.can_frame import (
-    ERROR_BUS_OFF,
-    ERROR_RESTARTED,
-    CanFrame,
-    pack,
-)
+from chute_ros.protocol.dronecan.can_frame import ERROR_BUS_OFF, ERROR_RESTARTED, CanFrame, pack
 from chute_ros.protocol.dronecan.data_types import DataTypes
-from chute_ros.protocol.dronecan.transfer import (
-    TRANSFER_IDS,
-    Assembler,
-    Kind,
-    Transfer,
-    frames_of,
-)
+from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, Assembler, Kind, Transfer, frames_of
 
 
 @dataclass(frozen=True)
@@ -91,12 +80,7 @@ class Endpoint:
         self._next_ids[name] = (number + 1) % TRANSFER_IDS
 
     def request(
-        self,
-        server: int,
-        service: str,
-        transfer_id: int,
-        values: Mapping[str, Any],
-        priority: int,
+        self, server: int, service: str, transfer_id: int, values: Mapping[str, Any], priority: int
     ) -> None:
         """Send a request."""
         data_type = self.types.request(service)

@@ -246,10 +246,7 @@ class NodeMonitor:
     def _counts_backwards(entry: NodeEntry, uptime: int, now: float) -> None:
         if uptime < entry.uptime:
             return  # it started anew, or its clock says already that there are two
-        entry.backwards = [
-            *(at for at in entry.backwards if now - at < _BACKWARDS_WITHIN),
-            now,
-        ]
+        entry.backwards = [*(at for at in entry.backwards if now - at < _BACKWARDS_WITHIN), now]
         if len(entry.backwards) >= _MOST_BACKWARDS:
             entry.conflict_shows(now)
 

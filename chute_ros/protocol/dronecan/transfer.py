@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 from collections import Counter, OrderedDict, deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dronecan.dsdl import common
 
@@ -169,7 +169,9 @@ class Assembler:
         if self._types.by_id(head.type_id, head.kind.value) is None:
             return self._drop("transfers of unknown types")
         if head.source == 0:
-            return self._anonymous(head, frame)
+            if frame.data[-1] & (_START | _END | _TOGGLE) != _START | _END:
+                return self._drop("anonymous transfers of more than one frame")
+            return replace(head, payload=frame.data[:-1])
         return self._next(head, frame, now)
 
     def _head(self, frame: CanFrame) -> Transfer:
@@ -183,11 +185,6 @@ class Assembler:
             return Transfer(kind, type_id, source, destination, transfer_id, b"", priority)
         type_id = identifier >> 8 & (0x3 if source == 0 else 0xFFFF)
         return Transfer(Kind.MESSAGE, type_id, source, 0, transfer_id, b"", priority)
-
-    def _anonymous(self, head: Transfer, frame: CanFrame) -> Transfer | None:
-        if frame.data[-1] & (_START | _END | _TOGGLE) != _START | _END:
-            return self._drop("anonymous transfers of more than one frame")
-        return self._done(head, frame.data[:-1])
 
     def _next(self, head: Transfer, frame: CanFrame, now: float) -> Transfer | None:
         key = (head.kind, head.type_id, head.source, head.destination)
@@ -218,7 +215,7 @@ class Assembler:
                 session.payload = None
                 session.done.append((head.transfer_id, now))
                 session.said = chunk
-                return self._done(head, chunk)
+                return replace(head, payload=chunk)
             session.crc = chunk[0] | chunk[1] << 8
             session.payload = bytearray(chunk[2:])
             return None
@@ -243,18 +240,7 @@ class Assembler:
             return self._drop("CRC of a transfer wrong (or another definition of its type)")
         session.done.append((head.transfer_id, now))
         session.said = b""
-        return self._done(head, payload)
-
-    def _done(self, head: Transfer, payload: bytes) -> Transfer:
-        return Transfer(
-            head.kind,
-            head.type_id,
-            head.source,
-            head.destination,
-            head.transfer_id,
-            payload,
-            head.priority,
-        )
+        return replace(head, payload=payload)
 
     def _drop(self, reason: str) -> Transfer | None:
         self._counts[reason] += 1

@@ -11,6 +11,7 @@ from mavlink_bench import Autopilot, do
 from mavlink_bench import quick as quick_mavlink
 from node_bench import LOCAL, Bench, port_of
 from relay_bench import Board
+from std_srvs.srv import Trigger
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.ros import qos
@@ -75,6 +76,22 @@ def test_a_deploy_stops_the_motors_fires_the_output_and_says_that_nothing_confir
     assert "sent; a relay output confirms nothing" in answer.message
     flight.await_stage(SafetyState.FAULT)
     assert flight.board.commands_to_deploy() == 1
+
+
+def test_a_release_by_hand_on_the_ground_blocks_flight_until_a_reset(bench: Bench) -> None:
+    flight = Flight(bench)
+    flight.board.plug_in()
+    flight.await_stage(SafetyState.READY)
+    bench.call(Deploy, "relay/deploy", force=True, reason="a test on the bench")
+    flight.await_stage(SafetyState.BLOCKED)
+    flight.bench.until(lambda: flight.safety[-1].block_reasons, "it is blocked")
+    (reason,) = flight.safety[-1].block_reasons
+    assert reason == (
+        "relay output asks to block flight: its output was switched: repack or replace the "
+        "parachute, then call safety/reset"
+    )
+    assert bench.call(Trigger, "safety/reset").success
+    flight.await_stage(SafetyState.READY)
 
 
 def test_nobody_flies_with_it_who_has_not_said_so(bench: Bench) -> None:

@@ -11,12 +11,15 @@ from typing import Any
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
 from chute_ros.links.mavlink.protocol.firmware import firmware_of
 from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
-from chute_ros.links.mavlink.protocol.optional_streams import OptionalStreams
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
 from chute_ros.links.mavlink.protocol.sensors import FURTHER_ACCELEROMETERS, PRESSURE
-from chute_ros.links.mavlink.protocol.stream_rate import StreamRate
-from chute_ros.links.mavlink.protocol.stream_watch import Ask, StreamWatch
+from chute_ros.links.mavlink.protocol.stream_watch import (
+    Ask,
+    OptionalStreams,
+    StreamRate,
+    StreamWatch,
+)
 from chute_ros.links.mavlink.protocol.targets import Vehicle
 from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
@@ -24,6 +27,7 @@ from chute_ros.model import Armed, LandedState, LinkState, Reading, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.vehicle_readings import PARTS
 
 #: What was said longer ago (s) proves nothing about now.
 STREAM_SILENCE = 2.5
@@ -208,52 +212,22 @@ class AutopilotTracker:
 
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture at now, each part with its age."""
-
-        value = self._readings.value
-
-        def age(name: str) -> float:
-            return self._readings.age(name, now)
-
-        target_vertical_speed, below_target, target_age = self._readers.targets.at(now)
+        fields: dict[str, Any] = {}
+        for part, names in PARTS.items():
+            fields |= {name: self._readings.value(name) for name in names}
+            fields[f"{part}_age"] = self._readings.age(names[0], now)
+        fields |= {"armed": self.armed, "landed_state": self.landed_state}
+        targets = ("target_vertical_speed", "below_target", "target_age")
+        fields |= zip(targets, self._readers.targets.at(now), strict=True)
         return VehicleState(
             source=self.device,
             link_state=self.liveness.state,
-            armed=self.armed,
-            armed_age=age("armed"),
-            landed_state=self.landed_state,
-            landed_state_age=age("landed_state"),
-            height=value("height"),
-            height_age=age("height"),
-            altitude=value("altitude"),
-            altitude_age=age("altitude"),
-            pressure=value("pressure"),
-            pressure_age=age("pressure"),
-            vertical_speed=value("vertical_speed"),
-            vertical_speed_age=age("vertical_speed"),
-            roll=value("roll"),
-            pitch=value("pitch"),
-            yaw=value("yaw"),
-            tilt=value("tilt"),
-            attitude_age=age("tilt"),
-            attitude_error=value("attitude_error"),
-            attitude_error_age=age("attitude_error"),
-            target_vertical_speed=target_vertical_speed,
-            below_target=below_target,
-            target_age=target_age,
-            acceleration=value("acceleration"),
-            acceleration_spread=value("acceleration_spread"),
-            acceleration_age=age("acceleration"),
-            latitude=value("latitude"),
-            longitude=value("longitude"),
-            position_age=age("latitude"),
-            battery_voltage=value("battery_voltage"),
-            battery_remaining=value("battery_remaining"),
-            battery_age=age("battery_voltage"),
             system_status=self._system_status,
             uptime=self._clock.uptime,
             reboot_count=self.reboot_count,
             rebooted_in_flight=self.rebooted_in_flight,
             faults=self._faults(now),
+            **fields,
         )
 
     def _faults(self, now: float) -> tuple[str, ...]:

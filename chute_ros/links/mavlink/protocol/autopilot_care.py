@@ -1,22 +1,32 @@
 """Care for our autopilot without a request: messages asked for, arming undone.
 
 Its settings are read and told, how long it takes to answer is measured, its heartbeats are had
-sooner, its arming is undone while flight is
-blocked, and its question whether it may arm is answered.
+sooner, its arming is undone while flight is blocked, and its question whether it may arm is
+answered.
+
+HEARTBEAT, which says armed, is asked for more often than once a second (SET_MESSAGE_INTERVAL), but
+of PX4, which by its source ignores that. While flight is blocked a heartbeat that is old is asked
+for one by one: an arming that is seen a second later has taken off.
+
+PX4 with COM_ARM_AUTH_REQ 1 asks the system COM_ARM_AUTH_ID whether it may arm
+(MAV_CMD_ARM_AUTHORIZATION_REQUEST), and arms only if COMMAND_ACK says ACCEPTED, for result_param2
+seconds (COM_ARM_AUTH_MET 0: the arming that asked; 1: the next one). Sources: MAVLink common.xml;
+PX4 ArmAuthorization.cpp.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from chute_ros.links.mavlink.protocol import arm_authorization, goals
+from chute_ros.links.mavlink.protocol import goals
 from chute_ros.links.mavlink.protocol.announcements import Announcements
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
-from chute_ros.links.mavlink.protocol.commands import CommandTransactions
+from chute_ros.links.mavlink.protocol.commands import Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
+from chute_ros.links.mavlink.protocol.firmware import Firmware
 from chute_ros.links.mavlink.protocol.flight_block import FlightBlock
-from chute_ros.links.mavlink.protocol.heartbeat_watch import HeartbeatWatch
 from chute_ros.links.mavlink.protocol.kill import KillPlan, kill_plan
 from chute_ros.links.mavlink.protocol.setup_check import Setup, SetupNews, setup_of
 from chute_ros.links.mavlink.protocol.wire import Outbox
@@ -30,6 +40,14 @@ _SETUP_EVERY = 0.5
 #: its question, which in its simulator, whose clock goes in steps, is every quick one.
 _ANSWER_AGAIN = 0.05
 _NO_ANSWER = (math.inf, (0, 0))
+#: An authorization holds for so long, s: short where the arming that asks is the one that arms.
+_AT_ONCE, _TWO_STEPS = 1, 5
+#: Wanted between two heartbeats, s.
+HEARTBEAT_INTERVAL = 0.2
+#: Older than this it is asked for while flight is blocked, and not more often, s.
+_OLD = 0.3
+#: The interval is asked for again after so long, s, so often at most for each autopilot.
+_ASK_AGAIN, _MOST_ASKED = 2.0, 3
 
 
 class AutopilotCare:
@@ -46,7 +64,7 @@ class AutopilotCare:
         self.block = FlightBlock(config.takeoff_height)
         self._config, self._devices = config, devices
         self._requests, self._outbox, self._announcements = requests, outbox, announcements
-        self._heartbeats = HeartbeatWatch()
+        self._heartbeats = _HeartbeatWatch()
         self._news = SetupNews()
         self._told_at = self._now = -math.inf
         #: The request that disarms. Ours count down from -1: they never meet one of the owner's.
@@ -77,10 +95,18 @@ class AutopilotCare:
         elif self._config.disarm_when_blocked and self.block.disarm_due(autopilot, now):
             self._disarm(autopilot, now)
 
+    def asks_to_arm(self, message: Any) -> bool:
+        """It is a command to us that asks whether the autopilot may arm."""
+        if message.get_type() != "COMMAND_LONG":
+            return False
+        config = self._config
+        for_us = message.target_component in (0, config.component_id)
+        for_us = for_us and message.target_system == config.system_id
+        return bool(for_us and message.command == dialect.MAV_CMD_ARM_AUTHORIZATION_REQUEST)
+
     def authorize(self, asking: tuple[int, int], now: float) -> None:
         """The autopilot with these ids asks whether it may arm."""
-        autopilot = self._devices.autopilots.get(*asking)
-        if autopilot is None:
+        if self._devices.autopilots.get(*asking) is None:
             return
         self._answer(asking, now)
         self._answer_again = (now + _ANSWER_AGAIN, asking)
@@ -102,8 +128,16 @@ class AutopilotCare:
     def _answer(self, asking: tuple[int, int], now: float) -> None:
         autopilot = self._devices.autopilots.get(*asking)
         assert autopilot is not None
-        reason = self.block.reason
-        self._outbox.send(arm_authorization.answer(asking, reason, autopilot.settings), now)
+        result, reason, seconds = dialect.MAV_RESULT_ACCEPTED, 0, _TWO_STEPS
+        if autopilot.settings.get("COM_ARM_AUTH_MET") == 0:
+            seconds = _AT_ONCE
+        if self.block.reason:
+            result, seconds = dialect.MAV_RESULT_DENIED, 0
+            reason = dialect.MAV_ARM_AUTH_DENIED_REASON_GENERIC
+        answer = dialect.MAVLink_command_ack_message(
+            dialect.MAV_CMD_ARM_AUTHORIZATION_REQUEST, result, reason, seconds, *asking
+        )
+        self._outbox.send(answer, now)
 
     def _settings(self, autopilot: AutopilotTracker, now: float) -> None:
         settings = autopilot.settings
@@ -134,8 +168,38 @@ class AutopilotCare:
             self._announcements.say(f"{reason}: flight blocked, disarming")
         self._disarming -= 1
         patience = self._config.commands.ack_timeout
-        goal = goals.disarm_on_ground(autopilot, self._may_force, patience, now)
+        goal = goals.disarm_on_ground(
+            autopilot, lambda: self.block.may_force(self._now), patience, now
+        )
         self._requests.begin(self._disarming, goal, now)
 
-    def _may_force(self) -> bool:
-        return self.block.may_force(self._now)
+
+class _HeartbeatWatch:
+    """What to ask an autopilot for, to have its heartbeats sooner."""
+
+    def __init__(self) -> None:
+        self._asked = self._polled = -math.inf
+        #: Which start of which autopilot.
+        self._asked_of = ("", 0)
+        self._times_asked = 0
+
+    def due(
+        self, autopilot: AutopilotTracker, rate_too: bool, blocked: bool, now: float
+    ) -> list[Command]:
+        """Commands to send once now. rate_too: other intervals may be asked for."""
+        this_start = (autopilot.device, autopilot.reboot_count)
+        if this_start != self._asked_of:
+            self._asked_of, self._times_asked, self._asked = this_start, 0, -math.inf
+        due: list[Command] = []
+        if autopilot.liveness.age(now) <= _OLD:
+            return due
+        obeys = autopilot.settings.firmware is not Firmware.PX4
+        again = self._times_asked < _MOST_ASKED and now >= self._asked + _ASK_AGAIN
+        if rate_too and obeys and again:
+            self._asked, self._times_asked = now, self._times_asked + 1
+            message_id = dialect.MAVLINK_MSG_ID_HEARTBEAT
+            due.append(goals.set_interval(autopilot, message_id, HEARTBEAT_INTERVAL * 1e6))
+        if blocked and now >= self._polled + _OLD:
+            self._polled = now
+            due.append(goals.request_heartbeat(autopilot))
+        return due

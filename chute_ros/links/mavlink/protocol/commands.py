@@ -54,7 +54,6 @@ class Acknowledgement:
     component_id: int
     number: int
     result: int
-    progress: int = 255
 
 
 @dataclass(frozen=True)
@@ -108,24 +107,19 @@ def _key(command: Command) -> _Key:
 
 
 @dataclass
-class _Open:
+class _Transaction:
+    """One that waits for its turn since started, or is under way since then."""
+
     tokens: list[int]
     command: Command
     family: int
     started: float
-    deadline: float
-    others: int
-    tries: int
+    deadline: float = math.inf
+    #: Sends of others that may still be answered, and how often it may be sent itself.
+    others: int = 0
+    tries: int = 0
     sends: int = 0
     answers: Counter[int] = field(default_factory=Counter)
-
-
-@dataclass(frozen=True)
-class _Waiting:
-    token: int
-    command: Command
-    family: int
-    since: float
 
 
 class CommandTransactions:
@@ -135,9 +129,9 @@ class CommandTransactions:
         self.limits = limits
         self.late_count = 0
         self.unexpected_count = 0
-        self._open: dict[_Key, _Open] = {}
+        self._open: dict[_Key, _Transaction] = {}
         self._sends: dict[_Key, UnansweredSends] = {}
-        self._waiting: dict[_Key, deque[_Waiting]] = {}
+        self._waiting: dict[_Key, deque[_Transaction]] = {}
         self._out: list[SendCommand] = []
         self._finished: list[CommandFinished] = []
 
@@ -156,14 +150,13 @@ class CommandTransactions:
         once, or takes the place of any other; what waits is given up, lest it undo it.
         """
         key = _key(command)
-        family = token if family is None else family
+        new = _Transaction([token], command, token if family is None else family, now)
         earlier = self._open.get(key)
         if earlier is not None and not urgent:
-            waiting = self._waiting.setdefault(key, deque())
-            waiting.append(_Waiting(token, command, family, now))
+            self._waiting.setdefault(key, deque()).append(new)
             return
         for other in self._waiting.pop(key, ()):
-            self._report(other.token, other.command, now - other.since, superseded=True)
+            self._report(other, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
         if earlier is not None and earlier.command == command:
             earlier.tokens.append(token)
             earlier.tries = max(earlier.tries, earlier.sends + self.limits.tries)
@@ -171,7 +164,7 @@ class CommandTransactions:
             return
         if earlier is not None:
             self._end(key, earlier, results.NO_ACKNOWLEDGEMENT, now, superseded=True)
-        self._begin(key, _Waiting(token, command, family, now), now)
+        self._begin(key, new, now)
 
     def send_once(self, command: Command, now: float) -> None:
         """Send command once; nobody waits for its answer, and it confirms nothing else."""
@@ -238,7 +231,7 @@ class CommandTransactions:
     def cancel(self, token: int, now: float) -> None:
         """Whoever started this command does not want it any more: nothing is sent or reported."""
         for key, waiting in list(self._waiting.items()):
-            left = deque(entry for entry in waiting if entry.token != token)
+            left = deque(entry for entry in waiting if token not in entry.tokens)
             if left:
                 self._waiting[key] = left
             else:
@@ -253,18 +246,17 @@ class CommandTransactions:
     def _sends_of(self, key: _Key) -> UnansweredSends:
         return self._sends.setdefault(key, UnansweredSends(self.limits.late_ack_window))
 
-    def _others_of(self, key: _Key, transaction: _Open, now: float) -> int:
+    def _others_of(self, key: _Key, transaction: _Transaction, now: float) -> int:
         # Those that were answered before it began are not waited for again.
         return min(transaction.others, self._sends_of(key).of_others(transaction.family, now))
 
-    def _begin(self, key: _Key, start: _Waiting, now: float) -> None:
-        others = self._sends_of(key).of_others(start.family, now)
-        self._open[key] = _Open(
-            [start.token], start.command, start.family, now, now, others, self.limits.tries
-        )
-        self._send(self._open[key], now)
+    def _begin(self, key: _Key, transaction: _Transaction, now: float) -> None:
+        transaction.started, transaction.tries = now, self.limits.tries
+        transaction.others = self._sends_of(key).of_others(transaction.family, now)
+        self._open[key] = transaction
+        self._send(transaction, now)
 
-    def _send(self, transaction: _Open, now: float) -> None:
+    def _send(self, transaction: _Transaction, now: float) -> None:
         confirmation = min(transaction.sends, 255)
         token = transaction.tokens[-1]
         self._out.append(SendCommand(transaction.command, confirmation, token))
@@ -282,22 +274,14 @@ class CommandTransactions:
         self._begin(key, start, now)
 
     def _end(
-        self, key: _Key, transaction: _Open, result: int, now: float, superseded: bool = False
+        self, key: _Key, one: _Transaction, result: int, now: float, superseded: bool = False
     ) -> None:
         del self._open[key]
-        seconds = now - transaction.started
-        for token in transaction.tokens:
-            self._report(
-                token, transaction.command, seconds, superseded, result, transaction.sends
-            )
+        self._report(one, result, now, superseded)
 
-    def _report(
-        self,
-        token: int,
-        command: Command,
-        seconds: float,
-        superseded: bool = False,
-        result: int = results.NO_ACKNOWLEDGEMENT,
-        sends: int = 0,
-    ) -> None:
-        self._finished.append(CommandFinished(token, command, result, sends, seconds, superseded))
+    def _report(self, one: _Transaction, result: int, now: float, superseded: bool) -> None:
+        seconds = now - one.started
+        self._finished += [
+            CommandFinished(token, one.command, result, one.sends, seconds, superseded)
+            for token in one.tokens
+        ]

@@ -94,18 +94,17 @@ class Devices:
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
-        doubts = [self.parachutes.doubt(), self.autopilots.doubt()]
-        doubts += [parachute.doubt(now) for parachute in self.parachutes.all()]
-        doubts += [autopilot.doubt(now) for autopilot in self.autopilots.all()]
-        both = self.parachutes.all() and self.autopilots.all()
-        if both and self.parachutes.system_id != self.autopilots.system_id:
-            unset = [f"{self.parachutes.kind}_system_id"] if not self.parachutes.fixed else []
-            unset += [f"{self.autopilots.kind}_system_id"] if not self.autopilots.fixed else []
-            if unset:
-                doubts.append(
-                    f"the parachute is of system {self.parachutes.system_id}, the autopilot of "
-                    f"system {self.autopilots.system_id}: set {' and '.join(unset)}"
-                )
+        parachutes, autopilots = self.parachutes, self.autopilots
+        doubts = [parachutes.doubt(), autopilots.doubt()]
+        doubts += [parachute.doubt(now) for parachute in parachutes.all()]
+        doubts += [autopilot.doubt(now) for autopilot in autopilots.all()]
+        unset = [f"{one.kind}_system_id" for one in (parachutes, autopilots) if not one.fixed]
+        both = parachutes.all() and autopilots.all()
+        if both and unset and parachutes.system_id != autopilots.system_id:
+            doubts.append(
+                f"the parachute is of system {parachutes.system_id}, the autopilot of "
+                f"system {autopilots.system_id}: set {' and '.join(unset)}"
+            )
         return [doubt for doubt in doubts if doubt]
 
     # -- what they say ---------------------------------------------------------------------------
@@ -179,8 +178,7 @@ class Devices:
             return
         autopilot = self.autopilots.get(*ids)
         if autopilot is None:
-            config = self._config
-            limits, needed = config.autopilot_liveness, config.needed_message_rate
+            limits, needed = self._config.autopilot_liveness, self._config.needed_message_rate
             autopilot = AutopilotTracker(*ids, limits, needed)
             self.autopilots.add(*ids, autopilot)
         self._changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
@@ -196,8 +194,7 @@ class Devices:
             reboots = parachute.reboot_count
             parachute.parachute_status(message, now)
             if parachute.reboot_count > reboots:
-                text = f"parachute {parachute.device} restarted"
-                self.notice(Severity.ERROR, text)
+                self.notice(Severity.ERROR, f"parachute {parachute.device} restarted")
             self._events.append(ParachuteChanged(parachute.status(now)))
         elif kind == "COMPONENT_INFORMATION_BASIC":
             parachute.component_information(message)
@@ -218,8 +215,7 @@ class Devices:
         changed = autopilot.message(message, now)
         if autopilot.reboot_count > reboots:
             where = "in flight" if autopilot.rebooted_in_flight else "on the ground"
-            text = f"autopilot {autopilot.device} restarted {where}"
-            self.notice(Severity.ERROR, text)
+            self.notice(Severity.ERROR, f"autopilot {autopilot.device} restarted {where}")
         if changed:
             self._vehicle_changed(now)
 

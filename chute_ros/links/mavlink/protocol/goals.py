@@ -17,10 +17,11 @@ from chute_ros.links.mavlink.protocol.config import KillMethod
 from chute_ros.links.mavlink.protocol.kill import KillPlan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import LinkState, TriggerFlags, flag_names
-from chute_ros.protocol.effect import ConfirmedCommand
+from chute_ros.protocol.goal import ConfirmedCommand
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 
 MavlinkGoal = ConfirmedCommand[Command]
+Device = ParachuteTracker | AutopilotTracker
 
 #: Whole numbers up to here are exact in a param, which is a 32-bit float.
 MOST_EXACT = 2**24
@@ -34,14 +35,26 @@ FORCED = "forced disarm on the ground"
 _LOOKS = (0.0, 0.025, 0.05, 0.1, 0.2)
 
 
-def _params(*values: float) -> tuple[float, float, float, float, float, float, float]:
-    p1, p2, p3, p4, p5, p6, p7 = (*values, *(0.0,) * (7 - len(values)))
-    return (p1, p2, p3, p4, p5, p6, p7)
-
-
-def command(device: ParachuteTracker | AutopilotTracker, number: int, *params: float) -> Command:
+def command(device: Device, number: int, *params: float) -> Command:
     """A command for device; the params that are not given are 0."""
-    return Command(device.system_id, device.component_id, number, _params(*params))
+    p1, p2, p3, p4, p5, p6, p7 = (*map(float, params), *(0.0,) * (7 - len(params)))
+    return Command(device.system_id, device.component_id, number, (p1, p2, p3, p4, p5, p6, p7))
+
+
+def set_interval(device: Device, message_id: int, interval_us: float) -> Command:
+    """Have a message sent each interval, microseconds."""
+    return command(device, dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, interval_us)
+
+
+def request_heartbeat(autopilot: AutopilotTracker) -> Command:
+    """Ask for one HEARTBEAT."""
+    return command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, dialect.MAVLINK_MSG_ID_HEARTBEAT)
+
+
+def request_status(parachute: ParachuteTracker) -> Command:
+    """Ask for one PARACHUTE_STATUS."""
+    message_id = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
+    return command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
 
 
 def set_triggers(
@@ -60,7 +73,7 @@ def set_triggers(
     )
     return ConfirmedCommand(
         "MAV_CMD_SET_PARACHUTE_ARM",
-        (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, float(arm), float(select)),),
+        (command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, arm, select),),
         f"PARACHUTE_STATUS reports {changed}",
         shown,
         request_status(parachute),
@@ -83,10 +96,10 @@ def release(
         return parachute.deployed and (alive or parachute.status_received > now)
 
     commands: tuple[Command, ...] = (
-        command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(dialect.PARACHUTE_RELEASE)),
+        command(parachute, dialect.MAV_CMD_DO_PARACHUTE, dialect.PARACHUTE_RELEASE),
     )
     if force:
-        sources = float(TriggerFlags.FC | TriggerFlags.OFFBOARD)
+        sources = TriggerFlags.FC | TriggerFlags.OFFBOARD
         arm = command(parachute, dialect.MAV_CMD_SET_PARACHUTE_ARM, sources, sources)
         commands = (arm, *commands)
     return ConfirmedCommand(
@@ -127,7 +140,7 @@ def parachute_action(parachute: ParachuteTracker, action: int) -> MavlinkGoal:
     """MAV_CMD_DO_PARACHUTE disable or enable; the status has no field that shows it."""
     return ConfirmedCommand(
         f"MAV_CMD_DO_PARACHUTE {ACTION_NAMES[action]}",
-        (command(parachute, dialect.MAV_CMD_DO_PARACHUTE, float(action)),),
+        (command(parachute, dialect.MAV_CMD_DO_PARACHUTE, action),),
         "acknowledged",
         hinders_release=action == dialect.PARACHUTE_DISABLE,
     )
@@ -157,7 +170,7 @@ def kill(
             (_stop_order(autopilot, way.method),),
             "the autopilot reports motors off",
             shown,
-            _request_heartbeat(autopilot),
+            request_heartbeat(autopilot),
             insist=True,
             urgent=True,
             looks=_LOOKS,
@@ -174,11 +187,6 @@ def _stop_order(autopilot: AutopilotTracker, method: KillMethod) -> Command:
     return command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, FORCE_DISARM)
 
 
-def _request_heartbeat(autopilot: AutopilotTracker) -> Command:
-    message_id = float(dialect.MAVLINK_MSG_ID_HEARTBEAT)
-    return command(autopilot, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
-
-
 def disarm_on_ground(
     autopilot: AutopilotTracker, may_force: Callable[[], bool], patience: float, now: float
 ) -> MavlinkGoal:
@@ -192,7 +200,7 @@ def disarm_on_ground(
             (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
             "the autopilot's heartbeat reports disarmed",
             lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
-            _request_heartbeat(autopilot),
+            request_heartbeat(autopilot),
             # The plain one, which may be tried on, must not keep it waiting.
             urgent=forced,
             looks=_LOOKS,
@@ -201,12 +209,6 @@ def disarm_on_ground(
         )
 
     return disarm(False)
-
-
-def request_status(parachute: ParachuteTracker) -> Command:
-    """Ask for one PARACHUTE_STATUS."""
-    message_id = float(dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS)
-    return command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
 
 
 @dataclass
@@ -240,7 +242,7 @@ def request_message(parachute: ParachuteTracker, message_id: int) -> tuple[Mavli
     watch = Watch(parachute.system_id, parachute.component_id, message_id)
     kind = dialect.mavlink_map.get(message_id)
     name = kind.msgname if kind is not None else f"message {message_id}"
-    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id))
+    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, message_id)
     goal = ConfirmedCommand(
         f"request of {name}", (ask,), f"{name} came", watch.seen, needs_acknowledgement=True
     )
@@ -251,12 +253,7 @@ def set_message_interval(
     parachute: ParachuteTracker, message_id: int, interval_us: int
 ) -> MavlinkGoal:
     """Set the interval of a message (MAV_CMD_SET_MESSAGE_INTERVAL), microseconds."""
-    order = command(
-        parachute,
-        dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
-        float(message_id),
-        float(interval_us),
-    )
+    order = set_interval(parachute, message_id, interval_us)
     return ConfirmedCommand(f"interval of message {message_id}", (order,), "acknowledged")
 
 
@@ -264,15 +261,8 @@ def read_message_interval(
     parachute: ParachuteTracker, message_id: int
 ) -> tuple[MavlinkGoal, Watch]:
     """Ask how often a message is sent: a MAV_CMD_REQUEST_MESSAGE of MESSAGE_INTERVAL."""
-    watch = Watch(
-        parachute.system_id,
-        parachute.component_id,
-        dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL,
-        "message_id",
-        message_id,
-    )
-    wanted = float(dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL)
-    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, float(message_id))
-    return ConfirmedCommand(
-        "request of MESSAGE_INTERVAL", (ask,), "MESSAGE_INTERVAL came", watch.seen
-    ), watch
+    wanted = dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL
+    watch = Watch(parachute.system_id, parachute.component_id, wanted, "message_id", message_id)
+    ask = command(parachute, dialect.MAV_CMD_REQUEST_MESSAGE, wanted, message_id)
+    name = "MESSAGE_INTERVAL"
+    return ConfirmedCommand(f"request of {name}", (ask,), f"{name} came", watch.seen), watch

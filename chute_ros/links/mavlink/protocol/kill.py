@@ -13,7 +13,6 @@ terminate_vehicle (42 stops the motors, 43 lands), AP_Arming.cpp (is_armed with 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
@@ -144,18 +143,3 @@ def _described(way: Way) -> str:
     if way.releases:
         text += f", only once a deploy is decided ({way.releases})"
     return text
-
-
-class DeployDecided:
-    """Was a deploy decided in this flight? A flight begins as the autopilot is armed."""
-
-    def __init__(self, armings: Callable[[], int]) -> None:
-        self._armings = armings
-        self._decided_in: int | None = None
-
-    def decide(self) -> None:
-        """A deploy was ordered."""
-        self._decided_in = self._armings()
-
-    def __call__(self) -> bool:
-        return self._decided_in is not None and self._decided_in == self._armings()

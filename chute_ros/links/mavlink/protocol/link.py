@@ -10,18 +10,17 @@ import math
 from collections import Counter
 from collections.abc import Hashable
 from dataclasses import replace
+from typing import Any
 
-from chute_ros.links.mavlink.protocol import arm_authorization, goals, results
+from chute_ros.links.mavlink.protocol import goals, results
 from chute_ros.links.mavlink.protocol.announcements import Announcements
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_care import AutopilotCare
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement, Command, CommandTransactions
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.devices import Devices
-from chute_ros.links.mavlink.protocol.kill import DeployDecided
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.links.mavlink.protocol.setup_check import Setup
-from chute_ros.links.mavlink.protocol.stream_watch import Ask
 from chute_ros.links.mavlink.protocol.wire import Duplicates, Inbox, Outbox
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.events import Event
@@ -52,7 +51,8 @@ class MavlinkLink:
         self._outbox = Outbox(config.system_id, config.component_id, signer)
         self._acknowledgements = Duplicates(config.commands.late_ack_window)
         self._announcements = Announcements()
-        self._deploy_decided = DeployDecided(self._devices.arming_count)
+        #: In which flight, counted by armings, a deploy was decided last.
+        self._deploy_decided_in = -1
         self._care = AutopilotCare(
             config, self._devices, self.requests, self._outbox, self._announcements
         )
@@ -127,7 +127,7 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
-        self._deploy_decided.decide()
+        self._deploy_decided_in = self._devices.arming_count()
         parachute = self._devices.to_release(device) or self._target(token, device)
         if parachute is not None:
             self.requests.make_way_for_release(now)
@@ -152,8 +152,7 @@ class MavlinkLink:
         parachute = self._target(token, device)
         if parachute is not None:
             goal, watch = goals.request_message(parachute, message_id)
-            self.requests.begin(token, goal, now, watch)
-            self._drive(now)
+            self._begin(token, goal, now, watch=watch)
 
     def set_message_interval(
         self, token: int, message_id: int, interval_us: int, device: str, now: float
@@ -163,8 +162,7 @@ class MavlinkLink:
         if parachute is not None:
             goal = goals.set_message_interval(parachute, message_id, interval_us)
             read_back = goals.read_message_interval(parachute, message_id)
-            self.requests.begin(token, goal, now, follow_up=read_back)
-            self._drive(now)
+            self._begin(token, goal, now, follow_up=read_back)
 
     def kill(self, token: int, now: float) -> None:
         """Stop the motors through the autopilot."""
@@ -172,20 +170,20 @@ class MavlinkLink:
         if autopilot is None:
             why = "no autopilot of ours was received yet; set autopilot_system_id"
             self.requests.refuse(token, why)
+            return
+        goal = goals.kill(
+            autopilot,
+            lambda: self._care.plan_of(autopilot),
+            self._deploy_decided,
+            self.config.commands.ack_timeout,
+            now,
+        )
+        if goal is None:
+            why = f"no way is allowed: {self._care.plan_of(autopilot).text()}"
+            self.requests.refuse(token, why)
         else:
-            goal = goals.kill(
-                autopilot,
-                lambda: self._care.plan_of(autopilot),
-                self._deploy_decided,
-                self.config.commands.ack_timeout,
-                now,
-            )
-            if goal is None:
-                why = f"no way is allowed: {self._care.plan_of(autopilot).text()}"
-                self.requests.refuse(token, why)
-            else:
-                self._announcements.ordered(token, "KILL")
-                self._begin(token, goal, now)
+            self._announcements.ordered(token, "KILL")
+            self._begin(token, goal, now)
 
     def flight_block(self, reason: str, now: float) -> None:
         """Block flight for reason, or release the block (empty)."""
@@ -214,9 +212,13 @@ class MavlinkLink:
         """A device that can deploy was received."""
         return self._devices.to_release("") is not None
 
+    def chosen_autopilot(self) -> AutopilotTracker | None:
+        """The first autopilot of ours that is not lost, or the first."""
+        return self._devices.chosen_autopilot()
+
     def has_autopilot(self) -> bool:
         """A device that can stop the motors was received."""
-        return self._devices.chosen_autopilot() is not None
+        return self.chosen_autopilot() is not None
 
     def chosen_parachute(self) -> ParachuteTracker | None:
         """Device for requests without a device: the first that is not lost, or the first."""
@@ -230,16 +232,6 @@ class MavlinkLink:
     def vehicle_state(self, now: float) -> VehicleState:
         """The picture of our autopilot's vehicle."""
         return self._devices.vehicle_state(now)
-
-    def autopilot_rates(self, now: float) -> dict[str, float]:
-        """Hz of each message that is read of our autopilot."""
-        autopilot = self._devices.chosen_autopilot()
-        return {} if autopilot is None else autopilot.rates(now)
-
-    def autopilot_round_trip(self, now: float) -> float:
-        """How long our autopilot takes to answer, s; NaN: it does not."""
-        autopilot = self._devices.chosen_autopilot()
-        return math.nan if autopilot is None else autopilot.round_trip.seconds(now)
 
     def doubts(self, now: float) -> list[str]:
         """Why it is doubtful which devices are ours."""
@@ -264,7 +256,7 @@ class MavlinkLink:
         self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
-        elif arm_authorization.is_request(message, self._own_ids):
+        elif self._care.asks_to_arm(message):
             self._care.authorize(ids, now)
         else:
             self._devices.heard(message, ids, now)
@@ -285,6 +277,10 @@ class MavlinkLink:
             if ack.result == results.ACCEPTED:
                 self._devices.accepted(ack, now)
 
+    def _deploy_decided(self) -> bool:
+        """In this flight: one begins as the autopilot is armed."""
+        return self._deploy_decided_in == self._devices.arming_count()
+
     def _release_under_way(self, token: int) -> bool:
         """A release is under way, which nothing may undo: the request is refused."""
         if not self.requests.under_way(goals.RELEASE):
@@ -302,8 +298,8 @@ class MavlinkLink:
             self.requests.refuse(token, f"{what} was received on this link (received: {known})")
         return target
 
-    def _begin(self, token: int, goal: goals.MavlinkGoal, now: float) -> None:
-        self.requests.begin(token, goal, now)
+    def _begin(self, token: int, goal: goals.MavlinkGoal, now: float, **then: Any) -> None:
+        self.requests.begin(token, goal, now, **then)
         self._drive(now)
 
     def _look_after_autopilot(self, now: float) -> None:
@@ -313,27 +309,16 @@ class MavlinkLink:
             return
         rate = self.config.autopilot_message_rate
         self._care.look(autopilot, rate > 0, now)
-        if rate > 0:
-            self._ask_for(autopilot.messages_due(1.0 / rate, now), autopilot, now)
+        for ask in autopilot.messages_due(1.0 / rate, now) if rate > 0 else ():
+            interval_us = min(ask.interval * 1e6, _LONGEST_INTERVAL_US)
+            order = goals.set_interval(autopilot, ask.message_id, interval_us)
+            self.requests.commands.send_once(order, now)
 
     def _look_after_parachutes(self, now: float) -> None:
         """Ask for the status that does not come; a ground station may have switched it off."""
         for parachute in self.parachutes.all():
             if parachute.status_due(now):
                 self.requests.commands.send_once(goals.request_status(parachute), now)
-
-    def _ask_for(self, asks: tuple[Ask, ...], autopilot: AutopilotTracker, now: float) -> None:
-        for ask in asks:
-            interval_us = min(ask.interval * 1e6, _LONGEST_INTERVAL_US)
-            self.requests.commands.send_once(
-                goals.command(
-                    autopilot,
-                    dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
-                    float(ask.message_id),
-                    interval_us,
-                ),
-                now,
-            )
 
     def _drive(self, now: float) -> None:
         for send in self.requests.drive(now):

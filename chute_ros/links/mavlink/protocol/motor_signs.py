@@ -26,10 +26,7 @@ _OUTPUTS = 16
 #: How the texts begin that autopilots send as they disarm.
 _DISARMED_TEXTS = ("Disarming motors", "Throttle disarmed", "Disarmed by ")
 #: The orders whose acceptance lets a sign count.
-_STOPPING = (
-    dialect.MAV_CMD_COMPONENT_ARM_DISARM,
-    dialect.MAV_CMD_DO_FLIGHTTERMINATION,
-)
+_STOPPING = (dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_FLIGHTTERMINATION)
 
 
 class MotorSigns:

@@ -13,7 +13,6 @@ from typing import Any
 
 from chute_ros.links.mavlink.protocol.twins import Twins
 from chute_ros.model import (
-    NAN,
     TRIGGER_SOURCES,
     DeploymentTrigger,
     ErrorFlags,
@@ -219,9 +218,8 @@ class ParachuteTracker:
         faults = self._faults(now)
         message = self._message
         if message is None:
-            return ParachuteStatus(
-                self.device, self.liveness.state, self._state(now), faults=tuple(faults)
-            )
+            state, link_state = self._state(now), self.liveness.state
+            return ParachuteStatus(self.device, link_state, state, faults=tuple(faults))
         date, wrong = packed_date(message.parachute_packed_date)
         return ParachuteStatus(
             device=self.device,
@@ -234,8 +232,6 @@ class ParachuteTracker:
             error_flags=ErrorFlags(message.error_status),
             safety_flags=SafetyFlags(message.safety_status),
             ats_arm_altitude=float(message.ats_arm_altitude),
-            height=NAN,
-            backup_voltage=NAN,
             uptime=message.time_boot_ms / 1000.0,
             packed_date=date,
             faults=tuple([*faults, wrong] if wrong else faults),

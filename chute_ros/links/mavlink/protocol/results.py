@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.protocol.goal import NO_ANSWER
 from chute_ros.protocol.mavlink.dialect import dialect
 
 ACCEPTED: int = dialect.MAV_RESULT_ACCEPTED

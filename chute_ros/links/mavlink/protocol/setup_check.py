@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from chute_ros.links.mavlink.protocol import arm_authorization
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.links.mavlink.protocol.autopilot_settings import AutopilotSettings
 from chute_ros.links.mavlink.protocol.firmware import Firmware
@@ -32,15 +31,11 @@ class Setup:
 def setup_of(autopilot: AutopilotTracker, plan: KillPlan, own_system_id: int) -> Setup:
     """As far as the autopilot has told it."""
     settings = autopilot.settings
-    warnings = [
-        plan.warning(),
-        arm_authorization.block_warning(settings, own_system_id),
-        *_by_itself(settings),
-    ]
+    warnings = [plan.warning(), _block_warning(settings, own_system_id), *_by_itself(settings)]
     return Setup(
         settings.firmware.value,
         plan.text(),
-        arm_authorization.block_text(settings, own_system_id),
+        _block_text(settings, own_system_id),
         plan.fault(),
         tuple(text for text in warnings if text),
         settings.texts(),
@@ -66,6 +61,39 @@ def _by_itself(settings: AutopilotSettings) -> list[str]:
             "by a kill in the air; set it to -1"
         )
     return told
+
+
+def _asks(settings: AutopilotSettings, system_id: int) -> bool:
+    """The autopilot asks system_id before it arms."""
+    wanted = settings.get("COM_ARM_AUTH_REQ") == 1
+    return wanted and settings.get("COM_ARM_AUTH_ID") == system_id
+
+
+def _block_text(settings: AutopilotSettings, system_id: int) -> str:
+    """How a flight block is kept, for a person before flight."""
+    if _asks(settings, system_id):
+        return "the autopilot asks us before it arms"
+    return "a vehicle that arms on the ground is disarmed"
+
+
+def _block_warning(settings: AutopilotSettings, system_id: int) -> str:
+    """Why a flight block may not be kept; empty: nothing known."""
+    if settings.firmware is not Firmware.PX4 or _asks(settings, system_id):
+        return ""
+    no_ramp = settings.get("MPC_TKO_RAMP_T") == 0 or settings.absent("MPC_TKO_RAMP_T")
+    if settings.get("COM_SPOOLUP_TIME") == 0 and no_ramp:
+        return (
+            "a flight block may not hold: COM_SPOOLUP_TIME is 0 and MPC_TKO_RAMP_T is "
+            f"{settings.text('MPC_TKO_RAMP_T')}, the vehicle takes off before its arming is "
+            "undone; set COM_SPOOLUP_TIME to 1, or COM_ARM_AUTH_REQ to 1 and COM_ARM_AUTH_ID to "
+            f"{system_id}"
+        )
+    if settings.get("COM_ARM_AUTH_REQ") == 1:
+        return (
+            f"COM_ARM_AUTH_ID is {settings.text('COM_ARM_AUTH_ID')}, and not our system id "
+            f"{system_id}: the autopilot asks another component before it arms"
+        )
+    return ""
 
 
 class SetupNews:

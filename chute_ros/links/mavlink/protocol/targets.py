@@ -21,6 +21,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.mavlink.protocol.firmware import Firmware, firmware_of, is_aeroplane
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.protocol.mavlink.dialect import dialect
 
@@ -37,8 +38,6 @@ _OLD_MS = 500
 #: Thrust (0 to 1) from which on, and tilt (rad) up to which, no motor can be commanded to do more.
 _FULL_THRUST, _UPRIGHT = 0.95, math.radians(30.0)
 
-_PX4: int = dialect.MAV_AUTOPILOT_PX4
-_ARDUPILOT: int = dialect.MAV_AUTOPILOT_ARDUPILOTMEGA
 _MULTIROTORS = frozenset(
     {
         dialect.MAV_TYPE_QUADROTOR,
@@ -49,19 +48,6 @@ _MULTIROTORS = frozenset(
         dialect.MAV_TYPE_DODECAROTOR,
         dialect.MAV_TYPE_DECAROTOR,
         dialect.MAV_TYPE_GENERIC_MULTIROTOR,
-    }
-)
-#: With ArduPilot as well: its quadplanes say FIXED_WING unless told otherwise.
-_AEROPLANES = frozenset(
-    {
-        dialect.MAV_TYPE_FIXED_WING,
-        dialect.MAV_TYPE_VTOL_DUOROTOR,
-        dialect.MAV_TYPE_VTOL_QUADROTOR,
-        dialect.MAV_TYPE_VTOL_TILTROTOR,
-        dialect.MAV_TYPE_VTOL_RESERVED2,
-        dialect.MAV_TYPE_VTOL_RESERVED3,
-        dialect.MAV_TYPE_VTOL_RESERVED4,
-        dialect.MAV_TYPE_VTOL_RESERVED5,
     }
 )
 #: ArduPlane's modes in which its height error is that of the wing: CIRCLE, FBWB, CRUISE, AUTO,
@@ -84,10 +70,7 @@ _THRUST_IGNORED = dialect.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE
 _Z_IGNORED = dialect.POSITION_TARGET_TYPEMASK_Z_IGNORE
 _VZ_IGNORED = dialect.POSITION_TARGET_TYPEMASK_VZ_IGNORE
 _ABOVE_SEA = (dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT)
-_ABOVE_HOME = (
-    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-    dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-)
+_ABOVE_HOME = (dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
 _OF_AN_AEROPLANE = {
     dialect.MAVLINK_MSG_ID_ATTITUDE_TARGET: "ATTITUDE_TARGET",
@@ -115,12 +98,13 @@ class Vehicle:
     @property
     def px4(self) -> bool:
         """PX4."""
-        return self.autopilot == _PX4
+        return firmware_of(self.autopilot) is Firmware.PX4
 
     @property
     def arduplane(self) -> bool:
-        """ArduPilot on an aeroplane, a quadplane too."""
-        return self.autopilot == _ARDUPILOT and self.kind in _AEROPLANES
+        """ArduPilot on an aeroplane; its quadplanes say FIXED_WING unless told otherwise."""
+        ardupilot = firmware_of(self.autopilot) is Firmware.ARDUPILOT
+        return ardupilot and is_aeroplane(self.kind)
 
     @property
     def target_messages(self) -> dict[int, str]:

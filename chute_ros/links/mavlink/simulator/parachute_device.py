@@ -73,8 +73,8 @@ class ParachuteDevice(MavlinkDevice):
             dialect.MAV_CMD_SET_PARACHUTE_ARM: self._set_parachute_arm,
         }
         self.actions |= {
-            "error": lambda name: self._set_errors(self.errors | ErrorFlags[name]),
-            "clear-errors": lambda _: self._set_errors(ErrorFlags(0)),
+            "error": lambda name: setattr(self, "errors", self.errors | ErrorFlags[name]),
+            "clear-errors": lambda _: setattr(self, "errors", ErrorFlags(0)),
             "deploy": lambda name: self._deploy(DeploymentTrigger[name]),
         }
         self.arguments |= {
@@ -133,25 +133,14 @@ class ParachuteDevice(MavlinkDevice):
         )
 
     def _heartbeat(self) -> object:
-        return dialect.MAVLink_heartbeat_message(
-            dialect.MAV_TYPE_PARACHUTE,
-            dialect.MAV_AUTOPILOT_INVALID,
-            0,
-            0,
-            self.settings.system_status,
-            3,
-        )
+        kind, autopilot = dialect.MAV_TYPE_PARACHUTE, dialect.MAV_AUTOPILOT_INVALID
+        status = self.settings.system_status
+        return dialect.MAVLink_heartbeat_message(kind, autopilot, 0, 0, status, 3)
 
     def _information(self) -> object:
+        texts = (b"chute_ros", b"simulated parachute", b"0.1.0", b"1", b"SIM-0001")
         return dialect.MAVLink_component_information_basic_message(
-            self.boot_ms(),
-            0,
-            1_750_000_000,
-            b"chute_ros",
-            b"simulated parachute",
-            b"0.1.0",
-            b"1",
-            b"SIM-0001",
+            self.boot_ms(), 0, 1_750_000_000, *texts
         )
 
     def _do_parachute(self, params: Params) -> int:
@@ -184,9 +173,6 @@ class ParachuteDevice(MavlinkDevice):
         self.armed = TriggerFlags(int(self.armed) & ~select | arm & select)
         self.say(f"armed triggers: {self.armed!r}")
         return int(dialect.MAV_RESULT_ACCEPTED)
-
-    def _set_errors(self, errors: ErrorFlags) -> None:
-        self.errors = errors
 
     def _deploy(self, trigger: DeploymentTrigger) -> None:
         if self.deployment is DeploymentTrigger.NONE:

@@ -13,8 +13,7 @@ from functools import cached_property
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, Outcome, ParachuteStatus
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
-from chute_ros.protocol.events import Event, ParachuteChanged, RequestFinished, RequestReport
+from chute_ros.protocol.events import Ask, AskSupervisor, Event, ParachuteChanged, ended
 from chute_ros.settings import Settings, parameter
 
 #: The one device of an output.
@@ -22,6 +21,7 @@ DEVICE = "output"
 #: Between two pictures of it, s.
 _PICTURES = 1.0
 _SENT = "sent; a relay output confirms nothing"
+_FIRED = "its output was switched: repack or replace the parachute, then call safety/reset"
 
 
 @dataclass(frozen=True)
@@ -193,6 +193,8 @@ class RelayLink:
         self.fired += 1
         self.fired_at = self._now
         self._fires_until = self._now + self.config.pulse_time
+        # Nothing ever reports that the parachute is out: a person has to look.
+        self._events.append(AskSupervisor(Ask.FLIGHT_BLOCK, DEVICE, _FIRED))
         waiting, self._waiting = self._waiting, {}
         for token in waiting:
             self._end(token, Outcome.SENT, _SENT)
@@ -211,7 +213,4 @@ class RelayLink:
         self._events.append(ParachuteChanged(ParachuteStatus(DEVICE, self.state)))
 
     def _end(self, token: int, outcome: Outcome, text: str) -> None:
-        self._events.append(RequestReport(Report(token, outcome, text)))
-        success = outcome is Outcome.CONFIRMED
-        finished = EffectFinished(token, success, False, NO_ANSWER, text)
-        self._events.append(RequestFinished(finished))
+        self._events += ended(token, outcome, text)

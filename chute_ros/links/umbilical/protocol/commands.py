@@ -10,10 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.errors import ParameterError
+from chute_ros.links.umbilical.protocol.canopies import CANOPIES
 from chute_ros.links.umbilical.protocol.layouts import Layout, Record
 from chute_ros.links.umbilical.protocol.modes import IN_FLIGHT, FlightMode
 from chute_ros.links.umbilical.protocol.scheduler import HEARTBEAT, Command
-from chute_ros.protocol.effect import ConfirmedCommand
 
 #: Degrees: a 32-bit float of a longitude is exact to 8e-6.
 _TARGET_TOLERANCE = 2e-5
@@ -60,23 +60,16 @@ def _flag(name: str, value: int) -> Effect:
     return Effect(text, lambda r: bool(r[name]) == bool(value))
 
 
-def _mode(*modes: FlightMode) -> Effect:
+def mode_shown(*modes: FlightMode) -> Effect:
+    """One of these modes shows it; the text names the first."""
     text = f"telemetry reports flight mode {modes[0].label}"
     return Effect(text, lambda r: r["flight_mode"] in modes)
 
 
-def mode_alone(mode: FlightMode) -> Effect:
-    """Only the mode can show it."""
-    return _mode(mode)
-
-
-def _deployed(flag: str, mode: FlightMode) -> Effect:
+def _deployed(canopy: str) -> Effect:
+    flag, mode = CANOPIES[canopy]
     text = f"telemetry reports {flag} 1, or flight mode {mode.label}"
     return Effect(text, lambda r: r[flag] != 0 or r["flight_mode"] == mode)
-
-
-def _payload(flag: str) -> Effect:
-    return Effect(f"telemetry reports {flag} 1", lambda r: flag in r and r[flag] != 0)
 
 
 def _safe(sv_open: int) -> Effect:
@@ -88,74 +81,41 @@ def _safe(sv_open: int) -> Effect:
 SAFE_THAT_VENTS = _safe(1)
 
 
-def _kinds() -> dict[str, CommandKind]:
-    def kind(
-        name: str,
-        token: str,
-        meaning: str,
-        effect: Effect | None = None,
-        once: bool = False,
-        lasting: bool = False,
-    ) -> CommandKind:
-        return CommandKind(Command(name, f"<{token}>".encode()), meaning, effect, once, lasting)
-
-    kinds = [
-        CommandKind(HEARTBEAT, "heartbeat", once=True),
-        kind("launch", "L", "launch, if armed and in Standby", _mode(*IN_FLIGHT), once=True),
-        kind("safe", "V", "safe the vehicle: close MAV and SV", _safe(0)),
-        kind("key_arm", "KA", "key arm", _mode(FlightMode.STANDBY, *IN_FLIGHT)),
-        kind("key_disarm", "KD", "key disarm", _mode(FlightMode.STARTUP)),
-        kind("open_mav", "M", "open the MAV", _flag("mav_open", 1)),
-        kind("close_mav", "m", "close the MAV", _flag("mav_open", 0)),
-        kind("open_sv", "S", "open the SV", _flag("sv_open", 1)),
-        kind("close_sv", "s", "close the SV", _flag("sv_open", 0)),
-        kind(
-            "drogue",
-            "D",
-            "trigger the drogue",
-            _deployed("ssa_drogue_deployed", FlightMode.DROGUE_DEPLOYED),
-        ),
-        kind(
-            "main",
-            "d",
-            "trigger the main",
-            _deployed("ssa_main_deployed", FlightMode.MAIN_DEPLOYED),
-        ),
-    ]
-    for event in ("N1", "N2", "N3", "N4", "A1", "A2", "A3"):
-        token = event[1:] if event[0] == "N" else event
-        low = event.lower()
-        effect = _payload(f"cmd_{low}")
-        kinds.append(kind(f"payload_{low}", token, f"payload event {event}", effect, once=True))
-    kinds += [
-        kind("reboot", "R", "reboot the flight computer", once=True),
-        kind("reset_fram", "F", "reset the FRAM", once=True),
-        kind("dump_fram", "f", "dump the FRAM", once=True, lasting=True),
-        kind("dump_flash", "G", "dump the flash", once=True, lasting=True),
-        kind("wipe_flash", "W", "wipe the flash", once=True, lasting=True),
-        kind("flash_info", "I", "report how full the flash is", once=True),
-        kind("wipe_fram_and_reboot", "X", "wipe the FRAM and reboot", once=True, lasting=True),
-    ]
-    return {one.command.name: one for one in kinds}
+def _kind(
+    name: str, token: str, meaning: str, effect: Effect | None = None, **traits: bool
+) -> CommandKind:
+    return CommandKind(Command(name, f"<{token}>".encode()), meaning, effect, **traits)
 
 
-KINDS = _kinds()
+def _payload(event: str) -> CommandKind:
+    token, name = event.removeprefix("N"), event.lower()
+    flag = f"cmd_{name}"
+    effect = Effect(f"telemetry reports {flag} 1", lambda r: flag in r and r[flag] != 0)
+    return _kind(f"payload_{name}", token, f"payload event {event}", effect, once=True)
 
 
-def goal_of(
-    kind: CommandKind, shown: Callable[[], bool] | None, effect: str, even_if_shown: bool
-) -> ConfirmedCommand[Command]:
-    """A goal that sends the command; shown None: nothing can show it."""
-    return ConfirmedCommand(
-        kind.command.name,
-        (kind.command,),
-        effect,
-        shown,
-        urgent=kind.command.name in URGENT,
-        unacknowledged=True,
-        once=kind.once,
-        even_if_shown=even_if_shown,
-    )
+_ALL = (
+    CommandKind(HEARTBEAT, "heartbeat", once=True),
+    _kind("launch", "L", "launch, if armed and in Standby", mode_shown(*IN_FLIGHT), once=True),
+    _kind("safe", "V", "safe the vehicle: close MAV and SV", _safe(0)),
+    _kind("key_arm", "KA", "key arm", mode_shown(FlightMode.STANDBY, *IN_FLIGHT)),
+    _kind("key_disarm", "KD", "key disarm", mode_shown(FlightMode.STARTUP)),
+    _kind("open_mav", "M", "open the MAV", _flag("mav_open", 1)),
+    _kind("close_mav", "m", "close the MAV", _flag("mav_open", 0)),
+    _kind("open_sv", "S", "open the SV", _flag("sv_open", 1)),
+    _kind("close_sv", "s", "close the SV", _flag("sv_open", 0)),
+    _kind("drogue", "D", "trigger the drogue", _deployed("drogue")),
+    _kind("main", "d", "trigger the main", _deployed("main")),
+    *map(_payload, ("N1", "N2", "N3", "N4", "A1", "A2", "A3")),
+    _kind("reboot", "R", "reboot the flight computer", once=True),
+    _kind("reset_fram", "F", "reset the FRAM", once=True),
+    _kind("dump_fram", "f", "dump the FRAM", once=True, lasting=True),
+    _kind("dump_flash", "G", "dump the flash", once=True, lasting=True),
+    _kind("wipe_flash", "W", "wipe the flash", once=True, lasting=True),
+    _kind("flash_info", "I", "report how full the flash is", once=True),
+    _kind("wipe_fram_and_reboot", "X", "wipe the FRAM and reboot", once=True, lasting=True),
+)
+KINDS = {one.command.name: one for one in _ALL}
 
 
 def set_target(layout: Layout, values: tuple[float, ...]) -> CommandKind:

@@ -59,7 +59,7 @@ class FlightComputer:
         self._counting = ("main",) if main_counts else tuple(CANOPIES)
         self._cable_pulled = False
         #: In the air, as far as its records have told.
-        self._flying = False
+        self.flying = False
         self._rest_altitude = NAN
         self._rest_since = NAN
         self._was_out = False
@@ -85,12 +85,12 @@ class FlightComputer:
         if self._has_restarted(record):
             age = Age.RESTARTED
         said_ground, self._said_ground = self._said_ground, _mode(record) in GROUND
-        if age is Age.NEW and self._flying and self._said_ground and not said_ground:
+        if age is Age.NEW and self.flying and self._said_ground and not said_ground:
             # Its clock runs on: text without a checksum may be damaged.
             return [], Age.DOUBTFUL
         if age is Age.RESTARTED:
             self.restarts += 1
-            self.restarted_in_flight = self._flying
+            self.restarted_in_flight = self.flying
             # Its altitude may count from elsewhere now.
             self._rest_altitude = NAN
         before, self.record = self.record, record
@@ -106,7 +106,7 @@ class FlightComputer:
         self._watch_rest(before, record, now)
         self._watch_flight()
         self._canopies.watch(before, record, self.mode)
-        if self.mode in GROUND and not self._flying:
+        if self.mode in GROUND and not self.flying:
             self._canopies = Canopies()
         return self.liveness.heard(now), age
 
@@ -116,7 +116,7 @@ class FlightComputer:
 
     def fired(self, name: str, now: float) -> None:
         """A command that fires the drogue or the main has left."""
-        if self._flying:
+        if self.flying:
             self._canopies.fired.add(name)
         else:
             self._fired_on_ground[name] = now
@@ -168,8 +168,8 @@ class FlightComputer:
         if not self.fresh(now):
             # What was in the air a moment ago is so now.
             near = self.liveness.state in (LinkState.OK, LinkState.STALE)
-            return Situation.LOST_IN_FLIGHT if self._flying and near else Situation.UNKNOWN
-        if self._flying and mode not in IN_FLIGHT:
+            return Situation.LOST_IN_FLIGHT if self.flying and near else Situation.UNKNOWN
+        if self.flying and mode not in IN_FLIGHT:
             return Situation.LOST_IN_FLIGHT
         return Situation.UNKNOWN if mode is None else _SITUATIONS[mode]
 
@@ -177,14 +177,14 @@ class FlightComputer:
     def landed(self) -> bool:
         """After a deployment its altitude does not change any more, by its records: silence is
         no rest."""
-        return self._is_out and self._at_rest
+        return self._says_out(CANOPIES) and self._at_rest
 
     @property
     def deployed(self) -> bool:
         """The parachute is out: drogue or main, or the main alone. By the newest record, and in
         flight, where nobody fired, the one before it; or by those of before a restart in this
         flight."""
-        fired_or_down = self._canopies.fired or not self._flying
+        fired_or_down = self._canopies.fired or not self.flying
         believed = fired_or_down or self._out_in_a_row >= _TO_BELIEVE
         says_so = self._says_out(self._counting) and bool(believed)
         return says_so or any(map(self.forgot, self._counting))
@@ -194,16 +194,6 @@ class FlightComputer:
         record, mode = self.record, self.mode
         shown_by = [CANOPIES[name] for name in names]
         return record is not None and any(bool(record[f]) or mode is m for f, m in shown_by)
-
-    @property
-    def _is_out(self) -> bool:
-        """Drogue or main are out."""
-        return self._says_out(CANOPIES)
-
-    @property
-    def flying(self) -> bool:
-        """In the air, as far as its records have told."""
-        return self._flying
 
     def came_out(self, name: str) -> bool:
         """The drogue or the main came out in this flight: a flag that was set before it, as by a
@@ -222,7 +212,7 @@ class FlightComputer:
     def forgot(self, name: str) -> bool:
         """The drogue or the main surely came out in this flight, and it has restarted since: that
         its records say so no more means nothing."""
-        return self._flying and self.restarted_in_flight and self.surely_out(name)
+        return self.flying and self.restarted_in_flight and self.surely_out(name)
 
     def was_fired(self, name: str, now: float) -> bool:
         """It surely came out in this flight, or was fired from here: not every firmware tells, nor
@@ -292,14 +282,15 @@ class FlightComputer:
         with a clock that falls behind.
         """
         before, mode = self.record, _mode(record)
-        if before is None or not self._flying or mode not in GROUND or _mode(before) in GROUND:
+        if before is None or not self.flying or mode not in GROUND or _mode(before) in GROUND:
             return False
         ran = (int(record["ms_since_boot_cfc"]) - int(before["ms_since_boot_cfc"])) / 1000.0
         return record.received - before.received - ran > _FALLS_BEHIND
 
     def _watch_rest(self, before: Record | None, record: Record, now: float) -> None:
         altitude = record.number("altitude")
-        came_out, self._was_out = self._is_out and not self._was_out, self._is_out
+        was_out, self._was_out = self._was_out, self._says_out(CANOPIES)
+        came_out = self._was_out and not was_out
         took_off = self.mode in IN_FLIGHT and (before is None or _mode(before) not in IN_FLIGHT)
         # A barometer that is stuck is no rest where the satellites tell of a fall.
         moves = record.number("fix_type") >= _FIX_3D and abs(record.number("vel_d")) > _REST_SPEED
@@ -311,9 +302,9 @@ class FlightComputer:
         """Whether it flies: a ground mode after a restart in the air, and a mode without a name or
         a fault, say nothing of it until its altitude stays."""
         if self.mode in IN_FLIGHT:
-            self._flying = not self.landed
+            self.flying = not self.landed
         elif self._at_rest or (self.mode in GROUND and not self.restarted_in_flight):
-            self._flying = False
+            self.flying = False
 
     @property
     def _at_rest(self) -> bool:
@@ -331,7 +322,7 @@ class FlightComputer:
         return Armed.ARMED if may_burn else Armed.DISARMED
 
     def _landed_state(self) -> LandedState:
-        if self._flying:
+        if self.flying:
             return LandedState.IN_AIR
         if self.mode in GROUND or self.landed:
             return LandedState.ON_GROUND
@@ -354,7 +345,7 @@ class FlightComputer:
                 faults.append(f"{name} is {self.record.number(name)}")
         if self.record.received - self._clock_moved_at > self._limits.stale_after:
             faults.append("its clock stands still")
-        if self.restarted_in_flight and self._flying:
+        if self.restarted_in_flight and self.flying:
             faults.append("it restarted in flight")
         return faults
 

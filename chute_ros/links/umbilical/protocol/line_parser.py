@@ -105,10 +105,7 @@ _LEVELS = {
 _LOG = re.compile(r"\[(ERROR|WARN|INFO|DEBUG|TRACE)\] (.*)$")
 #: How a line that is known begins, and what it is. What fits first counts.
 _KNOWN: tuple[tuple[re.Pattern[str], Callable[[re.Match[str]], Saying]], ...] = (
-    (
-        _LOG,
-        lambda m: LogLine(_LEVELS[m[1]], m[2]),
-    ),
+    (_LOG, lambda m: LogLine(_LEVELS[m[1]], m[2])),
     (re.compile(r"(?:SNAP seq=|Snapshot: |(?<! )FRAM).*$"), lambda m: MemoryText(m[0])),
     (
         re.compile(r"Flash: ([0-9]{1,9})/([0-9]{1,9}) KB used \([0-9.]+%\)$"),

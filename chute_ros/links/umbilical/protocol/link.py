@@ -56,9 +56,8 @@ class UmbilicalLink:
         )
         self.memory = MemoryWorks(config.memory)
         self.scheduler = CommandScheduler(config.scheduler)
-        requests: Requests[CommandScheduler] = Requests(self.scheduler, config.effect)
-        self.orders = Orders(config, requests, self.computer, self.decoder, self.memory)
-        self._requests = requests
+        self._requests = Requests(self.scheduler, config.effect)
+        self.orders = Orders(config, self._requests, self.computer, self.decoder, self.memory)
         self._stream: Hashable = None
         self._reader = self._new_reader()
         self._now = 0.0
@@ -139,9 +138,8 @@ class UmbilicalLink:
 
     def take_events(self) -> list[UmbilicalEvent]:
         """New events, oldest first; each is handed out once."""
-        notices = [*self.decoder.take_notices(), *self.orders.take_notices()]
-        happened = [*self._events, *notices]
-        self._events = []
+        happened, self._events = self._events, []
+        happened += [*self.decoder.take_notices(), *self.orders.take_notices()]
         happened += [*self.memory.take_events(), *self._requests.take_events()]
         return [one for one in happened if not self._is_one_too_many(one)]
 

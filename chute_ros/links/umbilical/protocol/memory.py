@@ -26,8 +26,8 @@ from chute_ros.links.umbilical.protocol.line_parser import (
 from chute_ros.links.umbilical.protocol.scheduler import Command
 from chute_ros.links.umbilical.protocol.stream import DumpBegan, DumpBytes, DumpEnded
 from chute_ros.model import Outcome
-from chute_ros.protocol.effect import NO_ANSWER, EffectFinished, Report
-from chute_ros.protocol.events import Notice, RequestFinished, RequestReport, Severity
+from chute_ros.protocol.events import Notice, RequestReport, Severity, ended
+from chute_ros.protocol.goal import Report
 from chute_ros.transitions import after
 
 #: A progress of a dump is told each so many bytes.
@@ -280,8 +280,4 @@ class MemoryWorks:
             self._events.append(Notice(severity, text))
         if work.token:
             outcome = Outcome.CONFIRMED if success else Outcome.FAILED
-            self._events.append(RequestReport(Report(work.token, outcome, text)))
-            finished = EffectFinished(
-                work.token, success, False, NO_ANSWER, text, work.sent, success
-            )
-            self._events.append(RequestFinished(finished))
+            self._events += ended(work.token, outcome, text, work.sent, success)

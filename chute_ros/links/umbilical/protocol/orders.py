@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.protocol import commands, gate
@@ -21,6 +20,7 @@ from chute_ros.links.umbilical.protocol.line_parser import FlashUsage
 from chute_ros.links.umbilical.protocol.memory import MemoryWorks
 from chute_ros.links.umbilical.protocol.scheduler import CommandScheduler
 from chute_ros.protocol.events import Notice, Severity
+from chute_ros.protocol.goal import ConfirmedCommand
 from chute_ros.protocol.requests import Requests
 
 #: Not while the vehicle is being made safe.
@@ -86,9 +86,8 @@ class Orders:
         stage = self._config.deploy
         if stage is DeployStage.NEXT:
             # The same deploy may be ordered once more, as by a supervisor that took over.
-            over = self._computer.was_fired("drogue", now) and not self._requests.under_way(
-                "drogue"
-            )
+            again_of_it = self._requests.under_way("drogue")
+            over = self._computer.was_fired("drogue", now) and not again_of_it
             stage = DeployStage.MAIN if over else DeployStage.DROGUE
         self._order(token, commands.KINDS[stage.value], force, again, now)
 
@@ -208,8 +207,15 @@ class Orders:
         shown, text = self._shown(kind, even_if_shown, now)
         # One damaged line must not make up for a command that never left.
         lately = now - self._config.effect.give_up_after
-        goal = replace(
-            commands.goal_of(kind, shown, text, even_if_shown),
+        goal = ConfirmedCommand(
+            name,
+            (kind.command,),
+            text,
+            shown,
+            urgent=name in commands.URGENT,
+            unacknowledged=True,
+            once=kind.once,
+            even_if_shown=even_if_shown,
             sent_by_another=lambda: self._sent_at.get(name, -math.inf) > lately,
         )
         self._requests.begin(token, goal, now)
@@ -287,16 +293,12 @@ class Orders:
     def _effect(self, kind: CommandKind) -> Effect | None:
         if kind.command.name == "safe" and self._config.safe_opens_sv:
             return commands.SAFE_THAT_VENTS
-        canopy = CANOPIES.get(kind.command.name)
-        record = self._computer.record
-        if (
-            canopy
-            and record
-            and record[canopy[0]]
-            and not self._computer.came_out(kind.command.name)
-        ):
-            # A flag that was set before shows nothing: as by a test on the ground.
-            return commands.mode_alone(canopy[1])
+        name, record = kind.command.name, self._computer.record
+        if name in CANOPIES and record and not self._computer.came_out(name):
+            flag, mode = CANOPIES[name]
+            if record[flag]:
+                # A flag that was set before shows nothing: as by a test on the ground.
+                return commands.mode_shown(mode)
         return kind.effect
 
     def _end(self, names: tuple[str, ...], why: str, now: float) -> None:

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from chute_ros.protocol.effect import NO_ANSWER
+from chute_ros.protocol.goal import NO_ANSWER
 from chute_ros.settings import Settings, parameter
 
 
@@ -74,7 +74,7 @@ class SchedulerLimits(Settings):
 
 @dataclass(frozen=True)
 class Send:
-    """Write this token now. token: number of the request's command; None: of none."""
+    """Write this command's token. token: number of the request's command; None: of none."""
 
     command: Command
     token: int | None = None
@@ -98,12 +98,6 @@ class NotSent:
         return f"not sent: {self.most_waiting} commands are waiting already"
 
 
-@dataclass(frozen=True)
-class _Waiting:
-    token: int | None
-    command: Command
-
-
 class CommandScheduler:
     """The commands on their way to the wire; sends them, and nothing ever comes back."""
 
@@ -115,8 +109,8 @@ class CommandScheduler:
         self.is_open = False
         #: No heartbeat is sent for now, whoever is alive.
         self.heartbeats_held = False
-        self._urgent: deque[_Waiting] = deque()
-        self._others: deque[_Waiting] = deque()
+        self._urgent: deque[Send] = deque()
+        self._others: deque[Send] = deque()
         self._heartbeats_until = -math.inf
         self._free_at = -math.inf
         self._heartbeat_at = -math.inf
@@ -150,11 +144,11 @@ class CommandScheduler:
             self._finished.append(NotSent(token, command, self.limits.most_waiting))
             return
         queue = self._urgent if urgent else self._others
-        queue.append(_Waiting(token, command))
+        queue.append(Send(command, token))
 
     def send_once(self, command: Command, now: float) -> None:
         """Queue a command that belongs to no request's loop."""
-        self._others.append(_Waiting(None, command))
+        self._others.append(Send(command))
 
     def cancel(self, token: int, now: float) -> None:
         """It is not needed any more: it does not leave if it has not yet."""
@@ -216,9 +210,9 @@ class CommandScheduler:
         self._heartbeat_at = now + self.limits.heartbeat_interval
         self._emit(Send(HEARTBEAT), now)
 
-    def _send(self, waiting: _Waiting, now: float) -> None:
+    def _send(self, waiting: Send, now: float) -> None:
         self.commands_sent += 1
-        self._emit(Send(waiting.command, waiting.token), now)
+        self._emit(waiting, now)
 
     def _emit(self, send: Send, now: float) -> None:
         self._free_at = now + self.limits.spacing

@@ -34,13 +34,7 @@ class FlightProgram:
         self.rocket = Rocket()
         #: Neither drogue nor main come out any more, whoever wants it.
         self.is_stuck = False
-        #: The flash was wiped; needed for arming with the interlock.
-        self.may_arm = False
-        self.mode = Mode.Startup
         self.armed_altitude = 0.0
-        self.target: tuple[float, ...] = ()
-        #: Fields that commands set, by name.
-        self.flags: dict[str, int] = {}
         self.handlers: dict[str, Callable[[], None]] = {
             "<L>": self._launch,
             "<V>": self._safe,
@@ -59,16 +53,17 @@ class FlightProgram:
         self._target_floats = target_floats
         self._log = log
         self._print_line = print_line
-        self._key = False
         self._drogue_out_for = math.inf  # simulated s
         self.restart()
 
     def restart(self) -> None:
         """Begin as after a reset. A canopy that is out stays out."""
         self.mode = Mode.Startup
+        #: The flash was wiped; needed for arming with the interlock.
         self.may_arm = False
-        self.target = ()
+        self.target: tuple[float, ...] = ()
         self._key = False
+        #: Fields that commands set, by name.
         self.flags = dict.fromkeys(
             (
                 *("mav_open", "sv_open", "ssa_drogue_deployed", "ssa_main_deployed"),
@@ -129,10 +124,6 @@ class FlightProgram:
         if mode is Mode.MainDeployed:
             self.rocket.main_out_for = 60.0
         self._enter(mode)
-
-    def land(self) -> None:
-        """Put the rocket on the ground."""
-        self.rocket.land()
 
     # -- the flight by itself -------------------------------------------------------------------
 

@@ -68,7 +68,7 @@ class FlightComputer(Actor):
             "fault": lambda _: self.flight.fail(),
             "reboot": lambda _: self.reboot(),
             "jump": lambda name: self.flight.jump(Mode[name]),
-            "land": lambda _: self.flight.land(),
+            "land": lambda _: self.flight.rocket.land(),
             "wipe-fails": lambda _: setattr(self.memory, "wipe_outcome", "fails"),
             "wipe-hangs": lambda _: setattr(self.memory, "wipe_outcome", "hangs"),
             "lose-dump-end": lambda _: self.memory.disturb_dump("loses-end"),

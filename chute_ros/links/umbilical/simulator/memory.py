@@ -22,20 +22,16 @@ class _Dump:
 
     def __init__(self, content: bytes, end: bytes, rate: float, now: float) -> None:
         self._content = content
-        self._end = end
+        self.end = end
         self._interval = 1.0 / rate
         self._next_at = now
         self._sent = 0
         #: It sends no more than the first half.
         self.stalls = False
 
-    def lose_end(self) -> None:
-        """The marker of the end does not come."""
-        self._end = b""
-
     def step(self, now: float, queue: OutboundQueue) -> bool:
         """Send what is due; whether all is sent."""
-        data = self._content + self._end
+        data = self._content + self.end
         while self._sent < len(data) and not self._is_stuck() and self._next_at <= now:
             if not queue.room:
                 self._next_at = now
@@ -140,8 +136,13 @@ class Memory:
         self.disturb_dump("")
 
     def content(self) -> bytes:
-        """What a dump of the flash holds."""
-        return self._bytes() if self._settings.binary_dump else self._table()
+        """What a dump of the flash holds: what is of an earlier time up to the size that was set,
+        and the flight's."""
+        rows = "".join(f"{row}\n" for row in self._rows).encode()
+        if self._settings.binary_dump:
+            return random.Random(self._settings.seed).randbytes(self._stored) + rows
+        earlier = ",".join("0" for _ in self._header.split(",")) + "\n"
+        return f"{self._header}\n{earlier * (self._stored // len(earlier))}".encode() + rows
 
     def disturb_dump(self, outcome: str) -> None:
         """Have the dump that runs, or else the next, end so; empty: as was said before."""
@@ -149,7 +150,7 @@ class Memory:
         if isinstance(self._job, _Dump):
             self._job.stalls = self.dump_outcome == "stalls"
             if self.dump_outcome == "loses-end":
-                self._job.lose_end()
+                self._job.end = b""  # its marker does not come
             self.dump_outcome = ""
 
     def begin_wipe(self, now: float) -> None:
@@ -178,17 +179,6 @@ class Memory:
     def stop(self) -> None:
         """A reboot ends what runs."""
         self._job = None
-
-    def _table(self) -> bytes:
-        """The header, rows of an earlier time up to the size that was set, and the flight's."""
-        lines = [self._header]
-        row = ",".join("0" for _ in self._header.split(","))
-        lines += [row] * (self._stored // (len(row) + 1))
-        return "".join(f"{line}\n" for line in [*lines, *self._rows]).encode()
-
-    def _bytes(self) -> bytes:
-        rows = "".join(f"{row}\n" for row in self._rows).encode()
-        return random.Random(self._settings.seed).randbytes(self._stored) + rows
 
     # -- FRAM -----------------------------------------------------------------------------------
 

@@ -11,6 +11,23 @@ from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
 from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
 from chute_ros.sim.command_line import main_of, parser_on_pty, run_on_pty, script_of
 
+#: Options of the settings of these names: with a number, and without.
+_NUMBERS = (
+    ("rate", "HZ", "lines of telemetry a second"),
+    ("speed", "FACTOR", "the flight is this much faster than real time"),
+    ("heartbeat-timeout", "S", "s without a heartbeat until it counts as disconnected"),
+    ("cut", "X", "probability that a line is cut, 0 to 1"),
+    ("garbage", "X", "probability that random bytes follow a line, 0 to 1"),
+)
+_SWITCHES = (
+    ("debug", "log lines on the wire"),
+    ("interlock", "arming needs a wiped flash"),
+    ("drogue-fails", "at the apogee nothing comes out; the command still works"),
+    ("safe-opens-sv", "<V> opens SV, as newer firmware does"),
+    ("faults-on-heartbeat", "a <H> in Ascent or Coast is a fault"),
+    ("binary-dump", "<G> sends bytes in place of lines"),
+)
+
 
 def _run() -> None:
     start = FlightComputerSettings()
@@ -29,40 +46,18 @@ def _run() -> None:
         help=f"of the $TELEM line (default: {REFERENCE_LAYOUT})",
     )
     options.add_argument("--telem-path", default="", help="folder with other layouts (*.yaml)")
-    for name, unit, text in (
-        ("rate", "HZ", "lines of telemetry a second"),
-        ("speed", "FACTOR", "the flight is this much faster than real time"),
-        ("heartbeat-timeout", "S", "s without a heartbeat until it counts as disconnected"),
-        ("cut", "X", "probability that a line is cut, 0 to 1"),
-        ("garbage", "X", "probability that random bytes follow a line, 0 to 1"),
-    ):
+    for name, unit, text in _NUMBERS:
         default = getattr(start, name.replace("-", "_"))
         text = f"{text} (default: {default:g})"
         options.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=text)
-    for name, text in (
-        ("debug", "log lines on the wire"),
-        ("interlock", "arming needs a wiped flash"),
-        ("drogue-fails", "at the apogee nothing comes out; the command still works"),
-        ("safe-opens-sv", "<V> opens SV, as newer firmware does"),
-        ("faults-on-heartbeat", "a <H> in Ascent or Coast is a fault"),
-        ("binary-dump", "<G> sends bytes in place of lines"),
-    ):
+    for name, text in _SWITCHES:
         options.add_argument(f"--{name}", action="store_true", help=text)
     chosen = options.parse_args()
+    given = [name.replace("-", "_") for name, *_ in (*_NUMBERS, *_SWITCHES)]
     settings = FlightComputerSettings(
-        rate=chosen.rate,
-        speed=chosen.speed,
-        debug=chosen.debug,
-        interlock=chosen.interlock,
-        drogue_fails=chosen.drogue_fails,
-        safe_opens_sv=chosen.safe_opens_sv,
-        heartbeat_timeout=chosen.heartbeat_timeout,
-        faults_on_heartbeat=chosen.faults_on_heartbeat,
         time_of_day=time.time() % 86_400.0,
-        binary_dump=chosen.binary_dump,
-        cut=chosen.cut,
-        garbage=chosen.garbage,
         seed=chosen.seed,
+        **{name: getattr(chosen, name) for name in given},
     )
     layout = _layout(chosen.layout, chosen.telem_path)
     run_on_pty(FlightComputer(settings, layout, script_of(chosen.at)), chosen)

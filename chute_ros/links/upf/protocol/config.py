@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from chute_ros.errors import ParameterError
-from chute_ros.protocol.dronecan.bus_config import BusNodeConfig
+from chute_ros.protocol.dronecan.bus_node import MOST_NAME_BYTES, BusNodeConfig
 from chute_ros.protocol.dronecan.calls import CallLimits
 from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID
 from chute_ros.protocol.goal import Commanded, EffectLimits
@@ -19,8 +19,6 @@ from chute_ros.settings import Settings, nested, parameter
 NODE_ID = 100
 #: As delivered (document, "node discovery"); never given out by the allocator.
 CONTROLLER_NODE_ID, TRIGGER_NODE_ID = 33, 34
-#: Of a node's name (uavcan.protocol.GetNodeInfo).
-MOST_NAME_BYTES = 80
 
 
 class Policy(enum.Enum):
@@ -58,8 +56,7 @@ class UpfConfig(Commanded, Settings):
     controller_node_id: int = parameter(0, "node id of the controller; 0: any", 0, HIGHEST_NODE_ID)
     trigger_node_id: int = parameter(0, "node id of the trigger; 0: any", 0, HIGHEST_NODE_ID)
     without_controller: bool = parameter(
-        False,
-        "the vehicle has no controller: its trigger is the parachute and is fired directly",
+        False, "the vehicle has no controller: its trigger is the parachute and is fired directly"
     )
     liveness: LivenessLimits = nested(LivenessLimits(1.5, 3.0), "device")
     status_timeout: float = parameter(

@@ -75,8 +75,8 @@ class ErrandDesk:
         """Read the parameters of new controllers, and end what has ended."""
         for node_id in [n for n, due in self._read_again.items() if now >= due]:
             del self._read_again[node_id]
-            controller = self._devices.controllers[node_id]
-            if controller.alive:
+            controller = self._devices.controllers.get(node_id)
+            if controller is not None and controller.alive:
                 self._devices.to_read.append(controller)
         for controller in self._devices.to_read:
             if controller.node_id in self._reading:

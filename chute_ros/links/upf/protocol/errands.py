@@ -53,12 +53,9 @@ Errand = Generator[Call, CallFinished, ErrandDone]
 
 def get_parameter(node_id: int, name: str) -> Errand:
     """Read one by name."""
-    if why := _bad_name(name):
-        return ErrandDone(False, why, node_id)
-    answer = yield _get(node_id, name)
-    found = _read(answer)
-    if found is None or not found.kind or found.name != name:
-        return ErrandDone(False, _no_parameter(answer, name), node_id)
+    found = yield from _find(node_id, name)
+    if isinstance(found, ErrandDone):
+        return found
     text = f"{name} is {p.words(found.value)}{_range(found)}"
     return ErrandDone(True, text, node_id, (found,))
 
@@ -68,12 +65,9 @@ def set_parameter(
 ) -> Errand:
     """Read one for its type and range, set it, and read it back. auto_save: whether the device
     keeps a change by itself; None: not known."""
-    if why := _bad_name(name):
-        return ErrandDone(False, why, node_id)
-    answer = yield _get(node_id, name)
-    before = _read(answer)
-    if before is None or not before.kind or before.name != name:
-        return ErrandDone(False, _no_parameter(answer, name), node_id)
+    before = yield from _find(node_id, name)
+    if isinstance(before, ErrandDone):
+        return before
     try:
         wanted = p.parse(text, before.kind, name)
     except ParameterError as error:
@@ -99,25 +93,14 @@ def set_parameter(
         why = f"{name} was not accepted: it is still {p.words(after.value)}"
         return ErrandDone(False, why, node_id, (after,))
     keeps = p.as_switch(after.value) if name == p.AUTO_SAVE else auto_save()
-    what_follows = [f"{name} is {p.words(after.value)}", *_when(after), *_kept(keeps)]
-    return ErrandDone(True, "; ".join(what_follows), node_id, (after,))
-
-
-def _when(after: DeviceParameter) -> list[str]:
-    """When a new value begins to count, if it is not at once."""
-    if after.name != p.STATIC_NODE_ID:
-        return []
-    asks = "" if after.value else " (0: requests a node id at each start)"
-    return [f"takes effect at the next start{asks}"]
-
-
-def _kept(keeps: bool | None) -> list[str]:
-    """Whether a new value survives a restart."""
-    if keeps is None:
-        return []
-    if keeps:
-        return ["kept"]
-    return [f"lost at a restart until ~/save_params: {p.AUTO_SAVE} is off"]
+    text = f"{name} is {p.words(after.value)}"
+    if name == p.STATIC_NODE_ID:
+        asks = "" if after.value else " (0: requests a node id at each start)"
+        text += f"; takes effect at the next start{asks}"
+    if keeps is not None:
+        lost = f"lost at a restart until ~/save_params: {p.AUTO_SAVE} is off"
+        text += "; kept" if keeps else f"; {lost}"
+    return ErrandDone(True, text, node_id, (after,))
 
 
 def list_parameters(node_id: int) -> Errand:
@@ -139,39 +122,53 @@ def list_parameters(node_id: int) -> Errand:
 def execute_opcode(node_id: int, opcode: int) -> Errand:
     """Save all parameters, or erase what was saved."""
     name = "save" if opcode == OPCODE_SAVE else "erase"
-    answer = yield Call(node_id, EXECUTE_OPCODE, {"opcode": opcode})
-    if answer.values is None:
-        return ErrandDone(False, f"{name}: {answer.text()}", node_id)
-    done = bool(answer.values["ok"])
-    text = "done" if done else "the device answered: not done"
-    return ErrandDone(done, f"{name}: {text}", node_id, values=answer.values)
+    texts = f"{name}: done", f"{name}: the device answered: not done"
+    return (yield from _ask(Call(node_id, EXECUTE_OPCODE, {"opcode": opcode}), name, *texts))
 
 
 def restart(node_id: int) -> Errand:
     """RestartNode with its magic number."""
-    answer = yield Call(node_id, RESTART_NODE, {"magic_number": RESTART_MAGIC})
-    if answer.values is None:
-        return ErrandDone(False, f"restart: {answer.text()}", node_id)
-    done = bool(answer.values["ok"])
-    text = "restart: the device answered that it will" + ("" if done else " not")
-    return ErrandDone(done, text, node_id, values=answer.values)
+    will = "restart: the device answered that it will"
+    call = Call(node_id, RESTART_NODE, {"magic_number": RESTART_MAGIC})
+    return (yield from _ask(call, "restart", will, f"{will} not"))
 
 
 def transport_stats(node_id: int) -> Errand:
     """GetTransportStats."""
-    return (yield from _plain(node_id, TRANSPORT_STATS, "transport statistics"))
+    what = "transport statistics"
+    return (yield from _ask(Call(node_id, TRANSPORT_STATS, {}), what, what))
 
 
 def node_info(node_id: int) -> Errand:
     """GetNodeInfo."""
-    return (yield from _plain(node_id, GET_NODE_INFO, "node information"))
+    what = "node information"
+    return (yield from _ask(Call(node_id, GET_NODE_INFO, {}), what, what))
 
 
-def _plain(node_id: int, service: str, what: str) -> Errand:
-    answer = yield Call(node_id, service, {})
+def _ask(call: Call, what: str, done: str, not_done: str = "") -> Errand:
+    """One call; the response's ok, where it has one, tells whether it was done."""
+    answer = yield call
     if answer.values is None:
-        return ErrandDone(False, f"{what}: {answer.text()}", node_id)
-    return ErrandDone(True, what, node_id, values=answer.values)
+        return ErrandDone(False, f"{what}: {answer.text()}", call.server)
+    ok = bool(answer.values.get("ok", True))
+    return ErrandDone(ok, done if ok else not_done, call.server, values=answer.values)
+
+
+def _find(node_id: int, name: str) -> Generator[Call, CallFinished, DeviceParameter | ErrandDone]:
+    """The parameter of this name as it is; ErrandDone: there is none."""
+    # An empty name would be a question by index, and set whatever has index 0.
+    if not 1 <= len(_encoded(name)) <= p.MOST_NAME_BYTES:
+        why = f"{name!r} is no parameter's name: need 1 to {p.MOST_NAME_BYTES} bytes"
+        return ErrandDone(False, why, node_id)
+    answer = yield _get(node_id, name)
+    found = _read(answer)
+    if found is not None and found.kind and found.name == name:
+        return found
+    why = f"{name}: {answer.text()}"
+    if found is not None:
+        known = ", ".join(one.name for one in p.PARAMETERS)
+        why = f"the device has no parameter {name!r}; the document lists {known}"
+    return ErrandDone(False, why, node_id)
 
 
 def _get(node_id: int, name: str) -> Call:
@@ -180,14 +177,6 @@ def _get(node_id: int, name: str) -> Call:
 
 def _encoded(name: str) -> bytes:
     return name.encode("utf-8", "replace")
-
-
-def _bad_name(name: str) -> str:
-    """What is wrong with the name of a parameter; empty: nothing."""
-    # An empty one would be a question by index, and set whatever has index 0.
-    if 1 <= len(_encoded(name)) <= p.MOST_NAME_BYTES:
-        return ""
-    return f"{name!r} is no parameter's name: need 1 to {p.MOST_NAME_BYTES} bytes"
 
 
 def _read(answer: CallFinished) -> DeviceParameter | None:
@@ -202,13 +191,6 @@ def _read(answer: CallFinished) -> DeviceParameter | None:
         p.value_of(values["max_value"]),
         p.value_of(values["default_value"]),
     )
-
-
-def _no_parameter(answer: CallFinished, name: str) -> str:
-    if answer.values is None:
-        return f"{name}: {answer.text()}"
-    known = ", ".join(one.name for one in p.PARAMETERS)
-    return f"the device has no parameter {name!r}; the document lists {known}"
 
 
 def _limits(one: DeviceParameter) -> tuple[p.Value | None, p.Value | None]:

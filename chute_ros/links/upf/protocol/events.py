@@ -15,7 +15,6 @@ from chute_ros.protocol.events import AskSupervisor, Event
 class TriggerChanged:
     """A trigger said something, or its silence grew too long. picture: see roster."""
 
-    node_id: int
     picture: Mapping[str, Any]
 
 

@@ -18,7 +18,7 @@ from chute_ros.links.upf.protocol.definitions import (
 from chute_ros.links.upf.protocol.devices import Controller, Trigger
 from chute_ros.model import ParachuteState
 from chute_ros.protocol.dronecan.calls import Call, CallFinished
-from chute_ros.protocol.effect import ConfirmedCommand
+from chute_ros.protocol.goal import ConfirmedCommand
 
 UpfGoal = ConfirmedCommand[Call]
 
@@ -52,7 +52,7 @@ OPPOSITE: dict[str, tuple[str, ...]] = {
 
 
 def read_answer(
-    definitions: Definitions, deploy_answered: Callable[[Call, bool], None] = lambda *_: None
+    definitions: Definitions, deploy_answered: Callable[[Call, bool], None]
 ) -> Callable[[CallFinished], CallFinished]:
     """Says of an answered call of the flyfire services what its result means. deploy_answered:
     is told which call to deploy a controller answered, and whether it accepted."""
@@ -147,10 +147,7 @@ def deploy(
 
 
 def fire_trigger(
-    trigger: Trigger,
-    triggers: Callable[[], list[Trigger]],
-    definitions: Definitions,
-    now: float,
+    trigger: Trigger, triggers: Callable[[], list[Trigger]], definitions: Definitions, now: float
 ) -> UpfGoal:
     """Deploy through a trigger: the architecture without a controller. Any one that has fired is
     enough."""

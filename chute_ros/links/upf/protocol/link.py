@@ -19,18 +19,17 @@ from chute_ros.links.upf.protocol.desk import ErrandDesk
 from chute_ros.links.upf.protocol.devices import Controller
 from chute_ros.links.upf.protocol.errands import Errand
 from chute_ros.links.upf.protocol.events import UpfEvent
-from chute_ros.links.upf.protocol.last_resort import LastResort
-from chute_ros.links.upf.protocol.over_motors import OverMotors
 from chute_ros.links.upf.protocol.roster import UpfDevices
 from chute_ros.links.upf.protocol.vehicle_service import VehicleService
 from chute_ros.links.upf.protocol.vehicle_status import Vehicle
 from chute_ros.model import Armed, ParachuteState, TriggerFlags, VehicleState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS, BusNode
-from chute_ros.protocol.dronecan.calls import ServiceCalls
+from chute_ros.protocol.dronecan.calls import Call, ServiceCalls
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.protocol.events import RequestFinished, RequestReport, Severity
+from chute_ros.protocol.goal import EffectFinished
 from chute_ros.protocol.requests import Requests
 
 
@@ -43,18 +42,19 @@ class UpfLink:
         self.bus = BusNode(types, config.bus())
         self.devices = UpfDevices(config, self.definitions)
         self.vehicle_service = VehicleService(config, self.definitions)
-        last_resort = LastResort(config.effect.retry_interval)
-        read = goals.read_answer(self.definitions, last_resort.answered)
+        read = goals.read_answer(self.definitions, self._deploy_answered)
         calls = ServiceCalls(config.calls, read)
         self.requests: Requests[ServiceCalls] = Requests(calls, config.effect)
         endpoint = self.bus.endpoint
-        self._deploying = Deploying(config, self.devices, self.requests, endpoint, last_resort)
         self._vehicle = Vehicle(config, self.devices, endpoint)
-        self._over_motors = OverMotors(self._vehicle, self.vehicle_service, self.devices)
+        self._deploying = Deploying(
+            config, self.devices, self.requests, endpoint, self._vehicle, self.vehicle_service
+        )
         self._desk = ErrandDesk(self.bus, self.devices, self._vehicle.in_air)
-        #: Our own requests count down from -1; what follows once such a one has succeeded.
-        self._next_internal = -1
-        self._then: dict[int, tuple[int, Callable[[float], None]]] = {}
+        #: Our own requests to take off count down from -1; once one has succeeded, the request
+        #: with this token arms this controller.
+        self._next_takeoff = -1
+        self._arm_after: dict[int, tuple[int, int]] = {}
         self._events: list[UpfEvent] = []
         for absent in self.definitions.absent:
             self.devices.notice(
@@ -84,11 +84,7 @@ class UpfLink:
         self.vehicle_service.update(now)
         self.requests.update(now)
         self._vehicle.update(now)
-        # What ends now must not be pursued any more.
-        self._drive(now)
-        if self._deploying.update(now):
-            self._drive(now)
-        self._events += self._deploying.take_reports()
+        self._pursue_deploys(now)
 
     def next_deadline(self) -> float:
         """When update has something to do."""
@@ -166,18 +162,13 @@ class UpfLink:
         controller = self._target(token, 0, now)
         if controller is None:
             return
+        on_ground = controller.state is ParachuteState.READY
         if not arm:
             self.service(token, "TYPE_DISARM", 0, now)
-        elif controller.state is ParachuteState.READY and not goals.excluded(
-            controller, "TYPE_ARM"
-        ):
-            internal, self._next_internal = self._next_internal, self._next_internal - 1
-
-            def then(later: float) -> None:
-                self.service(token, "TYPE_ARM", controller.node_id, later)
-
-            self._then[internal] = (token, then)
-            self.service(internal, "TYPE_TAKEOFF", controller.node_id, now)
+        elif on_ground and not goals.excluded(controller, "TYPE_ARM"):
+            takeoff, self._next_takeoff = self._next_takeoff, self._next_takeoff - 1
+            self._arm_after[takeoff] = (token, controller.node_id)
+            self.service(takeoff, "TYPE_TAKEOFF", controller.node_id, now)
         else:
             self.service(token, "TYPE_ARM", controller.node_id, now)
 
@@ -218,19 +209,13 @@ class UpfLink:
 
     def deploy(self, token: int, force: bool, now: float, node_id: int = 0) -> None:
         """Deploy through the controller; if it does not answer, or there is none, the trigger."""
-        self._over_motors.begin(token)
         self._deploying.deploy(token, force, node_id, now)
-        self._drive(now)
-        if self._deploying.update(now):
-            self._drive(now)
+        self._pursue_deploys(now)
 
     def fire_triggers(self, token: int, now: float) -> None:
         """Fire the triggers directly, whatever the controller does: the end of a ladder."""
-        self._over_motors.begin(token)
         self._deploying.fire_triggers(token, now)
-        self._drive(now)
-        if self._deploying.update(now):
-            self._drive(now)
+        self._pursue_deploys(now)
 
     def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
         """Ask something of a device: ends in one ErrandFinished. node_id 0: the chosen one."""
@@ -297,6 +282,15 @@ class UpfLink:
             self._drive(now)
         return controller
 
+    def _deploy_answered(self, call: Call, accepted: bool) -> None:
+        self._deploying.answered(call, accepted)
+
+    def _pursue_deploys(self, now: float) -> None:
+        # What ends now must not be pursued any more.
+        self._drive(now)
+        if self._deploying.update(now):
+            self._drive(now)
+
     def _drive(self, now: float) -> None:
         for send in self.requests.drive(now):
             call = send.command
@@ -309,24 +303,18 @@ class UpfLink:
         self._desk.update(now)
         self._events += self._deploying.take_reports()
         for event in self.requests.take_events():
-            self._pass_on(event, now)
+            if isinstance(event, RequestFinished):
+                self._over(self._deploying.over(event.finished, now), now)
+            elif not (isinstance(event, RequestReport) and event.report.token in self._arm_after):
+                self._events.append(event)
 
-    def _pass_on(self, event: object, now: float) -> None:
-        """Events of requests: those of ours stay inside and start what follows."""
-        if isinstance(event, RequestReport):
-            if event.report.token in self._then:
-                return
-            self._events.append(event)
+    def _over(self, finished: EffectFinished, now: float) -> None:
+        """The end of a request: of our own take-off it is followed by what it is for."""
+        token, node_id = self._arm_after.pop(finished.token, (0, 0))
+        if not node_id:
+            self._events.append(RequestFinished(finished))
+        elif finished.success:
+            self.service(token, "TYPE_ARM", node_id, now)
         else:
-            assert isinstance(event, RequestFinished)
-            finished = event.finished
-            self._deploying.over(finished.token)
-            if finished.token not in self._then:
-                self._events.append(RequestFinished(self._over_motors.end(finished, now)))
-                return
-            token, then = self._then.pop(finished.token)
-            if finished.success:
-                then(now)
-            else:
-                self.requests.refuse(token, finished.message)
-                self._drive(now)
+            self.requests.refuse(token, finished.message)
+            self._drive(now)

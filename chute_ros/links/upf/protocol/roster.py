@@ -103,7 +103,8 @@ class UpfDevices:
 
     def parachute_status(self, node_id: int, values: Mapping[str, Any], now: float) -> None:
         """A ParachuteStatus came."""
-        controller = self._admit(node_id, self._config.controller_node_id, self.controllers)
+        wanted = self._config.controller_node_id
+        controller = self._admit(node_id, wanted, self.controllers, Controller)
         if controller is None:
             return
         jumps = controller.unknown_jumps
@@ -131,7 +132,7 @@ class UpfDevices:
         self, node_id: int, values: Mapping[str, Any], now: float, ordered: bool
     ) -> None:
         """A TriggerStatus came. ordered: a release is under way."""
-        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers)
+        trigger = self._admit(node_id, self._config.trigger_node_id, self.triggers, Trigger)
         if trigger is not None:
             fired, doubted = trigger.launched, trigger.doubted
             sayings = SAYINGS_ORDERED if ordered else SAYINGS
@@ -204,7 +205,9 @@ class UpfDevices:
     def _all(self) -> list[Device]:
         return [*self.controllers.values(), *self.triggers.values()]
 
-    def _admit(self, node_id: int, wanted: int, known: dict[int, DeviceT]) -> DeviceT | None:
+    def _admit(
+        self, node_id: int, wanted: int, known: dict[int, DeviceT], kind: type[DeviceT]
+    ) -> DeviceT | None:
         """The device with this node id, if it is ours."""
         found = known.get(node_id)
         if found is not None or node_id == 0:
@@ -213,15 +216,10 @@ class UpfDevices:
             # Not ours by a parameter, or too many.
             self.counts["status of devices not followed"] += 1
             return None
-        made: Device
-        if known is self.controllers:
-            made = Controller(node_id, self._config, self.definitions)
+        made = known[node_id] = kind(node_id, self._config, self.definitions)
+        if isinstance(made, Controller):
             self.to_read.append(made)
-            self.controllers[node_id] = made
-        else:
-            made = Trigger(node_id, self._config, self.definitions)
-            self.triggers[node_id] = made
-        return known[node_id]
+        return made
 
     def _changed(self, device: Device, changes: list[LinkChange]) -> None:
         name = f"{device.kind} {device.node_id}"
@@ -250,7 +248,7 @@ class UpfDevices:
         self.notice(Severity.WARNING, f"trigger {trigger.node_id} has fired")
 
     def _trigger_changed(self, trigger: Trigger, now: float) -> None:
-        self._events.append(TriggerChanged(trigger.node_id, trigger_picture(trigger, now)))
+        self._events.append(TriggerChanged(trigger_picture(trigger, now)))
         if self._config.without_controller:
             self._events.append(ParachuteChanged(trigger.parachute_status(now)))
 

@@ -75,7 +75,10 @@ class VehicleService:
         self.counts: Counter[str] = Counter()
         self.newest_answer = ""
         self._pending: list[_Pending] = []
-        self._kill_confirmed = self._kill_waited_for = -math.inf
+        #: When the motors were last seen to stop by our kill, and not armed since; minus infinity:
+        #: they were not.
+        self.kill_confirmed_at = -math.inf
+        self._kill_waited_for = -math.inf
         #: Device -> why it wants flight blocked.
         self._blocks: dict[str, str] = {}
         self._standing: frozenset[str] = frozenset()
@@ -151,7 +154,7 @@ class VehicleService:
 
     def kill_confirmed(self, now: float) -> None:
         """The motors were seen to stop by our kill."""
-        self._kill_confirmed = now
+        self.kill_confirmed_at = now
         self._answer_what_is_so(now)
 
     def kill_waited_for(self, now: float) -> None:
@@ -162,14 +165,8 @@ class VehicleService:
 
     def motors_may_turn(self, said_at: float) -> None:
         """The vehicle said that it is armed: a kill from before says nothing any more."""
-        if said_at > self._kill_confirmed:
-            self._kill_confirmed = -math.inf
-
-    @property
-    def kill_confirmed_at(self) -> float:
-        """When the motors were last seen to stop by our kill, and not armed since; minus infinity:
-        they were not."""
-        return self._kill_confirmed
+        if said_at > self.kill_confirmed_at:
+            self.kill_confirmed_at = -math.inf
 
     def supervisor_said(self, blocked: bool, standing: Collection[str], now: float) -> None:
         """Flight is blocked or not, and the devices whose wish for it the supervisor knows."""
@@ -233,7 +230,7 @@ class VehicleService:
     def _happened(self, one: _Pending, now: float) -> bool:
         device = str(one.request.source)
         if one.ask is Ask.KILL:
-            return now - self._kill_confirmed <= KILL_MEMORY
+            return now - self.kill_confirmed_at <= KILL_MEMORY
         if one.ask is Ask.FLIGHT_BLOCK:
             return self._blocked and device in self._standing
         return device not in self._standing

@@ -16,8 +16,11 @@ from chute_ros.links.upf.protocol import machine
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.machine import Stimulus
-from chute_ros.links.upf.simulator.aps import ApsLimits, AutomaticDeployment
-from chute_ros.links.upf.simulator.automatic import AutomaticFunctions, AutomaticLimits
+from chute_ros.links.upf.simulator.automatic import (
+    ApsLimits,
+    AutomaticDeployment,
+    AutomaticFunctions,
+)
 from chute_ros.links.upf.simulator.errors import error_places, told_errors
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
 from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
@@ -51,7 +54,6 @@ class ControllerSettings:
     self_test: float = 0.5  # s
     #: Errors that it starts with, by the names of ParachuteStatus without ERROR_.
     errors: frozenset[str] = frozenset()
-    automatic: AutomaticLimits = field(default=AutomaticLimits())
     #: The kill switch is waited for this long before it launches all the same, s.
     kill_wait: float = 0.5
     #: Below it TYPE_DEPLOY is temporarily rejected, m; 0: never.
@@ -74,7 +76,7 @@ class UpfController(UpfNode):
         self.requests_heard: list[str] = []
         self._error_places = error_places(definitions, names.PARACHUTE_STATUS)
         self._aps = AutomaticDeployment(self.how.aps)
-        self._automatic = AutomaticFunctions(self.how.automatic)
+        self._automatic = AutomaticFunctions()
         #: When the self test ends, the trigger is to be told, and was told last; NaN: not.
         self._ready_at = self._launch_at = self._fired_at = math.nan
         self._launch_by_aps = False

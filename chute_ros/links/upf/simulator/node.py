@@ -73,7 +73,7 @@ class UpfNode(Actor):
         }
         #: What is broadcast: message type -> (interval in s, what makes it).
         self.broadcasts: dict[str, tuple[Callable[[], float], Callable[[], dict[str, Any]]]] = {
-            NODE_STATUS: (lambda: self._interval(p.NODE_STATUS_INTERVAL), self._node_status),
+            NODE_STATUS: (lambda: self._interval(p.NODE_STATUS_INTERVAL), self._node_status)
         }
         self.actions = {
             "mute": lambda _: setattr(self, "mute", True),

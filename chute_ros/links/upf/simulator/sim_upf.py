@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID, TRIGGER_NODE_ID
@@ -83,13 +81,8 @@ def _run() -> None:
         errors=frozenset(chosen.error),
     )
     controller = UpfController(definitions, settings)
-    trigger = UpfTrigger(
-        definitions,
-        replace(
-            NodeSettings(f"{chosen.name}.trigger", TRIGGER_PARAMETERS),
-            values={**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: chosen.trigger_node_id},
-        ),
-    )
+    of_trigger = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: chosen.trigger_node_id}
+    trigger = UpfTrigger(definitions, NodeSettings(f"{chosen.name}.trigger", of_trigger))
     nodes: list[UpfNode] = [] if chosen.no_controller else [controller]
     nodes += [] if chosen.no_trigger else [trigger]
     if not nodes:

@@ -8,7 +8,7 @@ import pytest
 from autopilot_bench import Told, attitude, imu, position
 from link_bench import landed
 
-from chute_ros.links.mavlink.protocol.optional_streams import AFTER, TRIES
+from chute_ros.links.mavlink.protocol.stream_watch import AFTER, TRIES
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
 PRESSURE, IMU2, IMU3 = 29, 116, 129

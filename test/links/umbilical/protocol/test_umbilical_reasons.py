@@ -2,7 +2,7 @@
 
 from umbilical_link_bench import FAULT, STANDBY, Bench
 
-from chute_ros.links.umbilical.protocol.reasons import reasons_of
+from chute_ros.links.umbilical.runtime import reasons_of
 
 
 def reasons(story):

@@ -40,3 +40,36 @@ def test_a_trigger_in_place_of_the_controller_is_no_controller_any_more(bench):
     assert text.startswith("node 33 is another device than before")
     assert story.link.devices.controllers == {}
     assert list(story.link.devices.triggers) == [33]
+
+
+def test_the_parameters_of_a_controller_that_is_gone_are_not_read_again(bench):
+    """Given a controller 33 whose parameters were asked for, and a trigger in its place."""
+    story = bench("").status("READY").node_status(uptime=100)
+    information = {"hardware_version": {"unique_id": bytes(16)}, "name": b"controller"}
+    story.link.bus.nodes.information(33, information, story.now)
+    story.at(3.0).node_status(uptime=0)
+    information = {"hardware_version": {"unique_id": OTHER}, "name": b"trigger"}
+    story.link.bus.nodes.information(33, information, story.now)
+    for second in range(4, 20):
+        story.at(second).node_status(uptime=second - 3).trigger_status(node_id=33)
+    assert story.link.devices.controllers == {}
+
+
+def test_a_controller_that_is_replaced_while_it_deploys_is_gone_round(bench):
+    """Given a controller 33 that has accepted a deploy, and another device that starts in its
+    place, accepts the deploy as well and says nothing of a parachute."""
+    story = bench("").status("ARMED").node_status(uptime=100).trigger_status()
+    information = {"hardware_version": {"unique_id": bytes(16)}, "name": b"controller"}
+    story.link.bus.nodes.information(33, information, story.now)
+    story.link.deploy(1, False, story.now)
+    while story.link.devices.controllers and story.t < 4.5:
+        if story.after(0.1).t > 0.5:
+            story.node_status(uptime=int(story.t))
+            information = {"hardware_version": {"unique_id": OTHER}, "name": b"another"}
+            story.link.bus.nodes.information(33, information, story.now)
+        for request in story.requests("flyfire.ParachuteService"):
+            story.answer_result(request, "SUCCESS")
+        story.heard.clear()
+        story.trigger_status()
+    assert story.link.devices.controllers == {}
+    assert story.after(0.3).requests("flyfire.TriggerService"), "the trigger is fired directly"

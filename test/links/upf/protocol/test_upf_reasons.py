@@ -2,7 +2,7 @@
 
 import pytest
 
-from chute_ros.links.upf.protocol.reasons import reasons_of
+from chute_ros.links.upf.runtime import reasons_of
 
 
 def reasons(story, *troubles):

@@ -5,7 +5,7 @@ import math
 import pytest
 from upf_device_bench import KILL, Story
 
-from chute_ros.links.upf.simulator.aps import ApsLimits, AutomaticDeployment
+from chute_ros.links.upf.simulator.automatic import ApsLimits, AutomaticDeployment
 from chute_ros.model import ParachuteState as S
 from chute_ros.sim.flight import FlightModel
 from chute_ros.sim.motion import Motion

@@ -1,0 +1,106 @@
+"""A ROS parameter file: what it has for one node, and what a started node took from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from chute_ros.errors import ParameterError
+
+#: Names of nodes and parts of them in one file, at most.
+_MOST_NAMES = 1000
+
+
+def given_in(
+    path: Path, node: str, also: str = "", load: Callable[[str], Any] = yaml.safe_load
+) -> dict[str, Any]:
+    """Parameter, nested ones with dots -> value of what the file has for this node, the later over
+    the earlier. node: its whole name; also: another that counts as it. ParameterError: the file
+    cannot be read, or has nothing for it: ROS would start the node on its defaults."""
+    try:
+        whole = load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror or error}") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ParameterError(f"{path} cannot be read: {' '.join(str(error).split())}") from None
+    found: dict[str, Any] = {}
+    names = {True: set[str](), False: set[str]()}
+    for name, section in _sections(path, whole):
+        ours = any(_matches(name, one) for one in (node, also) if one)
+        names[ours].add(name)
+        if ours:
+            found.update(_flat(section))
+    if not names[True]:
+        own, others = node.rpartition("/")[2], sorted(names[False])
+        has = f" (it has some for {', '.join(others[:5])})" if others else ""
+        raise ParameterError(
+            f"{path} has no ros__parameters for {node}{has}: need for example '/**/{own}:' with "
+            "'ros__parameters:' below"
+        )
+    return found
+
+
+def files_of(arguments: Sequence[str]) -> list[Path]:
+    """The parameter files among the arguments of a process, in their order."""
+    files, ours = [], False
+    for before, one in zip(("", *arguments), arguments, strict=False):
+        if one in ("--ros-args", "--"):
+            ours = one == "--ros-args"
+        elif ours and before == "--params-file":
+            files.append(Path(one))
+    return files
+
+
+def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iterable[str]) -> str:
+    """What a node takes from where, in words. known: its parameters; given: those that ROS has a
+    value for from a file or the command line. ParameterError as given_in has it."""
+    every = set(known)
+    left = every & set(given)
+    parts = [f"{len(every - left)} by default"]
+    for path in reversed(files_of(arguments)):
+        here = left & given_in(path, node).keys()
+        left -= here
+        parts.insert(0, f"{len(here)} from {path}")
+    if left:
+        parts.insert(-1, f"{len(left)} from the command line")
+    return f"{len(every)} parameters: {', '.join(parts)}"
+
+
+def _flat(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in section.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def _sections(path: Path, whole: Any) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Name of a node, with wildcards -> its parameters; names may be nested. ParameterError: there
+    are so many that the file must hold itself, or multiply by its aliases."""
+    waiting, walked = [("", whole)], 0
+    while waiting:
+        name, part = waiting.pop()
+        walked += 1
+        if walked > _MOST_NAMES:
+            raise ParameterError(f"{path}: more than {_MOST_NAMES} names in it: no parameter file")
+        if name.endswith("/ros__parameters"):
+            yield name.removesuffix("/ros__parameters"), part if isinstance(part, dict) else {}
+        elif isinstance(part, dict):
+            inner = [(f"{name}/{str(key).strip('/')}", one) for key, one in part.items()]
+            waiting += reversed(inner)
+
+
+def _matches(pattern: str, node: str) -> bool:
+    """As ROS: * is one name, ** any number of them."""
+    if pattern in ("/**", node):
+        return True
+    parts, names = pattern.split("/")[1:], node.split("/")[1:]
+    if parts[:1] == ["**"]:
+        tail = parts[1:]
+        names = names[len(names) - len(tail) :]
+        parts = tail
+    return len(parts) == len(names) and all(map(fnmatchcase, names, parts))

@@ -1,0 +1,222 @@
+"""No node and no launch file starts on settings that nobody gave: one line, and exit code 2."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from launch_files import LAUNCH, Recorded, loaded, made_by
+
+from chute_ros.errors import ParameterError
+from chute_ros.links.registered import module_of
+from chute_ros.ros.parameter_file import files_of, given_in, taken
+
+ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
+
+
+def start(node: str, *arguments: str) -> tuple[int, list[str]]:
+    """A node that is not to start: its exit code and what it said."""
+    done = subprocess.run(
+        [sys.executable, "-m", module_of(node), "--ros-args", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+        check=False,
+    )
+    assert done.stdout == ""
+    return done.returncode, done.stderr.splitlines()
+
+
+@pytest.mark.parametrize("node", ["upf_can", "safety_supervisor"])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--params-file", "FOLDER/none.yaml"), "Couldn't parse params file: '--params-file"),
+        (("--params-file", "FOLDER/broken.yaml"), "Couldn't parse params file: '--params-file"),
+        (("--params-file",), "Couldn't parse trailing --params-file flag"),
+        (("-r",), "Couldn't parse trailing -r flag"),
+        (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
+        (("-p", "call_tries"), "Couldn't parse parameter override rule: '-p call_tries'"),
+        (("--params-file", "FOLDER/other.yaml"), "other.yaml has no ros__parameters for /"),
+    ],
+)
+def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
+    node: str, arguments: tuple[str, ...], words: str, tmp_path: Path
+) -> None:
+    (tmp_path / "broken.yaml").write_text("upf_can: [")
+    (tmp_path / "other.yaml").write_text("somebody:\n  ros__parameters:\n    call_tries: 4\n")
+    code, said = start(node, *(one.replace("FOLDER", str(tmp_path)) for one in arguments))
+    assert code == 2
+    (line,) = said
+    assert line.startswith(f"{node}: ")
+    assert words in line
+
+
+def test_a_name_without_its_namespace_is_told_with_the_fix(tmp_path: Path) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(ROOTED)
+    code, (line,) = start("upf_can", "--params-file", str(path), "-r", "__ns:=/drone1")
+    assert code == 2
+    assert line == (
+        f"upf_can: {path} has no ros__parameters for /drone1/upf_can (it has some for /upf_can): "
+        "need for example '/**/upf_can:' with 'ros__parameters:' below"
+    )
+
+
+def test_what_a_node_takes_from_where_is_told(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.yaml", tmp_path / "second.yaml"
+    first.write_text("/**/upf_can:\n  ros__parameters:\n    b: 1\n    c: 1\n    foreign: 2\n")
+    second.write_text("/**:\n  ros__parameters:\n    c: 2\n    nested:\n      d: 3\n")
+    files = ["--ros-args", "--params-file", str(first), "--params-file", str(second)]
+    assert files_of([*files, "--", "--params-file", "not ROS's"]) == [first, second]
+    given = ["b", "c", "e", "nested.d"]
+    told = taken(files, "/a/upf_can", ["a", *given], given)
+    assert told == (
+        f"5 parameters: 1 from {first}, 2 from {second}, 1 from the command line, 1 by default"
+    )
+    assert taken([], "/a/upf_can", ["a", "b"], []) == "2 parameters: 2 by default"
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("upf_can", True),
+        ("/upf_can", True),
+        ("/**", True),
+        ("/**/upf_can", True),
+        ("/*/upf_can", False),
+        ("/drone1/upf_can", False),
+        ("/**/upf", False),
+    ],
+)
+def test_names_of_nodes_count_as_with_ros(name: str, found: bool, tmp_path: Path) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(f"{name}:\n  ros__parameters:\n    a: 1\n")
+    if found:
+        assert given_in(path, "/upf_can") == {"a": 1}
+    else:
+        with pytest.raises(ParameterError, match="has no ros__parameters for /upf_can"):
+            given_in(path, "/upf_can")
+
+
+# -- launch files ---------------------------------------------------------------------------------
+
+VEHICLE, SIMULATION = "vehicle.launch.py", "simulation.launch.py"
+GOOD = "/**/mavlink_parachute:\n  ros__parameters:\n    {}\n/**/safety_supervisor:\n"
+GOOD += "  ros__parameters:\n    mode: SHADOW\n"
+
+
+def refused(monkeypatch, capsys, file: str, **arguments: str) -> str:
+    """What a launch file says that starts nothing."""
+    with pytest.raises(SystemExit) as ended:
+        made_by(LAUNCH / file, monkeypatch, **arguments)
+    assert ended.value.code == 2
+    assert not [one for one in Recorded.made if "executable" in one.options]
+    (line,) = capsys.readouterr().err.splitlines()
+    return line.removeprefix(f"{file}: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "settings.yaml: No such file or directory"),
+        ("a: [", "settings.yaml cannot be read: while parsing"),
+        (GOOD.format("rate: 1").replace("/**/m", "m"), "no ros__parameters for /drone1/mavlink_p"),
+        (GOOD.format("conection: x"), "has no parameter conection: did you mean connection?"),
+        (GOOD.format("connection: 7"), "mavlink_parachute: parameter connection is 7: need"),
+    ],
+)
+def test_a_vehicle_does_not_start_with_a_file_that_is_not_all_for_it(
+    text: str | None, words: str, tmp_path: Path, monkeypatch, capsys
+) -> None:
+    path = tmp_path / "settings.yaml"
+    if text is not None:
+        path.write_text(text)
+    given = {"parachute": "mavlink", "namespace": "drone1", "config": str(path)}
+    line = refused(monkeypatch, capsys, VEHICLE, **given)
+    assert str(path) in line
+    assert words in line
+
+
+def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(GOOD.format("connection: udpin:0.0.0.0:1"))
+    given = {"parachute": "mavlink", "namespace": "drone1", "config": str(path)}
+    made = made_by(LAUNCH / VEHICLE, monkeypatch, **given)
+    assert len([one for one in made if "executable" in one.options]) == 2
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "meant"),
+    [
+        (VEHICLE, "conection", "connection"),
+        (VEHICLE, "name_space", "namespace"),
+        (SIMULATION, "parachut", "parachute"),
+    ],
+)
+def test_a_launch_argument_that_is_misspelt_is_told(
+    file: str, name: str, meant: str, monkeypatch, capsys
+) -> None:
+    space = loaded(LAUNCH / file, monkeypatch)
+
+    class Context:
+        launch_configurations = {name: "given", "somebody_elses": "too"}  # noqa: RUF012
+
+    with pytest.raises(SystemExit) as ended:
+        space["_look"](Context)
+    assert ended.value.code == 2
+    text = f"{file}: there is no launch argument {name}: did you mean {meant}?\n"
+    assert capsys.readouterr().err == text
+    Context.launch_configurations = {meant: "given", "somebody_elses": "too"}
+    assert space["_look"](Context) == []
+
+
+@pytest.mark.parametrize("port", ["abc", "", "0", "65534", "-1", "1.5"])
+def test_a_port_that_is_none_is_told(port: str, monkeypatch, capsys) -> None:
+    line = refused(monkeypatch, capsys, SIMULATION, parachute="mavlink", port=port)
+    assert line == f"port is {port!r}: need a whole number from 1 to 65533"
+
+
+def flown(monkeypatch, **arguments: str) -> list[str]:
+    """What the autopilot of a simulation is told to do."""
+    made = made_by(LAUNCH / SIMULATION, monkeypatch, **arguments)
+    (command,) = [one.options["cmd"] for one in made if one.options.get("name") == "sim_autopilot"]
+    return [after for before, after in itertools.pairwise(command) if before == "--at"]
+
+
+@pytest.mark.parametrize("parachute", ["mavlink", "upf", "relay"])
+def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch) -> None:
+    assert flown(monkeypatch, parachute=parachute) == []
+    start = ["10:arm", "11:takeoff=60"]
+    assert flown(monkeypatch, parachute=parachute, fly="60") == start
+    told = flown(monkeypatch, parachute=parachute, fly="60", fail="motor@15.5")
+    assert told == [*start, "26.5:fail-motor"]
+
+
+@pytest.mark.parametrize(
+    ("fly", "fail", "words"),
+    [
+        ("high", "", "fly is 'high': need a height from 1 to 500 (m), for example 60"),
+        ("0.5", "", "fly is '0.5': need a height"),
+        ("501", "", "fly is '501': need a height"),
+        ("nan", "", "fly is 'nan': need a height"),
+        ("", "motor@15", "fly is '': need a height"),
+        ("60", "motor", "fail is 'motor': need one of motor, autopilot, telemetry, @ and seconds"),
+        ("60", "wing@15", "fail is 'wing@15': need one of"),
+        ("60", "motor@-1", "fail is 'motor@-1': need one of"),
+        ("60", "motor@nan", "fail is 'motor@nan': need one of"),
+    ],
+)
+def test_a_flight_that_cannot_be_flown_is_told(
+    fly: str, fail: str, words: str, monkeypatch, capsys
+) -> None:
+    line = refused(monkeypatch, capsys, SIMULATION, parachute="mavlink", fly=fly, fail=fail)
+    assert line.startswith(words)
+
+
+def test_a_rocket_is_flown_by_its_flight_computer(monkeypatch, capsys) -> None:
+    line = refused(monkeypatch, capsys, SIMULATION, parachute="umbilical", fly="60")
+    assert line == "fly and fail need an autopilot, which this vehicle has not"
