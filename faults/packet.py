@@ -133,7 +133,7 @@ class Scene(Flight):
         if own is None:
             raise StepFailedError(f"the stranger hears nobody: {heard}")
         if self.story.victim:
-            victim = self.stranger.prefix_of(self.processes.number(self.story.victim))
+            victim = self.stranger.prefix_of(self.processes.pid(self.story.victim))
             if victim is None:
                 raise StepFailedError(f"the stranger does not hear {self.story.victim}: {heard}")
             packet = gap_packet(own, victim)
@@ -149,7 +149,7 @@ class Scene(Flight):
             self.stranger.listen(0.2)
             self.spin(0.2)
             own = self.stranger.prefix_of(os.getpid())
-            prefix = self.stranger.prefix_of(self.processes.number(self.story.victim))
+            prefix = self.stranger.prefix_of(self.processes.pid(self.story.victim))
             if own is not None and prefix is not None:
                 self.stranger.send(gap_packet(own, prefix), self.network.address(VEHICLE))
 
