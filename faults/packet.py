@@ -122,7 +122,7 @@ class Scene(Flight):
             names = ("-r", f"__node:={STANDBY}", "-p", "rank:=1")
             self.rig.start_supervisor(STANDBY, *standby, *names)
         director.until("flight is released", 60.0, director.stage(Stage.READY))
-        director.until_granted("arming", 10.0, director.ask_arm)
+        director.arm(10.0)
         self.climb(HEIGHT)
 
     def attack(self) -> float:

@@ -89,7 +89,7 @@ class Scene(Flight):
         self._start(SECOND, 1)
         director.until("the second follows", 30.0, lambda: self.follows(SECOND))
         director.until("flight is released", 30.0, director.stage(Stage.READY))
-        director.until_granted("arming", 10.0, director.ask_arm)
+        director.arm(10.0)
         self.climb(HEIGHT)
 
     def _start(self, name: str, rank: int) -> None:
