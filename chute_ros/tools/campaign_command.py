@@ -238,7 +238,7 @@ def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEa
 
 def _replay(profiles: Path, scenario: Scenario) -> None:
     """What was drawn, what happened, what it is counted as."""
-    _, flown, judged = campaign.fly_here(profiles, scenario)
+    flown, judged = campaign.fly_here(profiles, scenario)
     print("\n".join(text_of(scenario, "").splitlines()[3:-1]))
     up, truth, person, flies = flown.up, flown.truth, scenario.person, scenario.manoeuvre
     lines = [(at, f"said: {text}") for at, text in flown.said]
