@@ -67,18 +67,10 @@ def run(program: str, description: str, parts: Sequence[Part], output: Path | No
     print(text)
 
 
-class Children(Processes):
-    """Child processes that are also looked at from outside."""
-
-    def pid(self, name: str) -> int:
-        """The process of this name."""
-        return self._running[name].pid
-
-
-def with_children(measure: Callable[[str, Children], T]) -> T:
+def with_children(measure: Callable[[str, Processes], T]) -> T:
     """measure(namespace, children) in a ROS of its own; all children end with it."""
     with tempfile.TemporaryDirectory(prefix="chute_ros_bench_") as folder:
-        children = Children(Path(folder))
+        children = Processes(Path(folder))
         try:
             with isolated_ros() as namespace:
                 return measure(namespace, children)

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from bench.report import ratios, summary, table
+from bench.report import COMPARED, compared
 from chute_ros.errors import ChuteError
+from chute_ros.tools.pages import table
 
 
 class Peer(Protocol):
@@ -51,19 +52,7 @@ def times_table(what: str, measured: Mapping[str, Mapping[str, Times]], base: st
     """Rows of everything that was measured, with ratios to the peer that is called base."""
     rows = []
     for name, times in measured.items():
-        bare = summary(times[base].batches)
         for peer, one in times.items():
-            numbers = summary(one.batches)
-            told = (f"{number:.1f} us" for number in numbers)
-            values = (*told, *ratios(numbers, bare), str(one.missed))
-            rows.append((f"{name}: {peer}", *values))
-    head = (
-        what,
-        "median",
-        "99th percentile",
-        "largest",
-        "ratio of medians",
-        "of 99th percentiles",
-        "missed",
-    )
-    return table(head, rows)
+            cells = compared(one.batches, times[base].batches, "{:.1f} us")
+            rows.append((f"{name}: {peer}", *cells, str(one.missed)))
+    return table((what, *COMPARED, "missed"), rows)

@@ -11,11 +11,13 @@ import sys
 import time
 from functools import partial
 
-from bench.command import Children, at_least, run, with_children
+from bench.command import at_least, run, with_children
 from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
 from bench.on_executor import EXECUTORS
 from bench.process_cost import cpu_time
-from bench.report import load, summary, table
+from bench.report import load, summary
+from chute_ros.tools.pages import table
+from chute_ros.tools.processes import Processes
 
 HEADING = "Executors"
 
@@ -42,7 +44,7 @@ def section(chosen: argparse.Namespace) -> str:
 
 
 def _measure(
-    namespace: str, children: Children, count: int
+    namespace: str, children: Processes, count: int
 ) -> tuple[list[Peer], dict[str, float]]:
     starts: dict[str, Start] = {
         name: partial(start_ours, starter=("bench.on_executor", name), mark=f"_{name}")
@@ -52,7 +54,7 @@ def _measure(
     return peers, _cost(children, list(starts))
 
 
-def _cost(children: Children, names: list[str]) -> dict[str, float]:
+def _cost(children: Processes, names: list[str]) -> dict[str, float]:
     """Of each executor's processes, in % of a core, while nothing happens."""
 
     def taken(name: str) -> float:

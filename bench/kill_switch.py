@@ -16,10 +16,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 
 from bench.command import at_least, run, with_children
-from bench.report import load, ratios, summary, table
+from bench.report import COMPARED, compared, load
 from bench.wire_ends import NOMINAL_RATE, Round, RoundFailedError, WireEnds, WrongOrderError
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.tools.isolation import free_udp_ports
+from chute_ros.tools.pages import table
 from chute_ros.tools.processes import Processes, ros_arguments
 from chute_ros.transport.data_types import load_data_types
 
@@ -205,21 +206,11 @@ def report(peers: list[Peer], before: str) -> str:
     for how in (IDLE, LOADED):
         for what, which in (("the kill on MAVLink", "kill"), ("the answer on the bus", "answer")):
             times = {p.name: [getattr(r, which) for r in p.rounds[how]] for p in peers}
-            base = summary(times[BARE])
             for peer in peers:
-                numbers = summary(times[peer.name])
-                told = (f"{number:.2f} ms" for number in numbers)
-                values = (*told, *ratios(numbers, base), str(peer.missed[how]))
-                rows.append((f"to {what}, {how}: {peer.name}", *values))
-    head = (
-        "from the kill switch on the bus",
-        "median",
-        "99th percentile",
-        "largest",
-        "ratio of medians",
-        "of 99th percentiles",
-        "missed",
-    )
+                cells = compared(times[peer.name], times[BARE], "{:.2f} ms")
+                missed = str(peer.missed[how])
+                rows.append((f"to {what}, {how}: {peer.name}", *cells, missed))
+    head = ("from the kill switch on the bus", *COMPARED, "missed")
     count = len(peers[0].rounds[IDLE]) + peers[0].missed[IDLE]
     kills = ", ".join(f"{peer.name} {peer.ends.kills}" for peer in peers)
     return (

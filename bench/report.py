@@ -23,6 +23,16 @@ def ratios(values: Sequence[float], base: Sequence[float]) -> tuple[str, str]:
     return _ratio(first), _ratio(second)
 
 
+#: The heads of what compared returns.
+COMPARED = ("median", "99th percentile", "largest", "ratio of medians", "of 99th percentiles")
+
+
+def compared(values: Sequence[float], base: Sequence[float], told: str) -> tuple[str, ...]:
+    """Cells of a table: the summary of values, each as told has it, and the ratios to base."""
+    numbers = summary(values)
+    return (*(told.format(number) for number in numbers), *ratios(numbers, summary(base)))
+
+
 def _ratio(value: float) -> str:
     return f"{value:.1f}" if value >= 0.1 else f"{value:.4f}"
 
@@ -41,10 +51,3 @@ def document(sections: Sequence[tuple[str, str]]) -> str:
         parts.append(text if heading == before else f"## {heading}\n\n{text}")
         before = heading
     return "\n".join(parts)
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """As Markdown."""
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join(lines)

@@ -13,12 +13,13 @@ import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 
-from bench.command import Children, at_least, run, with_children
+from bench.command import at_least, run, with_children
 from bench.flight_lines import REAL_RATE, FlightLines
-from bench.report import load, ratios, summary, table
+from bench.report import COMPARED, compared, load
 from bench.umbilical_ends import LATE, Ends, Step, Subscriber
 from chute_ros.links.umbilical.layout_files import load_layouts
-from chute_ros.tools.processes import ros_arguments
+from chute_ros.tools.pages import table
+from chute_ros.tools.processes import Processes, ros_arguments
 
 HEADING = "Umbilical telemetry"
 
@@ -93,7 +94,7 @@ def section(chosen: argparse.Namespace) -> str:
 
 
 def start_peers(
-    namespace: str, children: Children, stack: ExitStack, top_rate: float = _FIRST_RATE
+    namespace: str, children: Processes, stack: ExitStack, top_rate: float = _FIRST_RATE
 ) -> list[Peer]:
     """Both peers, publishing."""
     layout = load_layouts("", "bench")[0]
@@ -118,7 +119,7 @@ def start_peers(
     return peers
 
 
-def _measure(namespace: str, children: Children, seconds: float, top_rate: float) -> list[Peer]:
+def _measure(namespace: str, children: Processes, seconds: float, top_rate: float) -> list[Peer]:
     with ExitStack() as stack:
         peers = start_peers(namespace, children, stack, top_rate)
 
@@ -135,13 +136,13 @@ def _measure(namespace: str, children: Children, seconds: float, top_rate: float
     return peers
 
 
-def _turn(peer: Peer, rate: float, children: Children, seconds: float) -> Step:
+def _turn(peer: Peer, rate: float, children: Processes, seconds: float) -> Step:
     children.check()
     peer.ends.flow(_FLOW_TIMEOUT)
     return peer.ends.step(rate, seconds)
 
 
-def _try(peer: Peer, rate: float, children: Children, seconds: float) -> Step:
+def _try(peer: Peer, rate: float, children: Processes, seconds: float) -> Step:
     """One turn at this rate, and if lines are lost another: it may be this machine's fault."""
     for _ in range(_TRIES):
         step = _turn(peer, rate, children, seconds)
@@ -186,24 +187,12 @@ def _latency(peers: list[Peer]) -> str:
         peer.name: [delay for step in peer.turns[REAL_RATE] for delay in step.delays]
         for peer in peers
     }
-    base = summary(delays[BARE])
     rows = []
     for peer in peers:
-        numbers = summary(delays[peer.name])
-        lost = sum(step.lost for step in peer.turns[REAL_RATE])
-        told = (f"{number:.2f} ms" for number in numbers)
-        values = (*told, *ratios(numbers, base), str(lost))
-        rows.append((f"at {REAL_RATE:g} lines/s: {peer.name}", *values))
-    head = (
-        "from writing a line to the subscriber",
-        "median",
-        "99th percentile",
-        "largest",
-        "ratio of medians",
-        "of 99th percentiles",
-        "lost",
-    )
-    return table(head, rows)
+        cells = compared(delays[peer.name], delays[BARE], "{:.2f} ms")
+        lost = str(sum(step.lost for step in peer.turns[REAL_RATE]))
+        rows.append((f"at {REAL_RATE:g} lines/s: {peer.name}", *cells, lost))
+    return table(("from writing a line to the subscriber", *COMPARED, "lost"), rows)
 
 
 def _cpu(peers: list[Peer]) -> str:

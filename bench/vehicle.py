@@ -13,16 +13,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-from bench.command import Children, at_least, run, with_children
+from bench.command import at_least, run, with_children
 from bench.person import Person
 from bench.process_cost import cpu_time, resident_memory
-from bench.report import load, summary, table
+from bench.report import load, summary
 from bench.vehicle_wire import NOMINAL_RATE, VehicleWire
 from chute_ros.errors import ChuteError
 from chute_ros.links.mavlink.protocol.commands import CommandLimits
 from chute_ros.links.registered import module_of
 from chute_ros.tools.isolation import free_udp_ports
-from chute_ros.tools.processes import ros_arguments
+from chute_ros.tools.pages import table
+from chute_ros.tools.processes import Processes, ros_arguments
 
 HEADING = "A vehicle"
 
@@ -80,7 +81,7 @@ def section(chosen: argparse.Namespace) -> str:
     return report(result, chosen, before)
 
 
-def _measure(namespace: str, children: Children, chosen: argparse.Namespace) -> Result:
+def _measure(namespace: str, children: Processes, chosen: argparse.Namespace) -> Result:
     (port,) = free_udp_ports(1)
     wire, person, result = VehicleWire(port), Person(namespace), Result()
     wire.start()
@@ -103,7 +104,7 @@ def _measure(namespace: str, children: Children, chosen: argparse.Namespace) -> 
     return result
 
 
-def _start(namespace: str, children: Children, port: int) -> None:
+def _start(namespace: str, children: Processes, port: int) -> None:
     limits = f"person stale_after={_STALE_AFTER} lost_after={_LOST_AFTER} regain_after=0.0"
     given = {
         "mavlink_parachute": {"connection": f"udpin:127.0.0.1:{port}"},
@@ -116,7 +117,7 @@ def _start(namespace: str, children: Children, port: int) -> None:
         children.start(name, module_of(name), *ros_arguments(namespace, **given[name]))
 
 
-def _until(what: str, holds: Callable[[], bool], children: Children) -> None:
+def _until(what: str, holds: Callable[[], bool], children: Processes) -> None:
     end = time.monotonic() + _WAIT
     while not holds():
         children.check()
@@ -125,7 +126,7 @@ def _until(what: str, holds: Callable[[], bool], children: Children) -> None:
         time.sleep(0.002)
 
 
-def _limit(wire: VehicleWire, person: Person, children: Children) -> float:
+def _limit(wire: VehicleWire, person: Person, children: Processes) -> float:
     """A link falls silent; from its limit on until the vehicle is told that flight is blocked."""
     _until("READY", lambda: person.stage == person.READY, children)
     wire.blocks.clear()
@@ -136,7 +137,7 @@ def _limit(wire: VehicleWire, person: Person, children: Children) -> float:
     return (wire.blocks[0] - silent_since) / 1e6 - _STALE_AFTER * 1e3
 
 
-def _deploys(wire: VehicleWire, person: Person, children: Children, count: int) -> list[float]:
+def _deploys(wire: VehicleWire, person: Person, children: Processes, count: int) -> list[float]:
     """Each once no acknowledgement of the last one's kill can come any more: until then the link
     cannot tell whose it is, and asks again."""
     times, alone_at = [], 0.0
@@ -151,7 +152,7 @@ def _is_past(at: float) -> bool:
     return time.monotonic() > at
 
 
-def _deploy(wire: VehicleWire, person: Person, children: Children) -> float:
+def _deploy(wire: VehicleWire, person: Person, children: Processes) -> float:
     """A person calls safety/deploy; until the release is on the wire, with the kill before it."""
     _until("READY", lambda: person.stage == person.READY, children)
     wire.releases.clear()
@@ -166,7 +167,7 @@ def _deploy(wire: VehicleWire, person: Person, children: Children) -> float:
 
 
 def _cost(
-    children: Children, wire: VehicleWire, seconds: float
+    children: Processes, wire: VehicleWire, seconds: float
 ) -> tuple[dict[str, tuple[float, float]], float]:
     """Share of one core and MB of each node while nothing happens; frames a second to them."""
     before = {name: cpu_time(children.pid(name)) for name in NODES}

@@ -12,7 +12,9 @@ import argparse
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from faults import ground_station_flight, packet, two_supervisors
 from faults import ground_station_stories as ground
@@ -30,11 +32,12 @@ Names = tuple[str, ...]
 Outcome = tuple[str, bool]
 
 
-def _supervisors(names: Names) -> Outcome:
-    with Network(two_supervisors.HOSTS) as network:
-        network.enter(two_supervisors.VEHICLE)
-        every = two_supervisors.fly_all(network, names)
-    return two_supervisors.table(every), not any(told.wrong for told in every)
+def _on_hosts(part: Any, names: Names) -> Outcome:
+    """The stories of a module, on its hosts."""
+    with Network(part.HOSTS) as network:
+        network.enter(part.VEHICLE)
+        every = part.fly_all(network, names)
+    return part.table(every), not any(told.wrong for told in every)
 
 
 def _ground(names: Names) -> Outcome:
@@ -54,19 +57,12 @@ def _fleet(names: Names) -> Outcome:
     return fleet_table(every), not any(flown.wrong for flown in every)
 
 
-def _packet(names: Names) -> Outcome:
-    with Network(packet.HOSTS) as network:
-        network.enter(packet.VEHICLE)
-        every = packet.fly_all(network, names)
-    return packet.table(every), not any(told.wrong for told in every)
-
-
 _RUN: dict[str, Callable[[Names], Outcome]] = {
-    "supervisors": _supervisors,
+    "supervisors": partial(_on_hosts, two_supervisors),
     "ground": _ground,
     "discovery": _discovery,
     "fleet": _fleet,
-    "packet": _packet,
+    "packet": partial(_on_hosts, packet),
 }
 
 

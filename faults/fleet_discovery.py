@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
+from chute_ros.tools import pages
 from faults.discovery_server import DiscoveryServers
 from faults.fleet import Fleet, host_of, hosts_for, name_of, until
 from faults.ground_station_link import GroundStationLink
@@ -159,12 +160,12 @@ _SUPER = {"ROS_SUPER_CLIENT": "TRUE"}
 
 def table(steps: list[Step]) -> str:
     """As Markdown."""
-    lines = ["| what happens | after | what is found | |", "|---|---|---|---|"]
+    rows = []
     for step in steps:
         after = "-" if step.seconds is None else f"{step.seconds:.2f} s"
         verdict = "**wrong**" if step.wrong else "as fleet.md says"
-        lines.append(f"| {step.name} | {after} | {step.found} | {verdict} |")
-    return "\n".join(lines)
+        rows.append((step.name, after, step.found, verdict))
+    return pages.table(("what happens", "after", "what is found", ""), rows)
 
 
 def search_all() -> list[Step]:

@@ -9,15 +9,15 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import bench.report
 from chute_ros.errors import ChuteError
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools import pages
 from faults.discovery_server import DiscoveryServers
 from faults.fleet import GROUND, HEIGHT, Fleet, hosts_for, name_of, newest_states, until
 from faults.fleet_load import Usage, busy, usage
 from faults.ground_station_link import GroundStationLink, Told
 from faults.network import Network
-from faults.stories import fly_stories
+from faults.stories import fly_stories, in_seconds
 
 #: How long a fleet that flies is measured, and how long is waited for what must not happen, s.
 MEASURED, WATCHED = 10.0, 5.0
@@ -228,7 +228,7 @@ def table(every: Sequence[Flown]) -> str:
         "the operator deploys: out after",
         "",
     )
-    return bench.report.table(head, [_cells(flown) for flown in every])
+    return pages.table(head, [_cells(flown) for flown in every])
 
 
 def _cells(flown: Flown) -> list[str]:
@@ -241,7 +241,7 @@ def _cells(flown: Flown) -> list[str]:
     memory = f"{costs['nodes'].memory / count:.0f} MB" if costs else "-"
     return [
         flown.size.name,
-        _seconds(flown.all_seen),
+        in_seconds(flown.all_seen),
         processor("nodes"),
         processor("simulators"),
         processor("ground station"),
@@ -250,18 +250,14 @@ def _cells(flown: Flown) -> list[str]:
         _rate(sent),
         str(flown.gaps),
         f"{flown.late} (told by {flown.told_late})",
-        _seconds(flown.released),
-        _seconds(flown.commanded),
+        in_seconds(flown.released),
+        in_seconds(flown.commanded),
         flown.wrong.rstrip("; ") or "correct",
     ]
 
 
 def _rate(value: float) -> str:
     return "-" if math.isnan(value) else f"{value / 1e3:.0f} kB/s"
-
-
-def _seconds(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.2f} s"
 
 
 def fly_all(names: tuple[str, ...] = ()) -> list[Flown]:

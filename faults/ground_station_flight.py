@@ -52,7 +52,7 @@ class GroundStationFlight(Flight):
         self.rig.start_supervisor("supervisor")
         station = self.station(USUAL)
         self.director.until("flight is released", _START_TIMEOUT, self.director.stage(Stage.READY))
-        self.director.until_granted("arming", 10.0, self.director.ask_arm)
+        self.director.arm(10.0)
         self.climb(HEIGHT)
         self.seen(station, time.monotonic(), state=int(Stage.IN_FLIGHT))
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from chute_ros.errors import ChuteError
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools import pages
 from faults.ground_station_flight import (
     CAREFUL,
     GROUND,
@@ -24,6 +25,7 @@ from faults.ground_station_flight import (
     GroundStationFlight,
 )
 from faults.network import Network
+from faults.stories import in_seconds
 
 #: How long what must not happen is waited for, s.
 WATCHED = 4.0
@@ -207,16 +209,12 @@ STORIES: Sequence[Story] = (
 
 def table(every: Sequence[tuple[Story, Seen]]) -> str:
     """As Markdown."""
-    lines = [
-        "| disturbance | on the wire | answered | seen (again) | |",
-        "|---|---|---|---|---|",
-    ]
+    rows = []
     for story, seen in every:
-        times = (seen.wire, seen.answer, seen.again)
-        cells = " | ".join("-" if math.isnan(one) else f"{one:.2f} s" for one in times)
-        verdict = seen.wrong or seen.known or "correct"
-        lines.append(f"| {story.name} | {cells} | {verdict} |")
-    return "\n".join(lines)
+        times = map(in_seconds, (seen.wire, seen.answer, seen.again))
+        rows.append((story.name, *times, seen.wrong or seen.known or "correct"))
+    head = ("disturbance", "on the wire", "answered", "seen (again)", "")
+    return pages.table(head, rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[tuple[Story, Seen]]:

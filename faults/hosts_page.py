@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-
+from chute_ros.tools import pages
 from chute_ros.tools.machine import machine
 
 _HEAD = """\
@@ -72,22 +71,9 @@ process, and until its flight continues; from the motor's failure to the parachu
 "deployed". "keep to the host": `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`.
 """,
 }
-_MARK = "<!-- part {} -->"
 
 
 def with_part(page: str, part: str, table: str, load: float) -> str:
     """The page with this part written anew; the others as page has them, if it has them."""
-    texts = _parts_of(page)
-    head = PARTS[part]
-    texts[part] = f"{head}\nLoad before the run: {load:.1f} (of the last minute).\n\n{table}\n"
-    every = [f"{_MARK.format(one)}\n{texts[one]}" for one in PARTS if one in texts]
-    return "\n".join([_HEAD.format(machine=machine()), *every])
-
-
-def _parts_of(page: str) -> dict[str, str]:
-    pieces = re.split(r"^<!-- part (\w+) -->\n", page, flags=re.MULTILINE)
-    return {
-        name: text.rstrip("\n") + "\n"
-        for name, text in zip(pieces[1::2], pieces[2::2], strict=True)
-        if name in PARTS
-    }
+    text = f"{PARTS[part]}\nLoad before the run: {load:.1f} (of the last minute).\n\n{table}"
+    return f"{_HEAD.format(machine=machine())}\n{pages.with_part(page, 'part', part, text, PARTS)}"

@@ -17,12 +17,13 @@ from pathlib import Path
 
 from chute_ros.ros.memory_limit import VARIABLE
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools import pages
 from chute_ros.tools.demo_director import StepFailedError
 from faults.flight import Flight
 from faults.gap_packet import Stranger, gap_packet
 from faults.network import Network
 from faults.respawned import RESPAWN_DELAY, RespawnedProcesses
-from faults.stories import flown, fly_stories
+from faults.stories import flown, fly_stories, in_seconds
 
 VEHICLE, STRANGER = "vehicle", "stranger"
 HOSTS = (VEHICLE, STRANGER)
@@ -121,7 +122,7 @@ class Scene(Flight):
             names = ("-r", f"__node:={STANDBY}", "-p", "rank:=1")
             self.rig.start_supervisor(STANDBY, *standby, *names)
         director.until("flight is released", 60.0, director.stage(Stage.READY))
-        director.until_granted("arming", 10.0, director.ask_arm)
+        director.arm(10.0)
         self.climb(HEIGHT)
 
     def attack(self) -> float:
@@ -132,7 +133,7 @@ class Scene(Flight):
         if own is None:
             raise StepFailedError(f"the stranger hears nobody: {heard}")
         if self.story.victim:
-            victim = self.stranger.prefix_of(self.processes.number(self.story.victim))
+            victim = self.stranger.prefix_of(self.processes.pid(self.story.victim))
             if victim is None:
                 raise StepFailedError(f"the stranger does not hear {self.story.victim}: {heard}")
             packet = gap_packet(own, victim)
@@ -148,7 +149,7 @@ class Scene(Flight):
             self.stranger.listen(0.2)
             self.spin(0.2)
             own = self.stranger.prefix_of(os.getpid())
-            prefix = self.stranger.prefix_of(self.processes.number(self.story.victim))
+            prefix = self.stranger.prefix_of(self.processes.pid(self.story.victim))
             if own is not None and prefix is not None:
                 self.stranger.send(gap_packet(own, prefix), self.network.address(VEHICLE))
 
@@ -267,20 +268,17 @@ def _watch(scene: Scene, told: Told) -> None:
 
 def table(every: list[Told]) -> str:
     """As Markdown."""
-    lines = [
-        "| who gets it | then | its process | memory | ends after | back after | out after | |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    rows = []
     for told in every:
-        times = (told.ended, told.back, told.released)
-        ended, back, out = ("-" if one != one else f"{one:.2f} s" for one in times)
+        ended, back, out = map(in_seconds, (told.ended, told.back, told.released))
         then = "-" if told.story.unbounded else told.story.fails.value
         if told.story.may_miss and told.released != told.released:
             out = "**stays in**"
         peak = "-" if told.peak != told.peak else f"{told.peak:.0f} MB"
         name, how, end = told.story.name, told.how or "-", told.wrong or "correct"
-        lines.append(f"| {name} | {then} | {how} | {peak} | {ended} | {back} | {out} | {end} |")
-    return "\n".join(lines)
+        rows.append((name, then, how, peak, ended, back, out, end))
+    head = ("who gets it", "then", "its process", "memory")
+    return pages.table((*head, "ends after", "back after", "out after", ""), rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:

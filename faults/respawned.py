@@ -45,13 +45,9 @@ class RespawnedProcesses(Processes):
             on = (*on, "env", *unset, "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST")
         super().start(name, module, *arguments, on=on)
 
-    def number(self, name: str) -> int:
-        """Of its process."""
-        return self._running[name].pid
-
     def memory(self, name: str) -> float:
         """What it has now, MB; NaN: it has ended."""
-        path = Path("/proc") / str(self.number(name)) / "status"
+        path = Path("/proc") / str(self.pid(name)) / "status"
         try:
             lines = path.read_text().splitlines()
         except OSError:

@@ -15,6 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from bench.command import at_least
 from bench.report import load
 from chute_ros.tools.isolation import isolated_ros
 from chute_ros.tools.machine import machine
@@ -87,7 +88,7 @@ def _apart() -> contextlib.AbstractContextManager[object]:
 def _options() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser("soak", description=__doc__)
     options.add_argument(
-        "--loops", type=_positive, default=20, help="number of loops (default: 20)"
+        "--loops", type=at_least(int, 1), default=20, help="number of loops (default: 20)"
     )
     options.add_argument(
         "--seed", type=int, default=0, help="seed of all random choices (default: 0)"
@@ -105,13 +106,6 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument("--only", type=int, metavar="LOOP", help="repeat this loop alone")
     options.add_argument("--page", type=Path, help=f"write the results there ({PAGE.name})")
     return options
-
-
-def _positive(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text}: need 1 or more")
-    return number
 
 
 def _share(chosen: argparse.Namespace) -> list[tuple[int, list[Plan]]]:

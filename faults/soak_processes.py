@@ -15,9 +15,8 @@ from pathlib import Path
 
 from bench.process_cost import resident_memory
 from chute_ros.tools.processes import END_TIMEOUT
+from faults.respawned import RESPAWN_DELAY
 
-#: As vehicle.launch.py waits before it starts a process again, s.
-RESPAWN_DELAY = 0.5
 #: What no process may ever write.
 _TROUBLE = re.compile(
     r"Traceback \(most recent call last\)|terminate called|Segmentation fault|"

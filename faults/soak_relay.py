@@ -26,7 +26,7 @@ class Relay:
         self.cut = False
         #: Empty, VALID or INVALID.
         self.flood = ""
-        self.passed = self.dropped = self.flooded = 0
+        self.passed = self.dropped = 0
         self.chance = random.Random(name)
 
     def takes(self) -> bool:

@@ -84,7 +84,6 @@ class CanRelay(Relay):
     def _more(self) -> list[bytes]:
         if not self.flood:
             return []
-        self.flooded += TIMES
         return [
             stranger(self.chance) if self.flood == VALID else nonsense(self.chance)
             for _ in range(TIMES)

@@ -78,7 +78,6 @@ class MavlinkRelay(Relay):
     def _more(self, data: bytes) -> list[bytes]:
         if not self.flood:
             return []
-        self.flooded += TIMES
         if self.flood == VALID:
             return [data] * TIMES
         half = TIMES // 2

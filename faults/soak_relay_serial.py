@@ -90,7 +90,6 @@ class SerialRelay(Relay):
     def _more(self) -> list[bytes]:
         if not self.flood:
             return []
-        self.flooded += TIMES
         if self.flood == VALID:
             return [b"[INFO] flood %d\n" % number for number in range(TIMES)]
         return [self.chance.randbytes(self.chance.randint(1, 60)) + b"\n" for _ in range(TIMES)]

@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from bench.report import table
+from chute_ros.tools.pages import table
 from faults.soak_measure import LIMITS, Growth, growth
 from faults.soak_plan import KINDS, MOTOR, NODES, PERSON, SUPERVISORS
 from faults.soak_run import Result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -45,6 +46,11 @@ def fly_stories(
         print(f"   {told.wrong or 'correct'}", flush=True)
         every.append(told)
     return every
+
+
+def in_seconds(value: float) -> str:
+    """For a table; NaN: it did not happen."""
+    return "-" if math.isnan(value) else f"{value:.2f} s"
 
 
 @contextmanager

@@ -15,9 +15,10 @@ from chute_msgs.msg import SupervisorLease
 from chute_ros.model import Action, Outcome
 from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools import pages
 from faults.flight import Flight
 from faults.network import Network
-from faults.stories import flown, fly_stories
+from faults.stories import flown, fly_stories, in_seconds
 
 VEHICLE, FIRST, SECOND = "vehicle", "first", "second"
 HOSTS = (VEHICLE, FIRST, SECOND)
@@ -88,7 +89,7 @@ class Scene(Flight):
         self._start(SECOND, 1)
         director.until("the second follows", 30.0, lambda: self.follows(SECOND))
         director.until("flight is released", 30.0, director.stage(Stage.READY))
-        director.until_granted("arming", 10.0, director.ask_arm)
+        director.arm(10.0)
         self.climb(HEIGHT)
 
     def _start(self, name: str, rank: int) -> None:
@@ -187,15 +188,12 @@ def _wrong(scene: Scene) -> str:
 
 def table(every: list[Told]) -> str:
     """As Markdown."""
-    lines = [
-        "| disturbance | takeover | kill on the wire | parachute out | one leads again | |",
-        "|---|---|---|---|---|---|",
-    ]
+    rows = []
     for told in every:
-        times = (told.taken_over, told.killed, told.released, told.healed)
-        cells = " | ".join("-" if one != one else f"{one:.2f} s" for one in times)
-        lines.append(f"| {told.story.name} | {cells} | {told.wrong or 'correct'} |")
-    return "\n".join(lines)
+        times = map(in_seconds, (told.taken_over, told.killed, told.released, told.healed))
+        rows.append((told.story.name, *times, told.wrong or "correct"))
+    head = ("disturbance", "takeover", "kill on the wire", "parachute out", "one leads again", "")
+    return pages.table(head, rows)
 
 
 def fly_all(network: Network, names: tuple[str, ...] = ()) -> list[Told]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from bench.report import table
 from chute_ros.tools.machine import machine
+from chute_ros.tools.pages import table
 from fuzz.run import Outcome
 from fuzz.stored import stored
 from fuzz.targets import NAMES, target_of

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from chute_ros.tools import pages
 from chute_ros.tools.machine import machine
 from sitl.autopilots import KINDS
 from sitl.judge import Verdict
@@ -35,7 +35,6 @@ ArduPilot's and PX4's own documentation of their simulators says how to get one.
 `make sitl AUTOPILOT=PATH STORIES="motor-30 block" RUNS=1` flies some stories;
 `python3 -m sitl --list` names all.
 """
-_MARK = "<!-- autopilot {} -->"
 _RIGHT = "right"
 
 
@@ -52,10 +51,8 @@ class Flown:
 
 def with_autopilot(page: str, flown: Sequence[Flown]) -> str:
     """The page with the part of this autopilot written anew; the others as page has them."""
-    parts = _parts_of(page)
-    parts[flown[0].kind] = _part(flown)
-    every = [f"{_MARK.format(kind)}\n{parts[kind]}" for kind in KINDS if kind in parts]
-    return "\n".join([_HEAD.format(machine=machine()), *every])
+    parts = pages.with_part(page, "autopilot", flown[0].kind, _part(flown), KINDS)
+    return f"{_HEAD.format(machine=machine())}\n{parts}"
 
 
 def _part(flown: Sequence[Flown]) -> str:
@@ -66,25 +63,15 @@ def _part(flown: Sequence[Flown]) -> str:
         f"{min(loads):.1f} to {max(loads):.1f} (of a minute)."
     )
     rows = [_row([one for one in flown if one.story == name]) for name in _names(flown)]
-    return "\n".join(
-        [
-            f"## {flown[0].kind} {flown[-1].version}",
-            "",
-            told,
-            "",
-            "| story | runs | what happened | times | |",
-            "|---|---|---|---|---|",
-            *rows,
-            "",
-        ]
-    )
+    table = pages.table(("story", "runs", "what happened", "times", ""), rows)
+    return f"## {flown[0].kind} {flown[-1].version}\n\n{told}\n\n{table}"
 
 
 def _names(flown: Sequence[Flown]) -> list[str]:
     return list(dict.fromkeys(one.story for one in flown))
 
 
-def _row(runs: Sequence[Flown]) -> str:
+def _row(runs: Sequence[Flown]) -> list[str]:
     happened = _each(one.verdict.happened for one in runs)
     names = dict.fromkeys(name for one in runs for name in one.verdict.times)
     times = [_span(name, [one.verdict.times[name] for one in runs if name in one.verdict.times])
@@ -93,7 +80,7 @@ def _row(runs: Sequence[Flown]) -> str:
     judged = "; ".join(f"**{text}**" for text in wrong) or _RIGHT
     cells = (f"`{runs[0].story}`: {runs[0].text}", str(len(runs)), "; ".join(happened),
              "; ".join(times), judged)  # fmt: skip
-    return "| " + " | ".join(_cell(text) for text in cells) + " |"
+    return [" ".join(text.split()).replace("|", "/") for text in cells]
 
 
 def _each(lists: Iterable[Iterable[str]]) -> list[str]:
@@ -107,16 +94,3 @@ def _span(name: str, values: Sequence[float]) -> str:
     if len(values) == 1:
         return f"{name} {middle:.2f} s"
     return f"{name} {middle:.2f} s ({min(values):.2f} to {max(values):.2f})"
-
-
-def _cell(text: str) -> str:
-    return " ".join(text.split()).replace("|", "/")
-
-
-def _parts_of(page: str) -> dict[str, str]:
-    pieces = re.split(r"^<!-- autopilot (\w+) -->\n", page, flags=re.MULTILINE)
-    return {
-        kind: text.rstrip("\n") + "\n"
-        for kind, text in zip(pieces[1::2], pieces[2::2], strict=True)
-        if kind in KINDS
-    }

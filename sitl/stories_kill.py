@@ -11,7 +11,7 @@ from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
 from sitl.judge import Want
 from sitl.stories import Story
-from sitl.vehicle import Setup
+from sitl.vehicle import Setup, Vehicle
 
 #: From an operator's call to the release, s.
 OPERATOR = 0.3
@@ -20,12 +20,20 @@ _SEEN = {ARDUCOPTER: 1.3, ARDUPLANE: 2.0, PX4: 1.3}
 _HEIGHT = 40.0
 
 
-def _person(flight: Flight) -> None:
+def _person(flight: Flight, ask: Callable[[Vehicle], tuple[float, Any]]) -> None:
     flight.go_up(_HEIGHT)
-    since, answer = flight.vehicle.ask_kill()
+    since, answer = ask(flight.vehicle)
     flight.expect(Want.RELEASE, since, OPERATOR, "call")
     flight.see_it_out(6.0, 0.0)
     _note_answer(flight, answer)
+
+
+def _person_kill(flight: Flight) -> None:
+    _person(flight, Vehicle.ask_kill)
+
+
+def _person_deploy(flight: Flight) -> None:
+    _person(flight, Vehicle.ask_deploy)
 
 
 def _person_kill_only(flight: Flight) -> None:
@@ -33,14 +41,6 @@ def _person_kill_only(flight: Flight) -> None:
     since, answer = flight.vehicle.ask_kill(kill_only=True)
     flight.expect(Want.KILL, since, cause="call")
     flight.vehicle.rest(1.0)
-    _note_answer(flight, answer)
-
-
-def _person_deploy(flight: Flight) -> None:
-    flight.go_up(_HEIGHT)
-    since, answer = flight.vehicle.ask_deploy()
-    flight.expect(Want.RELEASE, since, OPERATOR, "call")
-    flight.see_it_out(6.0, 0.0)
     _note_answer(flight, answer)
 
 
@@ -113,13 +113,13 @@ def _with(method: str, **settings: float) -> Setup:
 
 STORIES = (
     Story("kill-bench", "safety/kill, armed on the ground", _on_the_bench),
-    Story("kill-person", "safety/kill at 40 m", _person),
+    Story("kill-person", "safety/kill at 40 m", _person_kill),
     Story("kill-only", "safety/kill with kill_only at 40 m", _person_kill_only),
     Story("kill-low", "safety/kill at 5 m", _low),
     Story("deploy-person", "safety/deploy at 40 m", _person_deploy),
     Story("station-disarm", "the ground station disarms by force at 40 m", _station("disarm")),
     Story("station-terminate", "the ground station terminates at 40 m", _station("termination")),
-    Story("kill-termination", "safety/kill at 40 m, kill_method flight_termination", _person,
+    Story("kill-termination", "safety/kill at 40 m, kill_method flight_termination", _person_kill,
           _with("flight_termination"), (ARDUCOPTER, PX4)),
     Story("bench-termination", "safety/kill on the ground, kill_method flight_termination",
           _on_the_bench, _with("flight_termination"), (ARDUCOPTER, PX4)),
@@ -127,7 +127,8 @@ STORIES = (
           _with("flight_termination"), (ARDUPLANE,)),
     Story("kill-termination-afs",
           "safety/kill at 40 m, kill_method flight_termination, AFS_ENABLE 1, AFS_TERM_ACTION 42",
-          _person, _with("flight_termination", AFS_ENABLE=1, AFS_TERM_ACTION=42), (ARDUPLANE,)),
-    Story("kill-disarm", "safety/kill at 40 m, kill_method forced_disarm", _person,
+          _person_kill, _with("flight_termination", AFS_ENABLE=1, AFS_TERM_ACTION=42),
+          (ARDUPLANE,)),
+    Story("kill-disarm", "safety/kill at 40 m, kill_method forced_disarm", _person_kill,
           _with("forced_disarm")),
 )  # fmt: skip

@@ -15,7 +15,7 @@ from multiprocessing import active_children, get_context
 from pathlib import Path
 
 from chute_ros.campaign.draw import draw
-from chute_ros.campaign.flight import Flight, Flown
+from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
@@ -88,11 +88,10 @@ class Tally:
 _shipped = functools.cache(Shipped)
 
 
-def fly_here(folder: Path, scenario: Scenario) -> tuple[Flight, Flown, Judged]:
-    """One flight, with all that lived in it."""
-    flight = Flight(scenario, _shipped(folder))
-    flown = flight.run()
-    return flight, flown, judge(flown)
+def fly_here(folder: Path, scenario: Scenario) -> tuple[Flown, Judged]:
+    """One flight, and what it is counted as."""
+    flown = fly(scenario, _shipped(folder))
+    return flown, judge(flown)
 
 
 def _line(folder: Path, seed: int) -> Line:
@@ -101,7 +100,7 @@ def _line(folder: Path, seed: int) -> Line:
     who = (seed, scenario.vehicle, scenario.profile, scenario.failure.value)
     drawn = (faults, ", ".join(sorted(scenario.second_sources)))
     try:
-        _, flown, judged = fly_here(folder, scenario)
+        flown, judged = fly_here(folder, scenario)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
         return Line(*who, Count.BROKEN, why, math.nan, math.nan, math.nan, *drawn)

@@ -18,8 +18,6 @@ from pathlib import Path
 from chute_ros.campaign import campaign, checkpoint
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count
-from chute_ros.campaign.page import page
-from chute_ros.campaign.picture import picture
 from chute_ros.campaign.rare import OfEach, rare
 from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
@@ -27,6 +25,8 @@ from chute_ros.errors import RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
+from chute_ros.tools.campaign_page import page
+from chute_ros.tools.campaign_picture import picture
 from chute_ros.tools.machine import machine
 
 _TELL_EVERY = 5.0  # s
@@ -238,7 +238,7 @@ def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEa
 
 def _replay(profiles: Path, scenario: Scenario) -> None:
     """What was drawn, what happened, what it is counted as."""
-    _, flown, judged = campaign.fly_here(profiles, scenario)
+    flown, judged = campaign.fly_here(profiles, scenario)
     print("\n".join(text_of(scenario, "").splitlines()[3:-1]))
     up, truth, person, flies = flown.up, flown.truth, scenario.person, scenario.manoeuvre
     lines = [(at, f"said: {text}") for at, text in flown.said]

@@ -1,12 +1,10 @@
 """Executable demo: one simulated flight with the real nodes, told as it happens."""
 
+from functools import partial
+
 from chute_ros.tools.entry import run
 
-
-def main() -> None:
-    """Run the tool."""
-    run("demo", "demo_command")
-
+main = partial(run, "demo", "demo_command")
 
 if __name__ == "__main__":
     main()

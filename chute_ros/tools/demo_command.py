@@ -8,6 +8,7 @@ code 1.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import signal
 import sys
 import tempfile
@@ -50,17 +51,15 @@ def main() -> None:
         processes = Processes(chosen.logs or Path(scratch))
         try:
             with isolated_ros() as namespace:
-                director = Director(namespace, processes)
                 fault = chosen.fault or ""
-                try:
+                with contextlib.closing(Director(namespace, processes)) as director:
                     if chosen.vehicle == "rocket":
                         rocket = RocketRig(fault, namespace, processes, Path(scratch))
                         RocketStory(rocket, director).fly()
                     else:
                         drone = Rig.on_free_ports(chosen.parachute, fault, namespace, processes)
-                        _fly_drone(drone, director)
-                finally:
-                    director.close()
+                        with contextlib.closing(Pilot(drone.pilot, system_id=1)) as pilot:
+                            fly(drone, director, pilot)
         except ChuteError as error:
             sys.exit(f"\nDEMO FAILED: {error}")
         finally:
@@ -79,11 +78,3 @@ def _make(folder: Path) -> None:
         why = error.strerror or error
         print(f"demo: --logs {folder}: {why}: name a folder to write in", file=sys.stderr)
         sys.exit(2)
-
-
-def _fly_drone(rig: Rig, director: Director) -> None:
-    pilot = Pilot(rig.pilot, system_id=1)
-    try:
-        fly(rig, director, pilot)
-    finally:
-        pilot.close()

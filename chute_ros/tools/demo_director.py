@@ -106,17 +106,17 @@ class Director:
                 raise StepFailedError(f"{what}: not within {seconds:g} s\n{logs}")
             self._executor.spin_once(timeout_sec=0.05)
 
-    def until_granted(self, what: str, seconds: float, ask: Callable[[], Any]) -> None:
-        """Ask again with each new picture of a parachute until it succeeds; StepFailedError with
-        the reason if it has not within seconds."""
+    def arm(self, seconds: float) -> None:
+        """Call safety/arm, again with each new picture of a parachute until it succeeds;
+        StepFailedError with the reason if it has not within seconds."""
         end = time.monotonic() + seconds
         while True:
-            answer = ask()
-            self.until(f"{what} is answered", 10.0, answer.done)
+            answer = self.ask_arm()
+            self.until("arming is answered", 10.0, answer.done)
             if answer.result().success:
                 return
             if time.monotonic() >= end:
-                raise StepFailedError(f"{what}: {answer.result().message}")
+                raise StepFailedError(f"arming: {answer.result().message}")
             self.until("a parachute tells its picture", 5.0, self._newer_than(self._statuses))
 
     def _newer_than(self, statuses: int) -> Callable[[], bool]:

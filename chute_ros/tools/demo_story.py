@@ -64,7 +64,7 @@ def _preflight(director: Director, pilot: Pilot, rig: Rig) -> None:
 
     director.say("operator", "arms the parachute")
     # A parachute that has just been plugged in does not know its height at once.
-    director.until_granted("arming", 5.0, director.ask_arm)
+    director.arm(5.0)
     director.until("it is seen armed", 5.0, lambda: director.all_parachutes(lambda p: p.armed))
     for link, one in director.parachutes.items():
         names = ", ".join(flag_names(TriggerFlags(one.armed_triggers)))

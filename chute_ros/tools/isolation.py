@@ -33,11 +33,10 @@ def isolated_ros() -> Iterator[str]:
 
 def free_udp_ports(count: int) -> list[int]:
     """Ports of 127.0.0.1 that nobody uses at this moment."""
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
-    try:
-        for one in sockets:
+    ports = []
+    with contextlib.ExitStack() as stack:
+        for _ in range(count):
+            one = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
             one.bind(("127.0.0.1", 0))
-        return [one.getsockname()[1] for one in sockets]
-    finally:
-        for one in sockets:
-            one.close()
+            ports.append(one.getsockname()[1])
+    return ports

@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 import platform
 import sys
+from pathlib import Path
 
 
 def machine() -> str:
     """What the numbers depend on, in one line."""
-    model = "unknown processor"
-    with open("/proc/cpuinfo") as file:
-        for line in file:
-            if line.startswith("model name"):
-                model = line.partition(":")[2].strip()
-                break
+    about = Path("/proc/cpuinfo").read_text().splitlines()
+    names = [line.partition(":")[2].strip() for line in about if line.startswith("model name")]
+    model = names[0] if names else "unknown processor"
     interpreter = platform.python_implementation().removeprefix("C")
     distribution = os.environ.get("ROS_DISTRO", "?")
     return (

@@ -6,7 +6,6 @@ With --check it only names the files that are out of date.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import textwrap
 from pathlib import Path
@@ -16,6 +15,7 @@ from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMETERS
 from chute_ros.settings import Parameter, parameters_of
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
+from chute_ros.tools.pages import table, write_or_check
 
 NODES: dict[str, tuple[Parameter, ...]] = {
     **{
@@ -59,29 +59,24 @@ def parameters_text(before: str) -> str:
     """docs/reference/parameters.md with the tables of all nodes made anew."""
     rows: list[str] = []
     for node, parameters in NODES.items():
-        rows += [f"## {node}", ""]
-        rows += ["| parameter | default | meaning | allowed |", "|---|---|---|---|"]
-        rows += [
-            f"| `{p.name}` | `{_yaml(p.default)}` | {p.meaning} | {_allowed(p)} |"
-            for p in parameters
+        told = [
+            (f"`{p.name}`", f"`{_yaml(p.default)}`", p.meaning, _allowed(p)) for p in parameters
         ]
-        rows.append("")
+        rows += [f"## {node}", "", table(("parameter", "default", "meaning", "allowed"), told), ""]
     begin, end = "<!-- parameters -->", "<!-- end of parameters -->"
     return _between(before, PARAMETERS, begin, end, rows[:-1])
 
 
 def rules_text(before: str) -> str:
     """docs/reference/rules.md with its table of measurements made anew."""
-    rows = [
-        "| name | unit | range | rate (1/s) | jump | max_age (s) | stuck_after (s) |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    rows += [
-        f"| `{name}` | {UNITS[name]} | {one.minimum:g} to {one.maximum:g} | {one.rate:g} "
-        f"| {one.jump:g} | {one.max_age:g} | {one.stuck_after:g} |"
-        for name, one in STANDARD_LIMITS.items()
-    ]
-    return _between(before, RULES, "<!-- measurements -->", "<!-- end of measurements -->", rows)
+    head = ("name", "unit", "range", "rate (1/s)", "jump", "max_age (s)", "stuck_after (s)")
+    rows = []
+    for name, one in STANDARD_LIMITS.items():
+        numbers = (one.rate, one.jump, one.max_age, one.stuck_after)
+        span = f"{one.minimum:g} to {one.maximum:g}"
+        rows.append((f"`{name}`", UNITS[name], span, *(f"{number:g}" for number in numbers)))
+    begin, end = "<!-- measurements -->", "<!-- end of measurements -->"
+    return _between(before, RULES, begin, end, [table(head, rows)])
 
 
 def _between(before: str, path: Path, begin: str, end: str, rows: list[str]) -> str:
@@ -93,19 +88,15 @@ def _between(before: str, path: Path, begin: str, end: str, rows: list[str]) -> 
 
 
 def main() -> None:
-    """Write, or check, the files of the repository in the present folder."""
-    options = argparse.ArgumentParser("parameter_docs", description=__doc__)
-    options.add_argument("--check", action="store_true", help="write nothing")
-    check = options.parse_args().check
+    """Write, or check, all of them."""
+    write_or_check("parameter_docs", __doc__, _texts)
+
+
+def _texts() -> dict[Path, str]:
     texts = {path: config_text(path) for path in CONFIGS}
     texts[PARAMETERS] = parameters_text(PARAMETERS.read_text())
     texts[RULES] = rules_text(RULES.read_text())
-    old = [str(p) for p, text in texts.items() if not p.is_file() or p.read_text() != text]
-    if check and old:
-        sys.exit(f"out of date: {', '.join(old)}; run: make docs")
-    if not check:
-        for path, text in texts.items():
-            path.write_text(text)
+    return texts
 
 
 def _allowed(parameter: Parameter) -> str:

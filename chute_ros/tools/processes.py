@@ -69,6 +69,10 @@ class Processes:
         """All that were started."""
         return list(self._running)
 
+    def pid(self, name: str) -> int:
+        """Of one of them."""
+        return self._running[name].pid
+
     def send_signal(self, name: str, number: signal.Signals) -> None:
         """To one of them; one that was killed is not watched any more."""
         self._running[name].send_signal(number)

@@ -1,4 +1,4 @@
-"""What the tools that read recordings share: their files on the command line, and their errors."""
+"""What the tools that read recordings share: their files, and their errors."""
 
 from __future__ import annotations
 
@@ -23,6 +23,14 @@ def recording_options(program: str, description: str | None) -> argparse.Argumen
         help="files of a black box in their order, or its folder",
     )
     return options
+
+
+def write(path: Path, text: str) -> None:
+    """ChuteError in one line if it cannot be."""
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ChuteError(f"{path}: {error.strerror or error}") from None
 
 
 def complain(program: str, error: ChuteError) -> None:

@@ -1,12 +1,10 @@
 """Executable replay: decides a recorded flight once more and compares."""
 
+from functools import partial
+
 from chute_ros.tools.entry import run
 
-
-def main() -> None:
-    """Run the tool."""
-    run("replay", "replay_command")
-
+main = partial(run, "replay", "replay_command")
 
 if __name__ == "__main__":
     main()

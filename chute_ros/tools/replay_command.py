@@ -22,7 +22,7 @@ from chute_ros.supervisor.record import CODEC
 from chute_ros.tools.parameter_file import NODE, other_from
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, files_of, read
-from chute_ros.tools.recording_options import complain, recording_options
+from chute_ros.tools.recording_options import complain, recording_options, write
 from chute_ros.tools.replay_picture import Track, picture
 from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
 
@@ -83,7 +83,7 @@ def _replay(paths: list[Path], config: Path | None, wanted: Path | None) -> int:
     if wanted is None and other is not None:
         wanted = files[0].with_name(f"{files[0].name}.replay.svg")
     if wanted is not None:
-        _write(wanted, picture(recording, before, after))
+        write(wanted, picture(recording, before, after))
     return _print_end(recording, found, now, wanted)
 
 
@@ -155,10 +155,3 @@ def _print_end(recording: Recording, found: list[Row], now: Replayer, wrote: Pat
         return DIFFERS
     print("the same decisions")
     return SAME
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ChuteError(f"{path}: {error.strerror or error}") from None

@@ -74,16 +74,14 @@ def picture(recording: Recording, before: Track, after: Track) -> str:
 
 def vehicle_curves(recording: Recording) -> list[Row]:
     """Height and vertical speed as the core was told of them."""
-    heights: list[tuple[float, float]] = []
-    speeds: list[tuple[float, float]] = []
-    for one in recording.turns:
-        for told_of in one.turn.inputs:
-            if isinstance(told_of, i.VehicleReport):
-                seconds = recording.seconds(one.wall)
-                heights.append((seconds, told_of.state.height))
-                speeds.append((seconds, told_of.state.vertical_speed))
-    rows: list[Row] = []
-    for label, unit, points in (("height", "m", heights), ("vertical speed", "m/s", speeds)):
-        if any(math.isfinite(value) for _, value in points):
-            rows.append(Curve(label, unit, points))
-    return rows
+    told_of = [
+        (recording.seconds(one.wall), report.state)
+        for one in recording.turns
+        for report in one.turn.inputs
+        if isinstance(report, i.VehicleReport)
+    ]
+    curves = (
+        Curve("height", "m", [(at, state.height) for at, state in told_of]),
+        Curve("vertical speed", "m/s", [(at, state.vertical_speed) for at, state in told_of]),
+    )
+    return [one for one in curves if any(math.isfinite(value) for _, value in one.points)]

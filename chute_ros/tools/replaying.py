@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -121,9 +122,7 @@ def rows(recorded: RecordedTurn, replayed: Outputs, exact: bool) -> Iterator[Row
     decisions, whatever their numbers and reasons, and the alarms."""
     before = [one for one in recorded.turn.outputs if exact or _counts(one)]
     now = [one for one in replayed if exact or _counts(one)]
-    for index in range(max(len(before), len(now))):
-        old = before[index] if index < len(before) else None
-        new = now[index] if index < len(now) else None
+    for old, new in itertools.zip_longest(before, now):
         same = _text(old) == _text(new) if exact else _essence(old) == _essence(new)
         if not same or any(map(_counts, (old, new))):
             yield Row(recorded.wall, told(old), told(new), _reasons(old), _reasons(new), same)

@@ -1,12 +1,10 @@
 """Executable report: one HTML page of a recorded flight."""
 
+from functools import partial
+
 from chute_ros.tools.entry import run
 
-
-def main() -> None:
-    """Run the tool."""
-    run("report", "report_command")
-
+main = partial(run, "report", "report_command")
 
 if __name__ == "__main__":
     main()

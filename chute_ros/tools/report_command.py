@@ -19,7 +19,7 @@ from chute_ros.runtime.topics import SafetyTold
 from chute_ros.tools.flight_story import DECISION, tell
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, files_of, read
-from chute_ros.tools.recording_options import complain, recording_options
+from chute_ros.tools.recording_options import complain, recording_options, write
 from chute_ros.tools.replay_picture import vehicle_curves
 from chute_ros.tools.replaying import Replayer
 from chute_ros.tools.report_page import page
@@ -51,11 +51,7 @@ def main() -> None:
 def _report(paths: list[Path], output: Path | None) -> Path:
     files = files_of(paths)
     path = output or files[0].with_name(f"{files[0].name}.html")
-    text = report(files)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ChuteError(f"{path}: {error.strerror or error}") from None
+    write(path, report(files))
     return path
 
 

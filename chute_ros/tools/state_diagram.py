@@ -5,23 +5,19 @@ With --check it only names the files that are out of date.
 
 from __future__ import annotations
 
-import argparse
 import enum
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeVar
 
 from chute_ros.supervisor import lease, machine
 from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.pages import table, write_or_check
 from chute_ros.tools.state_drawing import drawing
 
 _State = TypeVar("_State", bound=enum.Enum)
 _Event = TypeVar("_Event", bound=enum.Enum)
 TEXT, PICTURE = Path("docs/reference/states.md"), Path("docs/reference/states.svg")
-#: Stages that are meant never to be left, or never to be reached from STARTUP: none is.
-MAY_BE_FINAL: frozenset[Stage] = frozenset()
-MAY_BE_UNREACHED: frozenset[Stage] = frozenset()
 
 _HEAD = """\
 # States
@@ -49,41 +45,19 @@ def states_text() -> str:
         _HEAD,
         _mermaid(machine.TRANSITIONS, first=Stage.STARTUP.name),
         _table(machine.Stage, machine.Event, machine.TRANSITIONS),
-        _meanings(machine.Event, "event"),
+        _meanings(machine.Event),
         _LEASE,
         _mermaid(lease.TRANSITIONS),
         _table(lease.Role, lease.Event, lease.TRANSITIONS),
-        _meanings(lease.Event, "event"),
+        _meanings(lease.Event),
     ]
     return "\n".join(parts)
 
 
-def unreached(transitions: Mapping[tuple[Stage, machine.Event], Stage]) -> set[Stage]:
-    """The stages to which nothing leads from STARTUP."""
-    reached, new = {Stage.STARTUP}, {Stage.STARTUP}
-    while new:
-        new = {after for (before, _), after in transitions.items() if before in new} - reached
-        reached |= new
-    return set(Stage) - reached
-
-
-def never_left(transitions: Mapping[tuple[Stage, machine.Event], Stage]) -> set[Stage]:
-    """The stages from which nothing leads to another."""
-    return set(Stage) - {before for (before, _), after in transitions.items() if after != before}
-
-
 def main() -> None:
-    """Write, or check, the files of the repository in the present folder."""
-    options = argparse.ArgumentParser("state_diagram", description=__doc__)
-    options.add_argument("--check", action="store_true", help="write nothing")
-    check = options.parse_args().check
+    """Write, or check, both."""
     texts = {TEXT: states_text(), PICTURE: drawing()}
-    old = [str(p) for p, text in texts.items() if not p.is_file() or p.read_text() != text]
-    if check and old:
-        sys.exit(f"out of date: {', '.join(old)}; run: make docs")
-    if not check:
-        for path, text in texts.items():
-            path.write_text(text)
+    write_or_check("state_diagram", __doc__, lambda: texts)
 
 
 def _mermaid(transitions: Mapping[tuple[_State, _Event], _State], first: str = "") -> str:
@@ -102,19 +76,15 @@ def _table(
     transitions: Mapping[tuple[_State, _Event], _State],
 ) -> str:
     """One row an event, one column a state; a dash: the pair is not listed."""
-    names = [state.name for state in states]
-    lines = [f"| | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
+    rows = []
     for event in events:
         after = [transitions.get((state, event)) for state in states]
-        cells = [one.name if one is not None else "-" for one in after]
-        lines.append(f"| {event.name} | {' | '.join(cells)} |")
-    return "\n".join([*lines, ""])
+        rows.append((event.name, *(one.name if one is not None else "-" for one in after)))
+    return table(("", *(state.name for state in states)), rows) + "\n"
 
 
-def _meanings(events: type[_Event], what: str) -> str:
-    lines = [f"| {what} | meaning |", "|---|---|"]
-    lines += [f"| {one.name} | {one.value} |" for one in events]
-    return "\n".join([*lines, ""])
+def _meanings(events: type[_Event]) -> str:
+    return table(("event", "meaning"), [(one.name, one.value) for one in events]) + "\n"
 
 
 if __name__ == "__main__":

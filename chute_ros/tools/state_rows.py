@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.model import Action, LinkState
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.timeline_rows import LINK_TONES, STAGE_TONES, Band, Level, Row, Segment
+from chute_ros.tools.timeline_rows import (
+    ACTION_TONES,
+    LINK_TONES,
+    STAGE_TONES,
+    Band,
+    Level,
+    Row,
+    Segment,
+)
 
 #: Each with its time, s from the start.
 States = list[tuple[float, Any]]
@@ -41,7 +49,9 @@ def state_rows(states: States) -> list[Row]:
     if not states:
         return []
     rows: list[Row] = [
-        Band("state", _segments((at, *_stage(one.state)) for at, one in states)),
+        Band(
+            "state", _segments((at, *_named(Stage, one.state, STAGE_TONES)) for at, one in states)
+        ),
     ]
     if any(one.mode for _, one in states):
         rows.append(Band("mode", _segments((at, *_mode(one.mode)) for at, one in states)))
@@ -62,7 +72,7 @@ def rules_of(states: States) -> list[RuleTold]:
         for rule in getattr(state, "rules", ()):
             told = found.get(rule.name)
             if told is None:
-                action = _name(Action, rule.action)
+                action, _ = _named(Action, rule.action, ACTION_TONES)
                 told = RuleTold(rule.name, action, tuple(rule.conditions), rule.hold)
                 found[rule.name] = told
             told.alive = told.alive or rule.alive
@@ -114,27 +124,19 @@ def _link(states: States, link: str) -> Iterable[tuple[float, str, str]]:
         if number == LinkState.OK and not healthy:
             yield at, "OK, DEVICE NOT HEALTHY", "warn"
         else:
-            tone = LINK_TONES[LinkState(number)] if number in _numbers(LinkState) else "quiet"
-            yield at, _name(LinkState, number), tone
-
-
-def _stage(number: int) -> tuple[str, str]:
-    tone = STAGE_TONES.get(Stage(number), "quiet") if number in _numbers(Stage) else "quiet"
-    return _name(Stage, number), tone
+            yield at, *_named(LinkState, number, LINK_TONES)
 
 
 def _mode(number: int) -> tuple[str, str]:
-    return _name(Mode, number), "plain" if number == Mode.ACTIVE else "warn"
+    return _named(Mode, number, {})[0], "plain" if number == Mode.ACTIVE else "warn"
 
 
 def _block(state: Any) -> tuple[str, str]:
     return ("BLOCKED", "warn") if state.flight_blocked else ("free", "good")
 
 
-def _numbers(kind: Any) -> set[int]:
-    return {int(one) for one in kind}
-
-
-def _name(kind: Any, number: int) -> str:
-    """A number of another version than ours has no name."""
-    return str(kind(number).name) if number in _numbers(kind) else f"number {number}"
+def _named(kind: Any, number: int, tones: Mapping[Any, str]) -> tuple[str, str]:
+    """Its name and its tone; a number of another version than ours has neither."""
+    if number not in {int(one) for one in kind}:
+        return f"number {number}", "quiet"
+    return kind(number).name, tones.get(kind(number), "quiet")

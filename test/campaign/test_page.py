@@ -5,8 +5,8 @@ from __future__ import annotations
 from chute_ros.campaign.campaign import Line, Tally
 from chute_ros.campaign.checkpoint import tally_of, text_of
 from chute_ros.campaign.judge import Count
-from chute_ros.campaign.page import page
 from chute_ros.campaign.scenario import Failure
+from chute_ros.tools.campaign_page import page
 
 PICTURES = {"delays": "d.svg", "heights": "h.svg"}
 

@@ -9,10 +9,11 @@ from collections.abc import Mapping
 
 from chute_ros.campaign.campaign import Tally
 from chute_ros.campaign.judge import WRONG, Count
-from chute_ros.campaign.picture import groups_of
 from chute_ros.campaign.rare import OfEach
 from chute_ros.campaign.scenario import MOST_FAULTS
 from chute_ros.protocol.vehicle_merge import FRESH
+from chute_ros.tools.campaign_picture import groups_of
+from chute_ros.tools.pages import table
 
 #: So many wrong flights are named, and so many causes.
 _MOST_NAMED = 50
@@ -93,11 +94,11 @@ def page(
         *_wrong(tally),
         *_not_told(tally),
         *_powerless(tally),
-        *("", "## Faults", "", "| fault | drawn |", "|---|---|"),
-        *(f"| {kind} | {number} |" for kind, number in sorted(tally.faults.items())),
+        *("", "## Faults", ""),
+        table(("fault", "drawn"), [(kind, str(n)) for kind, n in sorted(tally.faults.items())]),
         *("", "## From the failure to the release", ""),
         *(f"![delays]({pictures['delays']})", "", f"![heights]({pictures['heights']})", ""),
-        *_delays(tally),
+        _delays(tally),
     ]
     return "\n".join(lines) + "\n"
 
@@ -105,21 +106,22 @@ def page(
 def _counts(tally: Tally) -> list[str]:
     columns = sorted({(profile, vehicle) for vehicle, profile, _ in tally.by_vehicle})
     names = [v if v == p else f"{v}, {p}" for p, v in columns]
-    lines = [f"| counted as | {' | '.join(names)} | all |", "|---" * (len(names) + 2) + "|"]
+    rows = []
     for count in Count:
         numbers = [str(tally.by_vehicle[v, p, count]) for p, v in columns]
-        lines.append(f"| {count.value} | {' | '.join(numbers)} | {tally.counts[count]} |")
-    return [*lines, "", f"{sum(tally.counts[one] for one in WRONG)} of them are wrong."]
+        rows.append((count.value, *numbers, str(tally.counts[count])))
+    wrong = sum(tally.counts[one] for one in WRONG)
+    return [table(("counted as", *names, "all"), rows), "", f"{wrong} of them are wrong."]
 
 
 def _wrong(tally: Tally) -> list[str]:
     if not tally.wrong:
         return []
-    lines = ["", "| seed | vehicle | what failed | counted as |", "|---|---|---|---|"]
+    rows = []
     for line in tally.wrong[:_MOST_NAMED]:
         who, what = f"{line.vehicle}, {line.profile}", f"{line.count.name}: {line.why}"
-        lines.append(f"| {line.seed} | {who} | {line.failure} | {what} |")
-    return lines
+        rows.append((str(line.seed), who, line.failure, what))
+    return ["", table(("seed", "vehicle", "what failed", "counted as"), rows)]
 
 
 def _not_told(tally: Tally) -> list[str]:
@@ -128,9 +130,9 @@ def _not_told(tally: Tally) -> list[str]:
     # In the order of their numbers, and then of the alphabet: the same for the same seed.
     causes = sorted(tally.reasons.items(), key=lambda one: (-one[1], one[0]))
     rest = Counter(dict(causes[_MOST_NAMED:])).total()
-    lines = ["", "## Not told", "", "| why | flights |", "|---|---|"]
-    lines += [f"| {why} | {number} |" for why, number in causes[:_MOST_NAMED]]
-    return [*lines, *([f"| other sets of the same causes | {rest} |"] if rest else [])]
+    named = [*causes[:_MOST_NAMED], *([("other sets of the same causes", rest)] if rest else [])]
+    rows = [(why, str(number)) for why, number in named]
+    return ["", "## Not told", "", table(("why", "flights"), rows)]
 
 
 def _powerless(tally: Tally) -> list[str]:
@@ -139,25 +141,22 @@ def _powerless(tally: Tally) -> list[str]:
         return []
     counts = [one for one in Count if any(key[1] is one for key in tally.powerless)]
     names = [one.value.partition(":")[0] for one in counts]
-    lines = ["", "## Autopilot without power", ""]
-    lines += [f"| besides it | {' | '.join(names)} |", "|---" * (len(names) + 1) + "|"]
-    for second in sorted({key[0] for key in tally.powerless}):
-        numbers = [str(tally.powerless[second, one]) for one in counts]
-        lines.append(f"| {second or 'nothing'} | {' | '.join(numbers)} |")
-    return lines
-
-
-def _delays(tally: Tally) -> list[str]:
-    lines = [
-        "| vehicle | flights | median | 99th percentile | largest | height lost: median | most |",
-        "|---|---|---|---|---|---|---|",
+    rows = [
+        (second or "nothing", *(str(tally.powerless[second, one]) for one in counts))
+        for second in sorted({key[0] for key in tally.powerless})
     ]
+    return ["", "## Autopilot without power", "", table(("besides it", *names), rows)]
+
+
+def _delays(tally: Tally) -> str:
+    head = ("vehicle", "flights", "median", "99th percentile", "largest")
+    rows = []
     for name, some in groups_of(tally.lines).items():
         delays = sorted(line.release_delay for line in some)
         lost = sorted(line.height_lost for line in some)
         high = delays[math.ceil(0.99 * len(delays)) - 1]
-        lines.append(
-            f"| {name} | {len(some)} | {statistics.median(delays):.2f} s | {high:.2f} s | "
-            f"{delays[-1]:.2f} s | {statistics.median(lost):.1f} m | {lost[-1]:.1f} m |"
-        )
-    return lines
+        times = (statistics.median(delays), high, delays[-1])
+        heights = (statistics.median(lost), lost[-1])
+        told = (*(f"{one:.2f} s" for one in times), *(f"{one:.1f} m" for one in heights))
+        rows.append((name, str(len(some)), *told))
+    return table((*head, "height lost: median", "most"), rows)
