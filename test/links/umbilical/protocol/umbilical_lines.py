@@ -6,6 +6,7 @@ from pathlib import Path
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.protocol.layouts import Record
+from chute_ros.links.umbilical.protocol.stream import DumpBytes
 
 FOLDER = Path(__file__).parents[4] / "msg_defs" / "telem"
 
@@ -118,3 +119,19 @@ def as_rust_prints(value, kind):
 def as_f32(value):
     """The 32-bit float next to a value."""
     return struct.unpack("f", struct.pack("f", value))[0]
+
+
+#: What the dumps of flash begin and end with.
+BEGIN_CSV, END_CSV = b"--- BEGIN FLASH CSV DUMP ---\n", b"--- END FLASH CSV DUMP ---\n"
+BEGIN, END = b"--- BEGIN FLASH BINARY DUMP ---\n", b"--- END FLASH BINARY DUMP ---\n"
+
+
+def joined(items):
+    """What a stream gave, neighbouring bytes of a dump as one."""
+    found = []
+    for item in items:
+        if found and isinstance(item, DumpBytes) and isinstance(found[-1], DumpBytes):
+            found[-1] = DumpBytes(found[-1].data + item.data)
+        else:
+            found.append(item)
+    return found
