@@ -42,14 +42,12 @@ def plane(armed=False):
 def flying(make, *settings, **config):
     """An autopilot that has told its settings, armed and flies."""
     bench = Bench(**config).hear(PILOT, make(False), *settings)
-    bench.at(0.5).hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR))
-    bench.at(1.0).clear()
+    bench.at(0.5).hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR)).at(1.0).clear()
     return bench
 
 
 def kill(bench):
-    bench.link.kill(1, bench.now)
-    bench.collect()
+    bench.call("kill", 1)
 
 
 def ways(bench):
@@ -86,9 +84,7 @@ def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
     kill(bench)
     bench.at(1.1).hear(PILOT, ack(DISARM, NOT_NOW))
     assert ways(bench) == [(0.0, DISARM)]
-    bench.at(1.15)
-    bench.link.deploy(2, False, bench.now)
-    bench.collect()
+    bench.at(1.15).call("deploy", 2, False)
     assert (0.15, TERMINATE) in ways(bench), "without waiting for anything more"
     bench.hear(PILOT, ack(TERMINATE)).at(1.2).hear(
         PILOT, copter(True, d.MAV_STATE_FLIGHT_TERMINATION)
@@ -100,8 +96,7 @@ def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
 
 
 def test_a_deploy_of_the_flight_before_allows_nothing_in_this_one():
-    bench = flying(copter).hear(CHUTE, heartbeat(), status())
-    bench.link.deploy(2, False, bench.now)
+    bench = flying(copter).hear(CHUTE, heartbeat(), status()).call("deploy", 2, False)
     bench.hear(PILOT, copter(False)).at(1.5).hear(PILOT, copter(True))
     kill(bench)
     bench.at(1.6).hear(PILOT, ack(DISARM, NOT_NOW)).at(2.0)
@@ -110,8 +105,7 @@ def test_a_deploy_of_the_flight_before_allows_nothing_in_this_one():
 
 def test_flight_termination_is_the_first_way_on_px4_once_a_deploy_was_decided():
     bench = flying(copter, kill_method=KillMethod.FLIGHT_TERMINATION)
-    bench.hear(CHUTE, heartbeat(), status())
-    bench.link.deploy(2, False, bench.now)
+    bench.hear(CHUTE, heartbeat(), status()).call("deploy", 2, False)
     kill(bench)
     assert ways(bench) == [(0.0, TERMINATE)]
 
@@ -143,8 +137,7 @@ def test_a_way_without_an_answer_is_followed_by_the_other_and_not_given_up():
 def test_an_accepted_way_without_effect_is_followed_by_the_other():
     bench = flying(ardupilot, setting("AFS_ENABLE", 0))
     kill(bench)
-    bench.at(1.02).hear(PILOT, ack(DISARM))
-    bench.stream(3.0, 0.1, PILOT, lambda: ardupilot(True))
+    bench.at(1.02).hear(PILOT, ack(DISARM)).stream(3.0, 0.1, PILOT, lambda: ardupilot(True))
     first = next(t for t, way in ways(bench) if way == TERMINATE)
     assert first == pytest.approx(1.52, abs=0.11)
 
@@ -315,9 +308,8 @@ def test_a_motor_that_was_off_already_is_confirmed_by_the_heartbeat_after_the_de
     ],
 )
 def test_a_deploy_over_motors_that_turn_says_so(beats, warned):
-    bench = Bench().hear(CHUTE, heartbeat(), status(armed=12)).hear(PILOT, *beats)
-    bench.at(0.5)
-    bench.link.deploy(1, False, bench.now)
+    bench = Bench().hear(CHUTE, heartbeat(), status(armed=12)).hear(PILOT, *beats).at(0.5)
+    bench.call("deploy", 1, False)
     bench.at(0.6).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
     assert bench.end(1).finished.success
     assert ("WARNING: autopilot 1/1" in bench.end(1).finished.message) is warned
@@ -326,6 +318,6 @@ def test_a_deploy_over_motors_that_turn_says_so(beats, warned):
 def test_an_autopilot_that_fell_silent_says_nothing_of_the_motors():
     bench = Bench().hear(PILOT, copter(True)).at(4.0).hear(CHUTE, heartbeat(), status(armed=12))
     assert bench.link.vehicle_state(bench.now).armed is Armed.ARMED
-    bench.link.deploy(1, False, bench.now)
+    bench.call("deploy", 1, False)
     bench.at(4.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
     assert "WARNING" not in bench.end(1).finished.message

@@ -70,8 +70,7 @@ def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
     bench = Bench().hear(PILOT, copter()).hear(CHUTE, status())
     assert bench.link.has_parachute()
     assert bench.link.chosen_parachute() is None, "its link is its heartbeats"
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench.call("deploy", 1, False)
     (order,) = bench.commands(RELEASE)
     assert (order.target_system, order.target_component) == CHUTE
     bench.at(0.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
@@ -108,8 +107,7 @@ def test_but_not_in_doubt(others, first):
         bench.hear(ids, message)
     if first:
         bench.hear(CHUTE, status())
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench.call("deploy", 1, False)
     assert all((o.target_system, o.target_component) == (1, 200) for o in bench.commands(RELEASE))
 
 
@@ -269,9 +267,7 @@ def grounded(armed=True, **config):
 
 
 def test_block_undoes_arming_on_the_ground():
-    bench = grounded(armed=False)
-    bench.link.flight_block("parachute lost", bench.now)
-    bench.collect()
+    bench = grounded(armed=False).call("flight_block", "parachute lost")
     assert bench.commands() == []
     bench.at(0.5).hear(PILOT, landed(), copter(armed=True))
     (order,) = bench.commands(DISARM)
@@ -288,30 +284,25 @@ def test_block_undoes_arming_on_the_ground():
 
 
 def test_block_that_comes_after_arming_undoes_it_at_once():
-    bench = grounded()
-    bench.link.flight_block("x", bench.now)
-    bench.collect()
+    bench = grounded().call("flight_block", "x")
     assert len(bench.commands(DISARM)) == 1
 
 
 @pytest.mark.parametrize("where", [0, 2, 3, 4])
 def test_block_never_disarms_off_the_ground_or_where_that_is_not_known(where):
-    bench = Bench().hear(PILOT, copter(armed=True), landed(where))
-    bench.link.flight_block("x", bench.now)
+    bench = Bench().hear(PILOT, copter(armed=True), landed(where)).call("flight_block", "x")
     bench.stream(10.0, 0.5, PILOT, lambda: copter(armed=True))
     assert bench.commands(DISARM) == []
 
 
 def test_block_does_not_believe_an_old_word_of_standing_on_the_ground():
-    bench = grounded(armed=False).stream(3.0, 0.5, PILOT, copter)
-    bench.link.flight_block("x", bench.now)
+    bench = grounded(armed=False).stream(3.0, 0.5, PILOT, copter).call("flight_block", "x")
     bench.stream(6.0, 0.5, PILOT, lambda: copter(armed=True))
     assert bench.commands(DISARM) == []
 
 
 def test_block_switched_off_by_parameter():
-    bench = grounded(disarm_when_blocked=False)
-    bench.link.flight_block("x", bench.now)
+    bench = grounded(disarm_when_blocked=False).call("flight_block", "x")
     bench.at(1.0).hear(PILOT, copter(armed=True))
     assert bench.commands() == []
     assert bench.texts() == ["x: flight blocked"]
@@ -321,11 +312,10 @@ def test_block_switched_off_by_parameter():
     "end", [pytest.param("release", id="block released"), pytest.param("air", id="took off")]
 )
 def test_disarm_that_lost_its_reason_is_not_sent_again(end):
-    bench = grounded()
-    bench.link.flight_block("x", bench.now)
+    bench = grounded().call("flight_block", "x")
     bench.at(0.1).hear(PILOT, ack(DISARM, d.MAV_RESULT_TEMPORARILY_REJECTED))
     if end == "release":
-        bench.link.flight_block("", bench.now)
+        bench.call("flight_block", "")
     else:
         bench.hear(PILOT, landed(2))
     bench.stream(8.0, 0.1, PILOT, lambda: copter(armed=True))
@@ -334,12 +324,10 @@ def test_disarm_that_lost_its_reason_is_not_sent_again(end):
 
 
 def test_autopilot_that_refuses_for_ever_makes_no_storm():
-    bench = grounded()
-    bench.link.flight_block("x", bench.now)
+    bench = grounded().call("flight_block", "x")
     for tenth in range(1, 101):
         bench.at(tenth / 10).hear(PILOT, landed(), copter(armed=True))
-        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_DENIED))
-        bench.link.flight_block("x", bench.now)
+        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_DENIED)).call("flight_block", "x")
     assert 3 <= len(bench.commands(DISARM)) <= 10.0 / DISARM_INTERVAL + 1
     assert len(bench.notices()) == 1
     assert len(bench.texts()) == 2

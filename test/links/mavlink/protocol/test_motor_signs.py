@@ -52,9 +52,7 @@ SIGNS = [
 
 @pytest.mark.parametrize("sign", SIGNS)
 def test_a_sign_after_the_acceptance_confirms_the_kill(sign):
-    bench = flying()
-    bench.link.kill(1, bench.now)
-    bench.at(1.02).hear(PILOT, ack(DISARM))
+    bench = flying().call("kill", 1).at(1.02).hear(PILOT, ack(DISARM))
     assert bench.ends(1) == []
     bench.at(1.05).hear(PILOT, sign)
     assert bench.end(1).finished.success
@@ -62,24 +60,20 @@ def test_a_sign_after_the_acceptance_confirms_the_kill(sign):
 
 @pytest.mark.parametrize("sign", SIGNS)
 def test_a_sign_without_an_acceptance_confirms_nothing(sign):
-    bench = flying()
-    bench.link.kill(1, bench.now)
+    bench = flying().call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED), sign)
     assert bench.ends(1) == []
 
 
 @pytest.mark.parametrize("sign", SIGNS)
 def test_a_sign_from_before_the_order_confirms_nothing(sign):
-    bench = flying().hear(PILOT, sign)
-    bench.link.kill(1, bench.now)
-    bench.at(1.02).hear(PILOT, ack(DISARM))
+    bench = flying().hear(PILOT, sign).call("kill", 1).at(1.02).hear(PILOT, ack(DISARM))
     bench.at(1.05).hear(PILOT, ardupilot(True))
     assert bench.ends(1) == []
 
 
 def test_one_of_eight_motors_that_turns_is_enough():
-    bench = flying().hear(PILOT, esc_status(4000, 0, 0, 0, index=4))
-    bench.link.kill(1, bench.now)
+    bench = flying().hear(PILOT, esc_status(4000, 0, 0, 0, index=4)).call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, esc_status(0, 0, 0, 0))
     assert bench.ends(1) == []
     bench.at(1.07).hear(PILOT, esc_status(0, 0, 0, 0, index=4))
@@ -87,8 +81,7 @@ def test_one_of_eight_motors_that_turns_is_enough():
 
 
 def test_a_glider_with_its_motor_off_and_armed_confirms_nothing():
-    bench = flying().hear(PILOT, OFF)
-    bench.link.kill(1, bench.now)
+    bench = flying().hear(PILOT, OFF).call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
     assert bench.ends(1) == []
 
@@ -97,14 +90,12 @@ def test_a_glider_with_its_motor_off_and_armed_confirms_nothing():
     "newest", [outputs(1000, 1200, 1500), outputs(0, 0, 0)], ids=["one turns", "nothing known"]
 )
 def test_outputs_that_show_no_standstill_confirm_nothing(newest):
-    bench = flying()
-    bench.link.kill(1, bench.now)
+    bench = flying().call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, newest)
     assert (bench.ends(1) == []) is (newest is not None and newest.servo2_raw > 0)
 
 
 def test_outputs_of_an_autopilot_that_was_never_seen_disarmed_confirm_nothing():
-    bench = Bench().hear(PILOT, ardupilot(True), DRIVEN).at(1.0)
-    bench.link.kill(1, bench.now)
+    bench = Bench().hear(PILOT, ardupilot(True), DRIVEN).at(1.0).call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
     assert bench.ends(1) == []

@@ -65,8 +65,7 @@ def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
     bench = Bench().hear(PARACHUTE, status())
     assert bench.link.chosen_parachute() is None
     assert bench.events == []
-    bench.link.arm(1, True, 0, bench.now)
-    bench.collect()
+    bench.call("arm", 1, True, 0)
     assert "no parachute was received on this link" in bench.end(1).finished.message
     assert bench.commands() == []
 
@@ -85,9 +84,7 @@ def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
     ],
 )
 def test_connection_MAV_CMD_REQUEST_MESSAGE_512_of(message_id, answer):  # noqa: N802
-    bench = ready().at(1.0)
-    bench.link.request_message(7, message_id, "", bench.now)
-    bench.collect()
+    bench = ready().at(1.0).call("request_message", 7, message_id, "")
     (order,) = bench.commands()
     assert (order.command, order.param1) == (512, message_id)
     assert (order.target_system, order.target_component) == PARACHUTE
@@ -132,9 +129,7 @@ def on_the_wire(bench):
 
 def test_SET_PARACHUTE_ARM_worked_example():  # noqa: N802
     """ATS and FC are armed, MANUAL and GEOFENCE disarmed; bit 3 is left alone."""
-    bench = ready()
-    bench.link.set_triggers(3, 0b00000110, 0b00010111, "", bench.now)
-    bench.collect()
+    bench = ready().call("set_triggers", 3, 0b00000110, 0b00010111, "")
     assert on_the_wire(bench) == (0b00000110, 0b00010111)
     bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=0b00001110))
     assert bench.end(3).finished.success
@@ -145,9 +140,7 @@ def test_SET_PARACHUTE_ARM_worked_example():  # noqa: N802
 @pytest.mark.parametrize("flag", list(TriggerFlags), ids=lambda flag: flag.name)
 @pytest.mark.parametrize("arm", [True, False], ids=["1_arms", "0_disarms"])
 def test_SET_PARACHUTE_ARM_single_source(flag, arm):  # noqa: N802
-    bench = ready()
-    bench.link.set_triggers(3, int(flag) if arm else 0, int(flag), "", bench.now)
-    bench.collect()
+    bench = ready().call("set_triggers", 3, int(flag) if arm else 0, int(flag), "")
     assert on_the_wire(bench) == (int(flag) if arm else 0, int(flag))
     others = 0xFF & ~int(flag)
     shown = others | (int(flag) if arm else 0)
@@ -156,9 +149,7 @@ def test_SET_PARACHUTE_ARM_single_source(flag, arm):  # noqa: N802
 
 
 def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: N802
-    bench = ready()
-    bench.link.set_triggers(3, 4, 4, "", bench.now)
-    bench.at(0.1).hear(PARACHUTE, ack(225))
+    bench = ready().call("set_triggers", 3, 4, 4, "").at(0.1).hear(PARACHUTE, ack(225))
     boot = iter(range(5100, 9000, 100))
     bench.stream(5.5, 0.5, PARACHUTE, lambda: status(boot_ms=next(boot), armed=0))
     end = bench.end(3).finished
@@ -167,9 +158,7 @@ def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: 
 
 
 def test_SET_PARACHUTE_ARM_bit_beyond_128_is_the_devices_to_deny():  # noqa: N802
-    bench = ready()
-    bench.link.arm(3, True, 256, bench.now)
-    bench.collect()
+    bench = ready().call("arm", 3, True, 256)
     assert on_the_wire(bench) == (256, 256)
     bench.hear(PARACHUTE, ack(225, d.MAV_RESULT_DENIED))
     assert bench.end(3).finished.result == d.MAV_RESULT_DENIED
@@ -177,9 +166,7 @@ def test_SET_PARACHUTE_ARM_bit_beyond_128_is_the_devices_to_deny():  # noqa: N80
 
 @pytest.mark.parametrize(("arm", "select"), [(0, 0), (1, 2**24), (2**32 - 1, 1), (-1, 1)])
 def test_SET_PARACHUTE_ARM_mask_that_a_param_cannot_hold_is_not_sent(arm, select):  # noqa: N802
-    bench = ready()
-    bench.link.set_triggers(3, arm, select, "", bench.now)
-    bench.collect()
+    bench = ready().call("set_triggers", 3, arm, select, "")
     assert not bench.end(3).finished.success
     assert bench.commands() == []
 
@@ -195,9 +182,7 @@ def test_STATUS_stream_nominally_1_Hz_is_watched():  # noqa: N802
 
 
 def test_STATUS_rate_by_MAV_CMD_SET_MESSAGE_INTERVAL_511_and_read_back():  # noqa: N802
-    bench = ready()
-    bench.link.set_message_interval(4, 430, 500_000, "", bench.now)
-    bench.collect()
+    bench = ready().call("set_message_interval", 4, 430, 500_000, "")
     (order,) = bench.commands(511)
     assert (order.param1, order.param2) == (430, 500_000)
     bench.at(0.1).hear(PARACHUTE, ack(511))
@@ -223,9 +208,7 @@ def test_STATUS_rate_by_MAV_CMD_SET_MESSAGE_INTERVAL_511_and_read_back():  # noq
     ],
 )
 def test_MAV_CMD_DO_PARACHUTE_208(action, param1):  # noqa: N802
-    bench = ready()
-    bench.link.parachute_action(5, getattr(d, action), "", bench.now)
-    bench.collect()
+    bench = ready().call("parachute_action", 5, getattr(d, action), "")
     (order,) = bench.commands()
     assert (order.command, order.param1) == (208, param1)
     bench.hear(PARACHUTE, ack(208))
@@ -248,8 +231,7 @@ def test_MAV_CMD_DO_PARACHUTE_208(action, param1):  # noqa: N802
 def test_kill(method, number, params):
     bench = Bench(kill_method=method).hear((1, 1), ardupilot(armed=True))
     bench.hear((1, 1), setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42))
-    bench.link.kill(6, bench.now)
-    bench.collect()
+    bench.call("kill", 6)
     (order,) = bench.commands()
     assert (order.command, order.param1, order.param2) == (number, *params)
     assert (order.target_system, order.target_component) == (1, 1)

@@ -13,8 +13,7 @@ SERVICE, TRIGGER, LAUNCH = (
 
 
 def deploy(story, force=False, token=1, node_id=0):
-    story.link.deploy(token, force, story.now, node_id)
-    return story.step()
+    return story.call("deploy", token, force, node_id=node_id)
 
 
 def armed(story):
@@ -49,11 +48,9 @@ def test_forced_deploy_works_on_the_ground_where_a_plain_one_does_not(bench):
 
 
 def test_deploy_through_the_service_is_the_same(bench):
-    story = bench().in_flight()
-    story.link.service(1, "TYPE_DEPLOY", 0, story.now)
+    story = bench().in_flight().call("service", 1, "TYPE_DEPLOY", 0)
     assert story.after(2.0).end(1).success
-    story = bench().ready()
-    story.link.service(1, "TYPE_DEPLOY_FORCE", 33, story.now)
+    story = bench().ready().call("service", 1, "TYPE_DEPLOY_FORCE", 33)
     assert story.after(2.0).end(1).success
 
 
@@ -150,8 +147,7 @@ def test_acknowledged_deploy_that_is_never_shown_is_a_failure_that_says_so(bench
 
 
 def test_answer_to_another_request_is_no_answer_to_a_deploy(bench):
-    story = armed(bench("").status("READY"))
-    story.link.service(2, "TYPE_DISARM", 33, story.now)
+    story = armed(bench("").status("READY")).call("service", 2, "TYPE_DISARM", 33)
     (disarm,) = story.step().requests(SERVICE)
     deploy(story).answer_result(disarm, "REJECTED")
     assert fired_at(story.at(1.3))
@@ -249,9 +245,7 @@ def test_refusal_that_comes_after_the_call_was_given_up_counts(bench):
 
 
 def test_refusal_of_one_deploy_says_nothing_of_another(bench):
-    story = deploy(armed(bench("")), True)
-    story.link.deploy(2, False, story.now)
-    story.step()
+    story = deploy(armed(bench("")), True).call("deploy", 2, False)
     plain = [
         one
         for one in story.requests(SERVICE)
@@ -407,8 +401,7 @@ def test_deploy_need_not_wait_once_a_controller_or_a_trigger_was_heard(bench, ty
 
 
 def fire(story, token=1):
-    story.link.fire_triggers(token, story.now)
-    return story.step()
+    return story.call("fire_triggers", token)
 
 
 def test_triggers_are_fired_past_a_controller_that_is_well(bench):
@@ -467,8 +460,7 @@ def test_without_controller_the_trigger_is_the_parachute_whoever_else_speaks(ben
 
 
 def test_what_makes_it_less_ready_gives_way_to_the_triggers(bench):
-    story = armed(bench(""))
-    story.link.service(2, "TYPE_DISARM", 0, story.now)
+    story = armed(bench("")).call("service", 2, "TYPE_DISARM", 0)
     fire(story.step())
     assert "given up: a release was ordered" in story.end(2).message
 
@@ -489,16 +481,14 @@ def test_a_deploy_that_is_overdue_when_the_triggers_are_ordered_goes_on_as_well(
 
 @pytest.mark.parametrize("type_name", ["TYPE_DISARM", "TYPE_LAND"])
 def test_nothing_makes_the_parachute_less_ready_during_a_deploy(bench, type_name):
-    story = deploy(armed(bench("")))
-    story.link.service(2, type_name, 0, story.now)
+    story = deploy(armed(bench(""))).call("service", 2, type_name, 0)
     assert "a deploy is under way" in story.step().end(2).message
     assert len(story.requests(SERVICE)) == 1
 
 
 @pytest.mark.parametrize("type_name", ["TYPE_DISARM", "TYPE_LAND"])
 def test_what_makes_it_less_ready_gives_way_to_a_deploy(bench, type_name):
-    story = armed(bench(""))
-    story.link.service(2, type_name, 0, story.now)
+    story = armed(bench("")).call("service", 2, type_name, 0)
     deploy(story.step())
     assert not story.end(2).success
     assert "given up: a release was ordered" in story.end(2).message

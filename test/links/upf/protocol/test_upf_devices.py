@@ -311,7 +311,7 @@ def test_trigger_that_is_silent_is_no_healthy_parachute(bench):
 def test_stray_controller_does_not_take_the_place_of_the_trigger(bench):
     story = bench("", without_controller=True).trigger_status().status("ARMED")
     assert story.link.devices.picture(story.now).device == "34"
-    story.link.deploy(1, False, story.now)
+    story.call("deploy", 1, False)
     assert story.step().requests("flyfire.TriggerService")
     assert not story.requests("flyfire.ParachuteService")
 

@@ -91,8 +91,7 @@ def test_first_is_believed_when_the_controller_says_so_after_it(bench):
     story.status("LAUNCHED")
     assert story.link.devices.triggers[34].launched
     assert story.notices()[-1] == "trigger 34 has fired"
-    story.link.fire_triggers(1, story.now)
-    story.step()
+    story.call("fire_triggers", 1)
     assert story.end(1).success
     assert story.requests("flyfire.TriggerService") == []
 
@@ -113,8 +112,7 @@ def test_one_of_several_controllers_does_not_speak_for_a_trigger(bench):
 
 @pytest.mark.parametrize("config", [{}, {"without_controller": True}])
 def test_second_is_believed_when_a_deploy_is_under_way(bench, config):
-    story = flying(bench, **config)
-    story.link.deploy(1, False, story.now)
+    story = flying(bench, **config).call("deploy", 1, False)
     story.after(0.05).trigger_status("LAUNCHED")
     assert story.ends(1) == []
     assert not story.picture().deployed
@@ -128,9 +126,7 @@ def test_second_is_believed_when_a_deploy_is_under_way(bench, config):
 @pytest.mark.parametrize("config", [{}, {"without_controller": True}])
 def test_one_damaged_status_after_an_order_does_not_end_it(bench, config):
     """Given an order that was lost on its way."""
-    story = flying(bench, **config)
-    story.link.deploy(1, True, story.now)
-    story.clear()
+    story = flying(bench, **config).call("deploy", 1, True).clear()
     damaged(story.after(0.02)).after(0.1).trigger_status()
     story.after(0.3)
     assert story.ends(1) == []
@@ -144,8 +140,7 @@ def test_one_damaged_status_after_an_order_does_not_end_it(bench, config):
 def test_damage_before_an_order_keeps_nothing_from_being_sent(bench, config):
     story = flying(bench, **config)
     damaged(story)
-    story.link.deploy(1, False, story.now)
-    story.step()
+    story.call("deploy", 1, False)
     assert story.requests("flyfire.ParachuteService") or story.requests("flyfire.TriggerService")
     assert story.ends(1) == []
     assert story.after(0.05).trigger_status("LAUNCHED").end(1).success

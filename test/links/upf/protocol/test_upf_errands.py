@@ -15,7 +15,7 @@ def parameter(name, union, **more):
 
 
 def set_it(story, name, text, force=False, node_id=0, token=1):
-    story.link.set_parameter(token, node_id, name, text, force, story.now)
+    story.call("set_parameter", token, node_id, name, text, force)
     return story.after(0.5)
 
 
@@ -25,7 +25,7 @@ def set_it(story, name, text, force=False, node_id=0, token=1):
 @pytest.mark.parametrize("name", list(p.BY_NAME))
 def test_each_parameter_of_the_document_can_be_read(bench, name):
     story = bench().ready()
-    story.link.errand(1, 0, lambda node_id: errands.get_parameter(node_id, name), story.now)
+    story.call("errand", 1, 0, lambda node_id: errands.get_parameter(node_id, name))
     done = story.after(0.5).errand(1)
     known = p.words(story.controller.values[name])
     assert done.success
@@ -46,7 +46,7 @@ def test_each_parameter_of_the_document_can_be_set_and_is_read_back(bench, one):
 
 def test_parameter_that_the_device_does_not_have_is_said_with_the_known_ones(bench):
     story = bench().ready()
-    story.link.errand(1, 0, lambda one: errands.get_parameter(one, "Enable Music"), story.now)
+    story.call("errand", 1, 0, lambda one: errands.get_parameter(one, "Enable Music"))
     set_it(story, "Enable Music", "true", token=2)
     for token in (1, 2):
         done = story.errand(token)
@@ -59,7 +59,7 @@ def test_parameter_that_the_device_does_not_have_is_said_with_the_known_ones(ben
 def test_name_that_no_parameter_can_have_is_refused_before_anything_is_sent(bench, name):
     """An empty one asks by index: it would set whatever comes first, the node id."""
     story = bench().ready()
-    story.link.errand(1, 0, lambda node_id: errands.get_parameter(node_id, name), story.now)
+    story.call("errand", 1, 0, lambda node_id: errands.get_parameter(node_id, name))
     set_it(story, name, "50", token=2)
     assert "need 1 to 92 bytes" in story.errand(1).message
     assert "need 1 to 92 bytes" in story.errand(2).message
@@ -90,7 +90,7 @@ def test_value_that_does_not_fit_is_refused_before_it_is_sent(bench, name, text,
 
 def test_limits_of_the_document_count_where_the_device_has_none(bench):
     story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, p.STATIC_NODE_ID, "126", False, story.now)
+    story.call("set_parameter", 1, 33, p.STATIC_NODE_ID, "126", False)
     (question,) = story.step().requests(GET_SET)
     story.answer_values(question, parameter(p.STATIC_NODE_ID, {"integer_value": 33}), 33)
     assert "need 0 to 125" in story.errand(1).message
@@ -98,7 +98,7 @@ def test_limits_of_the_document_count_where_the_device_has_none(bench):
 
 def test_number_of_a_device_with_its_own_range(bench):
     story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, "Gain", "2.5", False, story.now)
+    story.call("set_parameter", 1, 33, "Gain", "2.5", False)
     limits = {"min_value": {"real_value": 0.0}, "max_value": {"real_value": 2.0}}
     (question,) = story.step().requests(GET_SET)
     story.answer_values(question, parameter("Gain", {"real_value": 1.0}, **limits), 33)
@@ -112,7 +112,7 @@ def test_number_of_a_device_with_its_own_range(bench):
 
 def test_device_that_answers_for_another_parameter_has_none_of_this_name(bench):
     story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    story.call("set_parameter", 1, 33, p.LIGHT, "true", False)
     (question,) = story.step().requests(GET_SET)
     story.answer_values(question, parameter("Enable Music", {"boolean_value": 0}), 33)
     assert "no parameter 'Enable Light'" in story.errand(1).message
@@ -120,7 +120,7 @@ def test_device_that_answers_for_another_parameter_has_none_of_this_name(bench):
 
 def test_device_that_does_not_take_a_value_is_believed(bench):
     story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    story.call("set_parameter", 1, 33, p.LIGHT, "true", False)
     for _ in range(3):
         off = parameter(p.LIGHT, {"boolean_value": 0})
         story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
@@ -131,8 +131,7 @@ def test_device_that_does_not_take_a_value_is_believed(bench):
 def test_device_that_answers_late_is_asked_again_and_heard(bench):
     story = bench().ready()
     story.controller.mute = True
-    story.link.set_parameter(1, 33, p.LIGHT, "false", False, story.now)
-    story.after(0.4)
+    story.call("set_parameter", 1, 33, p.LIGHT, "false", False).after(0.4)
     story.controller.mute = False
     assert story.after(1.0).errand(1).success
 
@@ -149,8 +148,7 @@ def test_device_that_falls_silent_on_the_way_leaves_what_is_not_known_open(bench
     story = bench("").status("READY")
     controller = story.link.devices.controllers[33]
     controller.parameters[p.LIGHT] = False
-    story.after(1.0).clear()
-    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    story.after(1.0).clear().call("set_parameter", 1, 33, p.LIGHT, "true", False)
     for _ in range(answered):
         off = parameter(p.LIGHT, {"boolean_value": 0})
         story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
@@ -162,7 +160,7 @@ def test_device_that_falls_silent_on_the_way_leaves_what_is_not_known_open(bench
 
 def test_text_parameter(bench):
     story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, "Owner", "us", False, story.now)
+    story.call("set_parameter", 1, 33, "Owner", "us", False)
     for now_is in (b"them", b"us", b"us"):
         answer = parameter("Owner", {"string_value": now_is})
         story.answer_values(story.step().requests(GET_SET)[-1], answer, 33)
@@ -183,17 +181,15 @@ def test_value_is_not_kept_where_auto_save_is_off(bench):
     assert done.message == (
         "Enable Light is false; lost at a restart until ~/save_params: Enable Auto-Save is off"
     )
-    story.link.errand(2, 0, errands.restart, story.now)
-    story.after(1.0)
+    story.call("errand", 2, 0, errands.restart).after(1.0)
     assert story.controller.values[p.LIGHT] is True
 
 
 def test_value_that_was_saved_survives(bench):
     story = set_it(bench(parameters={p.AUTO_SAVE: False}).ready(), p.LIGHT, "false")
-    story.link.errand(2, 0, lambda one: errands.execute_opcode(one, 0), story.now)
+    story.call("errand", 2, 0, lambda one: errands.execute_opcode(one, 0))
     assert story.after(0.5).errand(2).message == "save: done"
-    story.link.errand(3, 0, errands.restart, story.now)
-    story.after(1.0)
+    story.call("errand", 3, 0, errands.restart).after(1.0)
     assert story.controller.values[p.LIGHT] is False
 
 
@@ -222,8 +218,7 @@ def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
         "Static Node ID is 0; takes effect at the next start "
         "(0: requests a node id at each start); kept"
     )
-    story.link.errand(2, 33, errands.restart, story.now)
-    story.after(6.0)
+    story.call("errand", 2, 33, errands.restart).after(6.0)
     (given,) = [node_id for node_id in story.link.devices.controllers if node_id != 33]
     assert story.controller.node_id == given
     assert 1 <= given <= 125
@@ -233,8 +228,7 @@ def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
 
 
 def test_list_has_all_twelve(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, errands.list_parameters, story.now)
+    story = bench().ready().call("errand", 1, 0, errands.list_parameters)
     done = story.after(0.5).errand(1)
     assert (done.success, done.message) == (True, "12 parameters")
     assert [one.name for one in done.parameters] == list(p.BY_NAME)
@@ -247,8 +241,7 @@ def test_list_is_read_from_a_new_controller_unasked(bench):
 
 
 def test_list_of_a_device_that_falls_silent_tells_how_far_it_came(bench):
-    story = bench("").trigger_status().clear()
-    story.link.errand(1, 0, errands.list_parameters, story.now)
+    story = bench("").trigger_status().clear().call("errand", 1, 0, errands.list_parameters)
     story.answer_values(
         story.step().requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 34
     )
@@ -259,8 +252,7 @@ def test_list_of_a_device_that_falls_silent_tells_how_far_it_came(bench):
 
 
 def test_list_that_never_ends_is_ended(bench):
-    story = bench("").trigger_status().clear()
-    story.link.errand(1, 0, errands.list_parameters, story.now)
+    story = bench("").trigger_status().clear().call("errand", 1, 0, errands.list_parameters)
     for _ in range(errands.MOST_PARAMETERS):
         story.answer_values(
             story.step().requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 34
@@ -304,9 +296,9 @@ def test_list_of_a_controller_that_never_ends_is_not_begun_again(bench):
 
 def test_erased_parameters_are_those_of_delivery_after_a_restart(bench):
     story = set_it(bench().ready(), p.LIGHT, "false")
-    story.link.disturb(2, 0, False, lambda one: errands.execute_opcode(one, 1), story.now)
+    story.call("disturb", 2, 0, False, lambda one: errands.execute_opcode(one, 1))
     assert story.after(0.5).errand(2).message == "erase: done"
-    story.link.disturb(3, 0, False, errands.restart, story.now)
+    story.call("disturb", 3, 0, False, errands.restart)
     done = story.after(3.0).errand(3)
     assert (done.success, done.message) == (True, "restart: the device answered that it will")
     assert story.controller.values[p.LIGHT] is True
@@ -316,8 +308,7 @@ def test_erased_parameters_are_those_of_delivery_after_a_restart(bench):
 
 
 def test_restart_carries_the_magic_number_of_its_type(bench):
-    story = bench("").status("READY").clear()
-    story.link.errand(1, 0, errands.restart, story.now)
+    story = bench("").status("READY").clear().call("errand", 1, 0, errands.restart)
     (request,) = story.step().requests(errands.RESTART_NODE)
     assert request.values == {"magic_number": 0xACCE551B1E}
     story.answer_values(request, {"ok": False}, 33)
@@ -325,8 +316,7 @@ def test_restart_carries_the_magic_number_of_its_type(bench):
 
 
 def test_opcode_that_the_device_refuses(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, lambda one: errands.execute_opcode(one, 7), story.now)
+    story = bench().ready().call("errand", 1, 0, lambda one: errands.execute_opcode(one, 7))
     done = story.after(0.5).errand(1)
     assert done.message == "erase: the device answered: not done"
     assert not done.success
@@ -343,26 +333,22 @@ def test_opcode_that_the_device_refuses(bench):
     ],
 )
 def test_device_that_does_not_answer_ends_the_errand(bench, make, what):
-    story = bench("").status("READY").after(3.0).clear()
-    story.link.errand(1, 33, make, story.now)
+    story = bench("").status("READY").after(3.0).clear().call("errand", 1, 33, make)
     done = story.after(2.0).errand(1)
     assert not done.success
     assert done.message.startswith(f"{what}: no acknowledgement after 3 sends")
 
 
 def test_node_information_and_statistics(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, errands.node_info, story.now)
-    story.link.errand(2, 34, errands.transport_stats, story.now)
-    story.after(0.5)
+    story = bench().ready().call("errand", 1, 0, errands.node_info)
+    story.call("errand", 2, 34, errands.transport_stats).after(0.5)
     assert bytes(story.errand(1).values["name"]) == b"upf.controller"
     assert story.errand(2).values["transfers_tx"] > 0
     assert story.errand(2).node_id == 34
 
 
 def test_errand_goes_to_the_trigger_where_there_is_no_controller(bench):
-    story = bench("trigger").ready()
-    story.link.errand(1, 0, errands.node_info, story.now)
+    story = bench("trigger").ready().call("errand", 1, 0, errands.node_info)
     assert bytes(story.after(0.5).errand(1).values["name"]) == b"upf.trigger"
 
 
@@ -370,8 +356,7 @@ def test_errand_goes_to_the_trigger_where_there_is_no_controller(bench):
     ("node_id", "why"), [(0, "no UPF device was received"), (128, "there is no node id 128")]
 )
 def test_errand_without_a_device_ends_at_once(bench, node_id, why):
-    story = bench("")
-    story.link.errand(1, node_id, errands.node_info, story.now)
+    story = bench("").call("errand", 1, node_id, errands.node_info)
     done = story.step().errand(1)
     assert not done.success
     assert done.message == f"{why} on this link; name a node id from 1 to 127"
@@ -403,8 +388,7 @@ def test_protection_is_switched_off_in_the_air_by_force_and_said_loudly(bench, n
 def test_protection_is_switched_off_on_the_ground_and_on_anywhere(bench, name):
     story = set_it(bench().ready(), name, "false")
     assert story.errand(1).success
-    story.link.vehicle(flying(), story.now)
-    story.clear()
+    story.call("vehicle", flying()).clear()
     assert set_it(story, name, "true", token=2).errand(2).success
     assert not story.notices()
 
@@ -413,11 +397,10 @@ def test_protection_is_switched_off_on_the_ground_and_on_anywhere(bench, name):
     "make", [errands.restart, lambda one: errands.execute_opcode(one, errands.OPCODE_ERASE)]
 )
 def test_device_is_not_taken_away_in_the_air_unless_forced(bench, make):
-    story = bench("").status("ARMED").clear()
-    story.link.disturb(1, 0, False, make, story.now)
+    story = bench("").status("ARMED").clear().call("disturb", 1, 0, False, make)
     assert "refused while the vehicle is in the air" in story.step().errand(1).message
     assert not story.requests(OPCODE) + story.requests(errands.RESTART_NODE)
-    story.link.disturb(2, 0, True, make, story.now)
+    story.call("disturb", 2, 0, True, make)
     assert story.step().requests(OPCODE) + story.requests(errands.RESTART_NODE)
 
 
@@ -431,9 +414,9 @@ def test_vehicle_is_in_the_air_by_its_own_word_or_the_controllers(bench):
         (landed(armed=flying().armed), True),
     ]
     for state, in_air in said:
-        story.link.vehicle(state, story.now)
+        story.call("vehicle", state)
         assert story.link.in_air(story.now) is in_air
-    story.link.vehicle(landed(), story.now)
+    story.call("vehicle", landed())
     assert not story.link.in_air(story.now)
     assert story.link.in_air(story.now + 1.1)  # nobody says any more that it is on the ground
 

@@ -22,15 +22,13 @@ def standing_at(story: Bench, state: str) -> Bench:
     story.ready()
     way = {"READY": [], "TAKEOFF": ["TYPE_TAKEOFF"], "ARMED": ["TYPE_TAKEOFF", "TYPE_ARM"]}[state]
     for name in way:
-        story.link.service(-50, name, 0, story.now)
-        story.after(0.3)
+        story.call("service", -50, name, 0).after(0.3)
     assert story.controller.state.name == state
     return story.clear()
 
 
 def ask(story, type_name, token=1, node_id=0):
-    story.link.service(token, type_name, node_id, story.now)
-    return story.step()
+    return story.call("service", token, type_name, node_id)
 
 
 @EACH
@@ -195,8 +193,7 @@ def test_request_that_the_document_does_not_know_is_the_callers_mistake(bench, t
 
 
 def arm(story, on=True, token=1, triggers=0):
-    story.link.arm(token, on, triggers, story.now)
-    return story.step()
+    return story.call("arm", token, on, triggers)
 
 
 @pytest.mark.parametrize("on", [True, False])

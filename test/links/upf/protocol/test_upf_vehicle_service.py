@@ -33,7 +33,7 @@ def test_kill_is_answered_with_success_once_the_motors_are_off(alone):
     story = alone().ask(KILL)
     assert story.asked() == [("KILL", "33")]
     assert story.at(0.3).answers() == []
-    story.link.kill_confirmed(story.now)
+    story.call("kill_confirmed")
     assert story.step().answers() == ["SUCCESS"]
     assert story.link.vehicle_service.newest_answer == "TYPE_KILLSWITCH of 33: SUCCESS"
     assert story.at(5.0).answers() == ["SUCCESS"]
@@ -43,7 +43,7 @@ def test_a_kill_that_a_decided_deploy_has_waited_for_is_not_waited_for_again(alo
     """Given a kill that nobody confirms; then the deploy is decided all the same."""
     story = alone().ask(KILL).at(0.3)
     assert story.answers() == []
-    story.link.kill_waited_for(story.now)
+    story.call("kill_waited_for")
     assert story.at(0.34).answers() == []
     assert story.at(0.36).answers() == [failed(story)]
     story.ask(KILL, number=1).at(0.42)
@@ -53,24 +53,20 @@ def test_a_kill_that_a_decided_deploy_has_waited_for_is_not_waited_for_again(alo
 
 def test_one_that_was_confirmed_all_the_same_has_happened(alone):
     """Given the word that the motors are off a little behind the deploy that rests on it."""
-    story = alone().ask(KILL)
-    story.link.kill_waited_for(story.now)
+    story = alone().ask(KILL).call("kill_waited_for")
     story.at(0.03).link.kill_confirmed(story.now)
     assert story.step().answers() == ["SUCCESS"]
     assert story.ask(KILL, number=1).step().answers() == ["SUCCESS"] * 2
 
 
 def test_a_kill_long_after_the_deploy_is_another_one(alone):
-    story = alone()
-    story.link.kill_waited_for(story.now)
-    story.at(5.1).ask(KILL).step()
+    story = alone().call("kill_waited_for").at(5.1).ask(KILL).step()
     assert story.answers() == []
     assert story.at(6.0).answers() == [failed(story)]
 
 
 def test_a_flight_block_is_waited_for_also_after_a_deploy(alone):
-    story = alone()
-    story.link.kill_waited_for(story.now)
+    story = alone().call("kill_waited_for")
     assert story.ask(BLOCK).step().answers() == []
 
 
@@ -78,7 +74,7 @@ def test_kill_that_does_not_happen_is_answered_with_a_failure_in_time(alone):
     story = alone().ask(KILL).at(0.79)
     assert story.answers() == []
     assert story.at(0.81).answers() == [failed(story)]
-    story.link.kill_confirmed(story.now)
+    story.call("kill_confirmed")
     assert story.step().answers() == [failed(story)]
     assert story.link.counts["KILL not done in time"] == 1
 
@@ -90,8 +86,7 @@ def test_limit_of_an_answer_is_a_parameter(alone):
 
 
 def test_kill_of_a_moment_ago_answers_a_request_that_comes_after_it(alone):
-    story = alone()
-    story.link.kill_confirmed(story.now)
+    story = alone().call("kill_confirmed")
     assert story.at(KILL_MEMORY - 0.1).ask(KILL).answers() == ["SUCCESS"]
     assert story.at(KILL_MEMORY + 0.1).ask(KILL, number=1).at(9.0).answers() == [
         "SUCCESS",
@@ -100,9 +95,7 @@ def test_kill_of_a_moment_ago_answers_a_request_that_comes_after_it(alone):
 
 
 def test_vehicle_that_is_armed_again_has_forgotten_the_kill(alone):
-    story = alone()
-    story.link.vehicle(flying(), story.now)
-    story.link.kill_confirmed(story.now)
+    story = alone().call("vehicle", flying()).call("kill_confirmed")
     story.at(0.5).link.vehicle(flying(armed_age=0.6), story.now)  # said before the kill
     assert story.ask(KILL, number=1).answers() == ["SUCCESS"]
     story.at(1.0).link.vehicle(landed(), story.now)
@@ -112,8 +105,7 @@ def test_vehicle_that_is_armed_again_has_forgotten_the_kill(alone):
 
 
 def test_every_repetition_of_a_kill_is_answered(alone):
-    story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1)
-    story.link.kill_confirmed(story.now)
+    story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1).call("kill_confirmed")
     assert story.step().answers() == ["SUCCESS"] * 2
     assert set(story.asked()) == {("KILL", "33")}
 
@@ -122,8 +114,7 @@ def test_kill_that_waits_is_asked_for_again_until_it_is_answered(alone):
     """A supervisor that has just started has not heard the first."""
     story = alone().ask(KILL).at(0.5)
     assert len(story.asked()) == 3
-    story.link.kill_confirmed(story.now)
-    story.at(3.0)
+    story.call("kill_confirmed").at(3.0)
     assert len(story.asked()) == 3
 
 
@@ -135,13 +126,10 @@ def test_nodes_that_are_not_our_controller_are_rejected_and_counted(alone):
 
 
 def test_block_of_a_device_that_is_gone_does_not_outlive_a_reset_of_the_supervisor(alone):
-    story = alone().ask(BLOCK)
-    story.link.supervisor_said(True, {"33"}, story.now)
-    story.at(20.0)
+    story = alone().ask(BLOCK).call("supervisor_said", True, {"33"}).at(20.0)
     asked = len(story.asked())
     story.link.supervisor_said(False, set(), story.now)  # reset by a person
-    story.at(30.0)
-    story.link.supervisor_said(False, set(), story.now)
+    story.at(30.0).call("supervisor_said", False, set())
     assert len(story.asked()) == asked
 
 
@@ -155,7 +143,7 @@ def test_block_is_answered_once_the_supervisor_says_so_for_this_device(alone):
     assert story.step().answers() == []
     story.link.supervisor_said(False, {"33"}, story.now)  # known, but not in force
     assert story.step().answers() == []
-    story.link.supervisor_said(True, {"33"}, story.now)
+    story.call("supervisor_said", True, {"33"})
     assert story.step().answers() == ["SUCCESS"]
 
 
@@ -165,12 +153,11 @@ def test_block_that_does_not_happen_is_answered_with_a_failure(alone):
 
 
 def test_release_is_answered_once_the_supervisor_has_let_go(alone):
-    story = alone().ask(BLOCK)
-    story.link.supervisor_said(True, {"33"}, story.now)
+    story = alone().ask(BLOCK).call("supervisor_said", True, {"33"})
     story.at(1.0).ask(RELEASE, number=1)
     assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
     assert story.answers() == ["SUCCESS"]
-    story.link.supervisor_said(False, set(), story.now)
+    story.call("supervisor_said", False, set())
     assert story.step().answers() == ["SUCCESS"] * 2
 
 
@@ -208,8 +195,7 @@ def test_block_from_before_we_started_stands_until_its_device_says_something(alo
 
 
 def test_block_from_before_we_started_ends_when_its_device_is_ready(alone):
-    story = alone().status("READY")
-    story.link.supervisor_said(True, {"33"}, story.now)
+    story = alone().status("READY").call("supervisor_said", True, {"33"})
     assert story.step().asked() == [("FLIGHT_BLOCK_RELEASE", "33")]
 
 
@@ -257,7 +243,7 @@ def test_late_repetition_of_a_block_does_not_stay_when_the_state_is_ready(alone)
 def test_request_that_the_state_has_said_before_is_not_passed_on_twice(alone):
     story = alone().status("NOT_READY").ask(BLOCK)
     assert story.asked() == [("FLIGHT_BLOCK", "33")]
-    story.link.supervisor_said(True, {"33"}, story.now)
+    story.call("supervisor_said", True, {"33"})
     assert story.step().answers() == ["SUCCESS"]
 
 
@@ -291,8 +277,7 @@ def test_policy_reject_answers_at_once_and_tells_nobody(alone, type_name):
 
 @pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
 def test_policy_forward_passes_it_on_and_waits(alone, type_name):
-    story = alone().ask(BLOCK)
-    story.link.supervisor_said(True, {"33"}, story.now)
+    story = alone().ask(BLOCK).call("supervisor_said", True, {"33"})
     story.at(1.0).clear().ask(type_name, number=5)
     if type_name == BLOCK:
         assert story.answers() == ["SUCCESS"]  # it stands
@@ -341,7 +326,7 @@ def test_flood_of_requests_is_bounded_and_answered(alone):
     assert story.answers() == [failed(story)] * (100 - MOST_PENDING)
     assert story.link.counts["requests refused: too many at once"] == 100 - MOST_PENDING
     assert len(story.asked()) == 100  # the supervisor hears of each all the same
-    story.link.kill_confirmed(story.now)
+    story.call("kill_confirmed")
     assert story.step().answers().count("SUCCESS") == MOST_PENDING
 
 

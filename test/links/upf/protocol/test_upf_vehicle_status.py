@@ -20,7 +20,7 @@ KINDS = [
 def told(story, state=None, passed=0.0):
     """The VehicleStatus that follows; state as its name, empty: not known."""
     if state is not None:
-        story.link.vehicle(state, story.now)
+        story.call("vehicle", state)
     story.after(passed).clear().after(0.11)
     values = story.messages(VEHICLE_STATUS)[-1]
     name = story.definitions.state_name(VEHICLE_STATUS, values)
@@ -28,8 +28,7 @@ def told(story, state=None, passed=0.0):
 
 
 def test_it_is_sent_ten_times_a_second(bench):
-    story = bench("").step()
-    story.link.vehicle(flying(), story.now)
+    story = bench("").step().call("vehicle", flying())
     assert 99 <= len(story.clear().at(10.0).messages(VEHICLE_STATUS)) <= 101
 
 
@@ -147,8 +146,7 @@ def test_nothing_is_said_while_a_whole_number_cannot_hold_what_is_not_known(chan
 
 
 def test_types_without_a_state_still_tell_the_rest(changed):
-    story = changed(("uint3 state ", "uint3 other_state "))
-    story.link.vehicle(flying(), story.now)
+    story = changed(("uint3 state ", "uint3 other_state ")).call("vehicle", flying())
     (values,) = story.step().messages(VEHICLE_STATUS)[-1:]
     assert "state" not in values
     assert values["height_of_home"] == 50.0
