@@ -92,6 +92,26 @@ Event = (
 )
 
 
+class EventLog:
+    """What happened, until the owner takes it."""
+
+    def __init__(self) -> None:
+        self._events: list[Any] = []
+
+    def notice(self, severity: Severity, text: str) -> None:
+        """Put a notice among the events."""
+        self._events.append(Notice(severity, text))
+
+    def link_changed(self, name: str, changes: list[LinkChange]) -> None:
+        """So the link of the device with this name changed."""
+        self._events += [DeviceLinkChanged(name, change) for change in changes]
+
+    def take_events(self) -> list[Any]:
+        """New events, oldest first; each is handed out once."""
+        events, self._events = self._events, []
+        return events
+
+
 def ended(
     token: int, outcome: Outcome, text: str, sent: bool = False, shown: bool = False
 ) -> tuple[RequestReport, RequestFinished]:

@@ -79,10 +79,6 @@ class Answer(Protocol):
         """What came of it, in words."""
 
 
-def _nothing_else() -> None:
-    """A goal without another way."""
-
-
 @dataclass(frozen=True)
 class ConfirmedCommand(Generic[CommandT]):
     """What to send and how to see that it worked.
@@ -122,7 +118,7 @@ class ConfirmedCommand(Generic[CommandT]):
     hint: Callable[[], str] = str
     remark: Callable[[], str] = str
     looks: tuple[float, ...] = (0.0,)
-    otherwise: Callable[[], ConfirmedCommand[CommandT] | None] = _nothing_else
+    otherwise: Callable[[], ConfirmedCommand[CommandT] | None] = lambda: None
     patience: float = math.inf
 
 

@@ -131,6 +131,41 @@ class Liveness:
         return [LinkChange(before, self.state, now, silence)]
 
 
+class DeviceTracker:
+    """A device with a heartbeat, or the like, and a status message of its own. timeout: the newest
+    status is overdue when it is older, though the link may live, s."""
+
+    def __init__(self, limits: LivenessLimits, timeout: float) -> None:
+        self.liveness = Liveness(limits)
+        self.status_received = math.nan
+        self.status_interval = math.nan  # s, between the two newest
+        self._timeout = timeout
+        self._overdue = False
+
+    def status_came(self, now: float) -> None:
+        """Its newest status."""
+        self.status_interval, self.status_received = now - self.status_received, now
+        self._overdue = False
+
+    def overdue(self, now: float) -> bool:
+        """The newest status is too old: the stream stopped."""
+        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
+        return now >= self.status_received + self._timeout
+
+    def update(self, now: float) -> tuple[list[LinkChange], bool]:
+        """Look at the clock: (what changed of the link, whether the picture changed)."""
+        changes = self.liveness.update(now)
+        before, self._overdue = self._overdue, self.overdue(now)
+        return changes, bool(changes) or self._overdue != before
+
+    def next_deadline(self) -> float:
+        """When the picture changes by itself; infinity: never."""
+        overdue = self.status_received + self._timeout
+        if self._overdue or math.isnan(overdue):
+            overdue = math.inf
+        return min(self.liveness.next_deadline(), overdue)
+
+
 class Followed(Protocol):
     """A device whose link is followed."""
 

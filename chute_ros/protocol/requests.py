@@ -8,7 +8,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from chute_ros.model import Outcome
 from chute_ros.protocol.effect import EffectLoop
-from chute_ros.protocol.events import Event, RequestFinished, RequestReport, ended
+from chute_ros.protocol.events import EventLog, RequestFinished, RequestReport, ended
 from chute_ros.protocol.goal import ConfirmedCommand, EffectFinished, EffectLimits
 
 
@@ -95,17 +95,17 @@ class _Running:
         return "; ".join([f"{end.goal.name}: {end.finished.message}", *others])
 
 
-class Requests(Generic[TransactionsT]):
+class Requests(EventLog, Generic[TransactionsT]):
     """Each request has a token of its owner's and ends in exactly one RequestFinished."""
 
     def __init__(self, commands: TransactionsT, limits: EffectLimits) -> None:
+        super().__init__()
         self.commands = commands
         self._limits = limits
         self._running: dict[int, _Running] = {}
         #: Number of each command under way -> the loop that it is for.
         self._owners: dict[int, EffectLoop[Any]] = {}
         self._last_number = 0
-        self._events: list[Event] = []
 
     def __contains__(self, token: int) -> bool:
         return token in self._running
@@ -215,11 +215,6 @@ class Requests(Generic[TransactionsT]):
             if isinstance(event, RequestFinished) and event.finished.token in tokens:
                 failed = replace(event.finished, success=False, message=why, sent=False)
                 self._events[at] = replace(event, finished=failed)
-
-    def take_events(self) -> list[Event]:
-        """Reports and ends, oldest first; each is handed out once."""
-        events, self._events = self._events, []
-        return events
 
     def _number(self) -> int:
         self._last_number += 1

@@ -45,7 +45,10 @@ def parse_can_address(text: str, bitrate: int = 0) -> CanAddress:
         number = _number(bus, 255, "bus", text)
         at = _port(port, text) if colon else MULTICAST_PORT
         return CanAddress(interface, str(number), at, bitrate)
-    known = _python_can_interfaces()
+    # Here: a bus over mcast does not wait for the import (0.2 s).
+    import can
+
+    known = can.VALID_INTERFACES
     if interface not in known:
         raise ParameterError(
             f"connection {text!r}: {interface!r} is no interface: need mcast or one of "
@@ -85,13 +88,6 @@ def _group_and_port(channel: str, whole: str) -> tuple[str, int]:
         f"connection {whole!r}: {channel!r} is no multicast address, with a port or without, such "
         f"as 239.74.163.2:43113 or ff15::1: need {CAN_FORMS}"
     )
-
-
-def _python_can_interfaces() -> frozenset[str]:
-    # Here: a bus over mcast does not wait for the import (0.2 s).
-    import can
-
-    return frozenset(can.VALID_INTERFACES)
 
 
 def _is_group(text: str) -> bool:

@@ -19,18 +19,16 @@ from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Hashable
 
-from chute_ros.protocol.dronecan.can_frame import pack, unpack
+from chute_ros.protocol.dronecan.can_frame import LAYOUT, MOST_DATA, pack, unpack
 from chute_ros.transport.can_address import CanAddress
+from chute_ros.transport.udp import received
 
 _GROUP = "239.65.82."
 _MAGIC, _FLAG_FD = 0x2934, 0x0001
 _HEAD, _BODY = struct.Struct("<HH"), struct.Struct("<HI")
-_FRAME = struct.Struct("<IB3x8s")
 _CRC_START = 0xFFFF
-_MOST_DATA, _MOST_DATA_FD = 8, 64
+_MOST_DATA_FD = 64
 _LARGEST = _HEAD.size + _BODY.size + _MOST_DATA_FD
-#: Packets taken at once, so that a flood cannot keep the loop from its deadlines.
-_BURST = 64
 _LOOPBACK, _BY_ROUTE = (socket.inet_aton(host) for host in ("127.0.0.1", "0.0.0.0"))
 
 
@@ -101,11 +99,7 @@ class CanMulticastWire:
     def read(self, file: int) -> list[tuple[bytes, Hashable]]:
         assert self._receiver is not None
         frames: list[tuple[bytes, Hashable]] = []
-        for _ in range(_BURST):
-            try:
-                packet, sender = self._receiver.recvfrom(_LARGEST + 1)
-            except BlockingIOError:
-                break
+        for packet, sender in received(self._receiver, _LARGEST + 1):
             if sender == self._own_name:
                 continue  # a bus does not hear itself
             frame = self._frame(packet, sender[0])
@@ -115,7 +109,7 @@ class CanMulticastWire:
 
     def write(self, data: bytes) -> None:
         assert self._sender is not None
-        identifier, length, payload = _FRAME.unpack(data)
+        identifier, length, payload = LAYOUT.unpack(data)
         body = _BODY.pack(0, identifier) + payload[:length]
         self._sender.send(_HEAD.pack(_MAGIC, crc_hqx(body, _CRC_START)) + body)
 
@@ -140,9 +134,9 @@ class CanMulticastWire:
         data = body[_BODY.size :]
         if flags & _FLAG_FD:
             return self._drop("CAN FD frames")
-        if len(data) > _MOST_DATA:
+        if len(data) > MOST_DATA:
             return self._drop("packets of a wrong length")
-        frame = unpack(_FRAME.pack(identifier, len(data), data))
+        frame = unpack(LAYOUT.pack(identifier, len(data), data))
         if frame is None:
             return self._drop("impossible CAN identifiers")
         if frame.error:

@@ -78,9 +78,7 @@ class WireLoop(Generic[LinkT]):
         self.late = Lateness()
         #: Nothing waited to be read, monotonic s.
         self._caught_up_at = time.monotonic()
-        self._deliver = deliver
-        self._opened = opened
-        self._not_written = not_written
+        self._deliver, self._opened, self._not_written = deliver, opened, not_written
         self._watch = WireWatch(wire, frames, deliver)
         self._calls: deque[Callable[[LinkT, float], None]] = deque()
         self._at_turns_end: deque[Callable[[LinkT, float], None]] = deque(maxlen=1)

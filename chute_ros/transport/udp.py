@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
+from typing import Any
 
 from chute_ros.transport.address import Address
 
@@ -62,11 +63,7 @@ class UdpWire:
     def read(self, file: int) -> list[tuple[bytes, Hashable]]:
         assert self._receiver is not None
         datagrams: list[tuple[bytes, Hashable]] = []
-        for _ in range(_BURST):
-            try:
-                data, peer = self._receiver.recvfrom(_LARGEST)
-            except BlockingIOError:
-                break
+        for data, peer in received(self._receiver, _LARGEST):
             datagrams.append((data, None))
             self._peers.pop(peer, None)
             self._peers[peer] = None
@@ -98,6 +95,15 @@ class UdpWire:
         if address.kind == "udppair":
             return f"{here}:{address.send_host}:{address.send_port}"
         return here
+
+
+def received(end: socket.socket, largest: int) -> Iterator[tuple[bytes, Any]]:
+    """The datagrams that have come, with their senders."""
+    for _ in range(_BURST):
+        try:
+            yield end.recvfrom(largest)
+        except BlockingIOError:
+            return
 
 
 def _resolve(host: str, port: int) -> tuple[str, int]:

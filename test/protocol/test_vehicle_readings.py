@@ -94,20 +94,16 @@ def test_attitude_in_the_axes_of_aircraft(case):
         assert -180.0 <= found <= 180.0
 
 
-@pytest.mark.parametrize("case", VERTICAL_SPEEDS)
-def test_the_bodys_velocity_is_turned_into_the_world(case):
-    orientation, velocity, upward = VERTICAL_SPEEDS[case]
-    parts = readings.odometry(odometry(orientation, velocity=velocity))
-    assert by_name(parts)["vertical_speed"] == pytest.approx(upward, abs=1e-12)
+def test_the_bodys_velocity_is_turned_into_the_world():
+    for case, (orientation, velocity, upward) in VERTICAL_SPEEDS.items():
+        known = by_name(readings.odometry(odometry(orientation, velocity=velocity)))
+        assert known["vertical_speed"] == pytest.approx(upward, abs=1e-12), case
 
 
-@pytest.mark.parametrize(
-    "orientation",
-    [(0.0, 0.0, 0.0, 0.0), (0.5, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0), (NAN, 0.0, 0.0, 0.0)],
-)
-def test_without_a_unit_quaternion_height_is_all_that_odometry_knows(orientation):
-    parts = readings.odometry(odometry(orientation, 12.5, (1.0, 2.0, 3.0)))
-    assert parts == {"height": (12.5,), "vertical_speed": None, "attitude": None}
+def test_without_a_unit_quaternion_height_is_all_that_odometry_knows():
+    for w in (0.0, 0.5, 2.0, NAN):
+        parts = readings.odometry(odometry((w, 0.0, 0.0, 0.0), 12.5, (1.0, 2.0, 3.0)))
+        assert parts == {"height": (12.5,), "vertical_speed": None, "attitude": None}, w
 
 
 def test_what_is_not_finite_is_not_known_and_the_rest_is():
@@ -134,47 +130,38 @@ def test_imu_says_with_a_covariance_of_minus_1_what_it_does_not_estimate():
     assert readings.imu(message)["attitude"] is not None
 
 
-@pytest.mark.parametrize(
-    ("armed", "connected", "parts"),
-    [
+def test_mavros_state():
+    for armed, connected, parts in (
         (True, True, {"armed": (Armed.ARMED,), "autopilot": (LinkState.OK, 4)}),
         (False, True, {"armed": (Armed.DISARMED,), "autopilot": (LinkState.OK, 4)}),
         (False, False, {"armed": None, "autopilot": (LinkState.LOST, 0)}),
-    ],
-)
-def test_mavros_state(armed, connected, parts):
-    message = SimpleNamespace(armed=armed, connected=connected, system_status=4)
-    assert readings.mavros_state(message) == parts
+    ):
+        message = SimpleNamespace(armed=armed, connected=connected, system_status=4)
+        assert readings.mavros_state(message) == parts
 
 
-@pytest.mark.parametrize(
-    ("number", "landed_state"), [*((int(s), s) for s in LandedState), (5, None), (255, None)]
-)
-def test_mavros_extended_state(number, landed_state):
-    told = readings.mavros_extended_state(SimpleNamespace(landed_state=number))
-    known = landed_state not in (None, LandedState.UNKNOWN)
-    assert told == {"landed_state": (landed_state,) if known else None}
+def test_mavros_extended_state():
+    for number, landed_state in (*((int(s), s) for s in LandedState), (5, None), (255, None)):
+        told = readings.mavros_extended_state(SimpleNamespace(landed_state=number))
+        known = landed_state not in (None, LandedState.UNKNOWN)
+        assert told == {"landed_state": (landed_state,) if known else None}, number
 
 
-@pytest.mark.parametrize(
-    ("voltage", "percentage", "wanted"),
-    [
+def test_battery():
+    for voltage, percentage, wanted in (
         (22.2, 0.5, (22.2, 0.5)),
         (22.2, -0.01, (22.2, NAN)),
         (65.535, 0.5, (NAN, 0.5)),
         (0.0, 1.0, (NAN, 1.0)),
         (NAN, NAN, None),
         (INF, 1.5, None),
-    ],
-)
-def test_battery(voltage, percentage, wanted):
-    told = readings.battery(BatteryState(voltage=voltage, percentage=percentage))["battery"]
-    assert told == (None if wanted is None else pytest.approx(wanted, nan_ok=True))
+    ):
+        told = readings.battery(BatteryState(voltage=voltage, percentage=percentage))["battery"]
+        assert told == (None if wanted is None else pytest.approx(wanted, nan_ok=True))
 
 
-@pytest.mark.parametrize(
-    ("status", "latitude", "longitude", "known"),
-    [
+def test_position():
+    for status, latitude, longitude, known in (
         (0, 47.4, 8.5, True),
         (2, -33.9, 151.2, True),
         (-1, 47.4, 8.5, False),
@@ -182,12 +169,11 @@ def test_battery(voltage, percentage, wanted):
         (0, NAN, 8.5, False),
         (0, 91.0, 8.5, False),
         (0, 47.4, -181.0, False),
-    ],
-)
-def test_position(status, latitude, longitude, known):
-    message = NavSatFix(latitude=latitude, longitude=longitude)
-    message.status.status = status
-    assert readings.position(message) == {"position": (latitude, longitude) if known else None}
+    ):
+        message = NavSatFix(latitude=latitude, longitude=longitude)
+        message.status.status = status
+        expected = {"position": (latitude, longitude) if known else None}
+        assert readings.position(message) == expected, (status, latitude, longitude)
 
 
 def test_relative_altitude_is_a_height():
@@ -207,12 +193,13 @@ def test_of_a_vehicle_state_only_what_was_received_is_known():
     assert known == {"armed", "attitude", "autopilot"}
 
 
-@pytest.mark.parametrize(
-    ("frames", "foreign"),
-    [(("map", "base_link"), ""), (("odom_ned", ""), "odom_ned"), (("", "body_frd"), "body_frd")],
-)
-def test_frames_whose_axes_point_down_are_recognised(frames, foreign):
-    assert readings.foreign_frame(*frames) == foreign
+def test_frames_whose_axes_point_down_are_recognised():
+    for frame, child, foreign in (
+        ("map", "base_link", ""),
+        ("odom_ned", "", "odom_ned"),
+        ("", "body_frd", "body_frd"),
+    ):
+        assert readings.foreign_frame(frame, child) == foreign
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi / 2, math.pi / 2), FLOATS)

@@ -62,10 +62,7 @@ class VirtualMavlink(VirtualNode):
 
     def __init__(self, bus: Bus, process: Process, ros: Ros, expect_parachute: bool) -> None:
         settings = MavlinkSettings(expect_parachute=expect_parachute)
-
-        def runtime(shell: VirtualNode) -> MavlinkRuntime:
-            return MavlinkRuntime(process.name, settings, shell)
-
+        runtime = partial(MavlinkRuntime, process.name, settings)
         super().__init__(bus, process, ros, lambda: MavlinkLink(MavlinkConfig()), runtime)
 
     def is_release(self, data: bytes) -> bool:

@@ -48,9 +48,7 @@ class VirtualRelay(VirtualNode):
             link.wire_opened(ros.world.now)
             return link
 
-        def runtime(shell: VirtualNode) -> RelayRuntime:
-            return RelayRuntime(process.name, settings, shell)
-
+        runtime = partial(RelayRuntime, process.name, settings)
         super().__init__(bus, process, ros, make_link, runtime)
 
     def is_release(self, data: bytes) -> bool:

@@ -82,11 +82,8 @@ class VirtualUmbilical(VirtualNode):
             link.wire_opened(ros.world.now)
             return link
 
-        def runtime(shell: VirtualNode) -> UmbilicalRuntime:
-            return UmbilicalRuntime(
-                process.name, UmbilicalSettings(publish_vehicle_state=True), shell
-            )
-
+        settings = UmbilicalSettings(publish_vehicle_state=True)
+        runtime = functools.partial(UmbilicalRuntime, process.name, settings)
         super().__init__(bus, process, ros, make_link, runtime)
 
     def launch(self) -> None:

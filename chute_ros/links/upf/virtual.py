@@ -72,10 +72,8 @@ class VirtualUpf(VirtualNode):
     runtime: UpfRuntime
 
     def __init__(self, bus: Bus, process: Process, ros: Ros, types: DataTypes) -> None:
-        def runtime(shell: VirtualNode) -> UpfRuntime:
-            return UpfRuntime(process.name, UpfSettings(), shell)
-
-        make_link: Callable[[], UpfLink] = lambda: UpfLink(UpfConfig(), types)  # noqa: E731
+        make_link = partial(UpfLink, UpfConfig(), types)
+        runtime = partial(UpfRuntime, process.name, UpfSettings())
         super().__init__(bus, process, ros, make_link, runtime, spoil_can)
         self._releasing = {
             *(types.request(names.PARACHUTE_SERVICE).id, types.request(names.TRIGGER_SERVICE).id)

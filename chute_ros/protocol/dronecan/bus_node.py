@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from chute_ros.errors import MessageError, ParameterError
 from chute_ros.protocol.dronecan import allocation, time_sync
-from chute_ros.protocol.dronecan.allocation import UNIQUE_ID_LENGTH, Allocator, KeepTable
+from chute_ros.protocol.dronecan.allocation import UNIQUE_ID_LENGTH, Allocator
 from chute_ros.protocol.dronecan.calls import Call, CallFinished, CallLimits, SendCall
 from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
@@ -21,7 +21,7 @@ from chute_ros.protocol.dronecan.node_monitor import NodeMonitor
 from chute_ros.protocol.dronecan.scripts import Script, Scripts
 from chute_ros.protocol.dronecan.time_sync import TimeMaster
 from chute_ros.protocol.dronecan.transfer import HIGHEST_NODE_ID, Kind
-from chute_ros.protocol.events import Notice, Severity
+from chute_ros.protocol.events import EventLog, Severity
 
 NODE_STATUS = "uavcan.protocol.NodeStatus"
 GET_NODE_INFO = "uavcan.protocol.GetNodeInfo"
@@ -67,10 +67,12 @@ class BusNodeConfig:
             raise ParameterError(f"utc_offset is {self.utc_offset}: need a number of seconds")
 
 
-class BusNode:
-    """One node; the owner feeds frames in and sends what take_output gives."""
+class BusNode(EventLog):
+    """One node; the owner feeds frames in and sends what take_output gives. Its events are notices
+    and tables to keep (KeepTable)."""
 
     def __init__(self, types: DataTypes, config: BusNodeConfig) -> None:
+        super().__init__()
         self.config = config
         self.endpoint = Endpoint(types, config.node_id)
         self.nodes = NodeMonitor()
@@ -83,7 +85,6 @@ class BusNode:
         self._alive_until = -math.inf
         self._troubles: dict[str, str] = {}
         self._ended: list[tuple[object, object]] = []
-        self._events: list[Notice | KeepTable] = []
 
     @property
     def counts(self) -> Counter[str]:
@@ -133,7 +134,8 @@ class BusNode:
             self.scripts.begin(("who is", node_id), _who_is(node_id), now)
         self._drive(now)
         self._look_for_trouble(now)
-        self._events += [Notice(Severity.ERROR, text) for text in self.nodes.take_news(now)]
+        for text in self.nodes.take_news(now):
+            self.notice(Severity.ERROR, text)
 
     def next_deadline(self) -> float:
         """When update has something to do."""
@@ -158,11 +160,6 @@ class BusNode:
         """(token, result) of the errands that ended; each is handed out once."""
         ended, self._ended = self._ended, []
         return ended
-
-    def take_events(self) -> list[Notice | KeepTable]:
-        """What happened; each is handed out once."""
-        events, self._events = self._events, []
-        return events
 
     def take_output(self) -> list[bytes]:
         """Frames to send, oldest first; each is handed out once."""
@@ -261,13 +258,13 @@ class BusNode:
         now = self.allocator.left_to
         if now and now != before:
             text = f"node {now} gives out node ids, so this node does not (parameter allocator)"
-            self._events.append(Notice(Severity.INFO, text))
+            self.notice(Severity.INFO, text)
         elif before and not now:
             text = (
                 f"node {before} no longer answers requests for a node id: this node gives "
                 "them out again"
             )
-            self._events.append(Notice(Severity.WARNING, text))
+            self.notice(Severity.WARNING, text)
 
     def _answer_allocations(self) -> None:
         for answer in self.allocator.take_answers():
@@ -279,10 +276,10 @@ class BusNode:
         now_wrong = self._find_trouble(now)
         for key, text in now_wrong.items():
             if key not in self._troubles:
-                self._events.append(Notice(Severity.ERROR, text))
+                self.notice(Severity.ERROR, text)
         for key, text in self._troubles.items():
             if key not in now_wrong:
-                self._events.append(Notice(Severity.INFO, f"resolved: {text}"))
+                self.notice(Severity.INFO, f"resolved: {text}")
         self._troubles = now_wrong
 
     def _find_trouble(self, now: float) -> dict[str, str]:

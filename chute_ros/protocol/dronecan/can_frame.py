@@ -21,8 +21,8 @@ ERROR_BUS_OFF = 0x40
 ERROR_RESTARTED = 0x100
 
 SIZE = 16
-_LAYOUT = struct.Struct("<IB3x8s")
-_MOST_DATA = 8
+LAYOUT = struct.Struct("<IB3x8s")
+MOST_DATA = 8
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class CanFrame:
         highest = EXTENDED_MASK if self.extended or self.error else STANDARD_MASK
         if not 0 <= self.identifier <= highest:
             raise MessageError(f"CAN identifier {self.identifier:#x}: need 0 to {highest:#x}")
-        if len(self.data) > _MOST_DATA:
-            raise MessageError(f"{len(self.data)} bytes of CAN data: need at most {_MOST_DATA}")
+        if len(self.data) > MOST_DATA:
+            raise MessageError(f"{len(self.data)} bytes of CAN data: need at most {MOST_DATA}")
 
 
 def pack(frame: CanFrame) -> bytes:
@@ -49,15 +49,15 @@ def pack(frame: CanFrame) -> bytes:
     identifier |= EXTENDED_FLAG if frame.extended else 0
     identifier |= REMOTE_FLAG if frame.remote else 0
     identifier |= ERROR_FLAG if frame.error else 0
-    return _LAYOUT.pack(identifier, len(frame.data), frame.data)
+    return LAYOUT.pack(identifier, len(frame.data), frame.data)
 
 
 def unpack(data: bytes) -> CanFrame | None:
     """The frame in data; None if that is none."""
     if len(data) != SIZE:
         return None
-    identifier, length, payload = _LAYOUT.unpack(data)
-    if length > _MOST_DATA:
+    identifier, length, payload = LAYOUT.unpack(data)
+    if length > MOST_DATA:
         return None
     extended, error = bool(identifier & EXTENDED_FLAG), bool(identifier & ERROR_FLAG)
     number = identifier & EXTENDED_MASK

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS
+
 #: Silent for longer is gone (uavcan.protocol.NodeStatus.OFFLINE_TIMEOUT_MS), s.
 OFFLINE_TIMEOUT = 3.0
 #: A node that does not tell who it is is asked again after this (s), and taken as it is after so
@@ -23,8 +25,6 @@ _SAME_START = 2.5
 _CONFLICT_WINDOW = 5.0
 _CONFLICT_GAPS = 2.5
 _MOST_CLOCKS = 4
-#: Transfer ids wrap around (specification).
-_TRANSFER_IDS = 32
 #: Signs and clocks that lie further apart (s) have nothing to do with each other; nor have unique
 #: ids, as a node with two is asked each second.
 _MEMORY, _UNIQUE_ID_MEMORY = 60.0, 12.0
@@ -127,7 +127,7 @@ class NodeMonitor:
         entry.heard = now
         entry.health, entry.mode = values["health"], values["mode"]
         entry.vendor_status = values["vendor_specific_status_code"]
-        backwards = 0 < (entry.transfer_id - transfer_id) % _TRANSFER_IDS < _TRANSFER_IDS // 2
+        backwards = 0 < (entry.transfer_id - transfer_id) % TRANSFER_IDS < TRANSFER_IDS // 2
         if backwards and -1 not in (entry.transfer_id, transfer_id):
             self._counts_backwards(entry, values["uptime_sec"], now)
         entry.uptime, entry.transfer_id = values["uptime_sec"], transfer_id

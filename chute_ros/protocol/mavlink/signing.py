@@ -98,9 +98,7 @@ class Signer:
     """Gives out rising time stamps for the frames that we send with key on link_id."""
 
     def __init__(self, key: bytes, clock: SigningClock, link_id: int = 0) -> None:
-        self.key = key
-        self.link_id = link_id
-        self._clock = clock
+        self.key, self.link_id, self._clock = key, link_id, clock
         #: The highest that was given out.
         self.newest = 0
 

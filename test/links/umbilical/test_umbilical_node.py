@@ -12,54 +12,44 @@ from umbilical_bench import RATE, Cable
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.protocol.layouts import Record
-from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
+from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
 from chute_ros.links.umbilical.telem_message import RENAMED, telem, without_place
 from chute_ros.model import LandedState, LinkState, ParachuteState
 
-LAYOUTS = {
+LAYOUTS = (
     "telem57_airbrake_state",
     "telem57_airbrake_deployment",
     "telem54",
     "telem52",
     "telem50",
-}
-ERROR, WARN, OK = DiagnosticStatus.ERROR, DiagnosticStatus.WARN, DiagnosticStatus.OK
+)
 
 
 @pytest.fixture(scope="module")
 def layouts(ros):
     found = {one.name: one for one in load_layouts("", "test")}
-    assert set(found) == LAYOUTS
+    assert {*found} == {*LAYOUTS}
     return found
 
 
-def each_field():
-    """(layout, field) of all layouts, by the files that were built."""
-    return [(one, field.name) for one in load_layouts("", "test") for field in one.fields]
+def told(layout, values, sequence=1):
+    return telem(Record(layout, tuple(values), 5.0), sequence, Telem().header.stamp)
 
 
-# -- umbilical/telem ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("layout", "field"), each_field(), ids=lambda one: getattr(one, "name", one)
-)
-def test_each_field_of_each_layout_is_told_under_one_name(layout, field):
-    values = [1 for _ in layout.fields]
-    values[layout.index[field]] = 0
-    message = telem(Record(layout, tuple(values), 5.0), 7, Telem().header.stamp)
-    assert getattr(message, RENAMED.get(field, field)) == 0
-    others = [RENAMED.get(name, name) for name in layout.index if name != field]
-    assert all(getattr(message, name) in (1, 0.001) for name in others)
-    assert (message.layout, message.sequence) == (layout.name, 7)
-
-
-@pytest.mark.parametrize("name", sorted(LAYOUTS))
-def test_what_a_layout_lacks_reads_as_not_there(layouts, name):
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_each_field_of_a_layout_is_told_under_one_name_and_the_others_as_not_there(layouts, name):
     layout = layouts[name]
-    message = telem(Record(layout, (1,) * layout.count, 5.0), 1, Telem().header.stamp)
-    told = {RENAMED.get(one, one) for one in layout.index} | {"header", "layout", "sequence"}
-    lacking = set(Telem.get_fields_and_field_types()) - told
+    assert without_place(layout) == []
+    names = [RENAMED.get(one, one) for one in layout.index]
+    for place, field in enumerate(names):
+        values = [1] * layout.count
+        values[place] = 0
+        message = told(layout, values, 7)
+        assert getattr(message, field) == 0
+        others = [one for one in names if one != field]
+        assert all(getattr(message, one) in (1, 0.001) for one in others), field
+        assert (message.layout, message.sequence) == (name, 7)
+    lacking = {*Telem.get_fields_and_field_types()} - {*names, "header", "layout", "sequence"}
     assert lacking, "no layout has every field"
     for one in lacking:
         value = getattr(message, one)
@@ -67,29 +57,21 @@ def test_what_a_layout_lacks_reads_as_not_there(layouts, name):
         assert math.isnan(value) if isinstance(value, float) else value == whole, one
 
 
-@pytest.mark.parametrize("name", sorted(LAYOUTS))
-def test_telem_has_a_place_for_every_field(layouts, name):
-    assert without_place(layouts[name]) == []
+ERROR, WARN, OK = DiagnosticStatus.ERROR, DiagnosticStatus.WARN, DiagnosticStatus.OK
 
 
-@pytest.mark.parametrize(
-    ("field", "value", "told"),
-    [
+def test_a_number_that_is_too_large_for_its_place_reads_as_the_largest(layouts):
+    layout = layouts["telem57_airbrake_state"]
+    for field, value, wanted in (
         ("flight_mode", 2**32 - 1, 255),
         ("flight_mode", -1, 255),
         ("num_satellites", 2**32 - 1, 32767),
         ("cmd_n1", 70_000, 32767),
         ("sv_open", -200, -128),
-    ],
-)
-def test_a_number_that_is_too_large_for_its_place_reads_as_the_largest(
-    layouts, field, value, told
-):
-    layout = layouts["telem57_airbrake_state"]
-    values = [0] * layout.count
-    values[layout.index[field]] = value
-    message = telem(Record(layout, tuple(values), 0.0), 1, Telem().header.stamp)
-    assert getattr(message, field) == told
+    ):
+        values = [0] * layout.count
+        values[layout.index[field]] = value
+        assert getattr(told(layout, values), field) == wanted, (field, value)
 
 
 @pytest.mark.parametrize("name", sorted(LAYOUTS))
@@ -122,30 +104,26 @@ def test_with_a_layout_that_was_set_no_other_is_taken(bench):
     cable.await_link(LinkState.NEVER_SEEN)
 
 
-# -- parachute/status, vehicle/state, safety/heartbeat --------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("mode", "state", "armed", "deployed"),
-    [
+def test_each_flight_mode_as_a_parachutes_state(bench):
+    cable = Cable(bench)
+    cable.plugged()
+    for mode, state, armed, deployed in (
+        ("Fault", ParachuteState.ABNORMAL, False, False),
         ("Startup", ParachuteState.READY, False, False),
         ("Standby", ParachuteState.ARMED, True, False),
         ("Ascent", ParachuteState.ARMED, True, False),
         ("Coast", ParachuteState.ARMED, True, False),
         ("DrogueDeployed", ParachuteState.LAUNCHED, True, True),
         ("MainDeployed", ParachuteState.LAUNCHED, True, True),
-        ("Fault", ParachuteState.ABNORMAL, False, False),
-    ],
-)
-def test_each_flight_mode_as_a_parachutes_state(bench, mode, state, armed, deployed):
-    cable = Cable(bench)
-    cable.plugged()
-    cable.act(f"jump={mode}")
-    bench.until(lambda: cable.statuses[-1].state == state, f"{mode} is told")
-    one = cable.statuses[-1]
-    assert (one.armed, one.deployed) == (armed, deployed)
-    assert (one.link, one.device) == ("umbilical", "flight_computer")
-    assert ("flight mode Fault" in one.faults) == (mode == "Fault")
+    ):
+        cable.act(f"jump={mode}")
+        cable.await_mode(Mode[mode])
+        cable.statuses.clear()
+        bench.until(lambda state=state: cable.statuses and cable.statuses[-1].state == state, mode)
+        one = cable.statuses[-1]
+        assert (one.armed, one.deployed) == (armed, deployed), mode
+        assert (one.link, one.device) == ("umbilical", "flight_computer")
+        assert ("flight mode Fault" in one.faults) == (mode == "Fault")
 
 
 def test_the_vehicles_state_is_told_when_asked_to(bench):
@@ -202,9 +180,6 @@ def test_a_hung_executor_is_a_silent_heartbeat(bench):
     assert len(cable.computer.heartbeats) - before <= 8
     bench.executor.add_node(cable.node)
     bench.until(lambda: cable.computer.connected, "it hears us again")
-
-
-# -- logs and diagnostics -------------------------------------------------------------------------
 
 
 def newest(diagnostics, task):

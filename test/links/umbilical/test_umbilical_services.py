@@ -26,13 +26,8 @@ SIMPLE = {
     "close_mav": ("<m>", {"mav_open": 0}),
     "open_sv": ("<S>", {"sv_open": 1}),
     "close_sv": ("<s>", {"sv_open": 0}),
-    "payload_n1": ("<1>", {"cmd_n1": 1}),
-    "payload_n2": ("<2>", {"cmd_n2": 1}),
-    "payload_n3": ("<3>", {"cmd_n3": 1}),
-    "payload_n4": ("<4>", {"cmd_n4": 1}),
-    "payload_a1": ("<A1>", {"cmd_a1": 1}),
-    "payload_a2": ("<A2>", {"cmd_a2": 1}),
-    "payload_a3": ("<A3>", {"cmd_a3": 1}),
+    **{f"payload_n{n}": (f"<{n}>", {f"cmd_n{n}": 1}) for n in (1, 2, 3, 4)},
+    **{f"payload_a{n}": (f"<A{n}>", {f"cmd_a{n}": 1}) for n in (1, 2, 3)},
     "reset_fram": ("<F>", None),
 }
 
@@ -44,25 +39,21 @@ def cable(bench):
     return one
 
 
-# -- commands -------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", SIMPLE)
-def test_each_command_by_its_name_with_the_effect_that_telemetry_shows(cable, name):
-    token, shown = SIMPLE[name]
-    answer = cable.command(name)
-    assert answer.success, answer.message
-    assert answer.sent
-    assert answer.confirmed == (shown is not None)
-    cable.bench.until(lambda: cable.tokens() == [token], "it came, alone")
-    for field, value in (shown or {}).items():
-        cable.await_telemetry(lambda t, f=field, v=value: getattr(t, f) == v, f"{field} {value}")
-    if shown is None:
-        assert "telemetry cannot show its effect" in answer.message
+def test_each_command_by_its_name_with_the_effect_that_telemetry_shows(cable):
+    tokens = []
+    for name, (token, shown) in SIMPLE.items():
+        answer = cable.command(name)
+        assert answer.success, answer.message
+        assert answer.sent, name
+        assert answer.confirmed == (shown is not None), name
+        tokens.append(token)
+        cable.bench.until(lambda: cable.tokens() == tokens, f"{name} came, once")
+        for field, value in (shown or {}).items():
+            cable.await_telemetry(
+                lambda t, f=field, v=value: getattr(t, f) == v, f"{field} {value}"
+            )
+        assert shown is not None or "telemetry cannot show its effect" in answer.message
     assert cable.computer.receiver.lost == {}
-
-
-def test_heartbeat_by_its_name_is_one_more(cable):
     answer = cable.command("heartbeat")
     assert (answer.success, answer.sent, answer.confirmed) == (True, True, False)
 
@@ -81,38 +72,33 @@ def test_launch_needs_the_key_standby_and_a_confirmation(cable):
     assert "flight mode Ascent" in answer.message
 
 
-@pytest.mark.parametrize(("name", "token"), [("drogue", "<D>"), ("main", "<d>")])
-def test_drogue_and_main_are_refused_on_the_ground_unless_forced(cable, name, token):
-    answer = cable.command(name)
-    assert (answer.success, answer.sent) == (False, False)
-    assert f"the {name} is not fired on the ground" in answer.message
-    assert "force sends it all the same; nothing was sent" in answer.message
-    assert cable.command(name, force=True).confirmed
-    assert cable.tokens() == [token]
+def test_drogue_and_main_are_refused_on_the_ground_unless_forced(cable):
+    for name in ("drogue", "main"):
+        answer = cable.command(name)
+        assert (answer.success, answer.sent) == (False, False), name
+        assert f"the {name} is not fired on the ground" in answer.message
+        assert "force sends it all the same; nothing was sent" in answer.message
+        assert cable.command(name, force=True).confirmed, name
+    assert cable.tokens() == ["<D>", "<d>"]
 
 
-@pytest.mark.parametrize(
-    "name", ["reboot", "reset_fram", "wipe_flash", "wipe_fram_and_reboot", "dump_flash"]
-)
-def test_what_takes_the_flight_computer_away_is_refused_in_flight(cable, name):
+def test_what_takes_the_flight_computer_away_is_refused_in_flight(cable):
     cable.act("jump=Coast")
     cable.await_mode(Telem.COAST)
-    answer = cable.command(name)
-    assert (answer.success, answer.sent) == (False, False)
-    assert "(flight mode Coast); force sends it all the same" in answer.message
+    for name in ("reboot", "reset_fram", "wipe_flash", "wipe_fram_and_reboot", "dump_flash"):
+        answer = cable.command(name)
+        assert (answer.success, answer.sent) == (False, False), name
+        assert "(flight mode Coast); force sends it all the same" in answer.message
     assert cable.tokens() == []
 
 
-def test_reboot_is_confirmed_by_the_clock_that_starts_anew(cable):
+def test_reboot_is_confirmed_by_its_clock_and_flash_info_by_its_answer(cable):
+    answer = cable.command("flash_info")
+    assert (answer.success, answer.confirmed) == (True, True), answer.message
     cable.await_telemetry(lambda t: t.device_uptime > 1.5, "it has run for a while")
     answer = cable.command("reboot")
     assert (answer.success, answer.confirmed) == (True, True), answer.message
     assert "its clock restarts" in answer.message
-
-
-def test_flash_info_is_confirmed_by_its_answer(cable):
-    answer = cable.command("flash_info")
-    assert (answer.success, answer.confirmed) == (True, True), answer.message
 
 
 def test_a_wipe_lasts_and_its_progress_is_told(bench):
@@ -158,58 +144,42 @@ def test_a_command_whose_effect_does_not_show_is_sent_but_not_confirmed(bench):
     assert "sent once, but" in answer.message, "an event is never repeated"
 
 
-# -- target ---------------------------------------------------------------------------------------
-
-
 def test_set_target_with_two_floats(cable):
     answer = cable.set_target(42.4419130, -76.4878000)
     assert (answer.success, answer.sent, answer.confirmed) == (True, True, True), answer.message
     assert cable.tokens() == ["<T,42.4419130,-76.4878000>"]
     one = cable.await_telemetry(lambda t: t.blims_target_lat_deg > 40.0, "it is told")
     assert one.blims_target_lon_deg == pytest.approx(-76.4878, abs=1e-5)
-
-
-def test_set_target_without_a_word_of_the_other_two(cable):
+    # Without a word of the other two.
     answer = cable.bench.call(SetTarget, "umbilical/set_target", latitude=42.5, longitude=-76.5)
     assert answer.confirmed, answer.message
 
 
-def test_a_firmware_of_four_floats_takes_no_two(bench):
+def test_a_firmware_of_four_floats_takes_four_and_no_two(bench):
     cable = Cable(bench, sends="telem54", **PATIENT)
     cable.plugged()
     answer = cable.set_target(42.5, -76.5)
     assert not answer.sent
     assert "takes 4 floats (two points), not 2" in answer.message
-
-
-def test_set_target_with_four_floats(bench):
-    cable = Cable(bench, sends="telem54", **PATIENT)
-    cable.plugged()
     answer = cable.set_target(42.5, -76.5, 42.25, -76.25)
     assert answer.confirmed, answer.message
     one = cable.await_telemetry(lambda t: t.blims_upwind_lat_deg == 42.5, "it is told")
     assert one.blims_downwind_lon_deg == -76.25
 
 
-@pytest.mark.parametrize(
-    ("target", "why"),
-    [
-        ((90.1, 0.0), "latitude 90.1 is out of range: need -90 to 90"),
-        ((0.0, -180.1), "longitude -180.1 is out of range: need -180 to 180"),
-        ((float("nan"), 1.0), "latitude nan is out of range"),
-        ((1.0, float("inf")), "longitude inf is out of range"),
-        ((1.0, 2.0, 3.0, 4.0), "takes 2 floats (latitude and longitude), not 4"),
-        ((1.0, 2.0, 3.0), "takes 2 floats (latitude and longitude), not 4"),
-    ],
-)
-def test_a_target_that_cannot_be_is_refused(cable, target, why):
-    answer = cable.set_target(*target)
-    assert (answer.success, answer.sent, answer.confirmed) == (False, False, False)
-    assert why in answer.message
+def test_a_target_that_cannot_be_is_refused(cable):
+    for target, why in {
+        (90.1, 0.0): "latitude 90.1 is out of range: need -90 to 90",
+        (0.0, -180.1): "longitude -180.1 is out of range: need -180 to 180",
+        (float("nan"), 1.0): "latitude nan is out of range",
+        (1.0, float("inf")): "longitude inf is out of range",
+        (1.0, 2.0, 3.0, 4.0): "takes 2 floats (latitude and longitude), not 4",
+        (1.0, 2.0, 3.0): "takes 2 floats (latitude and longitude), not 4",
+    }.items():
+        answer = cable.set_target(*target)
+        assert (answer.success, answer.sent, answer.confirmed) == (False, False, False), target
+        assert why in answer.message
     assert cable.tokens() == []
-
-
-# -- dumps ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("binary", [False, True], ids=["CSV", "binary"])
@@ -242,18 +212,22 @@ def test_a_dump_goes_where_it_is_told_to(cable):
     assert cable.tokens().count("<G>") == 2
 
 
-@pytest.mark.parametrize(
-    ("memory", "path", "why"),
-    [
+def test_a_dump_that_cannot_be_is_refused(cable):
+    for memory, path, why in (
         ("disk", "", "memory 'disk': need one of flash, fram"),
         ("flash", "/nowhere/at/all.csv", "there is no folder /nowhere/at"),
-    ],
-)
-def test_a_dump_that_cannot_be_is_refused(cable, memory, path, why):
-    answer = cable.dump(memory, path)
-    assert (answer.success, answer.path_written, answer.size) == (False, "", 0)
-    assert why in answer.message
+    ):
+        answer = cable.dump(memory, path)
+        assert (answer.success, answer.path_written, answer.size) == (False, "", 0)
+        assert why in answer.message
     assert cable.tokens() == []
+
+
+def test_a_disk_that_is_full_is_told(cable):
+    assert os.path.exists("/dev/full"), "this machine has no /dev/full to write to"
+    answer = cable.dump("flash", "/dev/full/dump.csv")
+    assert not answer.success
+    assert "/dev/full" in answer.message
 
 
 def test_a_fram_dump_is_the_lines_that_came(cable):
@@ -308,17 +282,6 @@ def test_a_cable_pulled_in_a_dump_ends_it(bench):
     assert "the cable was pulled" in future.result().message
 
 
-def test_a_disk_that_is_full_is_told(cable):
-    if not os.path.exists("/dev/full"):
-        raise AssertionError("this machine has no /dev/full to write to")
-    answer = cable.dump("flash", "/dev/full/dump.csv")
-    assert not answer.success
-    assert "/dev/full" in answer.message
-
-
-# -- the supervisor's decisions -------------------------------------------------------------------
-
-
 @pytest.fixture
 def decide(bench):
     """Publish a decision as the supervisor would; its last report."""
@@ -349,25 +312,22 @@ def test_a_kill_is_the_vehicle_made_safe(cable, decide):
     assert cable.tokens() == ["<M>", "<V>"]
 
 
-def test_after_a_kill_nothing_launches_until_flight_is_released(cable, decide):
-    assert cable.arm().success
-    assert decide(Action.KILL, "a test").outcome == Outcome.CONFIRMED
-    answer = cable.command("launch", force=True)
-    assert "launch refused: flight is blocked (killed: a test)" in answer.message
-    answer = cable.command("open_mav")
-    assert "open_mav refused: flight is blocked (killed: a test)" in answer.message
-    assert decide(Action.FLIGHT_BLOCK_RELEASE).outcome == Outcome.CONFIRMED
-    assert cable.command("launch", force=True).confirmed
-
-
-def test_while_flight_is_blocked_nothing_launches(cable, decide):
-    assert cable.arm().success
-    assert decide(Action.FLIGHT_BLOCK, "a link is silent").outcome == Outcome.CONFIRMED
-    answer = cable.command("launch", force=True)
-    assert not answer.sent
-    assert "launch refused: flight is blocked (a link is silent)" in answer.message
-    assert decide(Action.FLIGHT_BLOCK_RELEASE).outcome == Outcome.CONFIRMED
-    assert cable.command("launch", force=True).confirmed
+def test_after_a_kill_or_while_flight_is_blocked_nothing_launches(cable, decide):
+    for action, reason, told in (
+        (Action.KILL, "a test", "killed: a test"),
+        (Action.FLIGHT_BLOCK, "a link is silent", "a link is silent"),
+    ):
+        cable.act("jump=Startup")
+        cable.await_mode(Telem.STARTUP)
+        assert cable.arm().success
+        assert decide(action, reason).outcome == Outcome.CONFIRMED
+        answer = cable.command("launch", force=True)
+        assert not answer.sent
+        assert f"launch refused: flight is blocked ({told})" in answer.message
+        answer = cable.command("open_mav")
+        assert f"open_mav refused: flight is blocked ({told})" in answer.message
+        assert decide(Action.FLIGHT_BLOCK_RELEASE).outcome == Outcome.CONFIRMED
+        assert cable.command("launch", force=True).confirmed
 
 
 def test_a_decided_deploy_on_the_ground_is_sent_where_that_is_wished(bench, decide):
@@ -401,8 +361,8 @@ def test_a_deploy_that_is_forced_fires_again(cable):
     assert cable.tokens() == ["<D>", "<D>"]
 
 
-@pytest.mark.parametrize("triggers", [1, 8, 255])
-def test_the_key_has_no_other_triggers(cable, triggers):
-    answer = cable.arm(triggers=triggers)
-    assert not answer.success
-    assert "the key has but one" in answer.message
+def test_the_key_has_no_other_triggers(cable):
+    for triggers in (1, 8, 255):
+        answer = cable.arm(triggers=triggers)
+        assert not answer.success
+        assert "the key has but one" in answer.message, triggers

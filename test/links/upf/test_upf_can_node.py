@@ -156,44 +156,47 @@ def test_the_vehicle_is_told_to_the_bus_at_its_rate(bench):
     bench.until(lambda: heard()[-1]["is_parachute_connected"], "the controller is heard")
 
 
-@pytest.mark.parametrize(
-    ("fields", "state", "height"),
-    [
-        ({"landed_state": 2, "height": 9.0}, 0, None),
-        ({"landed_state": 2, "landed_state_age": 0.0, "height": 9.0}, 2, None),
-        ({"landed_state": 0, "landed_state_age": 0.0, "height": 9.0, "height_age": 0.0}, 0, 9.0),
-        ({"landed_state": 2, "landed_state_age": 90.0, "height": 9.0, "height_age": 0.0}, 0, 9.0),
-        (
-            {"landed_state": 1, "landed_state_age": 0.0, "height": math.inf, "height_age": 0.0},
-            1,
-            None,
-        ),
-        ({"landed_state": 9, "landed_state_age": 0.0, "height": 1e6, "height_age": 0.0}, 0, None),
-        (
-            {"landed_state": 2, "landed_state_age": 0.0, "link_state": 3, "vertical_speed": 1.0},
-            0,
-            None,
-        ),
-    ],
-    ids=["no ages", "one age", "unknown", "old", "infinite", "no state, too high", "lost"],
-)
-def test_what_is_not_known_or_too_old_is_told_so(bench, fields, state, height):
+#: Parts of a vehicle/state -> the state and the height that the bus is told.
+UNKNOWN = {
+    "no ages": ({"landed_state": 2, "height": 9.0}, 0, NAN),
+    "one age": ({"landed_state": 2, "landed_state_age": 0.0, "height": 9.0}, 2, NAN),
+    "unknown": (
+        {"landed_state": 0, "landed_state_age": 0.0, "height": 9.0, "height_age": 0.0},
+        *(0, 9.0),
+    ),
+    "old": (
+        {"landed_state": 2, "landed_state_age": 90.0, "height": 9.0, "height_age": 0.0},
+        *(0, 9.0),
+    ),
+    "infinite": (
+        {"landed_state": 1, "landed_state_age": 0.0, "height": INF, "height_age": 0.0},
+        *(1, NAN),
+    ),
+    "no state, too high": (
+        {"landed_state": 9, "landed_state_age": 0.0, "height": 1e6, "height_age": 0.0},
+        *(0, NAN),
+    ),
+    "lost": (
+        {"landed_state": 2, "landed_state_age": 0.0, "link_state": 3, "vertical_speed": 1.0},
+        *(0, NAN),
+    ),
+}
+
+
+def test_what_is_not_known_or_too_old_is_told_so(bench):
     network = Network(bench, vehicle_state_age=60.0)
     party = network.party()
     link = network.link
-    # Before it, something else: what is told afterwards is told anew.
-    bench.publish(vehicle_state(bench, roll=1.0), "vehicle/state")
-    bench.until(lambda: link._vehicle._state.roll == 1.0, "the first is heard")
-    bench.publish(vehicle_state(bench, roll=2.0, **fields), "vehicle/state")
-    bench.until(lambda: link._vehicle._state.roll == 2.0, "the second is heard")
-    party.heard.clear()
-    # The first may have been on its way.
-    bench.until(lambda: len(party.values(VEHICLE_STATUS)) >= 2, "it is told")
-    told = party.values(VEHICLE_STATUS)[-1]
-    assert told["state"] == state
-    expected = NAN if height is None else height
-    assert told["height_of_home"] == pytest.approx(expected, nan_ok=True)
-    assert math.isnan(told["vz"])
+    for number, (story, (fields, state, height)) in enumerate(UNKNOWN.items(), 1):
+        bench.publish(vehicle_state(bench, roll=float(number), **fields), "vehicle/state")
+        bench.until(lambda n=number: link._vehicle._state.roll == n, f"{story}: it is heard")
+        party.heard.clear()
+        # The first may have been on its way.
+        bench.until(lambda: len(party.values(VEHICLE_STATUS)) >= 2, "it is told")
+        told = party.values(VEHICLE_STATUS)[-1]
+        assert told["state"] == state, story
+        assert told["height_of_home"] == pytest.approx(height, nan_ok=True), story
+        assert math.isnan(told["vz"])
 
 
 def test_a_vehicle_that_falls_silent_is_soon_not_known(bench):

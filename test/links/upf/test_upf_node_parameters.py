@@ -59,16 +59,16 @@ def outside(one):
     return [one.minimum - 1e-3, one.maximum * 1.001, NAN, INF, -INF, 1, "1.0", False]
 
 
+def refused_with_what_is_allowed(bench, one, value):
+    text = refusal(bench, **{one.name: value})
+    assert f"parameter {one.name} of " in text
+    assert f" is {value!r}: need {one.allowed()}" in text
+
+
 @pytest.mark.parametrize("one", RANGED, ids=lambda one: one.name)
-def test_a_value_outside_the_range_is_named_with_the_range(bench, one):
+def test_a_value_outside_the_range_is_named_with_the_range_whose_ends_are_taken(bench, one):
     for value in outside(one):
-        text = refusal(bench, **{one.name: value})
-        assert f"parameter {one.name} of " in text
-        assert f" is {value!r}: need {one.allowed()}" in text
-
-
-@pytest.mark.parametrize("one", RANGED, ids=lambda one: one.name)
-def test_both_ends_of_the_range_are_taken(bench, one):
+        refused_with_what_is_allowed(bench, one, value)
     kind = type(one.default)
     ends = {kind(one.minimum), kind(one.maximum)}
     others = {}
@@ -89,30 +89,23 @@ def test_a_value_of_another_kind_is_named_with_what_is_needed(bench, one):
         wrong = [value for value in wrong if value is not True]
     wrong += ["Forward", "", "forward "] if one.choices else []
     for value in wrong:
-        text = refusal(bench, **{one.name: value})
-        assert f"parameter {one.name} of " in text
-        assert f" is {value!r}: need {one.allowed()}" in text
+        refused_with_what_is_allowed(bench, one, value)
 
 
-@pytest.mark.parametrize(
-    ("connection", "need"),
-    [
-        ("", "need mcast:BUS[:PORT]"),
-        ("mcast", "need mcast:BUS[:PORT]"),
-        ("mcast:", "need mcast:BUS[:PORT]"),
-        ("mcast:256", "bus '256' is no number from 0 to 255"),
-        ("mcast:-1", "bus '-1' is no number from 0 to 255"),
-        ("mcast:0:65536", "port '65536' is no number from 0 to 65535"),
-        ("mcast:0:x", "port 'x' is no number"),
-        ("can0", "need mcast:BUS[:PORT]"),
-        ("nocan:can0", "'nocan' is no interface: need mcast or one of"),
-        ("udp_multicast:127.0.0.1", "'127.0.0.1' is no multicast address"),
-    ],
-)
-def test_a_bus_that_is_none_is_named_with_the_forms(bench, connection, need):
-    text = refusal(bench, connection=connection)
-    assert f"connection {connection!r}" in text
-    assert need in text
+def test_a_bus_that_is_none_is_named_with_the_forms(bench):
+    forms = "need mcast:BUS[:PORT]"
+    for connection, need in {
+        **dict.fromkeys(("", "mcast", "mcast:", "can0"), forms),
+        "mcast:256": "bus '256' is no number from 0 to 255",
+        "mcast:-1": "bus '-1' is no number from 0 to 255",
+        "mcast:0:65536": "port '65536' is no number from 0 to 65535",
+        "mcast:0:x": "port 'x' is no number",
+        "nocan:can0": "'nocan' is no interface: need mcast or one of",
+        "udp_multicast:127.0.0.1": "'127.0.0.1' is no multicast address",
+    }.items():
+        text = refusal(bench, connection=connection)
+        assert f"connection {connection!r}" in text
+        assert need in text
 
 
 def test_none_of_them_changes_while_running(bench):
@@ -126,21 +119,18 @@ def test_none_of_them_changes_while_running(bench):
 # Two that contradict each other
 
 
-@pytest.mark.parametrize(("stale", "lost"), [(3.0, 3.0), (4.0, 3.0)])
-def test_a_device_is_stale_before_it_is_lost(bench, stale, lost):
-    text = refusal(bench, device_stale_after=stale, device_lost_after=lost)
-    assert f"device_stale_after is {stale}" in text
-    assert f"device_lost_after is {lost}" in text
+def test_a_device_is_stale_before_it_is_lost(bench):
+    for stale, lost in ((3.0, 3.0), (4.0, 3.0)):
+        text = refusal(bench, device_stale_after=stale, device_lost_after=lost)
+        assert f"device_stale_after is {stale}" in text
+        assert f"device_lost_after is {lost}" in text
 
 
-@pytest.mark.parametrize("name", ["controller_node_id", "trigger_node_id"])
-def test_a_node_id_belongs_to_one_node(bench, name):
-    text = refusal(bench, **{"node_id": 33, name: 33})
-    assert f"{name} is 33 and node_id is 33: a node id belongs to one node" in text
-    assert "choose another node_id" in text
-
-
-def test_controller_and_trigger_may_be_one_node(bench):
+def test_a_node_id_belongs_to_one_node_but_controller_and_trigger_may_be_one(bench):
+    for name in ("controller_node_id", "trigger_node_id"):
+        text = refusal(bench, **{"node_id": 33, name: 33})
+        assert f"{name} is 33 and node_id is 33: a node id belongs to one node" in text
+        assert "choose another node_id" in text
     node = start(bench, controller_node_id=40, trigger_node_id=40)
     assert node.values["trigger_node_id"] == 40
 
@@ -162,23 +152,25 @@ def test_a_folder_of_the_vendors_own_is_taken(bench, tmp_path, source):
     assert start(bench, dsdl_path=str(tmp_path)).loop is not None, "the one that holds it, too"
 
 
-def test_a_folder_that_is_not_there_is_named(bench, tmp_path):
+def test_a_folder_that_is_none_of_types_is_refused(bench, tmp_path):
     text = refusal(bench, dsdl_path=str(tmp_path / "flyfire"))
     assert f"parameter dsdl_path is '{tmp_path}/flyfire': there is no such folder" in text
-
-
-def test_a_folder_of_another_name_is_refused(bench, tmp_path):
     folder = copied(tmp_path, "firefly")
     text = refusal(bench, dsdl_path=str(folder))
     assert f"parameter dsdl_path is '{folder}'" in text
     assert "must be flyfire" in text
-
-
-def test_a_folder_without_types_is_refused_with_all_that_is_lacking(bench, tmp_path):
     (tmp_path / "flyfire").mkdir()
     text = refusal(bench, dsdl_path=str(tmp_path / "flyfire"))
     for name in ("ParachuteService", "ParachuteStatus", "VehicleService", "TriggerLaunch"):
         assert f"flyfire.{name}" in text
+
+
+def test_types_that_are_no_dsdl_are_refused_with_the_file(bench, tmp_path):
+    folder = copied(tmp_path)
+    (folder / "1666.TriggerStatus.3.0.uavcan").write_text("this is no type\n")
+    text = refusal(bench, dsdl_path=str(folder))
+    assert f"parameter dsdl_path is '{folder}'" in text
+    assert "1666.TriggerStatus" in text
 
 
 @pytest.mark.parametrize(
@@ -216,14 +208,6 @@ def test_types_that_lack_what_fires_are_refused_with_the_list(
     assert f"flyfire.{file.partition('.')[2]}" in text
     for one in lacking:
         assert one in text
-
-
-def test_types_that_are_no_dsdl_are_refused_with_the_file(bench, tmp_path):
-    folder = copied(tmp_path)
-    (folder / "1666.TriggerStatus.3.0.uavcan").write_text("this is no type\n")
-    text = refusal(bench, dsdl_path=str(folder))
-    assert f"parameter dsdl_path is '{folder}'" in text
-    assert "1666.TriggerStatus" in text
 
 
 # A process of its own

@@ -40,20 +40,19 @@ TWELVE = {
 }
 
 
-@pytest.mark.parametrize("name", TWELVE)
-def test_each_is_read_set_and_read_back(bench, devices, name):
-    kind, delivered, smallest, largest, another = TWELVE[name]
-    answer = call(bench, GetParam, "get_param", name=name)
-    assert answer.success, answer.message
-    assert (answer.type, answer.value, answer.default_value) == (kind, delivered, delivered)
-    assert (answer.minimum, answer.maximum) == (smallest, largest)
-    assert answer.message.startswith(f"{name} is {delivered}")
-    answer = set_param(bench, name, another)
-    assert answer.success, answer.message
-    assert answer.value_read_back == another
-    assert p.words(devices.controller.values[name]) == another, "the device itself has it"
-    answer = call(bench, GetParam, "get_param", name=name)
-    assert (answer.value, answer.default_value) == (another, delivered)
+def test_each_is_read_set_and_read_back(bench, devices):
+    for name, (kind, delivered, smallest, largest, another) in TWELVE.items():
+        answer = call(bench, GetParam, "get_param", name=name)
+        assert answer.success, answer.message
+        assert (answer.type, answer.value, answer.default_value) == (kind, delivered, delivered)
+        assert (answer.minimum, answer.maximum) == (smallest, largest), name
+        assert answer.message.startswith(f"{name} is {delivered}")
+        answer = set_param(bench, name, another)
+        assert answer.success, answer.message
+        assert answer.value_read_back == another, name
+        assert p.words(devices.controller.values[name]) == another, "the device itself has it"
+        answer = call(bench, GetParam, "get_param", name=name)
+        assert (answer.value, answer.default_value) == (another, delivered), name
 
 
 def test_a_new_node_id_counts_from_the_next_start(bench, devices):
@@ -67,63 +66,50 @@ def test_a_new_node_id_counts_from_the_next_start(bench, devices):
     assert (answer.success, answer.value) == (True, "40")
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "need"),
-    [
-        (p.STATIC_NODE_ID, "126", "0 to 125"),
-        (p.STATIC_NODE_ID, "-1", "0 to 125"),
-        (p.NODE_STATUS_INTERVAL, "1", "2 to 1000"),
-        (p.NODE_STATUS_INTERVAL, "1001", "2 to 1000"),
-        (p.PARACHUTE_STATUS_INTERVAL, "1", "2 to 60000"),
-        (p.PARACHUTE_STATUS_INTERVAL, "60001", "2 to 60000"),
-        (p.STATIC_NODE_ID, str(10**30), "no parameter can hold it"),
-        (p.STATIC_NODE_ID, "thirty", "a number (integer)"),
-        (p.STATIC_NODE_ID, "33.5", "a number (integer)"),
-        (p.STATIC_NODE_ID, "", "a number (integer)"),
-        (p.AUTO_ARM, "maybe", "true or false"),
-        (p.AUTO_ARM, "2", "true or false"),
-        (p.AUTO_ARM, "", "true or false"),
-    ],
-)
-def test_a_value_that_does_not_fit_is_refused_with_what_does(bench, devices, name, value, need):
+UNFIT = {
+    p.STATIC_NODE_ID: {
+        **dict.fromkeys(("126", "-1"), "0 to 125"),
+        str(10**30): "no parameter can hold it",
+        **dict.fromkeys(("thirty", "33.5", ""), "a number (integer)"),
+    },
+    p.NODE_STATUS_INTERVAL: dict.fromkeys(("1", "1001"), "2 to 1000"),
+    p.PARACHUTE_STATUS_INTERVAL: dict.fromkeys(("1", "60001"), "2 to 60000"),
+    p.AUTO_ARM: dict.fromkeys(("maybe", "2", ""), "true or false"),
+}
+
+
+def test_a_value_that_does_not_fit_is_refused_with_what_does(bench, devices):
     before = dict(devices.controller.values)
-    answer = set_param(bench, name, value)
-    assert not answer.success
-    assert name in answer.message
-    assert value in answer.message
-    assert need in answer.message
-    assert "nothing was sent" in answer.message
+    for name, needs in UNFIT.items():
+        for value, need in needs.items():
+            answer = set_param(bench, name, value)
+            assert not answer.success, (name, value)
+            for told in (name, value, need, "nothing was sent"):
+                assert told in answer.message, (name, value)
+            assert devices.controller.values == before
+
+
+def test_a_name_that_the_device_does_not_know_or_no_request_can_carry_is_refused(bench, devices):
+    before = dict(devices.controller.values)
+    for kind, service in ((GetParam, "get_param"), (SetParam, "set_param")):
+        answer = call(bench, kind, service, name="Enable Everything")
+        assert not answer.success
+        assert "the device has no parameter 'Enable Everything'" in answer.message
+        assert all(name in answer.message for name in TWELVE), answer.message
+        for name in ("", "x" * 93, "é" * 47):
+            answer = call(bench, kind, service, name=name)
+            assert not answer.success, name
+            assert "is no parameter's name: need 1 to 92 bytes" in answer.message
     assert devices.controller.values == before
 
 
-@pytest.mark.parametrize(("kind", "service"), [(GetParam, "get_param"), (SetParam, "set_param")])
-def test_a_name_that_the_device_does_not_know_is_answered_with_those_it_does(
-    bench, devices, kind, service
-):
-    answer = call(bench, kind, service, name="Enable Everything")
-    assert not answer.success
-    assert "the device has no parameter 'Enable Everything'" in answer.message
-    for name in TWELVE:
-        assert name in answer.message
-
-
-@pytest.mark.parametrize("name", ["", "x" * 93, "é" * 47])
-@pytest.mark.parametrize(("kind", "service"), [(GetParam, "get_param"), (SetParam, "set_param")])
-def test_a_name_that_no_request_can_carry_is_refused(bench, devices, kind, service, name):
-    before = dict(devices.controller.values)
-    answer = call(bench, kind, service, name=name)
-    assert not answer.success
-    assert "is no parameter's name: need 1 to 92 bytes" in answer.message
-    assert devices.controller.values == before
-
-
-@pytest.mark.parametrize("node_id", [0, 33, 34])
-def test_all_are_listed_in_the_devices_order(bench, devices, node_id):
-    one = devices.trigger if node_id == 34 else devices.controller
-    answer = call(bench, ListParams, "list_params", node_id=node_id)
-    assert (answer.success, answer.message) == (True, f"{len(one.values)} parameters")
-    assert answer.names == list(one.values)
-    assert answer.values == [p.words(value) for value in one.values.values()]
+def test_all_are_listed_in_the_devices_order(bench, devices):
+    for node_id in (0, 33, 34):
+        one = devices.trigger if node_id == 34 else devices.controller
+        answer = call(bench, ListParams, "list_params", node_id=node_id)
+        assert (answer.success, answer.message) == (True, f"{len(one.values)} parameters")
+        assert answer.names == list(one.values)
+        assert answer.values == [p.words(value) for value in one.values.values()]
 
 
 def test_a_parameter_of_the_trigger_is_set_by_its_node_id(bench, devices):
@@ -150,21 +136,19 @@ def test_a_device_that_does_not_answer_is_told_plainly(bench):
 
 
 @pytest.mark.parametrize("name", p.PROTECTION)
-@pytest.mark.parametrize("off", ["false", "0", "off", "no", "False ", "nonsense"])
-def test_protection_is_not_switched_off_in_the_air(bench, devices, name, off):
-    devices.fly()
-    answer = set_param(bench, name, off)
-    assert not answer.success
-    assert f"{name} off would leave the vehicle without protection in the air" in answer.message
-    assert "force does it all the same; nothing was sent" in answer.message
-    assert devices.controller.values[name] is True
-
-
-@pytest.mark.parametrize("name", p.PROTECTION)
-def test_protection_is_switched_off_by_force_and_that_is_logged(bench, devices, name):
+def test_protection_is_switched_off_in_the_air_only_by_force_and_that_is_logged(
+    bench, devices, name
+):
     said = bench.follow_log()
     statuses = bench.follow(ParachuteStatus, "parachute/status")
     devices.fly()
+    for off in ("false", "0", "off", "no", "False ", "nonsense"):
+        answer = set_param(bench, name, off)
+        assert not answer.success, off
+        without = f"{name} off would leave the vehicle without protection in the air"
+        assert without in answer.message
+        assert "force does it all the same; nothing was sent" in answer.message
+        assert devices.controller.values[name] is True, off
     answer = set_param(bench, name, "false", force=True)
     assert (answer.success, answer.value_read_back) == (True, "false"), answer.message
     for line in (f"~/set_param {name!r} = 'false' (force=True)", f"{name} is being switched off"):

@@ -179,39 +179,14 @@ def test_its_kill_switch_is_answered_once_the_motors_are_off(bench, network, par
     assert one.await_end() == [{"bad": True}, {"success": True}]
 
 
-def test_beside_its_allocator_ours_is_silent_and_says_so(bench, bus, tmp_path, party):
+@pytest.mark.parametrize("allocator", [True, "auto"])
+def test_beside_its_allocator_ours_is_silent_and_says_so(bench, bus, tmp_path, party, allocator):
+    """An error where ours was switched on, and as it is meant to be by default."""
     path = tmp_path / "ids.json"
     network = Network(
         bench,
         connection=f"mcast:{bus}",
-        allocator=True,
-        allocation_table_file=str(path),
-        **PATIENT,
-    )
-    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
-    one = party("allocate")
-    bench.until(lambda: one.said() or one.ended(), "the other allocator runs", SLOW)
-    bench.until(lambda: network.link.bus.nodes.get(60), "it is heard", SLOW)
-    trigger = network.trigger(**{p.STATIC_NODE_ID: 0})
-    network.plug(trigger)
-    bench.until(lambda: trigger.node_id or one.ended(), "it is given a node id", SLOW)
-    assert trigger.node_id
-    assert not path.exists(), "not by us"
-
-    def told():
-        link = tasks(diagnostics).get("link")
-        return link and "node 60 gives out node ids as well" in link.message and link
-
-    link = bench.until(told, "diagnostics say so")
-    assert link.level == DiagnosticStatus.ERROR
-
-
-def test_by_default_node_ids_are_left_to_its_allocator(bench, bus, tmp_path, party):
-    path = tmp_path / "ids.json"
-    network = Network(
-        bench,
-        connection=f"mcast:{bus}",
-        allocator="auto",
+        allocator=allocator,
         allocation_table_file=str(path),
         **PATIENT,
     )
@@ -223,10 +198,16 @@ def test_by_default_node_ids_are_left_to_its_allocator(bench, bus, tmp_path, par
     bench.until(lambda: trigger.node_id or one.ended(), "it is given a node id", SLOW)
     assert trigger.node_id
     assert not path.exists(), "not by us"
+    said = "node 60 gives out node ids"
 
     def told():
-        task = tasks(diagnostics).get("node ids")
-        return task and task.message == "node 60 gives out node ids" and task
+        found = tasks(diagnostics).get("node ids" if allocator == "auto" else "link")
+        wanted = said if allocator == "auto" else f"{said} as well"
+        return found and wanted in found.message and found
 
-    assert bench.until(told, "diagnostics say so").level == DiagnosticStatus.OK
-    assert "gives out node ids" not in tasks(diagnostics)["link"].message
+    task = bench.until(told, "diagnostics say so")
+    if allocator == "auto":
+        assert (task.level, task.message) == (DiagnosticStatus.OK, said)
+        assert said not in tasks(diagnostics)["link"].message
+    else:
+        assert task.level == DiagnosticStatus.ERROR

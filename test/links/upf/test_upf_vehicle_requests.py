@@ -144,25 +144,27 @@ def test_a_kill_that_does_not_happen_in_time_is_told_as_failed(bench):
     bench.until(lambda: asking.network.link.counts["KILL not done in time"] == 1, "it is counted")
 
 
-@pytest.mark.parametrize("name", [KILL, BLOCK, RELEASE])
-def test_by_the_policy_accept_it_is_asked_and_answered_at_once(bench, name):
+@pytest.mark.parametrize(
+    ("name", "request_"),
+    [
+        (KILL, SafetyRequest.KILL),
+        (BLOCK, SafetyRequest.FLIGHT_BLOCK),
+        (RELEASE, SafetyRequest.FLIGHT_BLOCK_RELEASE),
+    ],
+)
+def test_by_the_policy_accept_it_is_asked_and_answered_at_once(bench, name, request_):
     asking = Asking(bench, killswitch_policy="accept", flight_block_policy="accept", **LONG)
     asking.ask(name)
     asking.await_answer("SUCCESS")
-    asking.await_request(
-        {
-            KILL: SafetyRequest.KILL,
-            BLOCK: SafetyRequest.FLIGHT_BLOCK,
-            RELEASE: SafetyRequest.FLIGHT_BLOCK_RELEASE,
-        }[name]
-    )
+    asking.await_request(request_)
 
 
-@pytest.mark.parametrize("name", [KILL, BLOCK, RELEASE])
-def test_by_the_policy_reject_nobody_is_asked(bench, name):
+def test_by_the_policy_reject_nobody_is_asked(bench):
     asking = Asking(bench, killswitch_policy="reject", flight_block_policy="reject", **LONG)
-    asking.ask(name)
-    asking.await_answer("REJECTED")
+    for number, name in enumerate((KILL, BLOCK, RELEASE), 1):
+        asking.ask(name)
+        bench.until(lambda n=number: len(asking.answers()) == n, f"{name} is answered")
+    assert asking.answers() == [(1, "REJECTED"), (2, "REJECTED"), (3, "REJECTED")]
     bench.turns(0.2)
     assert asking.asked == []
 

@@ -44,14 +44,17 @@ class Desk:
         return given_ids[0] if given_ids else None
 
 
-# -- on the wire --------------------------------------------------------------------------------
-
-
 def asking(bench):
     """The three anonymous frames of a node without an id, one after the other."""
-    bench.feed(raw(0x1048D100, "01000102030405c0"))
-    bench.feed(raw(0x1048D100, "00060708090a0bc1"))
-    bench.feed(raw(0x1048D100, "000c0d0e0fc2"))
+    for data in ("01000102030405c0", "00060708090a0bc1", "000c0d0e0fc2"):
+        bench.feed(raw(0x1048D100, data))
+
+
+def known(bench, node_id):
+    """This node is on the bus, and has said who it is."""
+    bench.hear(node_id, NODE_STATUS, uptime_sec=100)
+    (question,) = bench.requests("uavcan.protocol.GetNodeInfo")
+    return bench.answer(question, node_id, **information())
 
 
 def test_golden_the_exchange_of_three_stages():
@@ -80,32 +83,24 @@ def test_golden_the_exchange_of_three_stages():
     }
 
 
-def test_nobody_gets_an_id_before_the_bus_was_listened_to():
+def test_nobody_gets_an_id_before_the_bus_was_listened_to_and_all_have_said_who_they_are():
     bench = Bench(allocator=True).at(1.1)
     asking(bench)
     assert bench.tables() == []
     assert bench.node.allocator.refusal == "not every node has identified itself yet"
-    bench.at(1.9)
-    asking(bench)
+    asking(bench.at(1.9))
     assert len(bench.tables()) == 1
-
-
-def test_nobody_gets_an_id_while_a_node_has_not_said_who_it_is():
     bench = Bench(allocator=True).at(1.5).hear(40, NODE_STATUS, uptime_sec=100)
     asking(bench)
     assert bench.tables() == []
     (question,) = bench.requests("uavcan.protocol.GetNodeInfo")
-    bench.answer(question, 40, **information())
-    asking(bench)
+    asking(bench.answer(question, 40, **information()))
     assert len(bench.tables()) == 1
 
 
 def test_an_id_that_somebody_uses_is_not_given_out_nor_those_of_the_devices_as_delivered():
     bench = Bench(allocator=True, never=(124, 123)).at(1.5)
-    bench.hear(125, NODE_STATUS, uptime_sec=100)
-    (question,) = bench.requests("uavcan.protocol.GetNodeInfo")
-    bench.answer(question, 125, **information())
-    asking(bench)
+    asking(known(bench, 125))
     assert bench.tables()[0].table == {UID: 122}
 
 
@@ -129,9 +124,6 @@ def test_another_allocator_makes_ours_silent_and_is_told_of():
     assert len(bench.tables()) == 1
 
 
-# -- the rules ----------------------------------------------------------------------------------
-
-
 def test_each_part_is_echoed_with_those_before():
     desk = Desk()
     assert desk.part(OTHER[:6], True) == [(OTHER[:6], 0)]
@@ -151,27 +143,18 @@ def test_a_known_unit_gets_its_old_id_without_anything_to_keep():
     assert desk.ask(OTHER) == 77
 
 
-@pytest.mark.parametrize("owner", [UID, b""], ids=["somebody_else", "nobody_knows_who"])
-def test_a_known_unit_gets_another_id_if_its_own_is_in_use(owner):
-    desk = Desk({OTHER: 77})
-    desk.in_use[77] = owner
-    assert desk.ask(OTHER) == 125
-    assert desk.kept[-1].table == {OTHER: 125}
-
-
-def test_a_known_unit_gets_another_id_if_its_own_must_not_be_given_out_any_more():
+def test_a_known_unit_gets_another_id_if_its_own_is_in_use_or_not_to_be_given_out_any_more():
+    for owner in (UID, b""):
+        desk = Desk({OTHER: 77})
+        desk.in_use[77] = owner
+        assert desk.ask(OTHER) == 125, owner
+        assert desk.kept[-1].table == {OTHER: 125}
     assert Desk({OTHER: 33}).ask(OTHER) == 125
 
 
-@pytest.mark.parametrize(
-    ("wanted", "got"),
-    [(0, 125), (50, 50), (33, 35), (34, 35), (10, 11), (125, 125), (126, 125), (127, 125)],
-)
-def test_the_wanted_id_or_the_next_above_it(wanted, got):
-    assert Desk().ask(OTHER, wanted) == got
-
-
-def test_without_a_free_id_above_the_highest_below():
+def test_the_wanted_id_or_the_next_above_it_or_else_the_highest_below():
+    given_ids = {0: 125, 50: 50, 33: 35, 34: 35, 10: 11, 125: 125, 126: 125, 127: 125}
+    assert {wanted: Desk().ask(OTHER, wanted) for wanted in given_ids} == given_ids
     desk = Desk()
     desk.in_use |= {number: bytes(16) for number in range(60, 126)}
     assert desk.ask(OTHER, 100) == 59
@@ -229,23 +212,20 @@ def test_a_part_that_comes_too_late_starts_nothing():
     assert desk.ask(OTHER) == 125
 
 
-@pytest.mark.parametrize(
-    "parts",
-    [
-        pytest.param([(6, False)], id="second_part_first"),
-        pytest.param([(5, True)], id="first_part_too_short"),
-        pytest.param([(6, True), (5, False)], id="second_part_too_short"),
-        pytest.param([(6, True), (6, False), (6, False)], id="third_part_too_long"),
-        pytest.param([(6, True), (4, False)], id="third_part_second"),
-        pytest.param([(16, True)], id="all_at_once"),
-        pytest.param([(6, True), (0, False)], id="nothing"),
-    ],
-)
-def test_a_part_of_another_length_is_not_answered(parts):
-    desk = Desk()
-    answers = [desk.part(bytes(length), first) for length, first in parts]
-    assert answers[-1] == []
-    assert desk.kept == []
+def test_a_part_of_another_length_is_not_answered():
+    for story, *lengths in (
+        ("first part too short", 5),
+        ("second part too short", 6, 5),
+        ("third part too long", 6, 6, 6),
+        ("third part second", 6, 4),
+        ("all at once", 16),
+        ("nothing", 6, 0),
+    ):
+        desk = Desk()
+        answers = [desk.part(bytes(length), n == 0) for n, length in enumerate(lengths)]
+        assert answers[-1] == [], story
+        assert desk.kept == []
+    assert Desk().part(bytes(6), False) == [], "second part first"
 
 
 def test_two_nodes_that_ask_in_between_each_other_get_two_ids():
@@ -262,9 +242,6 @@ def test_a_table_that_nobody_can_have_kept_is_refused():
     for table in ({OTHER[:15]: 5}, {OTHER: 0}, {OTHER: 126}, {OTHER: 5, UID: 5}):
         with pytest.raises(ParameterError, match="table of node ids"):
             Allocator(table, NEVER)
-
-
-# -- another allocator on the bus ---------------------------------------------------------------
 
 
 def yielding(table=None):
@@ -339,9 +316,6 @@ def test_who_gives_out_the_ids_is_told_once_each_time_it_changes():
     assert len(bench.tables()) >= 1
 
 
-# -- strangers ----------------------------------------------------------------------------------
-
-
 def stranger(number):
     return bytes([number % 256, number // 256]) * 8
 
@@ -410,8 +384,6 @@ def test_the_order_of_the_table_tells_who_used_its_id_last():
     desk.ask(stranger(1))
     assert list(desk.kept[-1].table) == [stranger(1), UID, OTHER]
 
-
-# -- whatever comes -----------------------------------------------------------------------------
 
 UNITS = [bytes([number]) * 16 for number in range(1, 9)]
 STEP = st.one_of(

@@ -34,9 +34,6 @@ def error(classes):
     return pack(CanFrame(classes, bytes(8), extended=False, error=True))
 
 
-# -- alive --------------------------------------------------------------------------------------
-
-
 def test_golden_status_twice_a_second():
     bench = Bench().at(1.0)
     assert [t for t, _ in bench.said(NODE_STATUS)] == [0.0, 0.5, 1.0]
@@ -72,23 +69,14 @@ def test_before_the_first_look_at_the_clock_it_is_as_young_as_can_be():
     assert node.uptime(START) == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "config"),
-    [
-        ("node_id", {"node_id": 0}),
-        ("node_id", {"node_id": 128}),
-        ("name", {"name": ""}),
-        ("name", {"name": "ä" * 41}),
-        ("unique_id", {"unique_id": bytes(15)}),
-        ("utc_offset", {"utc_offset": math.nan}),
-    ],
-)
-def test_a_node_that_could_not_answer_for_itself_is_refused(name, config):
-    with pytest.raises(ParameterError, match=f"^{name}"):
-        BusNodeConfig(**{"node_id": OWN, "name": "org.test.us", "unique_id": UID, **config})
-
-
-# -- what is asked of us ------------------------------------------------------------------------
+def test_a_node_that_could_not_answer_for_itself_is_refused():
+    for name, value in (
+        *(("node_id", 0), ("node_id", 128), ("name", ""), ("name", "ä" * 41)),
+        *(("unique_id", bytes(15)), ("utc_offset", math.nan)),
+    ):
+        good = {"node_id": OWN, "name": "org.test.us", "unique_id": UID}
+        with pytest.raises(ParameterError, match=f"^{name}"):
+            BusNodeConfig(**{**good, name: value})
 
 
 def test_it_says_who_it_is():
@@ -150,9 +138,6 @@ def test_what_is_not_standard_is_handed_on():
     ]
 
 
-# -- who else is there --------------------------------------------------------------------------
-
-
 def test_a_new_node_is_asked_who_it_is_until_it_answers():
     bench = Bench().hear(33, NODE_STATUS, uptime_sec=5)
     bench.at(0.3)
@@ -189,26 +174,17 @@ def errand(*calls):
 
 
 def test_an_errand_of_the_owner_ends_under_its_token():
-    bench = Bench()
-    bench.node.begin("mine", errand(Call(33, OPCODE, {"opcode": 0})), bench.now)
-    bench.feed()
-    (asked,) = bench.requests(OPCODE)
-    bench.answer(asked, 33, ok=True)
-    assert bench.node.take_ended() == [("mine", [{"argument": 0, "ok": True}])]
-    assert bench.node.take_ended() == []
-
-
-def test_a_call_that_cannot_be_sent_ends_and_the_errand_goes_on():
-    bench = Bench()
-    bad = Call(33, GET_SET, {"name": b"x" * 200})
-    bench.node.begin("mine", errand(bad, Call(33, OPCODE, {"opcode": 0}), bad), bench.now)
-    bench.feed()
-    (asked,) = bench.requests(OPCODE)
-    bench.answer(asked, 33, ok=True)
-    assert bench.node.take_ended() == [("mine", [None, {"argument": 0, "ok": True}, None])]
-
-
-# -- trouble ------------------------------------------------------------------------------------
+    done = {"argument": 0, "ok": True}
+    # A call that cannot be sent ends, and the errand goes on.
+    bad, good = Call(33, GET_SET, {"name": b"x" * 200}), Call(33, OPCODE, {"opcode": 0})
+    for calls, results in (([good], [done]), ([bad, good, bad], [None, done, None])):
+        bench = Bench()
+        bench.node.begin("mine", errand(*calls), bench.now)
+        bench.feed()
+        (asked,) = bench.requests(OPCODE)
+        bench.answer(asked, 33, ok=True)
+        assert bench.node.take_ended() == [("mine", results)]
+        assert bench.node.take_ended() == []
 
 
 def story_of(bench, begins):
@@ -249,8 +225,6 @@ def test_trouble_bus_off_and_back():
     story_of(bench, "the CAN controller is bus-off")
     assert bench.node.endpoint.bus_off_count == 2
 
-
-# -- whatever comes -----------------------------------------------------------------------------
 
 STEPS = st.lists(
     st.one_of(

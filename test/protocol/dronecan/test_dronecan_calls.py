@@ -26,17 +26,26 @@ def answer(calls, transfer_id, now, server=33, service=SERVICE, **values):
     return calls.take_finished()
 
 
-@pytest.mark.parametrize(
-    ("timeout", "tries"), [(0.0, 3), (math.inf, 3), (math.nan, 3), (0.25, 0), (0.25, 8)]
-)
-def test_limits_that_make_no_sense_are_refused(timeout, tries):
-    with pytest.raises(ParameterError, match="need"):
-        CallLimits(timeout, tries)
+def calling(*tokens, call=DEPLOY):
+    """These calls were started at t+0."""
+    calls = ServiceCalls(LIMITS)
+    for token in tokens:
+        calls.start(token, call, 0.0)
+    return calls
+
+
+def tokens(calls):
+    return [send.token for send in calls.take_output()]
+
+
+def test_limits_that_make_no_sense_are_refused():
+    for timeout, tries in ((0.0, 3), (math.inf, 3), (math.nan, 3), (0.25, 0), (0.25, 8)):
+        with pytest.raises(ParameterError, match="need"):
+            CallLimits(timeout, tries)
 
 
 def test_a_call_is_sent_and_answered():
-    calls = ServiceCalls(LIMITS)
-    calls.start(1, DEPLOY, 0.0)
+    calls = calling(1)
     (send,) = calls.take_output()
     assert (send.command, send.transfer_id, send.token) == (DEPLOY, 0, 1)
     assert calls.next_deadline() == 0.25
@@ -64,19 +73,15 @@ def test_a_call_that_nobody_answers_is_sent_again_and_given_up():
 
 
 def test_a_late_answer_to_an_earlier_try_counts_and_the_next_is_nobodys():
-    calls = ServiceCalls(LIMITS)
-    calls.start(1, DEPLOY, 0.0)
+    calls = calling(1)
     calls.update(0.25)
     assert ids(calls) == [0, 1]
     (end,) = answer(calls, 0, 0.3, result=0)
     assert (end.token, end.sends) == (1, 2)
     assert answer(calls, 1, 0.31, result=0) == []
     assert calls.counts == {"unexpected responses": 1}
-
-
-def test_an_answer_of_another_server_service_or_id_is_nobodys():
-    calls = ServiceCalls(LIMITS)
-    calls.start(1, DEPLOY, 0.0)
+    # So is one of another server, service or id.
+    calls = calling(1)
     assert answer(calls, 0, 0.1, server=34) == []
     assert answer(calls, 0, 0.1, service=OTHER.service) == []
     assert answer(calls, 9, 0.1) == []
@@ -107,32 +112,25 @@ def test_the_reader_says_what_an_answer_means_and_is_not_asked_without_one():
     assert asked == [1]
 
 
-def test_more_calls_than_may_wait_at_once_follow_in_their_order():
-    calls = ServiceCalls(LIMITS)
-    for token in range(MOST_AT_ONCE + 2):
-        calls.start(token, DEPLOY, 0.0)
+def test_more_calls_than_may_wait_at_once_follow_in_their_order_but_an_urgent_one():
+    calls = calling(*range(MOST_AT_ONCE + 2))
     calls.start(100, OTHER, 0.0)
-    assert [send.token for send in calls.take_output()] == [0, 1, 2, 3, 100]
+    assert tokens(calls) == [0, 1, 2, 3, 100]
     (end,) = answer(calls, 2, 0.1)
     assert end.token == 2
-    assert [send.token for send in calls.take_output()] == [4]
+    assert tokens(calls) == [4]
     calls.start(6, DEPLOY, 0.1)
     assert calls.take_output() == []
     answer(calls, 0, 0.1)
-    assert [send.token for send in calls.take_output()] == [5]
-
-
-def test_an_urgent_call_does_not_wait():
-    calls = ServiceCalls(LIMITS)
-    for token in range(10):
-        calls.start(token, DEPLOY, 0.0)
+    assert tokens(calls) == [5]
+    calls = calling(*range(10))
     calls.take_output()
     calls.start(99, DEPLOY, 0.0, urgent=True)
-    assert [send.token for send in calls.take_output()] == [99]
+    assert tokens(calls) == [99]
 
 
 def test_a_request_whose_answer_does_not_matter_is_sent_once():
-    calls = ServiceCalls(LIMITS)
+    calls = calling()
     calls.send_once(DEPLOY, 0.0)
     (send,) = calls.take_output()
     assert (send.command, send.token) == (DEPLOY, None)
@@ -140,22 +138,18 @@ def test_a_request_whose_answer_does_not_matter_is_sent_once():
 
 
 def test_a_cancelled_call_is_neither_sent_nor_told_of():
-    calls = ServiceCalls(LIMITS)
-    for token in range(MOST_AT_ONCE + 2):
-        calls.start(token, DEPLOY, 0.0)
-    calls.cancel(0, 0.0)
-    calls.cancel(MOST_AT_ONCE + 1, 0.0)
-    calls.cancel(77, 0.0)
-    assert [send.token for send in calls.take_output()] == [1, 2, 3, 4]
+    calls = calling(*range(MOST_AT_ONCE + 2))
+    for token in (0, MOST_AT_ONCE + 1, 77):
+        calls.cancel(token, 0.0)
+    assert tokens(calls) == [1, 2, 3, 4]
     assert answer(calls, 0, 0.1) == []
     for now in (0.25, 0.5, 0.75):
         calls.update(now)
     assert sorted(end.token for end in calls.take_finished()) == [1, 2, 3, 4]
 
 
-def test_a_call_that_cannot_be_put_on_the_bus_ends_at_once_in_words():
-    calls = ServiceCalls(LIMITS)
-    calls.start(1, DEPLOY, 0.0)
+def test_a_call_that_cannot_be_put_on_the_bus_or_gives_way_ends_in_words():
+    calls = calling(1)
     (send,) = calls.take_output()
     calls.unsendable(send, "type is 300", 0.0)
     (end,) = calls.take_finished()
@@ -165,12 +159,7 @@ def test_a_call_that_cannot_be_put_on_the_bus_ends_at_once_in_words():
     calls.unsendable(calls.take_output()[0], "nobody waits for it", 0.0)
     assert calls.take_finished() == []
     assert calls.next_deadline() == math.inf
-
-
-def test_a_call_that_was_given_up_for_a_newer_one_says_so():
-    calls = ServiceCalls(LIMITS)
-    calls.start(1, DEPLOY, 0.0)
-    (end,) = answer(calls, 0, 0.5)
+    (end,) = answer(calling(1), 0, 0.5)
     newer = end.__class__(**{**end.__dict__, "superseded": True})
     assert newer.text() == "given up after 0.50 s for a newer call"
 
@@ -236,9 +225,6 @@ def test_many_calls_in_a_row_never_mix_up_their_answers_nor_wait_too_many(
         assert len(waiting) <= MOST_AT_ONCE
         assert max(sends.values(), default=0) <= tries
     assert calls.next_deadline() == math.inf
-
-
-# -- scripts ------------------------------------------------------------------------------------
 
 
 def script(*numbers):

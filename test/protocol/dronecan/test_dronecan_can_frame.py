@@ -15,70 +15,39 @@ from chute_ros.protocol.dronecan.can_frame import (
 )
 
 # Written out by hand from include/uapi/linux/can.h: id with flags, length, padding, data.
+STANDARD, ERROR = {"extended": False}, {"extended": False, "error": True}
 GOLDEN = [
-    pytest.param(
-        CanFrame(0x1001550A, b"\x01\x02\x03\xc0"),
-        "0a550190 04 000000 010203c000000000",
-        id="extended_data_frame",
-    ),
-    pytest.param(
-        CanFrame(0x1FFFFFFF, b"\xff" * 8), "ffffff9f 08 000000 ffffffffffffffff", id="all_ones"
-    ),
-    pytest.param(
-        CanFrame(0x123, b"\xab", extended=False),
-        "23010000 01 000000 ab00000000000000",
-        id="standard_data_frame",
-    ),
-    pytest.param(
-        CanFrame(0x7FF, b"", extended=False, remote=True),
-        "ff070040 00 000000 0000000000000000",
-        id="standard_remote_frame",
-    ),
-    pytest.param(
-        CanFrame(1, b"", remote=True),
-        "010000c0 00 000000 0000000000000000",
-        id="extended_remote_frame",
-    ),
-    pytest.param(
-        CanFrame(ERROR_BUS_OFF, bytes(8), extended=False, error=True),
-        "40000020 08 000000 0000000000000000",
-        id="bus_off",
-    ),
-    pytest.param(
-        CanFrame(ERROR_RESTARTED, bytes(8), extended=False, error=True),
-        "00010020 08 000000 0000000000000000",
-        id="controller_restarted",
-    ),
-    pytest.param(
-        CanFrame(0x1FFFFFFF, b"", extended=False, error=True),
-        "ffffff3f 00 000000 0000000000000000",
-        id="error_with_every_class",
-    ),
+    (0x1001550A, b"\x01\x02\x03\xc0", {}, "0a550190 04 000000 010203c000000000"),
+    (0x1FFFFFFF, b"\xff" * 8, {}, "ffffff9f 08 000000 ffffffffffffffff"),
+    (0x123, b"\xab", STANDARD, "23010000 01 000000 ab00000000000000"),
+    (0x7FF, b"", {**STANDARD, "remote": True}, "ff070040 00 000000 0000000000000000"),
+    (1, b"", {"remote": True}, "010000c0 00 000000 0000000000000000"),
+    (ERROR_BUS_OFF, bytes(8), ERROR, "40000020 08 000000 0000000000000000"),
+    (ERROR_RESTARTED, bytes(8), ERROR, "00010020 08 000000 0000000000000000"),
+    (0x1FFFFFFF, b"", ERROR, "ffffff3f 00 000000 0000000000000000"),
 ]
+NO_FRAME = {
+    "nine bytes of data": "0a550190 09 000000 0000000000000000",
+    "255 bytes of data": "0a550190 ff 000000 0000000000000000",
+    "standard identifier of 12 bits": "00080000 00 000000 0000000000000000",
+    "remote with 29 bits": "ffffff5f 00 000000 0000000000000000",
+    "nothing": "",
+    "fifteen bytes": "0a550190 00 000000 00000000000000",
+    "seventeen bytes": "0a550190 00 000000 000000000000000000",
+}
 
 
-@pytest.mark.parametrize(("frame", "data"), GOLDEN)
-def test_a_frame_is_these_bytes_and_these_bytes_are_the_frame(frame, data):
-    data = bytes.fromhex(data)
-    assert len(data) == SIZE
-    assert pack(frame) == data
-    assert unpack(data) == frame
+def test_a_frame_is_these_bytes_and_these_bytes_are_the_frame():
+    for identifier, content, flags, data in GOLDEN:
+        frame, data = CanFrame(identifier, content, **flags), bytes.fromhex(data)
+        assert len(data) == SIZE
+        assert pack(frame) == data
+        assert unpack(data) == frame
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        pytest.param("0a550190 09 000000 0000000000000000", id="nine_bytes_of_data"),
-        pytest.param("0a550190 ff 000000 0000000000000000", id="255_bytes_of_data"),
-        pytest.param("00080000 00 000000 0000000000000000", id="standard_identifier_of_12_bits"),
-        pytest.param("ffffff5f 00 000000 0000000000000000", id="remote_with_29_bits"),
-        pytest.param("", id="nothing"),
-        pytest.param("0a550190 00 000000 00000000000000", id="fifteen_bytes"),
-        pytest.param("0a550190 00 000000 000000000000000000", id="seventeen_bytes"),
-    ],
-)
-def test_what_is_no_frame_is_none(data):
-    assert unpack(bytes.fromhex(data)) is None
+def test_what_is_no_frame_is_none():
+    for story, data in NO_FRAME.items():
+        assert unpack(bytes.fromhex(data)) is None, story
 
 
 @pytest.mark.parametrize(
@@ -86,8 +55,8 @@ def test_what_is_no_frame_is_none(data):
     [
         (0x20000000, b"", {}),
         (-1, b"", {}),
-        (0x800, b"", {"extended": False}),
-        (0x20000000, b"", {"extended": False, "error": True}),
+        (0x800, b"", STANDARD),
+        (0x20000000, b"", ERROR),
         (1, bytes(9), {}),
     ],
 )

@@ -2,7 +2,6 @@
 
 import math
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +24,15 @@ def speak(monitor, begin, end, booted, node_id=33, every=1.0):
     while now <= end:
         monitor.status(node_id, status(int(now - booted)), now)
         now += every
+    return monitor
+
+
+def met(node_id=33, uptime=5):
+    """A monitor that heard this node at t+0, and who it is."""
+    monitor = NodeMonitor()
+    monitor.status(node_id, status(uptime), 0.0)
+    monitor.information(node_id, info(), 0.0)
+    return monitor
 
 
 def test_a_restart_soon_after_the_start_is_a_restart_and_no_conflict():
@@ -57,10 +65,12 @@ def test_a_new_node_is_asked_who_it_is_and_known_once_it_answers():
 
 
 def test_a_name_that_is_no_text_is_shown_as_far_as_it_is():
-    monitor = NodeMonitor()
-    monitor.status(33, status(0), 0.0)
+    monitor = met()
     monitor.information(33, info(name=b"a\xffb"), 0.0)
     assert monitor.get(33).name == "a\ufffdb"
+    monitor = NodeMonitor()
+    monitor.information(33, info(), 0.0)
+    assert monitor.all() == [], "the answer of a node that is not there says nothing"
 
 
 def test_a_node_that_never_tells_is_asked_five_times_and_taken_as_it_is():
@@ -72,12 +82,6 @@ def test_a_node_that_never_tells_is_asked_five_times_and_taken_as_it_is():
         # After the fifth question it has the time for an answer.
         assert monitor.all_discovered(now) == (now >= 5.0)
     assert asked == [0.0, 1.0, 2.0, 3.0, 4.0]
-
-
-def test_an_answer_of_a_node_that_is_not_there_says_nothing():
-    monitor = NodeMonitor()
-    monitor.information(33, info(), 0.0)
-    assert monitor.all() == []
 
 
 def test_a_restart_is_told_once_and_the_node_is_asked_again():
@@ -125,9 +129,7 @@ def test_the_older_of_two_under_one_id_may_come_last():
 
 
 def test_two_unique_ids_under_one_node_id_are_a_conflict():
-    monitor = NodeMonitor()
-    monitor.status(33, status(5), 0.0)
-    monitor.information(33, info(), 0.0)
+    monitor = met()
     monitor.information(33, info(), 0.1)
     assert monitor.conflicts(0.1) == []
     monitor.information(33, info(b"\x55" * 16), 0.2)
@@ -156,9 +158,7 @@ def test_two_that_were_switched_on_together_are_found_by_how_they_count():
         monitor.status(33, status(tick), tick, tick % 32)
         monitor.status(33, status(tick), tick + 0.4, (tick + 7) % 32)
     assert monitor.conflicts(5.0) == [33]
-
-
-def test_one_that_loses_messages_and_wraps_around_counts_forwards():
+    # One that loses messages and wraps around counts forwards.
     monitor = NodeMonitor()
     for tick in range(200):
         monitor.status(33, status(tick // 10), tick / 10, (tick * 3) % 32)
@@ -226,10 +226,8 @@ def test_two_devices_that_swap_their_ids_are_one_error():
 
 
 def test_a_silent_node_is_forgotten_and_may_be_another_when_it_comes_back():
-    monitor = NodeMonitor()
-    monitor.status(33, status(5), 0.0)
+    monitor = met()
     monitor.status(34, status(5), 2.0)
-    monitor.information(33, info(), 0.0)
     monitor.forget_gone(2.999)
     assert [entry.node_id for entry in monitor.all()] == [33, 34]
     monitor.forget_gone(3.0)
@@ -237,19 +235,12 @@ def test_a_silent_node_is_forgotten_and_may_be_another_when_it_comes_back():
     monitor.status(33, status(1), 4.0)
     assert monitor.get(33).information is None
     assert monitor.take_restarted() == []
-
-
-@pytest.mark.parametrize("passed", [3.0, 60.0])
-def test_a_node_that_is_back_before_anybody_looked_may_be_another_as_well(passed):
-    monitor = NodeMonitor()
-    monitor.status(33, status(5), 0.0)
-    monitor.information(33, info(), 0.0)
-    monitor.status(33, status(5 + int(passed)), passed)
-    assert monitor.get(33).information is None
-    assert not monitor.all_discovered(passed)
-
-
-def test_a_gone_node_that_nobody_has_forgotten_yet_is_not_waited_for():
+    for passed in (3.0, 60.0):
+        monitor = met()
+        monitor.status(33, status(5 + int(passed)), passed)
+        assert monitor.get(33).information is None, "so may one that nobody has forgotten"
+        assert not monitor.all_discovered(passed)
+    # Nor is one that is gone waited for.
     monitor = NodeMonitor()
     monitor.status(33, status(5), 0.0)
     assert monitor.all_discovered(3.0)

@@ -24,7 +24,16 @@ from chute_ros.protocol.dronecan.transfer import (
 OWN = 10
 STATUS = "flyfire.ParachuteStatus"
 CRC = "CRC of a transfer wrong (or another definition of its type)"
-STORIES = [pytest.param(one, id=one.story) for one in VECTORS]
+
+
+def test_the_librarys_frames_become_the_transfer():
+    for vector in VECTORS:
+        ear = Ear()
+        data_type = types().find(vector.name, vector.mode)
+        frames = [pack(one) for one in vector.can_frames]
+        came = ear.hear(frames, node_id=vector.destination or OWN)
+        assert came == [vector.transfer(data_type.id)], vector.story
+        assert ear.counts == {}, vector.story
 
 
 class Ear:
@@ -61,19 +70,6 @@ def single(source=33, transfer_id=0, payload=bytes(7)):
     return transfer, [pack(one) for one in frames_of(transfer, 0)]
 
 
-# -- whole ones ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("vector", STORIES)
-def test_the_librarys_frames_become_the_transfer(vector):
-    ear = Ear()
-    data_type = types().find(vector.name, vector.mode)
-    frames = [pack(one) for one in vector.can_frames]
-    came = ear.hear(frames, node_id=vector.destination or OWN)
-    assert came == [vector.transfer(data_type.id)]
-    assert ear.counts == {}
-
-
 def test_a_service_between_others_is_not_for_us_and_nothing_is_wrong_with_it():
     ear = Ear()
     _, frames = information()
@@ -95,61 +91,66 @@ def test_transfers_of_many_senders_in_between_each_other():
     assert ear.hear(mixed) == [transfer for transfer, _ in pairs]
 
 
-# -- every reason -------------------------------------------------------------------------------
+#: Reason -> frames that end with it at once.
+DROPPED = {
+    "no CAN frame": [b"", bytes(15), raw(1, "")[:4] + b"\x09" + bytes(11)],
+    "frames that are not of DroneCAN": [
+        pack(CanFrame(0x123, b"\xc0", extended=False)),
+        pack(CanFrame(0x10015521, b"\xc0", remote=True)),
+    ],
+    "frames without a tail byte": [raw(0x10015521, "")],
+    "services from or to nobody": [raw(n, "5046505505c0") for n in (0x10A38A80, 0x10A300A1)],
+    "transfers of unknown types": [raw(0x10FFFF21, "00c0"), raw(0x10FF8AA1, "00c0")],
+    "anonymous transfers of more than one frame": [
+        raw(0x1048D100, "4300010203040580"),
+        raw(0x1048D100, "43000102030405e0"),
+    ],
+    "toggle bit wrong": [raw(0x10015521, "00000000000000e0")],
+}
 
 
-def test_sixteen_other_bytes():
-    ear = Ear()
-    assert ear.hear([b"", bytes(15), raw(1, "")[:4] + b"\x09" + bytes(11)]) == []
-    assert ear.counts == {"no CAN frame": 3}
+@pytest.mark.parametrize("reason", DROPPED)
+def test_each_frame_that_is_none_of_a_transfer_ends_with_its_reason(reason):
+    for frame in DROPPED[reason]:
+        ear = Ear()
+        assert ear.hear([frame]) == []
+        assert ear.counts == {reason: 1}
 
 
-def test_frames_of_other_protocols():
-    ear = Ear()
-    standard = pack(CanFrame(0x123, b"\xc0", extended=False))
-    remote = pack(CanFrame(0x10015521, b"\xc0", remote=True))
-    assert ear.hear([standard, remote]) == []
-    assert ear.counts == {"frames that are not of DroneCAN": 2}
-
-
-def test_a_frame_without_a_tail_byte():
-    ear = Ear()
-    assert ear.hear([raw(0x10015521, "")]) == []
-    assert ear.counts == {"frames without a tail byte": 1}
-
-
-@pytest.mark.parametrize("identifier", [0x10A38A80, 0x10A300A1], ids=["from", "to"])
-def test_services_from_or_to_nobody(identifier):
-    ear = Ear()
-    assert ear.hear([raw(identifier, "5046505505c0")]) == []
-    assert ear.counts == {"services from or to nobody": 1}
-
-
-def test_types_that_are_not_known():
-    ear = Ear()
-    assert ear.hear([raw(0x10FFFF21, "00c0"), raw(0x10FF8AA1, "00c0")]) == []
-    assert ear.counts == {"transfers of unknown types": 2}
-
-
-def test_an_anonymous_transfer_has_one_frame():
-    ear = Ear()
-    start, other = raw(0x1048D100, "4300010203040580"), raw(0x1048D100, "43000102030405e0")
-    assert ear.hear([start, other]) == []
-    assert ear.counts == {"anonymous transfers of more than one frame": 2}
-
-
-def test_a_transfer_that_came_twice():
-    ear = Ear()
-    for transfer, frames in (single(), status(source=34)):
-        assert ear.hear([*frames, *frames], 1.0) == [transfer]
-    assert ear.counts == {"duplicate transfers": 2, "frames without their beginning": 1}
-
-
-def test_a_frame_that_came_twice_within_its_transfer():
-    ear = Ear()
-    transfer, frames = information()
-    assert ear.hear([frame for frame in frames for _ in "ab"]) == [transfer]
-    assert ear.counts == {"toggle bit wrong": 6, "frames without their beginning": 1}
+def test_what_is_doubled_late_or_cut_short_comes_out_once_or_not_at_all():
+    (one, frame), (two, pair), (info, eight) = single(), status(source=34), information()
+    singles = [single(transfer_id=number) for number in range(3)]
+    (first, a), (second, b), (third, c) = singles
+    (_, old), (before, whole), (newer, last) = (status(transfer_id=n) for n in (4, 5, 6))
+    (late, late_eight), (next_one, next_eight) = (information(transfer_id=n) for n in (4, 5))
+    beginning = "frames without their beginning"
+    for story, frames, came, counts in (
+        ("twice", [*frame, *frame], [one], {"duplicate transfers": 1}),
+        ("two frames twice", pair * 2, [two], {"duplicate transfers": 1, beginning: 1}),
+        (
+            "each frame twice",
+            [frame for frame in eight for _ in "ab"],
+            [info],
+            {"toggle bit wrong": 6, beginning: 1},
+        ),
+        ("older", [*a, *b, *a, *c, *b], [first, second, third], {"duplicate transfers": 2}),
+        (
+            "overtaken within the newer",
+            [*whole, last[0], *old, *last[1:]],
+            [before, newer],
+            {"messages that a newer one has overtaken": 1, beginning: 1},
+        ),
+        ("overtaken answer", [*next_eight, *late_eight], [next_one, late], {}),
+        (
+            "cut short by the next",
+            [*late_eight[:4], *next_eight, *late_eight[4:]],
+            [next_one],
+            {"transfers cut short": 1, beginning: 4},
+        ),
+    ):
+        ear = Ear()
+        assert ear.hear(frames, 1.0) == came, story
+        assert ear.counts == counts, story
 
 
 def test_an_id_that_comes_round_again_is_new_after_the_time_out_or_after_others():
@@ -162,13 +163,6 @@ def test_an_id_that_comes_round_again_is_new_after_the_time_out_or_after_others(
     sent = [single(transfer_id=index % TRANSFER_IDS) for index in range(100)]
     heard = [ear.hear(frames, 10.0 + index / 100) for index, (_, frames) in enumerate(sent)]
     assert heard == [[transfer] for transfer, _ in sent]
-
-
-def test_an_older_transfer_that_is_late_once_more_does_not_count_twice():
-    ear = Ear()
-    first, second, third = (single(transfer_id=number)[1] for number in range(3))
-    assert len(ear.hear([*first, *second, *first, *third, *second], 0.5)) == 3
-    assert ear.counts == {"duplicate transfers": 2}
 
 
 @pytest.mark.parametrize("newest", [2, 8, 31, 0, 1])
@@ -193,35 +187,16 @@ def test_each_node_status_is_heard_as_two_nodes_may_have_one_id():
     assert ear.counts == {}
 
 
-def test_an_overtaken_message_of_several_frames_does_not_end_the_newer_one():
-    ear = Ear()
-    _, old = status(transfer_id=4)
-    before, whole = status(transfer_id=5)
-    newer, frames = status(transfer_id=6)
-    assert ear.hear([*whole, frames[0], *old, *frames[1:]], 1.0) == [before, newer]
-
-
-def test_an_overtaken_answer_counts_all_the_same():
-    ear = Ear()
-    newer, older = (information(transfer_id=number) for number in (5, 4))
-    assert ear.hear([*newer[1], *older[1]], 1.0) == [newer[0], older[0]]
-
-
 def test_a_device_that_restarted_and_counts_from_0_again_is_heard():
     ear = Ear()
-    for number in range(3):
-        assert len(ear.hear(single(transfer_id=number)[1], number / 10)) == 1
-    for number in range(3):
-        assert len(ear.hear(single(transfer_id=number)[1], 0.4 + number / 10)) == 1
+    for number in (0, 1, 2, 4, 5, 6):
+        assert len(ear.hear(single(transfer_id=number % 4)[1], number / 10)) == 1
     assert ear.counts == {}
-
-
-def test_a_device_that_restarts_at_once_with_the_same_id_is_heard_if_it_says_something_new():
     ear = Ear()
     before, frames = single(payload=b"before!")
     after, again = single(payload=b"anew...")
     assert ear.hear(frames, 0.0) == [before]
-    assert ear.hear([*again, *again], 0.1) == [after]
+    assert ear.hear([*again, *again], 0.1) == [after], "the same id, but something new"
     assert ear.counts == {"duplicate transfers": 1}
 
 
@@ -232,14 +207,6 @@ def test_a_lost_frame_loses_its_transfer_and_not_the_next():
         next_one, next_frames = information(transfer_id=1, length=48)
         assert ear.hear([*frames[:lost], *frames[lost + 1 :], *next_frames]) == [next_one]
         assert sum(ear.counts.values()) > 0
-
-
-def test_a_transfer_cut_short_by_the_next():
-    ear = Ear()
-    _, frames = information(transfer_id=0)
-    next_one, next_frames = information(transfer_id=1)
-    assert ear.hear([*frames[:4], *next_frames, *frames[4:]]) == [next_one]
-    assert ear.counts == {"transfers cut short": 1, "frames without their beginning": 4}
 
 
 def test_a_transfer_of_one_frame_cuts_short_as_well():
@@ -268,12 +235,6 @@ def test_the_pause_is_between_two_frames_however_long_it_all_takes():
     assert came == [[]] * 7 + [[transfer]]
 
 
-def test_the_beginning_of_a_transfer_starts_with_the_toggle_at_0():
-    ear = Ear()
-    assert ear.hear([raw(0x10015521, "00000000000000e0")]) == []
-    assert ear.counts == {"toggle bit wrong": 1}
-
-
 def test_a_first_frame_that_is_not_full():
     ear = Ear()
     _, frames = status()
@@ -281,22 +242,16 @@ def test_a_first_frame_that_is_not_full():
     assert ear.counts == {"first frame too short": 1}
 
 
-def test_a_wrong_crc_and_the_same_id_sent_again():
+def test_a_wrong_crc_is_damage_or_another_definition_of_the_type():
     ear = Ear()
     transfer, frames = status()
     bad = bytearray(frames[1])
     bad[8] ^= 1
     assert ear.hear([frames[0], bytes(bad)]) == []
-    assert ear.counts == {CRC: 1}
-    assert ear.hear(frames) == [transfer]
-
-
-def test_another_definition_of_the_type_shows_as_a_wrong_crc():
-    ear = Ear()
-    data_type = types().message(STATUS)
-    frames = frames_of(Transfer(Kind.MESSAGE, 1663, 33, 0, 0, bytes(8)), data_type.base_crc ^ 1)
-    assert ear.hear([pack(one) for one in frames]) == []
-    assert ear.counts == {CRC: 1}
+    other = frames_of(transfer, types().message(STATUS).base_crc ^ 1)
+    assert ear.hear([pack(one) for one in other]) == []
+    assert ear.counts == {CRC: 2}
+    assert ear.hear(frames) == [transfer], "the same id sent again"
 
 
 def test_a_transfer_without_an_end():
@@ -323,60 +278,40 @@ def test_every_type_fits_into_what_is_put_together():
         assert longest <= 8 * MOST_PAYLOAD
 
 
-# -- what a caller cannot send ------------------------------------------------------------------
+def test_a_transfer_that_cannot_be_is_the_callers_mistake():
+    message, request, response = Kind.MESSAGE, Kind.REQUEST, Kind.RESPONSE
+    for why, *transfer in (
+        ("one frame", message, 1, 0, 0, 0, bytes(8)),
+        ("0 to 3", message, 341, 0, 0, 0, bytes(7)),
+        ("0 to 65535", message, 0x10000, 5, 0, 0, b""),
+        ("0 to 127", message, 341, 128, 0, 0, b""),
+        ("0 to 0", message, 341, 5, 7, 0, b""),
+        ("0 to 31", message, 341, 5, 0, 0, b"", 32),
+        ("0 to 31", message, 341, 5, 0, 0, b"", -1),
+        ("1 to 127", request, 163, 0, 33, 0, b""),
+        ("1 to 127", request, 163, 5, 0, 0, b""),
+        ("1 to 127", response, 163, 5, 128, 0, b""),
+        ("0 to 255", response, 256, 5, 33, 0, b""),
+    ):
+        with pytest.raises(MessageError, match=why):
+            pytest.fail(f"sent: {frames_of(Transfer(*transfer), 0)}")
 
 
-@pytest.mark.parametrize(
-    ("transfer", "why"),
-    [
-        (Transfer(Kind.MESSAGE, 1, 0, 0, 0, bytes(8)), "one frame"),
-        (Transfer(Kind.MESSAGE, 341, 0, 0, 0, bytes(7)), "0 to 3"),
-        (Transfer(Kind.MESSAGE, 0x10000, 5, 0, 0, b""), "0 to 65535"),
-        (Transfer(Kind.MESSAGE, 341, 128, 0, 0, b""), "0 to 127"),
-        (Transfer(Kind.MESSAGE, 341, 5, 7, 0, b""), "0 to 0"),
-        (Transfer(Kind.MESSAGE, 341, 5, 0, 0, b"", 32), "0 to 31"),
-        (Transfer(Kind.MESSAGE, 341, 5, 0, 0, b"", -1), "0 to 31"),
-        (Transfer(Kind.REQUEST, 163, 0, 33, 0, b""), "1 to 127"),
-        (Transfer(Kind.REQUEST, 163, 5, 0, 0, b""), "1 to 127"),
-        (Transfer(Kind.RESPONSE, 163, 5, 128, 0, b""), "1 to 127"),
-        (Transfer(Kind.RESPONSE, 256, 5, 33, 0, b""), "0 to 255"),
-    ],
-    ids=str,
-)
-def test_a_transfer_that_cannot_be_is_the_callers_mistake(transfer, why):
-    with pytest.raises(MessageError, match=why):
-        frames_of(transfer, 0)
-
-
-# -- whatever comes -----------------------------------------------------------------------------
-
-
-def test_a_flood_of_made_up_senders_and_types_does_not_grow_it():
-    ear = Ear()
-    ids = [one.id for one in types()._by_id.values() if not one.is_service]
-    start = bytes(7) + b"\x80"
-    for number in ids:
-        for source in range(1, 128):
-            ear.hear([pack(CanFrame(16 << 24 | number << 8 | source, start))])
-    assert len(ids) * 127 > MOST_SESSIONS
-    assert len(ear.assembler._sessions) == MOST_SESSIONS
-
-
-def test_a_device_that_speaks_on_during_a_flood_is_heard():
-    ear = Ear()
+def test_a_flood_of_made_up_senders_and_types_does_not_grow_it_and_silences_nobody():
     numbers = [one.id for one in types()._by_id.values() if not one.is_service]
     made_up = [
         raw(16 << 24 | number << 8 | source, "00" * 7 + "80")
         for source in range(40, 128)
         for number in numbers
     ]
-    transfer, frames = information()
+    ear, (transfer, frames) = Ear(), information()
     step = len(made_up) // len(frames)
     mixed = []
     for index, frame in enumerate(frames):
         mixed += [frame, *made_up[index * step : (index + 1) * step]]
     assert step < MOST_SESSIONS < len(made_up)
     assert ear.hear(mixed) == [transfer]
+    assert len(ear.assembler._sessions) == MOST_SESSIONS
 
 
 KNOWN = st.sampled_from([one.id for one in types()._by_id.values()])

@@ -7,33 +7,95 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker, is_autopilot
 from chute_ros.links.mavlink.protocol.commands import Acknowledgement
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.kill import kill_plan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
-from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES, Roster
 from chute_ros.model import Armed, LinkState, VehicleState
-from chute_ros.protocol.events import (
-    DeviceLinkChanged,
-    Event,
-    Notice,
-    ParachuteChanged,
-    Severity,
-    VehicleChanged,
-)
-from chute_ros.protocol.liveness import LinkChange, first_alive
+from chute_ros.protocol.events import EventLog, ParachuteChanged, Severity, VehicleChanged
+from chute_ros.protocol.liveness import first_alive
 from chute_ros.protocol.mavlink.dialect import dialect
 
+DeviceT = TypeVar("DeviceT", ParachuteTracker, AutopilotTracker)
 Ids = tuple[int, int]
 
+#: More devices of one kind than this are not followed: a flood of made-up ids must not grow us.
+MOST_DEVICES = 16
 
-class Devices:
+
+class Roster(Generic[DeviceT]):
+    """Which devices of one kind are ours, by (system id, component id). An id of 0 means any.
+
+    More than one vehicle may be heard. A command that fires goes only to a system that was named
+    by a parameter, or, where none was, to the first one heard; a second system then makes the
+    choice doubtful, which is said and forbids take-off until the parameter is set.
+    """
+
+    def __init__(self, kind: str, system_id: int, component_id: int) -> None:
+        self.kind, self.system_id, self.component_id = kind, system_id, component_id
+        self.refused_count = 0
+        #: The system was named by a parameter, not taken as the first one heard.
+        self.fixed = system_id != 0
+        self._ours: dict[Ids, DeviceT] = {}
+        self._other_systems: set[int] = set()
+
+    def fits(self, system_id: int, component_id: int) -> bool:
+        """May a device with these ids be ours, as far as is known?"""
+        return self._possible(system_id, component_id) and self.system_id in (0, system_id)
+
+    def admits(self, system_id: int, component_id: int) -> bool:
+        """Is a device with these ids ours? If no system was named, the first one heard is."""
+        if not self._possible(system_id, component_id):
+            return False
+        if self.system_id == 0:
+            self.system_id = system_id
+        if self.system_id != system_id:
+            if len(self._other_systems) < MOST_DEVICES:
+                self._other_systems.add(system_id)
+            return False
+        full = len(self._ours) >= MOST_DEVICES and (system_id, component_id) not in self._ours
+        self.refused_count += full
+        return not full
+
+    def _possible(self, system_id: int, component_id: int) -> bool:
+        # A command to system 0 would go to every vehicle.
+        return system_id != 0 and self.component_id in (0, component_id)
+
+    def get(self, system_id: int, component_id: int) -> DeviceT | None:
+        """The device with these ids, if it is ours and was heard."""
+        return self._ours.get((system_id, component_id))
+
+    def add(self, system_id: int, component_id: int, device: DeviceT) -> None:
+        """A device that admits let in was received for the first time."""
+        self._ours[system_id, component_id] = device
+
+    def all(self) -> list[DeviceT]:
+        """Our devices in the order in which they were first heard."""
+        return list(self._ours.values())
+
+    def named(self, device: str) -> DeviceT | None:
+        """Our device with this name ("1/161")."""
+        return next((ours for ours in self._ours.values() if ours.device == device), None)
+
+    def doubt(self) -> str:
+        """Why the choice is doubtful; empty: it is not."""
+        if self.fixed or not self._other_systems:
+            return ""
+        systems = sorted({self.system_id, *self._other_systems})
+        return (
+            f"{self.kind}s of systems {', '.join(map(str, systems))} received, using "
+            f"{self.system_id}: set {self.kind}_system_id"
+        )
+
+
+class Devices(EventLog):
     """Follows the devices that are ours, each known by its heartbeat's type and its ids."""
 
     def __init__(self, config: MavlinkConfig) -> None:
+        super().__init__()
         self.parachutes: Roster[ParachuteTracker] = Roster(
             "parachute", config.parachute_system_id, config.parachute_component_id
         )
@@ -45,7 +107,6 @@ class Devices:
         #: By the type in their heartbeat they are something else.
         self._others: set[Ids] = set()
         self._config = config
-        self._events: list[Event] = []
 
     # -- who -------------------------------------------------------------------------------------
 
@@ -127,12 +188,12 @@ class Devices:
         """Look at the clock."""
         for parachute in self.parachutes.all():
             changes, picture_changed = parachute.update(now)
-            self._changed(f"parachute {parachute.device}", changes)
+            self.link_changed(f"parachute {parachute.device}", changes)
             if picture_changed:
                 self._events.append(ParachuteChanged(parachute.status(now)))
         for autopilot in self.autopilots.all():
             changes = autopilot.liveness.update(now)
-            self._changed(f"autopilot {autopilot.device}", changes)
+            self.link_changed(f"autopilot {autopilot.device}", changes)
             if changes:
                 self._vehicle_changed(now)
 
@@ -151,15 +212,6 @@ class Devices:
         fault = kill_plan(self._config.kill_method, autopilot.vehicle_type, settings).fault()
         return replace(state, faults=(*state.faults, fault)) if fault else state
 
-    def take_events(self) -> list[Event]:
-        """New events, oldest first; each is handed out once."""
-        events, self._events = self._events, []
-        return events
-
-    def notice(self, severity: Severity, text: str) -> None:
-        """Put a notice among the events."""
-        self._events.append(Notice(severity, text))
-
     def _parachute_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
         if not self.parachutes.admits(*ids):
             return
@@ -167,7 +219,7 @@ class Devices:
         if parachute is None:
             parachute = self._unproven.pop(ids, None) or self._tracker(ids)
             self.parachutes.add(*ids, parachute)
-        self._changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
+        self.link_changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
         self._events.append(ParachuteChanged(parachute.status(now)))
 
     def _tracker(self, ids: Ids) -> ParachuteTracker:
@@ -181,7 +233,7 @@ class Devices:
             limits, needed = self._config.autopilot_liveness, self._config.needed_message_rate
             autopilot = AutopilotTracker(*ids, limits, needed)
             self.autopilots.add(*ids, autopilot)
-        self._changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
+        self.link_changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
         self._vehicle_changed(now)
 
     def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:
@@ -221,6 +273,3 @@ class Devices:
 
     def _vehicle_changed(self, now: float) -> None:
         self._events.append(VehicleChanged(self.vehicle_state(now)))
-
-    def _changed(self, name: str, changes: list[LinkChange]) -> None:
-        self._events += [DeviceLinkChanged(name, change) for change in changes]

@@ -90,7 +90,7 @@ def release(
     A status from before the order is believed only while the status stream is alive and the device
     not lost: what a lost device said long ago must not keep us from sending.
     """
-    alive = parachute.liveness.state is not LinkState.LOST and not parachute.status_overdue(now)
+    alive = parachute.liveness.state is not LinkState.LOST and not parachute.overdue(now)
 
     def shown() -> bool:
         return parachute.deployed and (alive or parachute.status_received > now)

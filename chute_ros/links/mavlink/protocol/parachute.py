@@ -24,7 +24,7 @@ from chute_ros.model import (
     flag_names,
 )
 from chute_ros.protocol.boot_clock import Age, BootClock
-from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
+from chute_ros.protocol.liveness import DeviceTracker, LinkChange, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.settings import Settings, parameter
 
@@ -110,25 +110,22 @@ def component_information(message: Any) -> ComponentInformation:
     )
 
 
-class ParachuteTracker:
+class ParachuteTracker(DeviceTracker):
     """Follows one parachute, told apart from others by its system and component id."""
 
     def __init__(
         self, system_id: int, component_id: int, liveness: LivenessLimits, status: StatusLimits
     ) -> None:
+        super().__init__(liveness, status.status_timeout)
         self.system_id = system_id
         self.component_id = component_id
-        self.liveness = Liveness(liveness)
         self.information: ComponentInformation | None = None
-        self.status_received = math.nan
-        self.status_interval = math.nan  # s, between the two newest
         self.reboot_count = 0
         self._clock = BootClock()
         self._twins = Twins()
-        self._limits = status
+        self._ignored_errors = int(status.ignored_errors)
         self._system_status = 0
         self._message: Any = None
-        self._overdue = False
         #: A status came that may be the first after a restart, or a delayed one from before.
         self._doubtful = False
         self._asked = -math.inf
@@ -170,9 +167,7 @@ class ParachuteTracker:
         if age in (Age.OLD, Age.DOUBTFUL):
             # Delayed: it must not undo what a newer one said.
             return
-        self.status_interval = now - self.status_received
-        self.status_received = now
-        self._overdue = False
+        self.status_came(now)
         self._message = message
 
     def component_information(self, message: Any) -> None:
@@ -182,11 +177,6 @@ class ParachuteTracker:
     def doubt(self, now: float) -> str:
         """Another device uses the same ids, in words; empty: none does."""
         return self._twins.doubt(f"two parachutes have the ids {self.device}", now)
-
-    def status_overdue(self, now: float) -> bool:
-        """The status stream stopped: the newest is too old, though the link may live."""
-        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
-        return now >= self.status_received + self._limits.status_timeout
 
     def status_due(self, now: float) -> bool:
         """It is to be asked for its status now (MAV_CMD_REQUEST_MESSAGE; the full protocol only
@@ -199,19 +189,6 @@ class ParachuteTracker:
             return False
         self._asked = now
         return True
-
-    def update(self, now: float) -> tuple[list[LinkChange], bool]:
-        """Look at the clock: (what changed of the link, whether the picture changed)."""
-        changes = self.liveness.update(now)
-        was_overdue, self._overdue = self._overdue, self.status_overdue(now)
-        return changes, bool(changes) or self._overdue != was_overdue
-
-    def next_deadline(self) -> float:
-        """When the picture changes by itself; infinity: never."""
-        overdue = self.status_received + self._limits.status_timeout
-        if self._overdue or math.isnan(overdue):
-            overdue = math.inf
-        return min(self.liveness.next_deadline(), overdue)
 
     def status(self, now: float) -> ParachuteStatus:
         """The normalised picture at now."""
@@ -240,7 +217,7 @@ class ParachuteTracker:
     @property
     def _errors(self) -> ErrorFlags:
         """The error flags that matter. On whole numbers: ~ of a flag drops the unnamed bits."""
-        return ErrorFlags(self._message.error_status & ~int(self._limits.ignored_errors))
+        return ErrorFlags(self._message.error_status & ~self._ignored_errors)
 
     @property
     def _unhealthy(self) -> str:
@@ -258,7 +235,7 @@ class ParachuteTracker:
             faults.append(f"heartbeat reports {self._unhealthy}")
         if self._message is None:
             return [*faults, "no PARACHUTE_STATUS received"]
-        if self.status_overdue(now):
+        if self.overdue(now):
             faults.append(f"PARACHUTE_STATUS {now - self.status_received:.1f} s old")
         faults += flag_names(self._errors)
         if self._message.deployment_status > max(DeploymentTrigger):
@@ -280,7 +257,7 @@ class ParachuteTracker:
             return ParachuteState.NOT_READY
         if self.liveness.state is LinkState.NEVER_SEEN or message is None:
             return ParachuteState.UNKNOWN
-        if self._errors or self._unhealthy or self.status_overdue(now):
+        if self._errors or self._unhealthy or self.overdue(now):
             return ParachuteState.ABNORMAL
         if self.armed_triggers & TRIGGER_SOURCES:
             return ParachuteState.ARMED

@@ -10,10 +10,11 @@ import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from chute_ros.errors import ParameterError
 from chute_ros.model import LinkState, Outcome, ParachuteStatus
-from chute_ros.protocol.events import Ask, AskSupervisor, Event, ParachuteChanged, ended
+from chute_ros.protocol.events import Ask, AskSupervisor, EventLog, ParachuteChanged, ended
 from chute_ros.settings import Settings, parameter
 
 #: The one device of an output.
@@ -84,10 +85,11 @@ def _bytes(text: str, name: str) -> bytes:
     return data
 
 
-class RelayLink:
+class RelayLink(EventLog):
     """The output: UNMONITORED while it can be written; else LOST, or NEVER_SEEN at first."""
 
     def __init__(self, config: RelayConfig) -> None:
+        super().__init__()
         self.config = config
         self.state = LinkState.NEVER_SEEN
         #: Bytes that came, which nobody expects; pulses; when the newest one began, monotonic s.
@@ -103,7 +105,6 @@ class RelayLink:
         self._output: list[bytes] = []
         #: What the wire was given, and has not refused so far.
         self._given: list[bytes] = []
-        self._events: list[Event] = []
 
     # -- the wire --------------------------------------------------------------------------------
 
@@ -150,10 +151,9 @@ class RelayLink:
         self._given += output
         return output
 
-    def take_events(self) -> list[Event]:
+    def take_events(self) -> list[Any]:
         self._look_at_written()
-        events, self._events = self._events, []
-        return events
+        return super().take_events()
 
     # -- the owner -------------------------------------------------------------------------------
 

@@ -74,11 +74,8 @@ class Layout:
         target_fields: tuple[str, ...],
         heartbeat_in_flight: bool = False,
     ) -> None:
-        self.name = name
-        self.fields = fields
-        self.target_floats = target_floats
-        self.target_fields = target_fields
-        self.heartbeat_in_flight = heartbeat_in_flight
+        self.name, self.fields, self.target_floats = name, fields, target_floats
+        self.target_fields, self.heartbeat_in_flight = target_fields, heartbeat_in_flight
         self.index = {field.name: number for number, field in enumerate(fields)}
         self._sure = re.compile(",".join(field.kind.sure_pattern for field in fields))
         self._ranges = struct.Struct("<" + "".join(f.kind.code for f in fields))

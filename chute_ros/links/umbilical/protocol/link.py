@@ -24,13 +24,7 @@ from chute_ros.links.umbilical.protocol.scheduler import HEARTBEAT, Command, Com
 from chute_ros.links.umbilical.protocol.stream import DumpBytes, Line, StreamReader
 from chute_ros.model import LinkState, TriggerFlags, VehicleState
 from chute_ros.protocol.boot_clock import Age
-from chute_ros.protocol.events import (
-    DeviceLinkChanged,
-    Notice,
-    ParachuteChanged,
-    Severity,
-    VehicleChanged,
-)
+from chute_ros.protocol.events import EventLog, Notice, ParachuteChanged, Severity, VehicleChanged
 from chute_ros.protocol.liveness import LinkChange
 from chute_ros.protocol.requests import Requests
 
@@ -43,10 +37,11 @@ MOST_TOLD = 50
 DOUBTED = "record held until the next one agrees"
 
 
-class UmbilicalLink:
+class UmbilicalLink(EventLog):
     """Follows the flight computer and carries commands to it."""
 
     def __init__(self, config: UmbilicalConfig, layouts: list[Layout]) -> None:
+        super().__init__()
         self.config = config
         self.counts: Counter[str] = Counter()
         self.received_bytes = 0
@@ -70,7 +65,6 @@ class UmbilicalLink:
         self._output: list[Command] = []
         #: Of the commands that were handed out last the names, by their tokens.
         self._handed_out: dict[bytes, str] = {}
-        self._events: list[UmbilicalEvent] = []
 
     # -- wire side -------------------------------------------------------------------------------
 
@@ -138,9 +132,9 @@ class UmbilicalLink:
 
     def take_events(self) -> list[UmbilicalEvent]:
         """New events, oldest first; each is handed out once."""
-        happened, self._events = self._events, []
-        happened += [*self.decoder.take_notices(), *self.orders.take_notices()]
-        happened += [*self.memory.take_events(), *self._requests.take_events()]
+        happened = [*super().take_events(), *self.decoder.take_notices()]
+        for part in (self.orders, self.memory, self._requests):
+            happened += part.take_events()
         return [one for one in happened if not self._is_one_too_many(one)]
 
     # -- what the node asks for ------------------------------------------------------------------
@@ -253,9 +247,9 @@ class UmbilicalLink:
         elif isinstance(said, s.FlashUsage):
             self.orders.flash_usage(said, now)
             text = f"flash: {said.used} of {said.total} KB used"
-            self._events.append(Notice(Severity.INFO, text))
+            self.notice(Severity.INFO, text)
         elif isinstance(said, s.ArmingBlocked):
-            self._events.append(Notice(Severity.WARNING, f"flight computer: {said.text}"))
+            self.notice(Severity.WARNING, f"flight computer: {said.text}")
             self.orders.arming_blocked(said.text, now)
         elif said is not None:
             self.memory.heard(said, now)
@@ -267,7 +261,7 @@ class UmbilicalLink:
             return
         self._show_unknown_at = now + _SHOW_UNKNOWN_EACH
         text = s.printable(line[:_MOST_SHOWN].decode("utf-8", errors="replace"))
-        self._events.append(Notice(Severity.INFO, f"unknown line: {text!r}"))
+        self.notice(Severity.INFO, f"unknown line: {text!r}")
 
     def _telemetry(self, body: str, now: float) -> None:
         record = self.decoder.decode(body, now)
@@ -280,7 +274,7 @@ class UmbilicalLink:
             return
         if age is Age.RESTARTED:
             where = " IN FLIGHT" if self.computer.restarted_in_flight else ""
-            self._events.append(Notice(Severity.ERROR, f"flight computer restarted{where}"))
+            self.notice(Severity.ERROR, f"flight computer restarted{where}")
             self.memory.restarted()
         self._hold.record(self.computer.flying)
         self.memory.telemetry(now)
@@ -295,7 +289,7 @@ class UmbilicalLink:
         self._events.append(VehicleChanged(self.computer.vehicle_state(now)))
 
     def _changed(self, changes: list[LinkChange]) -> None:
-        self._events += [DeviceLinkChanged(DEVICE.replace("_", " "), one) for one in changes]
+        self.link_changed(DEVICE.replace("_", " "), changes)
 
     def _drive(self, now: float) -> None:
         # What is over is taken out before the next token leaves.

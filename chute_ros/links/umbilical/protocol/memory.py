@@ -26,7 +26,7 @@ from chute_ros.links.umbilical.protocol.line_parser import (
 from chute_ros.links.umbilical.protocol.scheduler import Command
 from chute_ros.links.umbilical.protocol.stream import DumpBegan, DumpBytes, DumpEnded
 from chute_ros.model import Outcome
-from chute_ros.protocol.events import Notice, RequestReport, Severity, ended
+from chute_ros.protocol.events import EventLog, RequestReport, Severity, ended
 from chute_ros.protocol.goal import Report
 from chute_ros.transitions import after
 
@@ -84,14 +84,14 @@ class Work:
         return self.name.replace("_", " ")
 
 
-class MemoryWorks:
+class MemoryWorks(EventLog):
     """Follows the work under way; its requests end in one RequestFinished each."""
 
     def __init__(self, limits: MemoryLimits) -> None:
+        super().__init__()
         self._limits = limits
         self.work: Work | None = None
         self._unasked_until = -math.inf
-        self._events: list[events.UmbilicalEvent] = []
 
     # -- asked for -------------------------------------------------------------------------------
 
@@ -144,7 +144,7 @@ class MemoryWorks:
             self._memory_text(said.text, now)
         elif isinstance(said, WipeBegan):
             self._sign(self._wipe_name(), now)
-            self._events.append(Notice(Severity.INFO, "the flash is being wiped"))
+            self.notice(Severity.INFO, "the flash is being wiped")
         elif isinstance(said, WipeProgress):
             self._sign(self._wipe_name(), now)
             text = f"wiping the flash: {said.done} of {said.total} sectors"
@@ -202,11 +202,6 @@ class MemoryWorks:
         work = self.work
         return math.inf if work is None else work.last + self._limit(work)
 
-    def take_events(self) -> list[events.UmbilicalEvent]:
-        """New events, oldest first; each is handed out once."""
-        taken, self._events = self._events, []
-        return taken
-
     # -- inside ----------------------------------------------------------------------------------
 
     def _limit(self, work: Work) -> float:
@@ -251,18 +246,18 @@ class MemoryWorks:
             self._sign("dump_fram", now, ".txt")
             self._bytes(f"{text}\n".encode(), now)
         else:
-            self._events.append(Notice(Severity.INFO, f"flight computer: {text}"))
+            self.notice(Severity.INFO, f"flight computer: {text}")
 
     def _wipe_ended(self, said: WipeEnded, now: float) -> None:
         work = self.work
         if work is None or work.is_dump:
-            self._events.append(Notice(Severity.INFO, f"flight computer: {said.text}"))
+            self.notice(Severity.INFO, f"flight computer: {said.text}")
         elif work.name == "wipe_fram_and_reboot":
             # Whether the flash could be wiped or not: what is left is the restart.
             self._sign(work.name, now)
             assert self.work is not None
             self.work = replace(self.work, is_wiped=True)
-            self._events.append(Notice(Severity.INFO, f"flight computer: {said.text}"))
+            self.notice(Severity.INFO, f"flight computer: {said.text}")
         else:
             self._end(said.success, said.text)
 
@@ -277,7 +272,7 @@ class MemoryWorks:
             self._events.append(events.DumpFinished(work.token, success, text))
         else:
             severity = Severity.INFO if success else Severity.WARNING
-            self._events.append(Notice(severity, text))
+            self.notice(severity, text)
         if work.token:
             outcome = Outcome.CONFIRMED if success else Outcome.FAILED
             self._events += ended(work.token, outcome, text, work.sent, success)

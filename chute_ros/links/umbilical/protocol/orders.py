@@ -19,7 +19,7 @@ from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.links.umbilical.protocol.line_parser import FlashUsage
 from chute_ros.links.umbilical.protocol.memory import MemoryWorks
 from chute_ros.links.umbilical.protocol.scheduler import CommandScheduler
-from chute_ros.protocol.events import Notice, Severity
+from chute_ros.protocol.events import EventLog, Severity
 from chute_ros.protocol.goal import ConfirmedCommand
 from chute_ros.protocol.requests import Requests
 
@@ -40,7 +40,7 @@ _SETTLES = 0.3
 _NOTHING_SHOWS = "telemetry cannot show its effect"
 
 
-class Orders:
+class Orders(EventLog):
     """Begins requests; each ends in one RequestFinished with its token."""
 
     def __init__(
@@ -51,17 +51,14 @@ class Orders:
         decoder: TelemetryDecoder,
         memory: MemoryWorks,
     ) -> None:
-        self._config = config
-        self._requests = requests
-        self._computer = computer
-        self._decoder = decoder
-        self._memory = memory
+        super().__init__()
+        self._config, self._requests, self._computer = config, requests, computer
+        self._decoder, self._memory = decoder, memory
         self._block = ""
         self._key_disarmed = False
         self._flash_usage_at = -math.inf
         #: When a command was sent last, by its name.
         self._sent_at: dict[str, float] = {}
-        self._notices: list[Notice] = []
         #: What may still leave, for the first time or again: request -> (command, force).
         self._to_leave: dict[int, tuple[CommandKind, bool]] = {}
 
@@ -113,7 +110,7 @@ class Orders:
         """Refuse to launch for reason, or no longer (empty)."""
         if reason != self._block:
             text = f"flight blocked: {reason}" if reason else "flight block released"
-            self._notices.append(Notice(Severity.WARNING if reason else Severity.INFO, text))
+            self.notice(Severity.WARNING if reason else Severity.INFO, text)
         self._block = reason
         if reason:
             self._end(("launch",), f"flight is blocked: {reason}", now)
@@ -137,7 +134,7 @@ class Orders:
         if name in CANOPIES:
             self._computer.not_fired(name)
         text = f"{name} was not written: the port takes no more data; is anything at its end?"
-        self._notices.append(Notice(Severity.ERROR, text))
+        self.notice(Severity.ERROR, text)
         self._requests.fail_untold(
             [token for token, (kind, _) in self._to_leave.items() if kind.command.name == name],
             text,
@@ -173,11 +170,6 @@ class Orders:
                 self._memory.give_up(refusal)
             elif refusal:
                 self._requests.abandon(token, refusal, now)
-
-    def take_notices(self) -> list[Notice]:
-        """What a person should read; each is handed out once."""
-        notices, self._notices = self._notices, []
-        return notices
 
     # -- inside ----------------------------------------------------------------------------------
 

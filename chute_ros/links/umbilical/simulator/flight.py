@@ -49,9 +49,7 @@ class FlightProgram:
             **{f"<{n}>": self._payload(f"cmd_n{n}") for n in range(1, 5)},
             **{f"<A{n}>": self._payload(f"cmd_a{n}") for n in range(1, 4)},
         }
-        self._settings = settings
-        self._target_floats = target_floats
-        self._log = log
+        self._settings, self._target_floats, self._log = settings, target_floats, log
         self._print_line = print_line
         self._drogue_out_for = math.inf  # simulated s
         self.restart()

@@ -91,9 +91,7 @@ class Memory:
         self.wipe_outcome = ""
         #: Called once the flash is wiped.
         self.on_wiped: Callable[[], None] = lambda: None
-        self._settings = settings
-        self._header = header
-        self._queue = queue
+        self._settings, self._header, self._queue = settings, header, queue
         self._used = settings.flash_used * 1024
         self._stored = settings.dump_size
         self._rows: list[str] = []

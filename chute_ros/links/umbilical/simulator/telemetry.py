@@ -6,7 +6,6 @@ import math
 import struct
 from collections.abc import Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_DOWN, Context, Decimal
-from fractions import Fraction
 from functools import lru_cache
 
 from chute_ros.links.umbilical.protocol.fields import FieldType
@@ -14,8 +13,7 @@ from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.simulator.settings import Mode
 from chute_ros.sim.rocket import GRAVITY, Rocket
 
-_INFINITE_F32 = 0x7F80_0000
-_MANTISSA = 0x007F_FFFF
+_BOTH_WAYS = (ROUND_FLOOR, ROUND_CEILING)
 #: To the nearest decimal of so many digits.
 _NEAREST = {digits: Context(digits, ROUND_HALF_DOWN) for digits in range(1, 10)}
 
@@ -138,19 +136,11 @@ def _rounded_to_f32(value: float) -> float:
         return math.copysign(math.inf, value)
 
 
-def _f32(bits: int) -> Fraction:
-    """The number of these bits; that of infinity is what would follow the largest number."""
-    if bits == _INFINITE_F32:
-        return Fraction(2**128)
-    return Fraction(struct.unpack("<f", struct.pack("<I", bits))[0])
-
-
 def _shortest_f32(value: float) -> Decimal:
     """The shortest decimal that reads back as value, and of those the nearest. value: >= 0."""
     if value == 0.0:
         return Decimal(0)
-    bits = struct.unpack("<I", struct.pack("<f", value))[0]
-    if bits & _MANTISSA:
+    if math.frexp(value)[0] != 0.5:  # no power of two
         # Its neighbours are equally far: the nearest decimal of so many digits reads back as it,
         # or none of so many does; and that of one digit more is nearer. Most need eight or nine.
         shortest = _NEAREST[9].create_decimal_from_float(value)
@@ -160,17 +150,11 @@ def _shortest_f32(value: float) -> Decimal:
                 break
             shortest = near
         return shortest
-    exact = Fraction(value)
-    low, high = (exact + _f32(bits - 1)) / 2, (exact + _f32(bits + 1)) / 2
-    # What lies half way between two numbers reads as the one with the even last bit.
-    is_even = bits % 2 == 0
+    # The neighbour below is nearer than that above: the nearest decimal may be too low, and one
+    # that is further off, but higher, may read back as it.
     for digits in range(1, 10):
-        found = [
-            candidate
-            for rounding in (ROUND_FLOOR, ROUND_CEILING)
-            for candidate in [Context(digits, rounding).create_decimal_from_float(value)]
-            if low < Fraction(candidate) < high or (is_even and Fraction(candidate) in (low, high))
-        ]
+        both = [Context(digits, one).create_decimal_from_float(value) for one in _BOTH_WAYS]
+        found = [one for one in both if _rounded_to_f32(float(one)) == value]
         if found:
-            return min(found, key=lambda candidate: abs(Fraction(candidate) - exact))
+            return min(found, key=lambda one: abs(one - Decimal(value)))
     raise AssertionError(f"nine digits tell every 32-bit float, but not {value!r}")

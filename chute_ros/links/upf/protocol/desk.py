@@ -24,9 +24,7 @@ class ErrandDesk:
     """Every errand ends in one ErrandFinished with its token."""
 
     def __init__(self, bus: BusNode, devices: UpfDevices, in_air: Callable[[float], bool]) -> None:
-        self._bus = bus
-        self._devices = devices
-        self._in_air = in_air
+        self._bus, self._devices, self._in_air = bus, devices, in_air
         #: Controller -> when its parameters are to be read again.
         self._read_again: dict[int, float] = {}
         #: Controllers whose parameters are being read.

@@ -24,7 +24,7 @@ from chute_ros.model import (
     SafetyFlags,
     TriggerFlags,
 )
-from chute_ros.protocol.liveness import LinkChange, Liveness
+from chute_ros.protocol.liveness import DeviceTracker, LinkChange
 
 _HEALTH = ("OK", "WARNING", "ERROR", "CRITICAL")
 #: Errors of ours that have a name among the flags of the MAVLink parachute protocol.
@@ -37,16 +37,14 @@ _FLAGS = {
 }
 
 
-class Device:
+class Device(DeviceTracker):
     """What controller and trigger have in common."""
 
     kind = ""
 
     def __init__(self, node_id: int, config: UpfConfig, definitions: Definitions) -> None:
+        super().__init__(config.liveness, config.status_timeout)
         self.node_id = node_id
-        self.liveness = Liveness(config.liveness)
-        self.status_received = math.nan
-        self.status_interval = math.nan  # s, between the two newest
         self.restart_count = 0
         #: Fields of the newest status that we know nothing of.
         self.unknown_fields: dict[str, Any] = {}
@@ -54,8 +52,6 @@ class Device:
         self.values: Mapping[str, Any] = {}
         self.uptime = math.nan  # s, by NodeStatus
         self._health = 0
-        self._timeout = config.status_timeout
-        self._overdue = False
 
     @property
     def device(self) -> str:
@@ -70,31 +66,13 @@ class Device:
 
     def take_status(self, name: str, values: Mapping[str, Any], now: float) -> list[LinkChange]:
         """Its own status message."""
-        self.status_interval = now - self.status_received
-        self.status_received = now
-        self._overdue = False
+        self.status_came(now)
         self.values = values
         new = [
             one.rpartition(".")[2] for one in self.definitions.new if one.startswith(f"{name}.")
         ]
         self.unknown_fields = {field: values[field] for field in new if field in values}
         return self.liveness.heard(now)
-
-    def overdue(self, now: float) -> bool:
-        """The newest status is too old, though the link may live."""
-        # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
-        return now >= self.status_received + self._timeout
-
-    def update(self, now: float) -> tuple[list[LinkChange], bool]:
-        """Look at the clock: (what changed of the link, whether the picture changed)."""
-        changes = self.liveness.update(now)
-        before, self._overdue = self._overdue, self.overdue(now)
-        return changes, bool(changes) or self._overdue != before
-
-    def next_deadline(self) -> float:
-        """When the picture changes by itself; infinity: never."""
-        overdue = math.inf if self._overdue else self.status_received + self._timeout
-        return min(self.liveness.next_deadline(), overdue)
 
     @property
     def alive(self) -> bool:

@@ -22,7 +22,7 @@ from chute_ros.links.upf.protocol.devices import (
 )
 from chute_ros.links.upf.protocol.events import TriggerChanged
 from chute_ros.model import LinkState, ParachuteStatus
-from chute_ros.protocol.events import DeviceLinkChanged, Event, Notice, ParachuteChanged, Severity
+from chute_ros.protocol.events import EventLog, ParachuteChanged, Severity
 from chute_ros.protocol.liveness import LinkChange, first_alive
 
 DeviceT = TypeVar("DeviceT", bound=Device)
@@ -30,10 +30,11 @@ DeviceT = TypeVar("DeviceT", bound=Device)
 MOST_DEVICES = 8
 
 
-class UpfDevices:
+class UpfDevices(EventLog):
     """Follows the controllers and triggers that are ours."""
 
     def __init__(self, config: UpfConfig, definitions: Definitions) -> None:
+        super().__init__()
         self._config = config
         self.definitions = definitions
         self.controllers: dict[int, Controller] = {}
@@ -44,7 +45,6 @@ class UpfDevices:
         self.to_read: list[Controller] = []
         #: Node ids that two nodes use: what their statuses say changes with each.
         self.doubled: frozenset[int] = frozenset()
-        self._events: list[Event | TriggerChanged] = []
 
     # -- who -------------------------------------------------------------------------------------
 
@@ -191,15 +191,6 @@ class UpfDevices:
         """When update has something to do; infinity: never."""
         return min((device.next_deadline() for device in self._all()), default=math.inf)
 
-    def take_events(self) -> list[Event | TriggerChanged]:
-        """New events, oldest first; each is handed out once."""
-        events, self._events = self._events, []
-        return events
-
-    def notice(self, severity: Severity, text: str) -> None:
-        """Put a notice among the events."""
-        self._events.append(Notice(severity, text))
-
     # -- inside ----------------------------------------------------------------------------------
 
     def _all(self) -> list[Device]:
@@ -222,8 +213,7 @@ class UpfDevices:
         return made
 
     def _changed(self, device: Device, changes: list[LinkChange]) -> None:
-        name = f"{device.kind} {device.node_id}"
-        self._events += [DeviceLinkChanged(name, change) for change in changes]
+        self.link_changed(f"{device.kind} {device.node_id}", changes)
         if isinstance(device, Controller) and any(change.regained for change in changes):
             # Nobody knows what was done to it meanwhile.
             self.to_read.append(device)

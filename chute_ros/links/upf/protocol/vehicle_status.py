@@ -26,9 +26,7 @@ class Vehicle:
     """Keeps what the vehicle says of itself, and tells it to the controllers."""
 
     def __init__(self, config: UpfConfig, devices: UpfDevices, endpoint: Endpoint) -> None:
-        self._config = config
-        self._devices = devices
-        self._endpoint = endpoint
+        self._config, self._devices, self._endpoint = config, devices, endpoint
         self._definitions = devices.definitions
         self._state, self._received = VehicleState(), -math.inf
         self._tell_at = -math.inf

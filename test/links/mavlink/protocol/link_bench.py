@@ -137,12 +137,18 @@ class Bench:
         self.link.update(self.now)
         self.collect()
 
-    def collect(self) -> None:
+    def call(self, what: str, *arguments: Any) -> Bench:
+        """Call this method of the link now; what it sends at once has left."""
+        getattr(self.link, what)(*arguments, self.now)
+        return self.collect()
+
+    def collect(self) -> Bench:
         for raw in self.link.take_output():
             frames = self._decoder.feed_datagram(raw, self.now)
             assert len(frames) == 1
             self.sent.append((self.t, frames[0].message))
         self.events += self.link.take_events()
+        return self
 
     # -- what came out -------------------------------------------------------------------------
 
@@ -155,9 +161,10 @@ class Bench:
         """The PARAM_REQUEST_READs sent so far."""
         return [m for _, m in self.sent if m.get_type() == "PARAM_REQUEST_READ"]
 
-    def clear(self) -> None:
+    def clear(self) -> Bench:
         self.sent.clear()
         self.events.clear()
+        return self
 
     def ends(self, token: int) -> list[Any]:
         return [

@@ -22,8 +22,7 @@ def flying():
 
 
 def block(bench, reason):
-    bench.link.flight_block(reason, bench.now)
-    bench.collect()
+    bench.call("flight_block", reason)
     return bench
 
 
@@ -70,8 +69,7 @@ def test_one_that_comes_and_goes_within_the_pace_says_nothing():
 
 
 def test_a_kill_is_said_when_it_is_ordered_and_when_it_is_confirmed():
-    bench = flying()
-    bench.link.kill(1, bench.now)
+    bench = flying().call("kill", 1)
     bench.at(0.1).hear(PILOT, ack(KILL), copter(armed=False)).at(0.2)
     ordered, confirmed = bench.texts()
     assert ordered == "KILL ordered"
@@ -79,8 +77,7 @@ def test_a_kill_is_said_when_it_is_ordered_and_when_it_is_confirmed():
 
 
 def test_a_kill_that_is_refused_and_one_that_fails_are_said():
-    bench = flying()
-    bench.link.kill(1, bench.now)
+    bench = flying().call("kill", 1)
     bench.at(0.1).hear(PILOT, ack(KILL, d.MAV_RESULT_TEMPORARILY_REJECTED))
     bench.stream(20.0, 0.5, PILOT, lambda: copter(armed=True))
     texts = bench.texts()
@@ -91,8 +88,7 @@ def test_a_kill_that_is_refused_and_one_that_fails_are_said():
 
 
 def test_a_deploy_names_the_parachute():
-    bench = flying()
-    bench.link.deploy(1, True, bench.now)
+    bench = flying().call("deploy", 1, True)
     bench.at(0.1).hear(CHUTE, ack(225), status(armed=4), ack(RELEASE))
     bench.hear(CHUTE, status(deployed=4)).at(0.5)
     texts = bench.texts()

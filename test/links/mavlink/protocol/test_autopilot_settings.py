@@ -53,8 +53,7 @@ def test_a_lost_request_is_sent_again_and_a_name_without_an_answer_is_not_there(
 
 
 def test_an_autopilot_that_answers_none_is_said_to_and_forbids_nothing():
-    bench = Bench().hear(PILOT, ardupilot())
-    bench.stream(30.0, 0.1, PILOT, ardupilot)
+    bench = Bench().hear(PILOT, ardupilot()).stream(30.0, 0.1, PILOT, ardupilot)
     setup = bench.link.setup()
     assert set(setup.settings.values()) == {"not answered"}
     assert any("answers no parameter request" in text for text in setup.warnings)
@@ -63,8 +62,7 @@ def test_an_autopilot_that_answers_none_is_said_to_and_forbids_nothing():
 
 
 def test_an_unknown_autopilot_is_asked_for_nothing():
-    bench = Bench()
-    bench.stream(30.0, 0.5, PILOT, lambda: heartbeat(d.MAV_TYPE_QUADROTOR, 0))
+    bench = Bench().stream(30.0, 0.5, PILOT, lambda: heartbeat(d.MAV_TYPE_QUADROTOR, 0))
     assert bench.reads() == []
     assert bench.link.setup().settings == {}
 

@@ -87,22 +87,19 @@ def test_the_confirmation_is_a_byte_and_stays_at_its_highest():
     assert max(one.confirmation for _, one in bench.sent) == 255
 
 
-@pytest.mark.parametrize("ids", [(1, 162), (2, 161), (255, 0)])
-def test_only_the_component_that_was_addressed_can_answer(ids):
-    bench = Bench().start(7, RELEASE).at(0.1).ack(RELEASE, ids=ids)
-    assert bench.ends() == []
-    assert bench.commands.unexpected_count == 1
+def test_only_the_component_that_was_addressed_can_answer():
+    for ids in ((1, 162), (2, 161), (255, 0)):
+        bench = Bench().start(7, RELEASE).at(0.1).ack(RELEASE, ids=ids)
+        assert bench.ends() == [], ids
+        assert bench.commands.unexpected_count == 1
 
 
-@pytest.mark.parametrize("result", [*range(5), *range(6, 12), 254])
-def test_every_result_ends_it_with_words_of_its_own(result):
-    bench = Bench().start(7, RELEASE).at(0.1).ack(RELEASE, result)
-    (end,) = bench.ends()
-    assert end.result == result
-    assert end.text()
-
-
-def test_no_two_results_have_the_same_words():
+def test_every_result_ends_it_with_words_of_its_own():
+    for result in (*range(5), *range(6, 12), 254):
+        bench = Bench().start(7, RELEASE).at(0.1).ack(RELEASE, result)
+        (end,) = bench.ends()
+        assert end.result == result
+        assert end.text(), result
     texts = [results.result_text(number) for number in range(256)]
     assert len(set(texts)) == 256
     assert "which MAVLink does not define" in results.result_text(99)
@@ -114,6 +111,14 @@ def test_in_progress_extends_the_wait_and_nothing_is_sent_meanwhile():
     assert len(bench.sent) == 1
     (end,) = bench.ack(RELEASE).ends()
     assert end.accepted
+    # Right after an answered command too, but not if it is of an earlier one.
+    bench = Bench(in_progress_timeout=5.0).start(1, DISABLE).at(0.1).ack(DISABLE)
+    bench.at(0.2).start(2, RELEASE).at(0.3).ack(RELEASE, results.IN_PROGRESS)
+    assert bench.commands.next_deadline() == pytest.approx(5.3)
+    assert len(bench.at(5.0).sent) == 2
+    bench = Bench(tries=1, ack_timeout=0.5).start(1, DISABLE).at(0.5)
+    bench.at(0.6).start(2, RELEASE).at(0.7).ack(DISABLE, results.IN_PROGRESS)
+    assert bench.commands.next_deadline() == pytest.approx(1.1)
 
 
 def test_a_late_answer_to_an_earlier_command_does_not_confirm_a_later_one():
@@ -189,27 +194,11 @@ def test_a_cancelled_command_is_neither_sent_again_nor_reported():
     bench.commands.cancel(2, 0.1)
     assert bench.at(10.0).ends() == []
     assert bench.commands.next_deadline() == math.inf
-
-
-def test_a_command_that_waits_can_be_cancelled_and_the_others_keep_their_turn():
     bench = Bench().start(1, DISABLE).start(2, DISABLE).start(3, RELEASE)
     bench.commands.cancel(2, 0.1)
     bench.at(0.2).ack(DISABLE).at(0.3).ack(RELEASE)
-    assert [end.token for end in bench.ends()] == [1, 3]
+    assert [end.token for end in bench.ends()] == [1, 3], "the others keep their turn"
     assert [one.command for _, one in bench.sent] == [DISABLE, RELEASE]
-
-
-def test_in_progress_extends_the_wait_right_after_an_answered_command_too():
-    bench = Bench(in_progress_timeout=5.0).start(1, DISABLE).at(0.1).ack(DISABLE)
-    bench.at(0.2).start(2, RELEASE).at(0.3).ack(RELEASE, results.IN_PROGRESS)
-    assert bench.commands.next_deadline() == pytest.approx(5.3)
-    assert len(bench.at(5.0).sent) == 2
-
-
-def test_in_progress_of_an_earlier_command_does_not_extend_a_later_one():
-    bench = Bench(tries=1, ack_timeout=0.5).start(1, DISABLE).at(0.5)
-    bench.at(0.6).start(2, RELEASE).at(0.7).ack(DISABLE, results.IN_PROGRESS)
-    assert bench.commands.next_deadline() == pytest.approx(1.1)
 
 
 def test_commands_that_were_answered_add_no_tries_to_a_later_one():
@@ -229,13 +218,13 @@ def test_a_device_that_never_answers_does_not_make_us_grow():
     assert len(sends._sends) <= MOST_SENDS
 
 
-@pytest.mark.parametrize(
-    "limits",
-    [{"ack_timeout": 0.0}, {"tries": 0}, {"tries": 101}, {"late_ack_window": math.nan}],
-)
-def test_limits_that_make_no_sense_are_refused_by_name(limits):
-    with pytest.raises(ParameterError, match=next(iter(limits))):
-        CommandLimits(**limits)
+def test_limits_that_make_no_sense_are_refused_by_name():
+    for name, value in (
+        *(("ack_timeout", 0.0), ("tries", 0), ("tries", 101)),
+        ("late_ack_window", math.nan),
+    ):
+        with pytest.raises(ParameterError, match=name):
+            CommandLimits(**{name: value})
 
 
 class Device:

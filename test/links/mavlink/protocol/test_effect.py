@@ -17,7 +17,6 @@ from chute_ros.transitions import after
 
 ORDER = Command(1, 161, 208, (2.0, *[0.0] * 6))
 ASK = Command(1, 161, 512, (430.0, *[0.0] * 6))
-PAIRS = list(itertools.product(Phase, Happening))
 
 
 class Bench:
@@ -72,16 +71,14 @@ class Bench:
         return self.loop.finished
 
 
-@pytest.mark.parametrize(("phase", "happening"), PAIRS, ids=lambda one: one.name)
-def test_a_pair_is_in_the_table_or_raises(phase, happening):
-    if (phase, happening) in TRANSITIONS:
-        assert after(TRANSITIONS, phase, happening) is TRANSITIONS[phase, happening]
-    else:
-        with pytest.raises(TransitionError, match=phase.name):
-            after(TRANSITIONS, phase, happening)
-
-
-def test_no_way_leads_out_of_an_end():
+def test_a_pair_is_in_the_table_or_raises():
+    for phase, happening in itertools.product(Phase, Happening):
+        if (phase, happening) in TRANSITIONS:
+            moved = after(TRANSITIONS, phase, happening)
+            assert moved is TRANSITIONS[phase, happening], (phase, happening)
+        else:
+            with pytest.raises(TransitionError, match=phase.name):
+                after(TRANSITIONS, phase, happening)
     assert not [pair for pair in TRANSITIONS if pair[0] in (Phase.CONFIRMED, Phase.FAILED)]
 
 
@@ -129,51 +126,32 @@ def test_an_effect_that_is_late_is_asked_for_again_and_then_ordered_again():
     assert bench.end.success
 
 
-def test_temporarily_rejected_is_tried_again():
-    bench = Bench().at(0.1).answer(results.TEMPORARILY_REJECTED).at(0.4)
-    assert bench.sent == [0.0, pytest.approx(0.35)]
-    bench.answer().shows()
-    assert bench.end.success
-
-
-def test_a_refusal_for_now_is_told_once_and_at_once():
+def test_temporarily_rejected_is_told_once_and_at_once_and_tried_again():
     bench = Bench().at(0.1).answer(results.TEMPORARILY_REJECTED)
     assert bench.reports == [Outcome.SENT, Outcome.REFUSED]
-    bench.at(0.4).answer(results.TEMPORARILY_REJECTED).at(0.7).answer().shows()
+    assert bench.at(0.4).sent == [0.0, pytest.approx(0.35)]
+    bench.answer(results.TEMPORARILY_REJECTED).at(0.7).answer().shows()
+    assert bench.end.success
     assert bench.reports[2:] == [Outcome.ACCEPTED, Outcome.CONFIRMED]
-
-
-def test_no_answer_and_a_newer_command_are_no_refusals():
+    # No answer and a newer command are no refusals.
     bench = Bench(urgent=True).at(1.0).answer(results.NO_ACKNOWLEDGEMENT)
     bench.at(1.3).answer(results.TEMPORARILY_REJECTED, superseded=True)
     assert Outcome.REFUSED not in bench.reports
 
 
-def test_a_refusal_for_good_that_is_insisted_on_is_told_as_well():
-    bench = Bench(insist=True).at(0.1).answer(results.DENIED)
-    assert bench.reports == [Outcome.SENT, Outcome.REFUSED]
-    assert not bench.loop.ended
-
-
-@pytest.mark.parametrize(
-    "result", [results.DENIED, results.UNSUPPORTED, results.FAILED, results.CANCELLED, 9, 99]
-)
-def test_any_other_refusal_is_final_and_in_words(result):
-    bench = Bench().at(0.1).answer(result)
-    assert (bench.end.success, bench.end.accepted, bench.end.result) == (False, False, result)
-    assert results.result_text(result) in bench.end.message
-    assert bench.reports[-1] is Outcome.FAILED
-
-
-@pytest.mark.parametrize("result", [results.DENIED, results.UNSUPPORTED, results.FAILED])
-def test_who_insists_is_stopped_by_time_alone(result):
-    bench = Bench(insist=True).at(0.1).answer(result).at(0.4)
-    assert len(bench.sent) == 2
-    bench.at(20.0)
-    assert "given up after 5.0 s" in bench.end.message
-
-
-def test_a_refusal_names_what_the_device_says_of_itself():
+def test_any_other_refusal_is_final_and_in_words_unless_somebody_insists():
+    for result in (results.DENIED, results.UNSUPPORTED, results.FAILED, results.CANCELLED, 9, 99):
+        bench = Bench().at(0.1).answer(result)
+        end = bench.end
+        assert (end.success, end.accepted, end.result) == (False, False, result)
+        assert results.result_text(result) in end.message
+        assert bench.reports[-1] is Outcome.FAILED
+    for result in (results.DENIED, results.UNSUPPORTED, results.FAILED):
+        bench = Bench(insist=True).at(0.1).answer(result)
+        assert bench.reports == [Outcome.SENT, Outcome.REFUSED]
+        assert not bench.loop.ended
+        assert len(bench.at(0.4).sent) == 2
+        assert "given up after 5.0 s" in bench.at(20.0).end.message
     bench = Bench(hint=lambda: "armed triggers: none").at(0.1).answer(results.FAILED)
     assert bench.end.message.endswith("; armed triggers: none")
 
@@ -211,10 +189,10 @@ def test_what_is_not_wanted_any_more_ends_with_the_reason():
     assert "again" not in bench.end.message
 
 
-@pytest.mark.parametrize("name", ["effect_timeout", "retry_interval", "give_up_after"])
-def test_times_that_make_no_sense_are_refused_by_name(name):
-    with pytest.raises(ParameterError, match=name):
-        EffectLimits(**{name: 0.0})
+def test_times_that_make_no_sense_are_refused_by_name():
+    for name in ("effect_timeout", "retry_interval", "give_up_after"):
+        with pytest.raises(ParameterError, match=name):
+            EffectLimits(**{name: 0.0})
 
 
 def test_a_refusal_after_an_acceptance_is_the_answer_that_is_reported():
@@ -239,23 +217,22 @@ def test_superseded_is_tried_again_only_if_urgent():
     assert "for a newer command of the same number" in other.end.message
 
 
-@pytest.mark.parametrize("end", ["shown", "abandoned"])
-def test_an_order_that_nobody_has_fetched_is_not_sent_after_the_end(end):
-    bench = Bench()
-    loop = EffectLoop(1, bench.goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
-    if end == "shown":
-        bench.there = True
-        loop.effect_may_show(0.0)
-    else:
-        loop.abandon("a release was ordered", 0.0)
-    assert loop.take_commands() == []
+def test_an_order_that_nobody_has_fetched_is_not_sent_after_the_end():
+    for end in ("shown", "abandoned"):
+        bench = Bench()
+        loop = EffectLoop(1, bench.goal, EffectLimits(1.5, 0.25, 5.0), 0.0)
+        if end == "shown":
+            bench.there = True
+            loop.effect_may_show(0.0)
+        else:
+            loop.abandon("a release was ordered", 0.0)
+        assert loop.take_commands() == [], end
 
 
 def test_the_status_is_not_asked_for_if_the_acknowledgement_finds_it_shown():
     bench = Bench().at(0.1)
     bench.there = True
-    bench.answer()
-    assert bench.end.success
+    assert bench.answer().end.success
     assert bench.asked == []
 
 

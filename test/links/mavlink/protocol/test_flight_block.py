@@ -24,7 +24,7 @@ def quadplane(armed=False):
 def on_the_ground(make=quadplane, reason="no parachute", **config):
     """Disarmed, at height 0, flight blocked."""
     bench = Bench(**config).hear(PILOT, make(False), landed(), at_height(0.0))
-    bench.link.flight_block(reason, bench.now)
+    bench.call("flight_block", reason)
     return bench.at(0.5).hear(PILOT, make(False), at_height(0.0))
 
 
@@ -79,8 +79,7 @@ def test_one_height_above_it_is_no_take_off():
 
 def test_home_that_is_set_as_it_arms_is_no_climb():
     bench = Bench().hear(PILOT, quadplane(), landed(), at_height(30.0))
-    bench.link.flight_block("x", bench.now)
-    bench.at(0.5).hear(PILOT, at_height(30.0), quadplane(True))
+    bench.call("flight_block", "x").at(0.5).hear(PILOT, at_height(30.0), quadplane(True))
     climb(bench, quadplane, [0.0, 0.0])
     bench.clear()
     climb(bench, quadplane, [n / 2 for n in range(1, 20)])
@@ -97,9 +96,7 @@ def test_home_that_is_set_as_it_arms_is_no_climb():
     ],
 )
 def test_nothing_is_forced_where_the_height_since_arming_is_not_known(before):
-    bench = Bench()
-    bench.link.flight_block("x", bench.now)
-    bench.hear(PILOT, landed(), *before)
+    bench = Bench().call("flight_block", "x").hear(PILOT, landed(), *before)
     for _ in range(20):
         bench.at(bench.t + 0.1).hear(PILOT, at_height(0.0), landed(), quadplane(True))
         bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
@@ -107,8 +104,7 @@ def test_nothing_is_forced_where_the_height_since_arming_is_not_known(before):
 
 
 def test_nothing_is_forced_on_a_height_that_no_longer_comes():
-    bench = on_the_ground().at(0.7).hear(PILOT, quadplane(True), at_height(0.1))
-    bench.clear()
+    bench = on_the_ground().at(0.7).hear(PILOT, quadplane(True), at_height(0.1)).clear()
     for _ in range(20):
         bench.at(bench.t + 0.2).hear(PILOT, quadplane(True), landed())
         if bench.t > 2.0:
@@ -120,7 +116,7 @@ def test_nothing_is_forced_on_a_height_that_no_longer_comes():
 def test_nothing_is_forced_on_a_vehicle_that_was_armed_before_the_block():
     bench = Bench().hear(PILOT, quadplane(), landed(), at_height(0.0)).at(0.5)
     bench.hear(PILOT, quadplane(True), at_height(0.5), landed(IN_AIR))
-    bench.link.flight_block("the supervisor is lost", bench.now)
+    bench.call("flight_block", "the supervisor is lost")
     for _ in range(20):
         bench.at(bench.t + 0.1).hear(PILOT, at_height(1.0), landed(IN_AIR), quadplane(True))
         bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
@@ -131,13 +127,10 @@ def test_nothing_is_forced_on_a_vehicle_that_was_armed_before_the_block():
 
 
 def test_an_old_heartbeat_is_asked_for_while_flight_is_blocked():
-    bench = on_the_ground(copter)
-    bench.stream(2.5, 0.1, PILOT, lambda: at_height(0.0))
+    bench = on_the_ground(copter).stream(2.5, 0.1, PILOT, lambda: at_height(0.0))
     asked = [m for m in bench.commands(REQUEST) if m.param1 == 0]
     assert 4 <= len(asked) <= 7
-    bench.link.flight_block("", bench.now)
-    bench.clear()
-    bench.stream(2.9, 0.1, PILOT, lambda: at_height(0.0))
+    bench.call("flight_block", "").clear().stream(2.9, 0.1, PILOT, lambda: at_height(0.0))
     assert bench.commands(REQUEST) == []
 
 
@@ -172,15 +165,11 @@ def test_an_autopilot_that_asks_may_arm_only_while_flight_is_not_blocked():
     assert answers(bench) == [(d.MAV_RESULT_ACCEPTED, 0, 5, 1, 1)] * 2, "again, and no more"
     bench.at(1.0)
     assert len(answers(bench)) == 2
-    bench.link.flight_block("no parachute", bench.now)
-    bench.clear()
-    bench.hear(PILOT, may_it_arm((1, 191)))
+    bench.call("flight_block", "no parachute").clear().hear(PILOT, may_it_arm((1, 191)))
     generic = d.MAV_ARM_AUTH_DENIED_REASON_GENERIC
     assert answers(bench) == [(d.MAV_RESULT_DENIED, generic, 0, 1, 1)]
     assert bench.texts()[-1] == "no parachute: flight blocked, arming denied"
-    bench.link.flight_block("", bench.now)
-    bench.clear()
-    bench.hear(PILOT, may_it_arm())
+    bench.call("flight_block", "").clear().hear(PILOT, may_it_arm())
     assert answers(bench)[0][0] == d.MAV_RESULT_ACCEPTED
 
 

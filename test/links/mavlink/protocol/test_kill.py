@@ -42,14 +42,12 @@ def plane(armed=False):
 def flying(make, *settings, **config):
     """An autopilot that has told its settings, armed and flies."""
     bench = Bench(**config).hear(PILOT, make(False), *settings)
-    bench.at(0.5).hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR))
-    bench.at(1.0).clear()
+    bench.at(0.5).hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR)).at(1.0).clear()
     return bench
 
 
 def kill(bench):
-    bench.link.kill(1, bench.now)
-    bench.collect()
+    return bench.call("kill", 1)
 
 
 def ways(bench):
@@ -65,19 +63,16 @@ def outcomes(bench, token):
     return [e.report.outcome.name for e in bench.events if isinstance(e, RequestReport)]
 
 
-# -- which way ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("make", [copter, ardupilot, plane, unknown])
-@pytest.mark.parametrize("method", list(KillMethod))
-def test_a_kill_alone_terminates_nothing_that_may_release(make, method):
+def test_a_kill_alone_terminates_nothing_that_may_release(make):
     """No setting was read yet: of none of them it is known what termination does."""
-    bench = flying(make, kill_method=method)
-    kill(bench)
-    for result in REFUSALS:
-        bench.at(bench.t + 0.3).hear(PILOT, make(True), ack(DISARM, result))
-    bench.stream(9.0, 0.5, PILOT, lambda: make(True))
-    assert {way for _, way in ways(bench)} == {DISARM}
+    for method in KillMethod:
+        bench = flying(make, kill_method=method)
+        kill(bench)
+        for result in REFUSALS:
+            bench.at(bench.t + 0.3).hear(PILOT, make(True), ack(DISARM, result))
+        bench.stream(9.0, 0.5, PILOT, lambda: make(True))
+        assert {way for _, way in ways(bench)} == {DISARM}, method
 
 
 @pytest.mark.parametrize("method", list(KillMethod))
@@ -86,9 +81,7 @@ def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
     kill(bench)
     bench.at(1.1).hear(PILOT, ack(DISARM, NOT_NOW))
     assert ways(bench) == [(0.0, DISARM)]
-    bench.at(1.15)
-    bench.link.deploy(2, False, bench.now)
-    bench.collect()
+    bench.at(1.15).call("deploy", 2, False)
     assert (0.15, TERMINATE) in ways(bench), "without waiting for anything more"
     bench.hear(PILOT, ack(TERMINATE)).at(1.2).hear(
         PILOT, copter(True, d.MAV_STATE_FLIGHT_TERMINATION)
@@ -100,8 +93,7 @@ def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
 
 
 def test_a_deploy_of_the_flight_before_allows_nothing_in_this_one():
-    bench = flying(copter).hear(CHUTE, heartbeat(), status())
-    bench.link.deploy(2, False, bench.now)
+    bench = flying(copter).hear(CHUTE, heartbeat(), status()).call("deploy", 2, False)
     bench.hear(PILOT, copter(False)).at(1.5).hear(PILOT, copter(True))
     kill(bench)
     bench.at(1.6).hear(PILOT, ack(DISARM, NOT_NOW)).at(2.0)
@@ -110,8 +102,7 @@ def test_a_deploy_of_the_flight_before_allows_nothing_in_this_one():
 
 def test_flight_termination_is_the_first_way_on_px4_once_a_deploy_was_decided():
     bench = flying(copter, kill_method=KillMethod.FLIGHT_TERMINATION)
-    bench.hear(CHUTE, heartbeat(), status())
-    bench.link.deploy(2, False, bench.now)
+    bench.hear(CHUTE, heartbeat(), status()).call("deploy", 2, False)
     kill(bench)
     assert ways(bench) == [(0.0, TERMINATE)]
 
@@ -143,8 +134,7 @@ def test_a_way_without_an_answer_is_followed_by_the_other_and_not_given_up():
 def test_an_accepted_way_without_effect_is_followed_by_the_other():
     bench = flying(ardupilot, setting("AFS_ENABLE", 0))
     kill(bench)
-    bench.at(1.02).hear(PILOT, ack(DISARM))
-    bench.stream(3.0, 0.1, PILOT, lambda: ardupilot(True))
+    bench.at(1.02).hear(PILOT, ack(DISARM)).stream(3.0, 0.1, PILOT, lambda: ardupilot(True))
     first = next(t for t, way in ways(bench) if way == TERMINATE)
     assert first == pytest.approx(1.52, abs=0.11)
 
@@ -161,37 +151,25 @@ def test_both_ways_fail_and_the_end_names_both():
     assert "kill (forced_disarm): failed" in end.message
 
 
-def test_an_aeroplane_without_afs_is_disarmed():
+def test_an_aeroplane_without_afs_is_disarmed_and_one_that_runs_its_motor_unarmed_terminated():
     bench = flying(plane, setting("AFS_ENABLE", 0), kill_method=KillMethod.FLIGHT_TERMINATION)
     kill(bench)
     bench.at(1.02).hear(PILOT, ack(TERMINATE, FAILED))
     assert ways(bench) == [(0.0, TERMINATE), (0.02, DISARM)]
-
-
-def test_an_aeroplane_that_runs_its_motor_unarmed_is_terminated():
     afs = (setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42), setting("AFS_TERM_PIN", -1))
     bench = flying(plane, setting("ARMING_REQUIRE", 0), *afs)
     kill(bench)
     assert ways(bench) == [(0.0, TERMINATE)]
 
 
-def test_a_termination_that_lands_is_no_kill():
-    bench = flying(ardupilot, setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 43))
-    kill(bench)
-    bench.at(1.02).hear(PILOT, ack(DISARM, FAILED)).at(4.0)
-    assert {way for _, way in ways(bench)} == {DISARM}
-
-
-def test_a_termination_pin_may_be_a_parachutes():
-    afs = (setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42), setting("AFS_TERM_PIN", 50))
-    bench = flying(plane, *afs)
+def test_a_termination_that_lands_is_no_kill_and_its_pin_may_be_a_parachutes():
+    lands = (setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 43))
+    pin = (setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42), setting("AFS_TERM_PIN", 50))
+    for bench in (flying(ardupilot, *lands), flying(plane, *pin)):
+        kill(bench)
+        bench.at(1.02).hear(PILOT, ack(DISARM, FAILED)).at(4.0)
+        assert {way for _, way in ways(bench)} == {DISARM}
     assert "AFS_TERM_PIN is 50" in bench.link.setup().kill
-    kill(bench)
-    bench.at(1.02).hear(PILOT, ack(DISARM, FAILED)).at(4.0)
-    assert {way for _, way in ways(bench)} == {DISARM}
-
-
-# -- said before flight --------------------------------------------------------------------------
 
 
 def test_the_way_is_said_once_the_settings_are_read():
@@ -257,24 +235,15 @@ def test_settings_that_make_the_kill_impossible_forbid_take_off_by_name(config, 
     assert bench.link.vehicle_state(bench.now).faults == ()
 
 
-@pytest.mark.parametrize(
-    ("make", "settings"),
-    [(copter, ()), (unknown, ()), (ardupilot, ("AFS_ENABLE",)), (plane, ("AFS_ENABLE",))],
-)
-def test_with_its_delivered_settings_no_autopilot_is_kept_from_taking_off(make, settings):
-    bench = Bench().hear(PILOT, make())
-    for name in settings:
-        bench.hear(PILOT, setting(name, 0))
-    assert bench.link.vehicle_state(bench.now).faults == ()
-
-
-def test_what_termination_does_on_px4_is_said_where_it_was_chosen():
+def test_with_its_delivered_settings_no_autopilot_is_kept_from_taking_off():
+    afs = setting("AFS_ENABLE", 0)
+    for told in ([copter()], [unknown()], [ardupilot(), afs], [plane(), afs]):
+        bench = Bench().hear(PILOT, *told)
+        assert bench.link.vehicle_state(bench.now).faults == (), told
+    # What termination does on PX4 is said where it was chosen.
     bench = Bench(kill_method=KillMethod.FLIGHT_TERMINATION).hear(PILOT, copter())
     (warning,) = bench.link.setup().warnings
     assert "a kill without a deploy goes by forced disarm" in warning
-
-
-# -- confirmed as fast as it can be ---------------------------------------------------------------
 
 
 def asked(bench):
@@ -286,15 +255,13 @@ def asked(bench):
     ]
 
 
-@pytest.mark.parametrize("result", [d.MAV_RESULT_ACCEPTED, DENIED, NOT_NOW])
-def test_the_heartbeat_is_asked_for_soon_after_any_answer_and_again(result):
-    bench = flying(ardupilot)
-    kill(bench)
-    bench.at(1.01).hear(PILOT, ack(DISARM, result)).at(1.2)
-    assert asked(bench) == [0.01, 0.035, 0.06, 0.11]
-
-
-def test_a_motor_that_was_off_already_is_confirmed_by_the_heartbeat_after_the_denial():
+def test_the_heartbeat_is_asked_for_soon_after_any_answer_and_again():
+    for result in (d.MAV_RESULT_ACCEPTED, DENIED, NOT_NOW):
+        bench = flying(ardupilot)
+        kill(bench)
+        bench.at(1.01).hear(PILOT, ack(DISARM, result)).at(1.2)
+        assert asked(bench) == [0.01, 0.035, 0.06, 0.11], result
+    # A motor that was off already is confirmed by the heartbeat after the denial.
     bench = flying(copter)
     kill(bench)
     bench.at(1.01).hear(PILOT, ack(DISARM, DENIED)).at(1.04).hear(PILOT, copter(False))
@@ -302,30 +269,24 @@ def test_a_motor_that_was_off_already_is_confirmed_by_the_heartbeat_after_the_de
     assert "after 0.04 s" in bench.end(1).finished.message
 
 
-# -- a deploy over motors that turn ---------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("beats", "warned"),
-    [
+def test_a_deploy_over_motors_that_turn_says_so():
+    for beats, warned in (
         ([copter(True)], True),
         ([copter(False)], False),
         ([copter(True, d.MAV_STATE_FLIGHT_TERMINATION)], False),
         ([], False),
-    ],
-)
-def test_a_deploy_over_motors_that_turn_says_so(beats, warned):
-    bench = Bench().hear(CHUTE, heartbeat(), status(armed=12)).hear(PILOT, *beats)
-    bench.at(0.5)
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.6).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
-    assert bench.end(1).finished.success
-    assert ("WARNING: autopilot 1/1" in bench.end(1).finished.message) is warned
+    ):
+        bench = Bench().hear(CHUTE, heartbeat(), status(armed=12)).hear(PILOT, *beats)
+        bench.at(0.5).call("deploy", 1, False)
+        bench.at(0.6).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
+        end = bench.end(1).finished
+        assert end.success
+        assert ("WARNING: autopilot 1/1" in end.message) is warned, beats
 
 
 def test_an_autopilot_that_fell_silent_says_nothing_of_the_motors():
     bench = Bench().hear(PILOT, copter(True)).at(4.0).hear(CHUTE, heartbeat(), status(armed=12))
     assert bench.link.vehicle_state(bench.now).armed is Armed.ARMED
-    bench.link.deploy(1, False, bench.now)
+    bench.call("deploy", 1, False)
     bench.at(4.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
     assert "WARNING" not in bench.end(1).finished.message

@@ -29,9 +29,6 @@ GCS = heartbeat(d.MAV_TYPE_GCS, d.MAV_AUTOPILOT_INVALID)
 DISARM, RELEASE = 400, 208
 
 
-# -- who --------------------------------------------------------------------------------------
-
-
 def test_several_parachutes_at_once():
     bench = Bench().hear(CHUTE, heartbeat(), status(armed=4))
     bench.hear(SECOND, heartbeat(), status(armed=0)).at(0.1)
@@ -55,23 +52,13 @@ def test_without_a_name_the_first_parachute_that_is_not_lost_is_meant():
     assert bench.link.chosen_parachute().device == "1/161"  # both are lost
 
 
-def test_a_deploy_need_not_wait_once_a_parachute_was_heard():
-    bench = Bench()
-    assert not bench.link.has_parachute()
-    bench.hear(PILOT, copter())
-    assert not bench.link.has_parachute(), "an autopilot is none"
-    bench.hear(CHUTE, heartbeat()).at(60.0)
-    assert bench.link.has_parachute(), "one that is lost is told all the same"
-
-
 def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
     """Given that our process was started anew, and that its heartbeats are damaged: a deploy that
     waits need not wait for them, and its own status ends it."""
     bench = Bench().hear(PILOT, copter()).hear(CHUTE, status())
     assert bench.link.has_parachute()
     assert bench.link.chosen_parachute() is None, "its link is its heartbeats"
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench.call("deploy", 1, False)
     (order,) = bench.commands(RELEASE)
     assert (order.target_system, order.target_component) == CHUTE
     bench.at(0.1).hear(CHUTE, ack(RELEASE), status(boot_ms=5100, deployed=4))
@@ -81,44 +68,40 @@ def test_a_release_goes_to_whom_says_what_only_a_parachute_does():
     assert bench.last_status().deployed, "what it said before its heartbeat is not forgotten"
 
 
-@pytest.mark.parametrize(
-    ("device", "known"), [("1/161", True), ("1/162", True), ("1/163", False), ("2/161", False)]
-)
-def test_also_the_one_that_is_named(device, known):
-    bench = Bench().hear(CHUTE, status()).hear(SECOND, status())
-    bench.link.deploy(1, False, bench.now, device)
+def released(bench, device=None):
+    """To whom a release was sent."""
+    bench.link.deploy(1, False, bench.now, *([device] if device else []))
     bench.collect()
-    sent = [f"{one.target_system}/{one.target_component}" for one in bench.commands(RELEASE)]
-    assert sent == ([device] if known else [])
-    assert known or f"no parachute '{device}' was received" in bench.end(1).finished.message
+    return [(one.target_system, one.target_component) for one in bench.commands(RELEASE)]
 
 
-@pytest.mark.parametrize(
-    "others",
-    [
-        pytest.param([(CHUTE, heartbeat(d.MAV_TYPE_GIMBAL))], id="by its heartbeat a gimbal"),
-        pytest.param([((2, 161), status())], id="another vehicle's as well"),
-        pytest.param([((1, 200), heartbeat())], id="another is known by its heartbeat"),
-    ],
-)
-@pytest.mark.parametrize("first", [True, False])
-def test_but_not_in_doubt(others, first):
-    bench = Bench() if first else Bench().hear(CHUTE, status())
-    for ids, message in others:
-        bench.hear(ids, message)
-    if first:
-        bench.hear(CHUTE, status())
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
-    assert all((o.target_system, o.target_component) == (1, 200) for o in bench.commands(RELEASE))
+def test_also_the_one_that_is_named():
+    for device, ids in (("1/161", CHUTE), ("1/162", SECOND), ("1/163", None), ("2/161", None)):
+        bench = Bench().hear(CHUTE, status()).hear(SECOND, status())
+        assert released(bench, device) == ([ids] if ids else [])
+        unknown = f"no parachute '{device}' was received"
+        assert ids or unknown in bench.end(1).finished.message
 
 
-@pytest.mark.parametrize(
-    "ids", [(0, 161), (2, 161), (1, 162)], ids=["everybody", "another system", "another component"]
-)
-def test_nor_another_than_the_parameters_name(ids):
-    bench = Bench(parachute_system_id=1, parachute_component_id=161).hear(ids, status())
-    assert not bench.link.has_parachute()
+def test_but_not_in_doubt():
+    for ids, message in (
+        # By its heartbeat a gimbal; another vehicle's as well; another is known by its heartbeat.
+        (CHUTE, heartbeat(d.MAV_TYPE_GIMBAL)),
+        ((2, 161), status()),
+        ((1, 200), heartbeat()),
+    ):
+        for bench in (
+            Bench().hear(ids, message).hear(CHUTE, status()),
+            Bench().hear(CHUTE, status()).hear(ids, message),
+        ):
+            assert {*released(bench)} <= {(1, 200)}, ids
+
+
+def test_nor_another_than_the_parameters_name():
+    # Everybody, another system, another component.
+    for ids in ((0, 161), (2, 161), (1, 162)):
+        bench = Bench(parachute_system_id=1, parachute_component_id=161).hear(ids, status())
+        assert not bench.link.has_parachute(), ids
 
 
 def test_made_up_devices_do_not_grow_what_waits_for_a_heartbeat():
@@ -129,18 +112,22 @@ def test_made_up_devices_do_not_grow_what_waits_for_a_heartbeat():
     assert len(bench.link._devices._unproven) == len(bench.link._devices._others) == 16
 
 
-def test_a_kill_need_not_wait_once_an_autopilot_was_heard():
-    bench = Bench().hear(CHUTE, heartbeat())
-    assert not bench.link.has_autopilot(), "a parachute is none"
-    bench.hear(PILOT, copter()).at(60.0)
-    assert bench.link.has_autopilot(), "one that is lost is told all the same"
+def test_an_order_need_not_wait_once_its_device_was_heard():
+    bench = Bench()
+    assert not bench.link.has_parachute()
+    bench.hear(PILOT, copter())
+    assert not bench.link.has_parachute(), "an autopilot is none"
+    bench.hear(CHUTE, heartbeat()).at(60.0)
+    assert bench.link.has_parachute(), "one that is lost is told all the same"
+    assert bench.link.has_autopilot(), "so is such an autopilot"
+    assert not Bench().hear(CHUTE, heartbeat()).link.has_autopilot(), "a parachute is none"
 
 
-@pytest.mark.parametrize("interval", [0.0, -1.0, math.inf, math.nan])
-def test_a_heartbeat_needs_a_time_between_two(interval):
-    with pytest.raises(ParameterError) as raised:
-        MavlinkConfig(heartbeat_interval=interval)
-    assert str(raised.value) == f"heartbeat_interval is {interval}: need a time above 0 s"
+def test_a_heartbeat_needs_a_time_between_two():
+    for interval in (0.0, -1.0, math.inf, math.nan):
+        with pytest.raises(ParameterError) as raised:
+            MavlinkConfig(heartbeat_interval=interval)
+        assert str(raised.value) == f"heartbeat_interval is {interval}: need a time above 0 s"
 
 
 def test_without_its_dialect_it_says_what_to_build(monkeypatch):
@@ -173,21 +160,14 @@ def test_our_own_frames_that_come_back_are_counted_and_nothing_else():
     assert bench.link.counts["frames with our own system and component id"] == 2
 
 
-@pytest.mark.parametrize(
-    ("config", "doubts"),
-    [
-        ({}, 1),
-        ({"parachute_system_id": 1}, 1),
-        ({"autopilot_system_id": 2}, 1),
-        ({"parachute_system_id": 1, "autopilot_system_id": 2}, 0),
-    ],
-)
-def test_parachute_and_autopilot_of_different_systems_are_doubtful_unless_named(config, doubts):
-    bench = Bench(**config).hear(CHUTE, heartbeat()).hear((2, 1), copter())
-    assert len(bench.link.doubts(bench.now)) == doubts
-
-
-def test_doubt_names_the_parameter_to_set():
+def test_parachute_and_autopilot_of_different_systems_are_doubtful_unless_named():
+    both = {"parachute_system_id": 1, "autopilot_system_id": 2}
+    for config, doubts in (
+        *(({}, 1), ({"parachute_system_id": 1}, 1), ({"autopilot_system_id": 2}, 1)),
+        (both, 0),
+    ):
+        bench = Bench(**config).hear(CHUTE, heartbeat()).hear((2, 1), copter())
+        assert len(bench.link.doubts(bench.now)) == doubts, config
     bench = Bench().hear(CHUTE, heartbeat()).hear(PILOT, copter())
     assert bench.link.doubts(bench.now) == []
     bench.hear((3, 161), heartbeat()).hear((3, 1), copter())
@@ -234,9 +214,6 @@ def test_both_versions_are_understood_from_a_stream_cut_anywhere():
     assert bench.link.received_count == 4
 
 
-# -- our heartbeat ----------------------------------------------------------------------------
-
-
 def test_own_heartbeat_only_while_the_owner_is_alive():
     bench = Bench().at(1.0)
     assert bench.sent == []
@@ -261,17 +238,12 @@ def test_owner_that_died_between_two_heartbeats_leaves_nothing_to_wake_for():
     assert bench.link.next_deadline() == math.inf
 
 
-# -- flight block -----------------------------------------------------------------------------
-
-
 def grounded(armed=True, **config):
     return Bench(**config).hear(PILOT, copter(armed), landed())
 
 
 def test_block_undoes_arming_on_the_ground():
-    bench = grounded(armed=False)
-    bench.link.flight_block("parachute lost", bench.now)
-    bench.collect()
+    bench = grounded(armed=False).call("flight_block", "parachute lost")
     assert bench.commands() == []
     bench.at(0.5).hear(PILOT, landed(), copter(armed=True))
     (order,) = bench.commands(DISARM)
@@ -287,59 +259,45 @@ def test_block_undoes_arming_on_the_ground():
     assert len(bench.commands(DISARM)) == 1
 
 
-def test_block_that_comes_after_arming_undoes_it_at_once():
-    bench = grounded()
-    bench.link.flight_block("x", bench.now)
-    bench.collect()
-    assert len(bench.commands(DISARM)) == 1
+def armed_copter():
+    return copter(armed=True)
 
 
-@pytest.mark.parametrize("where", [0, 2, 3, 4])
-def test_block_never_disarms_off_the_ground_or_where_that_is_not_known(where):
-    bench = Bench().hear(PILOT, copter(armed=True), landed(where))
-    bench.link.flight_block("x", bench.now)
-    bench.stream(10.0, 0.5, PILOT, lambda: copter(armed=True))
-    assert bench.commands(DISARM) == []
-
-
-def test_block_does_not_believe_an_old_word_of_standing_on_the_ground():
-    bench = grounded(armed=False).stream(3.0, 0.5, PILOT, copter)
-    bench.link.flight_block("x", bench.now)
-    bench.stream(6.0, 0.5, PILOT, lambda: copter(armed=True))
-    assert bench.commands(DISARM) == []
-
-
-def test_block_switched_off_by_parameter():
-    bench = grounded(disarm_when_blocked=False)
-    bench.link.flight_block("x", bench.now)
-    bench.at(1.0).hear(PILOT, copter(armed=True))
+def test_block_that_comes_after_arming_undoes_it_at_once_unless_a_parameter_forbids_it():
+    assert len(grounded().call("flight_block", "x").commands(DISARM)) == 1
+    bench = grounded(disarm_when_blocked=False).call("flight_block", "x")
+    bench.at(1.0).hear(PILOT, armed_copter())
     assert bench.commands() == []
     assert bench.texts() == ["x: flight blocked"]
 
 
-@pytest.mark.parametrize(
-    "end", [pytest.param("release", id="block released"), pytest.param("air", id="took off")]
-)
-def test_disarm_that_lost_its_reason_is_not_sent_again(end):
-    bench = grounded()
-    bench.link.flight_block("x", bench.now)
-    bench.at(0.1).hear(PILOT, ack(DISARM, d.MAV_RESULT_TEMPORARILY_REJECTED))
-    if end == "release":
-        bench.link.flight_block("", bench.now)
-    else:
-        bench.hear(PILOT, landed(2))
-    bench.stream(8.0, 0.1, PILOT, lambda: copter(armed=True))
-    assert len(bench.commands(DISARM)) == 1
-    assert not bench.end(-1).finished.success
+def test_block_never_disarms_off_the_ground_or_where_that_is_not_known():
+    for where in (0, 2, 3, 4):
+        bench = Bench().hear(PILOT, armed_copter(), landed(where)).call("flight_block", "x")
+        assert bench.stream(10.0, 0.5, PILOT, armed_copter).commands(DISARM) == [], where
+    # Nor is an old word of standing on the ground believed.
+    bench = grounded(armed=False).stream(3.0, 0.5, PILOT, copter).call("flight_block", "x")
+    assert bench.stream(6.0, 0.5, PILOT, armed_copter).commands(DISARM) == []
+
+
+def test_disarm_that_lost_its_reason_is_not_sent_again():
+    for end in ("released", "took off"):
+        bench = grounded().call("flight_block", "x")
+        bench.at(0.1).hear(PILOT, ack(DISARM, d.MAV_RESULT_TEMPORARILY_REJECTED))
+        if end == "released":
+            bench.call("flight_block", "")
+        else:
+            bench.hear(PILOT, landed(2))
+        bench.stream(8.0, 0.1, PILOT, armed_copter)
+        assert len(bench.commands(DISARM)) == 1, end
+        assert not bench.end(-1).finished.success
 
 
 def test_autopilot_that_refuses_for_ever_makes_no_storm():
-    bench = grounded()
-    bench.link.flight_block("x", bench.now)
+    bench = grounded().call("flight_block", "x")
     for tenth in range(1, 101):
         bench.at(tenth / 10).hear(PILOT, landed(), copter(armed=True))
-        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_DENIED))
-        bench.link.flight_block("x", bench.now)
+        bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_DENIED)).call("flight_block", "x")
     assert 3 <= len(bench.commands(DISARM)) <= 10.0 / DISARM_INTERVAL + 1
     assert len(bench.notices()) == 1
     assert len(bench.texts()) == 2
@@ -347,8 +305,6 @@ def test_autopilot_that_refuses_for_ever_makes_no_storm():
     bench.at(10.1).hear(PILOT, copter(armed=False), landed(), copter(armed=True))
     assert len(bench.notices()) == 2
 
-
-# -- signing ----------------------------------------------------------------------------------
 
 KEY, OTHER = bytes(range(32)), bytes(32)
 
@@ -383,9 +339,6 @@ def test_signed_end_to_end():
     assert far.link.received_count == 1
 
 
-# -- a status that does not come ------------------------------------------------------------------
-
-
 def asked_for_status(bench):
     """When a PARACHUTE_STATUS was asked for."""
     return [
@@ -408,17 +361,13 @@ def test_a_module_that_sends_no_status_is_asked_for_it():
     assert asked_for_status(bench)[2:] == pytest.approx([5.5])
 
 
-def test_one_that_streams_is_not_asked():
+def test_one_that_streams_or_is_silent_is_not_asked():
     bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=1000))
     for second in range(1, 10):
         bench.at(second).hear(CHUTE, heartbeat(), status(boot_ms=1000 + 1000 * second))
     assert asked_for_status(bench) == []
-
-
-def test_one_that_is_silent_is_not_asked():
     bench = Bench().hear(CHUTE, heartbeat(), status()).at(1.0).hear(CHUTE, status(boot_ms=6000))
-    bench.at(60.0)
-    assert len(asked_for_status(bench)) <= 1
+    assert len(asked_for_status(bench.at(60.0))) <= 1
 
 
 def test_the_first_status_after_a_restart_is_followed_by_a_question():

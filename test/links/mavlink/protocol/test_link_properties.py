@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from link_bench import START, Bench, ack, copter, heartbeat, landed, status
 
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
+from chute_ros.links.mavlink.protocol.devices import MOST_DEVICES
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
-from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameEncoder
 

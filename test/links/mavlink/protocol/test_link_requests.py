@@ -22,13 +22,8 @@ def steps(bench, token):
     return [report.outcome.name for report in reports if report.token == token]
 
 
-# -- release ----------------------------------------------------------------------------------
-
-
 def test_release_is_done_when_the_parachute_itself_says_deployed():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.6).hear(CHUTE, ack(RELEASE))
+    bench = ready().call("deploy", 1, False).at(0.6).hear(CHUTE, ack(RELEASE))
     assert steps(bench, 1) == ["SENT", "ACCEPTED"]
     assert bench.commands(REQUEST)[0].param1 == 430  # does not wait for the 1 Hz stream
     bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
@@ -42,18 +37,18 @@ def test_release_is_done_when_the_parachute_itself_says_deployed():
     assert len(bench.commands(RELEASE)) == count  # nothing more is sent
 
 
-def test_release_whose_acknowledgement_was_lost_is_done_all_the_same():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4))
-    end = bench.end(1).finished
+def test_release_is_done_without_an_acknowledgement_but_not_without_being_shown():
+    bench = ready().call("deploy", 1, False)
+    end = bench.at(0.8).hear(CHUTE, status(boot_ms=5300, deployed=4)).end(1).finished
     assert (end.success, end.accepted) == (True, False)
+    bench = ready().call("deploy", 1, False)
+    end = bench.at(0.6).hear(CHUTE, ack(RELEASE)).at(20.0).end(1).finished
+    assert (end.success, end.accepted) == (False, True)
+    assert "never showed that PARACHUTE_STATUS reports deployed" in end.message
 
 
 def test_release_that_nobody_answers_is_resent_and_given_up_in_time():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
-    bench.at(20.0)
+    bench = ready().call("deploy", 1, False).at(20.0)
     orders = bench.commands(RELEASE)
     assert [order.confirmation for order in orders[:3]] == [0, 1, 2]
     end = bench.end(1).finished
@@ -61,43 +56,26 @@ def test_release_that_nobody_answers_is_resent_and_given_up_in_time():
     assert "given up after 5.0 s" in end.message
 
 
-def test_release_acknowledged_but_never_shown_is_a_failure_that_says_so():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.6).hear(CHUTE, ack(RELEASE)).at(20.0)
-    end = bench.end(1).finished
-    assert (end.success, end.accepted) == (False, True)
-    assert "never showed that PARACHUTE_STATUS reports deployed" in end.message
-
-
 def test_release_without_ground_clearance_goes_on_until_it_is_accepted():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
+    bench = ready().call("deploy", 1, False)
     bench.at(0.6).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_TEMPORARILY_REJECTED))
     bench.at(1.0).hear(CHUTE, ack(RELEASE), status(boot_ms=5500, deployed=4))
     assert bench.end(1).finished.success
 
 
 def test_release_with_force_arms_the_trigger_on_the_way():
-    bench = ready()
-    bench.link.deploy(1, True, bench.now)
-    bench.collect()
+    bench = ready().call("deploy", 1, True)
     arm, order = bench.commands()
     assert (arm.command, arm.param1, arm.param2) == (TRIGGERS, 12, 12)
     assert (order.command, order.param1) == (RELEASE, 2)
 
 
-@pytest.mark.parametrize("foreign", [(2, 161), (1, 162), (255, 190), (1, 1)])
-def test_release_is_not_acknowledged_by_another_component(foreign):
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.6).hear(foreign, heartbeat(), ack(RELEASE), status(deployed=4))
-    assert steps(bench, 1) == ["SENT"]
-
-
-def test_acknowledgement_to_another_component_is_not_ours():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
+def test_acknowledgement_by_or_to_another_component_is_not_ours():
+    for foreign in ((2, 161), (1, 162), (255, 190), (1, 1)):
+        bench = ready().call("deploy", 1, False)
+        bench.at(0.6).hear(foreign, heartbeat(), ack(RELEASE), status(deployed=4))
+        assert steps(bench, 1) == ["SENT"], foreign
+    bench = ready().call("deploy", 1, False)
     bench.at(0.6).hear(CHUTE, ack(RELEASE, target=(255, 190)), ack(RELEASE, target=(1, 1)))
     assert steps(bench, 1) == ["SENT"]
     assert bench.link.counts["acknowledgements for another component"] == 2
@@ -106,18 +84,14 @@ def test_acknowledgement_to_another_component_is_not_ours():
 
 
 def test_deployed_parachute_is_not_released_again():
-    bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2))
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2)).call("deploy", 1, False)
     assert bench.end(1).finished.success
     assert bench.commands() == []
 
 
 def test_old_word_of_having_deployed_does_not_hold_back_a_release():
     bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2))
-    bench.stream(6.0, 1.0, CHUTE, heartbeat)
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench.stream(6.0, 1.0, CHUTE, heartbeat).call("deploy", 1, False)
     assert len(bench.commands(RELEASE)) == 1
     assert bench.ends(1) == []
     bench.at(6.1).hear(CHUTE, status(boot_ms=11_000, deployed=2))
@@ -129,42 +103,29 @@ def test_old_word_of_having_deployed_does_not_hold_back_a_release():
 )
 def test_a_young_word_of_having_deployed_counts_until_the_device_is_lost(quiet, sent):
     bench = ready().stream(quiet, 0.5, CHUTE, lambda: status(boot_ms=5200, deployed=2))
-    bench.clear()
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench.clear().call("deploy", 1, False)
     assert len(bench.commands(RELEASE)) == sent
     assert [end.finished.success for end in bench.ends(1)] == [True] * (1 - sent)
 
 
 def test_nothing_makes_a_parachute_less_ready_while_it_is_being_released():
-    bench = ready()
-    bench.link.deploy(1, False, bench.now)
-    bench.link.set_triggers(2, 0, 4, "", bench.now)
-    bench.link.parachute_action(3, d.PARACHUTE_DISABLE, "", bench.now)
-    bench.collect()
+    bench = ready().call("deploy", 1, False).call("set_triggers", 2, 0, 4, "")
+    bench.call("parachute_action", 3, d.PARACHUTE_DISABLE, "")
     for token in (2, 3):
         assert "a release is under way" in bench.end(token).finished.message
     assert [order.command for order in bench.commands()] == [RELEASE]
 
 
 def test_disarm_under_way_gives_way_to_a_release():
-    bench = ready()
-    bench.link.arm(1, False, 0, bench.now)
-    bench.link.deploy(2, False, bench.now)
+    bench = ready().call("arm", 1, False, 0).call("deploy", 2, False)
     bench.stream(6.0, 0.5, CHUTE, heartbeat)
     assert not bench.end(1).finished.success
     assert "a release was ordered" in bench.end(1).finished.message
     assert len(bench.commands(TRIGGERS)) <= 1
 
 
-# -- kill -------------------------------------------------------------------------------------
-
-
 def test_kill_before_deploy_go_side_by_side():
-    bench = ready()
-    bench.link.kill(1, bench.now)
-    bench.link.deploy(2, False, bench.now)
-    bench.collect()
+    bench = ready().call("kill", 1).call("deploy", 2, False)
     assert [order.command for order in bench.commands()] == [DISARM, RELEASE]
     bench.at(0.6).hear(PILOT, ack(DISARM)).hear(CHUTE, ack(RELEASE))
     bench.hear(CHUTE, status(boot_ms=5100, deployed=4))
@@ -174,9 +135,7 @@ def test_kill_before_deploy_go_side_by_side():
 
 
 def test_kill_is_sent_even_if_the_motors_are_thought_to_be_off():
-    bench = Bench().hear(PILOT, copter(armed=False)).at(0.5)
-    bench.link.kill(1, bench.now)
-    bench.collect()
+    bench = Bench().hear(PILOT, copter(armed=False)).at(0.5).call("kill", 1)
     assert len(bench.commands(DISARM)) == 1
     assert bench.ends(1) == []
     bench.at(0.6).hear(PILOT, copter(armed=False))
@@ -184,22 +143,13 @@ def test_kill_is_sent_even_if_the_motors_are_thought_to_be_off():
 
 
 def test_kill_that_is_refused_is_tried_on_until_time_is_up():
-    bench = ready()
-    bench.link.kill(1, bench.now)
     denied = ack(DISARM, d.MAV_RESULT_DENIED)
-    bench.stream(6.0, 0.1, PILOT, lambda: denied)
+    bench = ready().call("kill", 1).stream(6.0, 0.1, PILOT, lambda: denied)
     assert len(bench.commands(DISARM)) > 10
     assert bench.end(1).finished.result == d.MAV_RESULT_DENIED
-
-
-def test_kill_without_an_autopilot_says_so():
-    bench = Bench().hear(CHUTE, heartbeat())
-    bench.link.kill(1, bench.now)
-    bench.collect()
+    bench = Bench().hear(CHUTE, heartbeat()).call("kill", 1)
     assert "no autopilot of ours was received yet" in bench.end(1).finished.message
 
-
-# -- the rest ---------------------------------------------------------------------------------
 
 ALL = [
     lambda link, token, device, now: link.set_triggers(token, 4, 4, device, now),
@@ -211,45 +161,33 @@ ALL = [
 
 
 @pytest.mark.parametrize("ask", ALL)
-def test_device_that_is_not_there_is_refused_and_nothing_sent(ask):
+def test_device_that_is_not_there_is_refused_and_every_request_ends_exactly_once(ask):
     bench = ready()
     ask(bench.link, 9, "1/7", bench.now)
-    bench.collect()
     text = "no parachute '1/7' was received on this link (received: 1/161)"
-    assert bench.end(9).finished.message == text
+    assert bench.collect().end(9).finished.message == text
     assert bench.commands() == []
-
-
-@pytest.mark.parametrize("ask", ALL)
-def test_every_request_ends_exactly_once(ask):
     bench = ready()
     ask(bench.link, 9, "", bench.now)
-    bench.stream(30.0, 1.0, CHUTE, heartbeat)
-    assert not bench.end(9).finished.success
+    assert not bench.stream(30.0, 1.0, CHUTE, heartbeat).end(9).finished.success
 
 
-@pytest.mark.parametrize("action", [3, 7, 255, -1])
-def test_action_that_does_not_exist_is_refused(action):
-    bench = ready()
-    bench.link.parachute_action(9, action, "", bench.now)
-    bench.collect()
-    assert not bench.end(9).finished.success
-    assert bench.commands() == []
+def test_action_that_does_not_exist_is_refused():
+    for action in (3, 7, 255, -1):
+        bench = ready().call("parachute_action", 9, action, "")
+        assert not bench.end(9).finished.success, action
+        assert bench.commands() == []
 
 
-@pytest.mark.parametrize(("arm", "triggers", "masks"), [(True, 0, (12, 12)), (False, 6, (0, 6))])
-def test_arm_by_default_and_by_mask(arm, triggers, masks):
-    bench = ready()
-    bench.link.arm(1, arm, triggers, bench.now)
-    bench.collect()
-    (order,) = bench.commands(TRIGGERS)
-    assert (order.param1, order.param2) == masks
+def test_arm_by_default_and_by_mask():
+    for arm, triggers, masks in ((True, 0, (12, 12)), (False, 6, (0, 6))):
+        (order,) = ready().call("arm", 1, arm, triggers).commands(TRIGGERS)
+        assert (order.param1, order.param2) == masks
 
 
 def test_public_emulator_speaks_as_255_0_and_is_answered_there():
     bench = Bench(system_id=1).hear((255, 0), heartbeat(), status())
-    bench.link.deploy(1, False, bench.now)
-    bench.collect()
+    bench.call("deploy", 1, False)
     (order,) = bench.commands()
     assert (order.target_system, order.target_component) == (255, 0)
     bench.at(0.1).hear((255, 0), ack(RELEASE), status(boot_ms=5100, deployed=4))
@@ -257,11 +195,10 @@ def test_public_emulator_speaks_as_255_0_and_is_answered_there():
 
 
 def test_copy_of_an_acknowledgement_settles_nothing_twice():
-    bench = ready().hear(CHUTE, heartbeat())
-    bench.link.parachute_action(1, 1, "", bench.now)
+    bench = ready().hear(CHUTE, heartbeat()).call("parachute_action", 1, 1, "")
     raw = bench.encoder(CHUTE).encode(ack(RELEASE), bench.now)
     bench.link.receive(raw, bench.now)
-    bench.link.parachute_action(2, 0, "", bench.now)
+    bench.call("parachute_action", 2, 0, "")
     bench.link.receive(raw, bench.now)
     bench.collect()
     assert bench.end(1).finished.success
@@ -283,16 +220,11 @@ def test_autopilots_messages_are_asked_for_at_the_set_rate():
     assert asked == [(message, 50_000) for message in STREAMED[:-1]] + [(STREAMED[-1], 1_000_000)]
     bench.stream(4.6, 0.5, PILOT, copter)
     assert len(needed(bench)) == 5 * 10, "often at first"
-    bench.clear()
-    bench.stream(40.0, 0.5, PILOT, copter)
+    bench.clear().stream(40.0, 0.5, PILOT, copter)
     assert 5 * 6 <= len(needed(bench)) <= 5 * 9, "then now and then"
-    bench.clear()
-    bench.link.set_autopilot_message_rate(4.0, bench.now)
-    bench.collect()
+    bench.clear().call("set_autopilot_message_rate", 4.0)
     assert [order.param2 for order in bench.commands(511)] == [250_000] * 4 + [1_000_000]
-    bench.clear()
-    bench.link.set_autopilot_message_rate(0.0, bench.now)
-    bench.stream(20.0, 0.5, PILOT, copter)
+    bench.clear().call("set_autopilot_message_rate", 0.0).stream(20.0, 0.5, PILOT, copter)
     assert bench.commands() == []
 
 
@@ -304,33 +236,22 @@ def test_no_rate_that_may_be_set_is_too_much_for_a_command(rate):
 
 def test_a_rate_that_is_set_later_is_asked_for_once_the_autopilot_is_there():
     bench = Bench(autopilot_message_rate=0.0).hear(PILOT, copter())
-    bench.link.set_autopilot_message_rate(10.0, bench.now)
-    bench.collect()
+    bench.call("set_autopilot_message_rate", 10.0)
     assert [order.param2 for order in bench.commands(511)] == [100_000] * 4 + [1_000_000]
 
 
+def refused(result, **told):
+    """The end of a release that a parachute refuses that says this of itself."""
+    bench = Bench().hear(CHUTE, heartbeat(), status(**told)).call("deploy", 1, False)
+    return bench.at(0.1).hear(CHUTE, ack(RELEASE, result)).end(1).finished.message
+
+
 def test_a_refused_release_names_what_the_parachute_says_of_itself():
-    bench = Bench().hear(CHUTE, heartbeat(), status(armed=2))
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED))
-    message = bench.end(1).finished.message
+    message = refused(d.MAV_RESULT_FAILED, armed=2)
     assert "armed triggers: ATS; need FC or OFFBOARD, which force arms on the way" in message
     assert "does not report GROUND_CLEARED" in message
-
-
-def test_a_refused_release_of_one_whose_offboard_trigger_alone_is_armed_names_the_other():
-    bench = Bench().hear(CHUTE, heartbeat(), status(armed=8, safety=1))
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_FAILED))
-    message = bench.end(1).finished.message
     said = "armed triggers: OFFBOARD; this module may need FC, which force arms on the way"
-    assert said in message
-
-
-def test_a_refused_release_of_a_ready_parachute_adds_nothing():
-    bench = Bench().hear(CHUTE, heartbeat(), status(armed=4, safety=1))
-    bench.link.deploy(1, False, bench.now)
-    bench.at(0.1).hear(CHUTE, ack(RELEASE, d.MAV_RESULT_DENIED))
-    message = bench.end(1).finished.message
+    assert said in refused(d.MAV_RESULT_FAILED, armed=8, safety=1)
+    message = refused(d.MAV_RESULT_DENIED, armed=4, safety=1)
     assert "armed triggers" not in message
     assert "GROUND_CLEARED" not in message

@@ -39,47 +39,31 @@ def esc_telemetry(*rpm):
     return d.MAVLink_esc_telemetry_1_to_4_message(zero, zero, zero, zero, rpm, zero)
 
 
-SIGNS = [
-    pytest.param(OFF, id="SERVO_OUTPUT_RAW"),
-    pytest.param(landed(), id="EXTENDED_SYS_STATE"),
-    pytest.param(esc_status(0, 0, 0, 0), id="ESC_STATUS"),
-    pytest.param(esc_telemetry(0, 0, 0, 0), id="ESC_TELEMETRY_1_TO_4"),
-    pytest.param(text("Disarming motors"), id="ArduCopter"),
-    pytest.param(text("Throttle disarmed"), id="ArduPlane"),
-    pytest.param(text("Disarmed by external command"), id="PX4"),
-]
+SIGNS = {
+    "SERVO_OUTPUT_RAW": OFF,
+    "EXTENDED_SYS_STATE": landed(),
+    "ESC_STATUS": esc_status(0, 0, 0, 0),
+    "ESC_TELEMETRY_1_TO_4": esc_telemetry(0, 0, 0, 0),
+    "ArduCopter": text("Disarming motors"),
+    "ArduPlane": text("Throttle disarmed"),
+    "PX4": text("Disarmed by external command"),
+}
 
 
-@pytest.mark.parametrize("sign", SIGNS)
-def test_a_sign_after_the_acceptance_confirms_the_kill(sign):
-    bench = flying()
-    bench.link.kill(1, bench.now)
-    bench.at(1.02).hear(PILOT, ack(DISARM))
+@pytest.mark.parametrize("name", SIGNS)
+def test_a_sign_after_the_acceptance_alone_confirms_the_kill(name):
+    sign = SIGNS[name]
+    bench = flying().call("kill", 1).at(1.02).hear(PILOT, ack(DISARM))
     assert bench.ends(1) == []
-    bench.at(1.05).hear(PILOT, sign)
-    assert bench.end(1).finished.success
-
-
-@pytest.mark.parametrize("sign", SIGNS)
-def test_a_sign_without_an_acceptance_confirms_nothing(sign):
-    bench = flying()
-    bench.link.kill(1, bench.now)
-    bench.at(1.02).hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED), sign)
-    assert bench.ends(1) == []
-
-
-@pytest.mark.parametrize("sign", SIGNS)
-def test_a_sign_from_before_the_order_confirms_nothing(sign):
-    bench = flying().hear(PILOT, sign)
-    bench.link.kill(1, bench.now)
-    bench.at(1.02).hear(PILOT, ack(DISARM))
-    bench.at(1.05).hear(PILOT, ardupilot(True))
-    assert bench.ends(1) == []
+    assert bench.at(1.05).hear(PILOT, sign).end(1).finished.success
+    failed = ack(DISARM, d.MAV_RESULT_FAILED)
+    assert flying().call("kill", 1).at(1.02).hear(PILOT, failed, sign).ends(1) == []
+    bench = flying().hear(PILOT, sign).call("kill", 1).at(1.02).hear(PILOT, ack(DISARM))
+    assert bench.at(1.05).hear(PILOT, ardupilot(True)).ends(1) == [], "it is of before the order"
 
 
 def test_one_of_eight_motors_that_turns_is_enough():
-    bench = flying().hear(PILOT, esc_status(4000, 0, 0, 0, index=4))
-    bench.link.kill(1, bench.now)
+    bench = flying().hear(PILOT, esc_status(4000, 0, 0, 0, index=4)).call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, esc_status(0, 0, 0, 0))
     assert bench.ends(1) == []
     bench.at(1.07).hear(PILOT, esc_status(0, 0, 0, 0, index=4))
@@ -87,8 +71,7 @@ def test_one_of_eight_motors_that_turns_is_enough():
 
 
 def test_a_glider_with_its_motor_off_and_armed_confirms_nothing():
-    bench = flying().hear(PILOT, OFF)
-    bench.link.kill(1, bench.now)
+    bench = flying().hear(PILOT, OFF).call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
     assert bench.ends(1) == []
 
@@ -97,14 +80,12 @@ def test_a_glider_with_its_motor_off_and_armed_confirms_nothing():
     "newest", [outputs(1000, 1200, 1500), outputs(0, 0, 0)], ids=["one turns", "nothing known"]
 )
 def test_outputs_that_show_no_standstill_confirm_nothing(newest):
-    bench = flying()
-    bench.link.kill(1, bench.now)
+    bench = flying().call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, newest)
     assert (bench.ends(1) == []) is (newest is not None and newest.servo2_raw > 0)
 
 
 def test_outputs_of_an_autopilot_that_was_never_seen_disarmed_confirm_nothing():
-    bench = Bench().hear(PILOT, ardupilot(True), DRIVEN).at(1.0)
-    bench.link.kill(1, bench.now)
+    bench = Bench().hear(PILOT, ardupilot(True), DRIVEN).at(1.0).call("kill", 1)
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
     assert bench.ends(1) == []

@@ -2,20 +2,16 @@
 
 import math
 
-import pytest
 from parachute_bench import Told, picture
 
 from chute_ros.model import LinkState, ParachuteState, SafetyFlags
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
-# -- state ------------------------------------------------------------------------------------
-
 CLEARED, GROUND = SafetyFlags.GROUND_CLEARED, SafetyFlags.ON_GROUND
 
 
-@pytest.mark.parametrize(
-    ("fields", "state"),
-    [
+def test_state_in_the_numbering_of_upf():
+    for fields, state in (
         ({}, ParachuteState.READY),
         ({"safety": CLEARED}, ParachuteState.TAKEOFF),
         ({"safety": CLEARED | GROUND}, ParachuteState.READY),
@@ -23,35 +19,27 @@ CLEARED, GROUND = SafetyFlags.GROUND_CLEARED, SafetyFlags.ON_GROUND
         ({"armed": 4, "errors": 8}, ParachuteState.ABNORMAL),
         ({"deployed": 1, "errors": 8}, ParachuteState.LAUNCHED),
         ({"deployed": 1, "safety": GROUND}, ParachuteState.TOUCHDOWN),
-    ],
-)
-def test_state_in_the_numbering_of_upf(fields, state):
-    assert picture(**fields).state is state
+    ):
+        assert picture(**fields).state is state, fields
 
 
-@pytest.mark.parametrize(
-    ("system_status", "state", "fault"),
-    [
-        (d.MAV_STATE_UNINIT, ParachuteState.READY, ""),
-        (d.MAV_STATE_BOOT, ParachuteState.NOT_READY, ""),
-        (d.MAV_STATE_CALIBRATING, ParachuteState.NOT_READY, ""),
-        (d.MAV_STATE_STANDBY, ParachuteState.READY, ""),
-        (d.MAV_STATE_ACTIVE, ParachuteState.READY, ""),
-        (d.MAV_STATE_CRITICAL, ParachuteState.ABNORMAL, "heartbeat reports critical"),
-        (d.MAV_STATE_EMERGENCY, ParachuteState.ABNORMAL, "heartbeat reports emergency"),
-        (d.MAV_STATE_POWEROFF, ParachuteState.ABNORMAL, "heartbeat reports powering off"),
-        (
-            d.MAV_STATE_FLIGHT_TERMINATION,
-            ParachuteState.ABNORMAL,
-            "heartbeat reports flight termination",
-        ),
-        (99, ParachuteState.ABNORMAL, "heartbeat reports state 99, which has no name"),
-    ],
-)
-def test_health_from_the_heartbeats_system_status(system_status, state, fault):
-    told = Told().heartbeat(state=system_status).status().at(0.0)
-    assert told.state is state
-    assert told.faults == ((fault,) if fault else ())
+def test_health_from_the_heartbeats_system_status():
+    ready, not_ready = ParachuteState.READY, ParachuteState.NOT_READY
+    healthy = {d.MAV_STATE_UNINIT: ready, d.MAV_STATE_BOOT: not_ready}
+    healthy |= {d.MAV_STATE_CALIBRATING: not_ready, d.MAV_STATE_STANDBY: ready}
+    for system_status, state in {**healthy, d.MAV_STATE_ACTIVE: ready}.items():
+        told = Told().heartbeat(state=system_status).status().at(0.0)
+        assert (told.state, told.faults) == (state, ()), system_status
+    for system_status, fault in {
+        d.MAV_STATE_CRITICAL: "critical",
+        d.MAV_STATE_EMERGENCY: "emergency",
+        d.MAV_STATE_POWEROFF: "powering off",
+        d.MAV_STATE_FLIGHT_TERMINATION: "flight termination",
+        99: "state 99, which has no name",
+    }.items():
+        told = Told().heartbeat(state=system_status).status().at(0.0)
+        assert told.state is ParachuteState.ABNORMAL, fault
+        assert told.faults == (f"heartbeat reports {fault}",)
 
 
 def test_nothing_is_known_before_the_first_status():
@@ -61,9 +49,6 @@ def test_nothing_is_known_before_the_first_status():
     assert math.isnan(told.uptime)
     assert math.isnan(told.ats_arm_altitude)
     assert not told.healthy
-
-
-# -- times ------------------------------------------------------------------------------------
 
 
 def test_status_overdue_though_heartbeats_come():

@@ -200,8 +200,7 @@ def test_copies_of_acknowledgements_settle_no_later_request(seed, loss, slowest,
     bench.hear(CHUTE, heartbeat()).hear(CHUTE, heartbeat())
     actions = {token: chance.choice([0, 1]) for token in range(1, 9)}
     for token, action in actions.items():
-        bench.link.parachute_action(token, action, "", bench.now)
-        bench.collect()
+        bench.call("parachute_action", token, action, "")
         until = bench.t + chance.choice([0.05, 0.3, 1.0, 6.0])
         while bench.t < until:
             for _, order in bench.sent[seen:]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from chute_ros.links.mavlink.protocol.roster import MOST_DEVICES, Roster
+from chute_ros.links.mavlink.protocol.devices import MOST_DEVICES, Roster
 from chute_ros.protocol.liveness import Liveness, LivenessLimits
 
 

@@ -14,23 +14,12 @@ def ready(ids=PARACHUTE, **config):
     return Bench(**config).hear(ids, heartbeat(), status())
 
 
-# -- "Parachute Connection" -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "component",
-    [
-        pytest.param(d.MAV_COMP_ID_PARACHUTE, id="MAV_COMP_ID_PARACHUTE_by_default"),
-        pytest.param(1, id="any_ID_may_be_used_1"),
-        pytest.param(191, id="any_ID_may_be_used_that_of_a_computer_of_another_system"),
-        pytest.param(0, id="any_ID_may_be_used_0_of_the_public_emulator"),
-        pytest.param(255, id="any_ID_may_be_used_255"),
-    ],
-)
-def test_connection_identified_by_type_MAV_TYPE_PARACHUTE(component):  # noqa: N802
-    bench = ready((2, component))
-    assert bench.link.chosen_parachute().device == f"2/{component}"
-    assert bench.last_status().state is ParachuteState.READY
+def test_connection_identified_by_type_MAV_TYPE_PARACHUTE():  # noqa: N802
+    """Any ID may be used; the public emulator uses 0."""
+    for component in (d.MAV_COMP_ID_PARACHUTE, 1, 191, 0, 255):
+        bench = ready((2, component))
+        assert bench.link.chosen_parachute().device == f"2/{component}"
+        assert bench.last_status().state is ParachuteState.READY
 
 
 def test_connection_MAV_COMP_ID_PARACHUTE_without_the_type_is_no_parachute():  # noqa: N802
@@ -65,44 +54,33 @@ def test_connection_a_status_before_any_heartbeat_is_of_nobody_known():
     bench = Bench().hear(PARACHUTE, status())
     assert bench.link.chosen_parachute() is None
     assert bench.events == []
-    bench.link.arm(1, True, 0, bench.now)
-    bench.collect()
+    bench.call("arm", 1, True, 0)
     assert "no parachute was received on this link" in bench.end(1).finished.message
     assert bench.commands() == []
 
 
-@pytest.mark.parametrize(
-    ("message_id", "answer"),
-    [
-        pytest.param(430, status(boot_ms=5100), id="PARACHUTE_STATUS"),
-        pytest.param(
-            396,
-            d.MAVLink_component_information_basic_message(
-                1500, 3, 86400, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
-            ),
-            id="COMPONENT_INFORMATION_BASIC",
-        ),
-    ],
-)
-def test_connection_MAV_CMD_REQUEST_MESSAGE_512_of(message_id, answer):  # noqa: N802
-    bench = ready().at(1.0)
-    bench.link.request_message(7, message_id, "", bench.now)
-    bench.collect()
-    (order,) = bench.commands()
-    assert (order.command, order.param1) == (512, message_id)
-    assert (order.target_system, order.target_component) == PARACHUTE
-    bench.at(1.1).hear(PARACHUTE, ack(512), answer)
-    end = bench.end(7)
-    assert end.finished.success
-    assert end.data.get_type() == answer.get_type()
+def information_basic(manufactured=86400):
+    return d.MAVLink_component_information_basic_message(
+        1500, 3, manufactured, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
+    )
+
+
+def test_connection_MAV_CMD_REQUEST_MESSAGE_512():  # noqa: N802
+    for message_id, answer in ((430, status(boot_ms=5100)), (396, information_basic())):
+        bench = ready().at(1.0).call("request_message", 7, message_id, "")
+        (order,) = bench.commands()
+        assert (order.command, order.param1) == (512, message_id)
+        assert (order.target_system, order.target_component) == PARACHUTE
+        end = bench.at(1.1).hear(PARACHUTE, ack(512), answer).end(7)
+        assert end.finished.success
+        assert end.data.get_type() == answer.get_type()
 
 
 def test_connection_COMPONENT_INFORMATION_BASIC_field_by_field():  # noqa: N802
-    message = d.MAVLink_component_information_basic_message(
-        1500, 3, 86400, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
-    )
-    information = ready().hear(PARACHUTE, message).link.chosen_parachute().information
-    assert vars(information) == {
+    def told(message):
+        return ready().hear(PARACHUTE, message).link.chosen_parachute().information
+
+    assert vars(told(information_basic())) == {
         "vendor_name": "Maker",
         "model_name": "Chute 3",
         "software_version": "1.2.3",
@@ -112,17 +90,7 @@ def test_connection_COMPONENT_INFORMATION_BASIC_field_by_field():  # noqa: N802
         "capabilities": 3,
         "uptime": 1.5,
     }
-
-
-def test_connection_COMPONENT_INFORMATION_BASIC_without_a_date():  # noqa: N802
-    message = d.MAVLink_component_information_basic_message(
-        1500, 3, 0, b"Maker", b"Chute 3", b"1.2.3", b"B", b"S-7"
-    )
-    information = ready().hear(PARACHUTE, message).link.chosen_parachute().information
-    assert information.manufacture_date == "", "0 is not known, and no day of 1970"
-
-
-# -- "MAV_CMD_SET_PARACHUTE_ARM", "Parachute Triggering Sources" ------------------------------
+    assert told(information_basic(0)).manufacture_date == "", "not known, and no day of 1970"
 
 
 def on_the_wire(bench):
@@ -132,9 +100,7 @@ def on_the_wire(bench):
 
 def test_SET_PARACHUTE_ARM_worked_example():  # noqa: N802
     """ATS and FC are armed, MANUAL and GEOFENCE disarmed; bit 3 is left alone."""
-    bench = ready()
-    bench.link.set_triggers(3, 0b00000110, 0b00010111, "", bench.now)
-    bench.collect()
+    bench = ready().call("set_triggers", 3, 0b00000110, 0b00010111, "")
     assert on_the_wire(bench) == (0b00000110, 0b00010111)
     bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=0b00001110))
     assert bench.end(3).finished.success
@@ -142,23 +108,18 @@ def test_SET_PARACHUTE_ARM_worked_example():  # noqa: N802
     assert text in bench.end(3).finished.message
 
 
-@pytest.mark.parametrize("flag", list(TriggerFlags), ids=lambda flag: flag.name)
-@pytest.mark.parametrize("arm", [True, False], ids=["1_arms", "0_disarms"])
-def test_SET_PARACHUTE_ARM_single_source(flag, arm):  # noqa: N802
-    bench = ready()
-    bench.link.set_triggers(3, int(flag) if arm else 0, int(flag), "", bench.now)
-    bench.collect()
-    assert on_the_wire(bench) == (int(flag) if arm else 0, int(flag))
-    others = 0xFF & ~int(flag)
-    shown = others | (int(flag) if arm else 0)
-    bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=shown))
-    assert bench.end(3).finished.success
+def test_SET_PARACHUTE_ARM_single_source():  # noqa: N802
+    for flag in TriggerFlags:
+        for armed in (int(flag), 0):
+            bench = ready().call("set_triggers", 3, armed, int(flag), "")
+            assert on_the_wire(bench) == (armed, int(flag))
+            shown = 0xFF & ~int(flag) | armed
+            bench.at(0.1).hear(PARACHUTE, ack(225), status(boot_ms=5100, armed=shown))
+            assert bench.end(3).finished.success, flag
 
 
 def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: N802
-    bench = ready()
-    bench.link.set_triggers(3, 4, 4, "", bench.now)
-    bench.at(0.1).hear(PARACHUTE, ack(225))
+    bench = ready().call("set_triggers", 3, 4, 4, "").at(0.1).hear(PARACHUTE, ack(225))
     boot = iter(range(5100, 9000, 100))
     bench.stream(5.5, 0.5, PARACHUTE, lambda: status(boot_ms=next(boot), armed=0))
     end = bench.end(3).finished
@@ -167,24 +128,17 @@ def test_SET_PARACHUTE_ARM_acknowledged_but_not_shown_is_no_success():  # noqa: 
 
 
 def test_SET_PARACHUTE_ARM_bit_beyond_128_is_the_devices_to_deny():  # noqa: N802
-    bench = ready()
-    bench.link.arm(3, True, 256, bench.now)
-    bench.collect()
+    bench = ready().call("arm", 3, True, 256)
     assert on_the_wire(bench) == (256, 256)
     bench.hear(PARACHUTE, ack(225, d.MAV_RESULT_DENIED))
     assert bench.end(3).finished.result == d.MAV_RESULT_DENIED
 
 
-@pytest.mark.parametrize(("arm", "select"), [(0, 0), (1, 2**24), (2**32 - 1, 1), (-1, 1)])
-def test_SET_PARACHUTE_ARM_mask_that_a_param_cannot_hold_is_not_sent(arm, select):  # noqa: N802
-    bench = ready()
-    bench.link.set_triggers(3, arm, select, "", bench.now)
-    bench.collect()
-    assert not bench.end(3).finished.success
-    assert bench.commands() == []
-
-
-# -- "Parachute Status" -----------------------------------------------------------------------
+def test_SET_PARACHUTE_ARM_mask_that_a_param_cannot_hold_is_not_sent():  # noqa: N802
+    for arm, select in ((0, 0), (1, 2**24), (2**32 - 1, 1), (-1, 1)):
+        bench = ready().call("set_triggers", 3, arm, select, "")
+        assert not bench.end(3).finished.success, (arm, select)
+        assert bench.commands() == []
 
 
 def test_STATUS_stream_nominally_1_Hz_is_watched():  # noqa: N802
@@ -195,9 +149,7 @@ def test_STATUS_stream_nominally_1_Hz_is_watched():  # noqa: N802
 
 
 def test_STATUS_rate_by_MAV_CMD_SET_MESSAGE_INTERVAL_511_and_read_back():  # noqa: N802
-    bench = ready()
-    bench.link.set_message_interval(4, 430, 500_000, "", bench.now)
-    bench.collect()
+    bench = ready().call("set_message_interval", 4, 430, 500_000, "")
     (order,) = bench.commands(511)
     assert (order.param1, order.param2) == (430, 500_000)
     bench.at(0.1).hear(PARACHUTE, ack(511))
@@ -211,29 +163,17 @@ def test_STATUS_rate_by_MAV_CMD_SET_MESSAGE_INTERVAL_511_and_read_back():  # noq
     assert (end.data.message_id, end.data.interval_us) == (430, 500_000)
 
 
-# -- commands of the reduced document and its note --------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("action", "param1"),
-    [
-        pytest.param("PARACHUTE_DISABLE", 0, id="PARACHUTE_DISABLE"),
-        pytest.param("PARACHUTE_ENABLE", 1, id="PARACHUTE_ENABLE"),
-        pytest.param("PARACHUTE_RELEASE", 2, id="PARACHUTE_RELEASE"),
-    ],
-)
-def test_MAV_CMD_DO_PARACHUTE_208(action, param1):  # noqa: N802
-    bench = ready()
-    bench.link.parachute_action(5, getattr(d, action), "", bench.now)
-    bench.collect()
-    (order,) = bench.commands()
-    assert (order.command, order.param1) == (208, param1)
-    bench.hear(PARACHUTE, ack(208))
-    if action == "PARACHUTE_RELEASE":
-        assert bench.ends(5) == []
-        deployed = d.PARACHUTE_DEPLOYMENT_TRIGGER_MAVLINK
-        bench.at(0.2).hear(PARACHUTE, status(boot_ms=5200, deployed=deployed))
-    assert bench.end(5).finished.success
+def test_MAV_CMD_DO_PARACHUTE_208():  # noqa: N802
+    deployed = d.PARACHUTE_DEPLOYMENT_TRIGGER_MAVLINK
+    for param1, name in enumerate(("DISABLE", "ENABLE", "RELEASE")):
+        bench = ready().call("parachute_action", 5, getattr(d, f"PARACHUTE_{name}"), "")
+        (order,) = bench.commands()
+        assert (order.command, order.param1) == (208, param1)
+        bench.hear(PARACHUTE, ack(208))
+        if name == "RELEASE":
+            assert bench.ends(5) == []
+            bench.at(0.2).hear(PARACHUTE, status(boot_ms=5200, deployed=deployed))
+        assert bench.end(5).finished.success, name
 
 
 @pytest.mark.parametrize(
@@ -248,8 +188,7 @@ def test_MAV_CMD_DO_PARACHUTE_208(action, param1):  # noqa: N802
 def test_kill(method, number, params):
     bench = Bench(kill_method=method).hear((1, 1), ardupilot(armed=True))
     bench.hear((1, 1), setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42))
-    bench.link.kill(6, bench.now)
-    bench.collect()
+    bench.call("kill", 6)
     (order,) = bench.commands()
     assert (order.command, order.param1, order.param2) == (number, *params)
     assert (order.target_system, order.target_component) == (1, 1)

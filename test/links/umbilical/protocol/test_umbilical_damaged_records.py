@@ -11,7 +11,7 @@ from umbilical_link_bench import (
     in_situation,
     ready,
 )
-from umbilical_rocket import Rocket, vehicle
+from umbilical_rocket import flown, vehicle
 
 from chute_ros.links.umbilical.protocol.config import DeployStage
 from chute_ros.links.umbilical.protocol.gate import Situation
@@ -28,54 +28,32 @@ def damaged(bench: Bench, **fields: int) -> Bench:
     return bench.hear_bytes(line)
 
 
-# -- its clock ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("clock", ["920100", "4294967295", "1100"])
-def test_one_clock_that_is_wrong_is_no_restart(clock):
-    rocket = Rocket()
-    rocket.says(0.0, COAST)
-    rocket.says(0.1, COAST)
-    assert rocket.says(0.2, COAST, ms_since_boot_cfc=clock) == ([], Age.DOUBTFUL)
-    for at in (0.3, 0.4, 0.5):
-        assert rocket.says(at, COAST)[1] is Age.NEW
-    assert rocket.computer.restarts == 0
-    assert not vehicle(rocket, 0.5).rebooted_in_flight
-
-
-def test_one_that_is_wrong_in_the_first_record_of_all_is_no_restart():
-    rocket = Rocket()
-    rocket.says(0.0, COAST, ms_since_boot_cfc="920100")
-    assert rocket.says(0.1, COAST) == ([], Age.DOUBTFUL)
+def test_a_clock_that_is_wrong_now_and_then_is_believed_by_nobody():
+    """Also where several are, that do not agree."""
+    wrong = [[clock] for clock in ("920100", "4294967295", "1100")]
+    for clocks in (*wrong, ["400100", "920100", "1100", "50100"]):
+        rocket = flown((0.0, COAST), (0.1, COAST))
+        for n, clock in enumerate(clocks):
+            told = rocket.says(0.2 + n / 10, COAST, ms_since_boot_cfc=clock)
+            assert told == ([], Age.DOUBTFUL), clock
+        for at in (0.6, 0.7, 0.8):
+            assert rocket.says(at, COAST)[1] is Age.NEW, clocks
+        assert rocket.computer.restarts == 0
+        assert not vehicle(rocket, 0.8).rebooted_in_flight
+    rocket = flown((0.0, COAST, {"ms_since_boot_cfc": "920100"}))
+    assert rocket.says(0.1, COAST) == ([], Age.DOUBTFUL), "the first record of all was wrong"
     assert rocket.says(0.2, COAST)[1] is Age.NEW
     assert rocket.computer.restarts == 0
 
 
 def test_a_clock_that_has_leapt_is_believed_at_the_second_record():
-    rocket = Rocket()
-    rocket.says(0.0, COAST)
-    rocket.says(0.1, COAST)
+    rocket = flown((0.0, COAST), (0.1, COAST))
     rocket.started -= 500.0
     assert rocket.says(0.2, COAST) == ([], Age.DOUBTFUL)
     assert rocket.says(0.3, COAST)[1] is Age.NEW
     assert rocket.computer.restarts == 0
-
-
-def test_two_damaged_clocks_that_do_not_agree_are_believed_by_nobody():
-    rocket = Rocket()
-    rocket.says(0.0, COAST)
-    rocket.says(0.1, COAST)
-    for at, clock in ((0.2, "400100"), (0.3, "920100"), (0.4, "1100"), (0.5, "50100")):
-        assert rocket.says(at, COAST, ms_since_boot_cfc=clock) == ([], Age.DOUBTFUL)
-    assert rocket.says(0.6, COAST)[1] is Age.NEW
-    assert rocket.computer.restarts == 0
-
-
-def test_the_clock_may_go_on_as_long_as_the_cable_was_out():
-    rocket = Rocket()
-    rocket.says(0.0, STANDBY)
-    rocket.says(0.1, STANDBY)
-    assert rocket.says(400.0, STANDBY)[1] is Age.NEW
+    rocket = flown((0.0, STANDBY), (0.1, STANDBY))
+    assert rocket.says(400.0, STANDBY)[1] is Age.NEW, "as long as the cable was out"
 
 
 def test_a_damaged_clock_does_not_make_up_for_a_reboot():
@@ -86,48 +64,30 @@ def test_a_damaged_clock_does_not_make_up_for_a_reboot():
     assert not bench.end(number).success
 
 
-# -- its mode -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("mode", [STARTUP, STANDBY])
-def test_one_mode_of_the_ground_ends_no_flight(mode):
-    rocket = Rocket()
-    rocket.says(0.0, COAST)
-    rocket.says(0.1, FAULT)
+def test_one_mode_of_the_ground_ends_no_flight_but_two_in_a_row_do(mode):
+    rocket = flown((0.0, COAST), (0.1, FAULT))
     assert rocket.says(0.2, mode) == ([], Age.DOUBTFUL)
     rocket.says(0.3, FAULT)
     assert rocket.computer.situation(0.3) is Situation.LOST_IN_FLIGHT
     assert vehicle(rocket, 0.3).landed_state is LandedState.IN_AIR
-
-
-@pytest.mark.parametrize("mode", [STARTUP, STANDBY])
-def test_two_in_a_row_do(mode):
-    rocket = Rocket()
-    rocket.says(0.0, COAST)
-    rocket.says(0.1, mode)
-    rocket.says(0.2, mode)
+    rocket = flown((0.0, COAST), (0.1, mode), (0.2, mode))
     assert not rocket.computer.flying
     assert rocket.computer.restarts == 0
 
 
-def test_one_mode_of_the_ground_does_not_abandon_a_deploy():
+def test_one_mode_of_the_ground_does_not_abandon_a_deploy_nor_forget_what_was_fired():
     bench = ready(COAST, altitude=2900.0)
     number = bench.deploy()
     damaged(bench.after(0.33), flight_mode=STANDBY)
     bench.after(4.0)
     assert bench.times("<D>") == [1.05, 2.55, 4.05]
     assert not bench.ends(number)
-
-
-def test_nor_forget_what_was_fired():
     bench = ready(COAST, altitude=2900.0, deploy=DeployStage.NEXT)
     bench.deploy(force=True)
     damaged(bench.after(6.0), flight_mode=STARTUP)
     bench.after(0.5).clear().deploy(force=True)
     assert set(bench.after(0.5).tokens) == {"<d>"}
-
-
-# -- next, where nothing says that it flies ------------------------------------------------------
 
 
 @pytest.mark.parametrize("situation", [Situation.UNKNOWN, Situation.STANDBY, Situation.FAULT])
@@ -146,9 +106,6 @@ def test_what_was_fired_on_the_ground_is_packed_anew_before_the_flight():
     bench.after(310.0).talk(flight_mode=ASCENT, altitude=200.0).after(0.5)
     bench.talk(flight_mode=COAST).after(0.5).clear().deploy()
     assert set(bench.after(0.5).tokens) == {"<D>"}
-
-
-# -- what the port does not take -----------------------------------------------------------------
 
 
 def refused(bench: Bench) -> Bench:

@@ -40,35 +40,29 @@ def test_deploy_fires_the_stage_of_the_settings(stage):
     assert (end.success, end.sent, end.shown) == (True, True, True)
     assert bench.steps(number) == ["SENT", "CONFIRMED"]
     assert bench.after(9.0).tokens == [TOKENS[stage]]
-
-
-@STAGES
-def test_a_flight_mode_shows_it_as_well(stage):
     bench = ready(COAST, deploy=stage)
     number = bench.deploy()
-    assert bench.after(0.3).talk(flight_mode=MODES[stage]).after(0.2).end(number).shown
+    shown_by_mode = bench.after(0.3).talk(flight_mode=MODES[stage]).after(0.2).end(number).shown
+    assert shown_by_mode
 
 
-@pytest.mark.parametrize(
-    ("told", "token"),
-    [
+def test_next_is_the_main_once_the_drogue_is_out_and_nothing_once_both_are():
+    for told, token in (
         ({"flight_mode": COAST}, "<D>"),
         ({"flight_mode": COAST, "ssa_drogue_deployed": 1}, "<d>"),
         ({"flight_mode": DROGUE, "ssa_drogue_deployed": 1}, "<d>"),
         ({"flight_mode": DROGUE}, "<d>"),
-    ],
-)
-def test_next_is_the_main_once_the_drogue_is_out(told, token):
-    bench = ready(COAST, deploy=DeployStage.NEXT).talk(**told).after(0.3)
-    bench.deploy()
-    assert bench.tokens == [token]
-
-
-def test_next_stays_the_drogue_after_one_damaged_record():
+    ):
+        bench = ready(COAST, deploy=DeployStage.NEXT).talk(**told).after(0.3)
+        bench.deploy()
+        assert bench.tokens == [token], told
     bench = ready(COAST, deploy=DeployStage.NEXT).talk(ssa_drogue_deployed=1)
     bench.talk(ssa_drogue_deployed=0).after(0.3)
     bench.deploy()
-    assert bench.tokens == ["<D>"]
+    assert bench.tokens == ["<D>"], "after one damaged record"
+    bench = ready(MAIN, deploy=DeployStage.NEXT).talk().after(0.2)
+    assert "already; nothing was sent" in bench.end(bench.deploy()).message
+    assert bench.tokens == []
 
 
 def test_one_damaged_record_keeps_nothing_from_being_fired():
@@ -77,37 +71,22 @@ def test_one_damaged_record_keeps_nothing_from_being_fired():
     assert bench.after(0.2).tokens == ["<D>"]
 
 
-def test_next_is_nothing_once_both_are_out():
-    bench = ready(MAIN, deploy=DeployStage.NEXT).talk().after(0.2)
-    assert "already; nothing was sent" in bench.end(bench.deploy()).message
-    assert bench.tokens == []
-
-
 @STAGES
-def test_what_is_out_already_is_not_fired(stage):
+def test_what_is_out_already_is_fired_only_where_that_is_wanted(stage):
     bench = out(stage, deploy=stage)
-    number = bench.deploy()
-    end = bench.end(number)
+    end = bench.end(bench.deploy())
     assert (end.success, end.sent, end.shown) == (True, False, True)
     assert end.message.endswith("already; nothing was sent")
     assert bench.after(9.0).tokens == []
-
-
-@STAGES
-def test_what_is_out_already_is_fired_again_where_that_is_wanted(stage):
     bench = out(stage, deploy=stage)
     number = bench.deploy(again=True)
     assert bench.after(0.2).ends(number) == []
     assert bench.after(0.2).end(number).sent
     assert bench.after(9.0).tokens == [TOKENS[stage]]
-
-
-@STAGES
-@pytest.mark.parametrize("force", [False, True])
-def test_by_name_it_is_fired_again_only_if_forced(stage, force):
-    bench = out(stage)
-    bench.order(stage.value, force)
-    assert bench.after(2.0).tokens == ([TOKENS[stage]] if force else [])
+    for force in (False, True):
+        bench = out(stage)
+        bench.order(stage.value, force)
+        assert bench.after(2.0).tokens == ([TOKENS[stage]] if force else []), "by its name"
 
 
 @STAGES
@@ -129,14 +108,14 @@ def test_stale_telemetry_is_not_believed_after_an_earlier_shot_either():
 
 
 @STAGES
-@pytest.mark.parametrize("mode", [STARTUP, STANDBY, FAULT])
-def test_on_the_ground_it_is_refused_unless_forced(stage, mode):
-    bench = ready(mode, deploy=stage)
-    number = bench.deploy()
-    assert f"the {stage.value} is not fired on the ground" in bench.end(number).message
-    assert bench.after(1.0).tokens == []
-    bench.deploy(force=True)
-    assert bench.tokens == [TOKENS[stage]]
+def test_on_the_ground_it_is_refused_unless_forced(stage):
+    for mode in (STARTUP, STANDBY, FAULT):
+        bench = ready(mode, deploy=stage)
+        number = bench.deploy()
+        assert f"the {stage.value} is not fired on the ground" in bench.end(number).message, mode
+        assert bench.after(1.0).tokens == []
+        bench.deploy(force=True)
+        assert bench.tokens == [TOKENS[stage]]
 
 
 def test_without_telemetry_it_is_refused_unless_forced():
@@ -152,14 +131,11 @@ def test_it_fires_again_until_telemetry_shows_it():
     number = bench.deploy()
     bench.after(3.5).talk(ssa_drogue_deployed=1).after(6.0)
     assert bench.times("<D>") == [1.05, 2.55, 4.05]
-    message = bench.end(number).message
-    assert message == (
+    assert bench.end(number).message == (
         "telemetry reports ssa_drogue_deployed 1, or flight mode DrogueDeployed after 3.55 s; "
         "sent 3 times"
     )
-
-
-def test_by_the_standard_settings_a_lost_one_costs_half_a_second():
+    # By the standard settings a lost one costs half a second.
     bench = ready(ASCENT, effect=UmbilicalConfig().effect)
     bench.deploy()
     bench.after(1.2).talk(ssa_drogue_deployed=1).after(6.0)
@@ -191,19 +167,27 @@ def test_it_ends_when_the_time_is_up_and_says_so():
     )
 
 
-def test_it_fires_again_though_telemetry_is_lost_meanwhile():
+def test_it_fires_again_though_telemetry_is_lost_meanwhile_and_forced_on_the_ground():
     bench = ready(ASCENT)
     bench.deploy()
     bench.silent().after(20.0)
     assert len(bench.times("<D>")) == 4
+    bench = ready(STANDBY)
+    bench.deploy(force=True)
+    assert len(bench.after(4.0).times("<D>")) == 3
 
 
-def test_it_leaves_before_all_that_waits():
-    bench = ready(COAST)
-    for _ in range(5):
-        bench.order("flash_info")
-    bench.deploy()
-    assert bench.after(1.0).tokens == ["<I>", "<D>", *["<I>"] * 4]
+def test_it_leaves_before_all_that_waits_and_finds_a_place_though_the_queue_is_full():
+    for limits, after in (
+        (SchedulerLimits(), ["<I>"] * 4),
+        (SchedulerLimits(most_waiting=1), None),
+    ):
+        bench = ready(COAST, scheduler=limits)
+        for _ in range(5):
+            bench.order("flash_info")
+        bench.deploy()
+        assert bench.after(0.2).tokens == ["<I>", "<D>"]
+        assert after is None or bench.after(0.8).tokens[2:] == after
 
 
 def test_a_second_one_that_waits_is_not_fired_once_the_first_shows():
@@ -226,26 +210,14 @@ def test_one_damaged_line_does_not_swallow_one_that_waits():
     assert len(bench.times("<D>")) == 1
 
 
-def test_it_finds_a_place_though_the_queue_is_full():
-    bench = ready(COAST, scheduler=SchedulerLimits(most_waiting=1))
-    for _ in range(5):
-        bench.order("flash_info")
-    bench.deploy()
-    assert bench.after(0.2).tokens == ["<I>", "<D>"]
-
-
-# -- the cable ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("out_for", [0.0, 1.0, 4.8])
-def test_ordered_while_the_cable_is_out_it_leaves_as_soon_as_it_is_back(out_for):
-    bench = ready(COAST).pull().silent()
-    number = bench.deploy()
-    bench.after(out_for).plug()
-    back = bench.t
-    bench.after(0.15)
-    assert bench.times("<D>") == [pytest.approx(back + 0.12)]
-    assert bench.steps(number) == ["SENT"]
+def test_ordered_while_the_cable_is_out_it_leaves_as_soon_as_it_is_back():
+    for out_for in (0.0, 1.0, 4.8):
+        bench = ready(COAST).pull().silent()
+        number = bench.deploy()
+        back = bench.after(out_for).plug().t
+        bench.after(0.15)
+        assert bench.times("<D>") == [pytest.approx(back + 0.12)], out_for
+        assert bench.steps(number) == ["SENT"]
 
 
 def test_a_cable_that_comes_back_too_late_fires_nothing():
@@ -256,9 +228,7 @@ def test_a_cable_that_comes_back_too_late_fires_nothing():
     end = bench.end(number)
     assert (end.success, end.sent) == (False, False)
     assert "never sent: its turn did not come, or the wire is closed" in end.message
-
-
-def test_a_time_that_is_up_unseen_when_the_cable_comes_back_fires_nothing():
+    # Nor where nobody saw that the time was up.
     bench = ready(COAST).pull().silent()
     number = bench.deploy()
     bench.t += 30.0
@@ -287,9 +257,6 @@ def test_a_decided_deploy_waits_for_telemetry_only_where_telemetry_must_allow_it
     assert bench.plug().link.has_parachute()
 
 
-# -- what was out before the flight, and what a restart forgets -----------------------------------
-
-
 @STAGES
 def test_a_flag_that_a_test_on_the_ground_left_does_not_keep_a_canopy_in(stage):
     bench = ready(STANDBY, deploy=stage, **{FLAGS[stage]: 1})
@@ -300,11 +267,15 @@ def test_a_flag_that_a_test_on_the_ground_left_does_not_keep_a_canopy_in(stage):
     assert bench.talk(flight_mode=MODES[stage]).after(0.3).end(number).shown
 
 
-def test_after_a_restart_in_flight_next_is_still_the_main():
+def test_next_is_the_main_after_a_restart_in_flight_and_where_the_drogue_is_never_told():
     bench = ready(DROGUE, deploy=DeployStage.NEXT, ssa_drogue_deployed=1, altitude=900)
     bench.restarts(flight_mode=STARTUP, ssa_drogue_deployed=0, altitude=800).after(0.5)
     bench.deploy()
     assert bench.tokens == ["<d>"]
+    bench = ready(COAST, deploy=DeployStage.NEXT, altitude=2000)
+    bench.deploy()
+    bench.after(6.0).clear().deploy()
+    assert bench.after(0.2).tokens == ["<d>"]
 
 
 def test_it_is_not_fired_again_once_fresh_telemetry_says_ground():
@@ -313,19 +284,6 @@ def test_it_is_not_fired_again_once_fresh_telemetry_says_ground():
     bench.after(0.5).talk(flight_mode=STANDBY).after(9.0)
     assert bench.times("<D>") == [1.05]
     assert "not to be sent again (flight mode Standby)" in bench.end(number).message
-
-
-def test_forced_it_is_fired_again_on_the_ground_as_well():
-    bench = ready(STANDBY)
-    bench.deploy(force=True)
-    assert len(bench.after(4.0).times("<D>")) == 3
-
-
-def test_next_is_the_main_though_the_firmware_never_tells_of_the_drogue():
-    bench = ready(COAST, deploy=DeployStage.NEXT, altitude=2000)
-    bench.deploy()
-    bench.after(6.0).clear().deploy()
-    assert bench.after(0.2).tokens == ["<d>"]
 
 
 def test_where_the_main_is_the_parachute_the_drogue_does_not_count_as_deployed():

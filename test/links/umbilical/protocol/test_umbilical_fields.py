@@ -33,11 +33,9 @@ TOO_FAR = {
 }
 WHOLE = ["bool01", "u8", "u32", "i8", "i32"]
 FLOATS = ["f32", "f64"]
-FIELDS = [
-    pytest.param(layout, field, id=f"{name}-{field.name}")
-    for name, layout in BY_NAME.items()
-    for field in layout.fields
-]
+
+
+FIELDS = [(layout, field) for layout in BY_NAME.values() for field in layout.fields]
 
 
 def reason(kind, text):
@@ -48,149 +46,97 @@ def test_the_types_are_those_of_the_reference_and_a_flag():
     assert sorted(TYPES) == sorted(TAKEN)
 
 
-@pytest.mark.parametrize("kind", TAKEN)
-def test_a_type_takes_its_lowest_and_its_highest(kind):
-    for text, value in TAKEN[kind].items():
-        assert reason(kind, text) == ""
-        assert convert(TYPES[kind], text) == value
-
-
-@pytest.mark.parametrize("kind", TOO_FAR)
-def test_a_type_does_not_take_what_it_cannot_hold(kind):
-    assert {reason(kind, text) for text in TOO_FAR[kind]} == {"out of range"}
-
-
-@pytest.mark.parametrize("kind", FLOATS)
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("inf", math.inf),
-        ("-inf", -math.inf),
-        ("25", 25.0),
-        ("0", 0.0),
-        ("-76.4878", -76.4878),
-        ("0." + "0" * 44 + "1", 1e-45),
-        ("-0." + "0" * 37 + "11754944", -1.1754944e-38),
-        ("0." + "0" * 400 + "1", 0.0),
-        ("16777216", 16777216.0),
-        ("0.1", 0.1),
-        ("1.0", 1.0),
-    ],
-)
-def test_a_float_is_read_as_it_is_printed(kind, text, value):
-    assert reason(kind, text) == ""
-    assert convert(TYPES[kind], text) == value
-
-
-@pytest.mark.parametrize("kind", FLOATS)
-def test_nan_and_the_negative_zero_keep_what_they_are(kind):
-    assert reason(kind, "NaN") == reason(kind, "-0") == ""
-    assert math.isnan(convert(TYPES[kind], "NaN"))
-    assert math.copysign(1.0, convert(TYPES[kind], "-0")) == -1.0
-
-
-#: What neither a whole number nor a float may look like.
-ODD = {
-    "": "empty field",
-    " 25": "padded field",
-    "25 ": "padded field",
-    "25\r": "padded field",
-    "\x0025": "not a number",
-    " ": "padded field",
-    "+1": "not a number",
-    "1_000": "not a number",
-    "007": "leading zero",
-    "-01": "leading zero",
-    "00": "leading zero",
-    "1e3": "exponent",
-    "-1.5E-7": "exponent",
-    "0x1": "not a number",
-    "\u0661": "not a number",
-    "\uff11": "not a number",
-    "\u00b2": "not a number",
-    "nan": "not a number",
-    "NAN": "not a number",
-    "-NaN": "not a number",
-    "Infinity": "not a number",
-    "+inf": "not a number",
-    "Inf": "not a number",
-    "--1": "not a number",
-    "-": "not a number",
-    "1.2.3": "not a number",
-    "1.": "not a number",
-    ".5": "not a number",
-    "-.5": "not a number",
-    "1 2": "not a number",
-    "1\n": "padded field",
-    "true": "not a number",
-    "\ufffd": "not a number",
+PRINTED = {
+    "inf": math.inf,
+    "-inf": -math.inf,
+    "25": 25.0,
+    "0": 0.0,
+    "-76.4878": -76.4878,
+    "0." + "0" * 44 + "1": 1e-45,
+    "-0." + "0" * 37 + "11754944": -1.1754944e-38,
+    "0." + "0" * 400 + "1": 0.0,
+    "16777216": 16777216.0,
+    "0.1": 0.1,
+    "1.0": 1.0,
 }
 
 
-@pytest.mark.parametrize("kind", TYPES)
-@pytest.mark.parametrize("text", [pytest.param(one, id=ascii(one)) for one in ODD])
-def test_what_rust_never_prints_has_its_reason_in_every_type(kind, text):
-    assert reason(kind, text) == ODD[text]
+def test_a_type_takes_its_lowest_and_its_highest_and_nothing_beyond():
+    for kind, taken in TAKEN.items():
+        for text, value in taken.items():
+            assert (reason(kind, text), convert(TYPES[kind], text)) == ("", value), kind
+        for text in TOO_FAR[kind]:
+            assert reason(kind, text) == "out of range", (kind, text)
 
 
-@pytest.mark.parametrize("kind", WHOLE)
-@pytest.mark.parametrize("text", ["0.5", "1.0", "-3.25", "00.5", "9" * 50 + ".5"])
-def test_a_fraction_is_no_whole_number(kind, text):
-    assert reason(kind, text) == "not a whole number"
+def test_a_float_is_read_as_it_is_printed():
+    for kind in FLOATS:
+        for text, value in PRINTED.items():
+            assert (reason(kind, text), convert(TYPES[kind], text)) == ("", value)
+        assert reason(kind, "NaN") == reason(kind, "-0") == ""
+        assert math.isnan(convert(TYPES[kind], "NaN"))
+        assert math.copysign(1.0, convert(TYPES[kind], "-0")) == -1.0
 
 
-@pytest.mark.parametrize("kind", WHOLE)
-@pytest.mark.parametrize("text", ["NaN", "inf", "-inf", "-0"])
-def test_what_only_a_float_may_be_is_no_whole_number_either(kind, text):
-    assert reason(kind, text) == "not a number"
+#: What neither a whole number nor a float may look like, by its reason.
+ODD = {
+    "empty field": [""],
+    "padded field": [" 25", "25 ", "25\r", " ", "1\n"],
+    "leading zero": ["007", "-01", "00"],
+    "exponent": ["1e3", "-1.5E-7"],
+    "not a number": [
+        *("\x0025", "+1", "1_000", "0x1", "\u0661", "\uff11", "\u00b2", "nan", "NAN", "-NaN"),
+        *("Infinity", "+inf", "Inf", "--1", "-", "1.2.3", "1.", ".5", "-.5", "1 2", "true"),
+        "\ufffd",
+    ],
+}
+#: And what only a float may be.
+NOT_WHOLE = {
+    "not a whole number": ["0.5", "1.0", "-3.25", "00.5", "9" * 50 + ".5"],
+    "not a number": ["NaN", "inf", "-inf", "-0"],
+}
 
 
-# -- the same, where the field stands in its line -----------------------------------------------
+def test_what_rust_never_prints_has_its_reason_in_every_type():
+    for kind in TYPES:
+        for odd in [ODD, NOT_WHOLE] if kind in WHOLE else [ODD]:
+            for why, texts in odd.items():
+                for text in texts:
+                    assert reason(kind, text) == why, (kind, text)
 
 
 def decoded(layout, field, text):
     return layout.decode(body(layout, **{field.name: text}))
 
 
-@pytest.mark.parametrize(("layout", "field"), FIELDS)
-def test_every_field_takes_its_lowest_and_highest_in_its_own_place(layout, field):
-    for text, value in TAKEN[field.kind.name].items():
-        assert decoded(layout, field, text)[layout.index[field.name]] == value
+def test_every_field_takes_its_lowest_and_highest_in_its_own_place_and_nothing_beyond():
+    for layout, field in FIELDS:
+        at = layout.index[field.name]
+        for text, value in TAKEN[field.kind.name].items():
+            assert decoded(layout, field, text)[at] == value, field.name
+        for text in TOO_FAR[field.kind.name]:
+            problem = decoded(layout, field, text)
+            assert isinstance(problem, Problem), field.name
+            assert problem.reason == "out of range"
+            assert problem.detail.startswith(f"{field.name} ({field.kind.name}) is ")
+            assert len(problem.detail) < 120
 
 
-@pytest.mark.parametrize(("layout", "field"), FIELDS)
-def test_every_field_refuses_what_is_just_outside_and_names_itself(layout, field):
-    for text in TOO_FAR[field.kind.name]:
-        problem = decoded(layout, field, text)
-        assert isinstance(problem, Problem)
-        assert problem.reason == "out of range"
-        assert problem.detail.startswith(f"{field.name} ({field.kind.name}) is ")
-        assert len(problem.detail) < 120
-
-
-@pytest.mark.parametrize(("layout", "field"), FIELDS)
-def test_every_field_refuses_the_wrong_kind(layout, field):
-    wrong = {"": "empty field", "x": "not a number", "1e2": "exponent", "01": "leading zero"}
-    if field.kind.name in WHOLE:
-        wrong |= {"0.5": "not a whole number", "NaN": "not a number", "-0": "not a number"}
-    for text, why in wrong.items():
-        problem = decoded(layout, field, text)
-        assert isinstance(problem, Problem)
-        assert (problem.reason, field.name in problem.detail) == (why, True)
-
-
-@pytest.mark.parametrize(("layout", "field"), FIELDS)
-def test_only_a_float_may_be_no_number_or_infinite(layout, field):
-    came = [decoded(layout, field, text) for text in ("NaN", "inf", "-inf")]
-    if field.kind.name in WHOLE:
-        assert [one.reason for one in came] == ["not a number"] * 3
-    else:
-        values = [one[layout.index[field.name]] for one in came]
-        assert math.isnan(values[0])
-        assert values[1:] == [math.inf, -math.inf]
-
-
-# -- the printer that other tests rest on --------------------------------------------------------
+def test_every_field_refuses_the_wrong_kind_and_only_a_float_may_be_no_number_or_infinite():
+    for layout, field in FIELDS:
+        at, whole = layout.index[field.name], field.kind.name in WHOLE
+        wrong = {"": "empty field", "x": "not a number", "1e2": "exponent", "01": "leading zero"}
+        if whole:
+            wrong |= {"0.5": "not a whole number"}
+            wrong |= dict.fromkeys(("NaN", "-0", "inf", "-inf"), "not a number")
+        for text, why in wrong.items():
+            problem = decoded(layout, field, text)
+            assert isinstance(problem, Problem), field.name
+            assert (problem.reason, field.name in problem.detail) == (why, True)
+        if not whole:
+            values = [decoded(layout, field, text)[at] for text in ("NaN", "inf", "-inf")]
+            assert math.isnan(values[0]), field.name
+            assert values[1:] == [math.inf, -math.inf], field.name
 
 
 @pytest.mark.parametrize(

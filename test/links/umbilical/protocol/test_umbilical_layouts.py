@@ -45,34 +45,26 @@ def text_of(line):
     return line.decode().removeprefix("$TELEM,").removesuffix("\n")
 
 
-# -- the reference ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("number", range(1, 58))
-def test_the_field_of_this_number_is_the_references(number):
-    field = LAYOUT.fields[number - 1]
-    assert (field.name, field.kind.name) == REFERENCE_FIELDS[number - 1]
-
-
-@pytest.mark.parametrize("number", range(1, 58))
-def test_the_field_of_this_number_takes_the_value_at_this_place_and_no_other(number):
-    texts = ["0"] * 57
-    texts[number - 1] = "1"
-    values = LAYOUT.decode(",".join(texts))
-    assert values == tuple(float(text) for text in texts)
-    name, _ = REFERENCE_FIELDS[number - 1]
-    assert Record(LAYOUT, values, 0.0)[name] == 1
-
-
-def test_the_reference_has_57_fields_and_comes_first():
+def test_each_field_is_the_references_and_takes_the_value_at_its_place_and_no_other():
     assert (len(REFERENCE_FIELDS), LAYOUT.count) == (57, 57)
     assert LAYOUTS[0].name == STATE
+    for place, (field, (name, kind)) in enumerate(
+        zip(LAYOUT.fields, REFERENCE_FIELDS, strict=True)
+    ):
+        assert (field.name, field.kind.name) == (name, kind)
+        texts = ["0"] * 57
+        texts[place] = "1"
+        values = LAYOUT.decode(",".join(texts))
+        assert values == tuple(float(text) for text in texts), name
+        assert Record(LAYOUT, values, 0.0)[name] == 1
 
 
 def test_a_line_from_the_pad():
     values = LAYOUT.decode(text_of(PAD))
     assert dict(zip(LAYOUT.index, values, strict=True)) == PAD_VALUES
     assert list(LAYOUT.index) == list(PAD_VALUES)
+    kinds = [float if kind in ("f32", "f64") else int for _, kind in REFERENCE_FIELDS]
+    assert [type(value) for value in values] == kinds
 
 
 def test_a_line_with_every_odd_number_that_can_be_printed():
@@ -80,66 +72,43 @@ def test_a_line_with_every_odd_number_that_can_be_printed():
     assert [repr(one) for one in values] == [repr(one) for one in ODD_VALUES]
 
 
-@pytest.mark.parametrize("number", range(1, 58))
-def test_whole_numbers_are_ints_and_the_others_floats(number):
-    kind = REFERENCE_FIELDS[number - 1][1]
-    value = LAYOUT.decode(text_of(PAD))[number - 1]
-    assert type(value) is (float if kind in ("f32", "f64") else int)
+def test_a_line_with_a_field_missing_empty_or_too_many():
+    whole = text_of(PAD).split(",")
+    for place, (name, kind) in enumerate(REFERENCE_FIELDS):
+        before, after = whole[:place], whole[place + 1 :]
+        problem = LAYOUT.decode(",".join(before + after))
+        assert problem == Problem("field count", f"56 fields where {STATE} has 57"), name
+        problem = LAYOUT.decode(",".join([*before, "", *after]))
+        assert problem == Problem("empty field", f"{name} ({kind}) is ''")
+        assert LAYOUT.decode(",".join([*before, "0", *whole[place:]])).reason == "field count"
+    assert LAYOUT.decode(",".join([*whole, "0"])).reason == "field count"
+    for text in ("", ",", "," * 56, "," * 100_000, "x" * 100_000):
+        assert isinstance(LAYOUT.decode(text), Problem), text[:60]
 
 
-# -- lines that are none ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("number", range(57))
-def test_a_line_without_one_of_its_fields(number):
-    texts = text_of(PAD).split(",")
-    del texts[number]
-    problem = LAYOUT.decode(",".join(texts))
-    assert problem == Problem("field count", f"56 fields where {STATE} has 57")
-
-
-@pytest.mark.parametrize("number", range(58))
-def test_a_line_with_one_field_more(number):
-    texts = text_of(PAD).split(",")
-    texts.insert(number, "0")
-    assert LAYOUT.decode(",".join(texts)).reason == "field count"
-
-
-@pytest.mark.parametrize("number", range(57))
-def test_a_line_with_an_empty_field(number):
-    texts = text_of(PAD).split(",")
-    texts[number] = ""
-    name, kind = REFERENCE_FIELDS[number]
-    assert LAYOUT.decode(",".join(texts)) == Problem("empty field", f"{name} ({kind}) is ''")
-
-
-@pytest.mark.parametrize("text", ["", ",", "," * 56, "," * 100_000, "x" * 100_000])
-def test_hardly_a_line_at_all(text):
-    assert isinstance(LAYOUT.decode(text), Problem)
-
-
-def test_a_field_that_is_too_long_to_show_is_shown_by_its_beginning():
+def test_a_field_is_shown_up_to_47_characters():
     problem = LAYOUT.decode(body(altitude="9" * 5000))
     assert problem == Problem("out of range", f"altitude (f32) is '{'9' * 47}...'")
-
-
-def test_a_field_of_47_characters_is_shown_whole():
     text = "0." + "0" * 43 + "1x"
     assert LAYOUT.decode(body(altitude=text)).detail == f"altitude (f32) is {text!r}"
 
 
-# -- the five layouts ---------------------------------------------------------------------------
-
-
 def test_the_layouts_that_are_shipped():
     assert {name: layout.count for name, layout in BY_NAME.items()} == COUNTS
-
-
-@pytest.mark.parametrize("name", COUNTS)
-def test_a_line_of_each_layout_comes_out_as_it_was_put_in(name):
-    layout = BY_NAME[name]
-    values = layout.decode(body(layout, altitude="1234.5", ms_since_boot_cfc="99"))
-    assert (values[3], values[-1], len(values)) == (1234.5, 99, COUNTS[name])
+    one_point = ["blims_target_lat", "blims_target_lon"]
+    two = [f"blims_{point}_{part}" for point in ("upwind", "downwind") for part in ("lat", "lon")]
+    targets = {"telem50": [], "telem54": two}
+    for name, layout in BY_NAME.items():
+        values = layout.decode(body(layout, altitude="1234.5", ms_since_boot_cfc="99"))
+        assert (values[3], values[-1], len(values)) == (1234.5, 99, COUNTS[name]), name
+        record = Record(layout, layout.decode(body(layout)), 1.5)
+        assert [one for one in layout.index if one not in record] == []
+        assert "blims_upwind_lat" in record or name != "telem54"
+        assert "no such field" not in record
+        assert math.isnan(record.number("no such field"))
+        assert record.number("mag_x") == 12.5
+        assert list(layout.target_fields) == targets.get(name, one_point), name
+        assert layout.target_floats == (4 if name == "telem54" else 2), name
 
 
 def test_the_second_layout_of_57_fields_differs_in_field_32_alone():
@@ -149,51 +118,15 @@ def test_the_second_layout_of_57_fields_differs_in_field_32_alone():
     assert BY_NAME[DEPLOYMENT].fields[31].kind.name == "f32"
 
 
-@pytest.mark.parametrize("name", COUNTS)
-def test_a_record_says_which_fields_it_has(name):
-    layout = BY_NAME[name]
-    record = Record(layout, layout.decode(body(layout)), 1.5)
-    assert [one for one in layout.index if one not in record] == []
-    assert "blims_upwind_lat" in record or name != "telem54"
-    assert "no such field" not in record
-    assert math.isnan(record.number("no such field"))
-    assert record.number("mag_x") == 12.5
-
-
-@pytest.mark.parametrize(
-    ("name", "floats", "fields"),
-    [
-        ("telem50", 2, []),
-        ("telem52", 2, ["blims_target_lat", "blims_target_lon"]),
-        (STATE, 2, ["blims_target_lat", "blims_target_lon"]),
-        (DEPLOYMENT, 2, ["blims_target_lat", "blims_target_lon"]),
-        (
-            "telem54",
-            4,
-            ["blims_upwind_lat", "blims_upwind_lon", "blims_downwind_lat", "blims_downwind_lon"],
-        ),
-    ],
-)
-def test_what_each_firmware_takes_and_shows_as_a_target(name, floats, fields):
-    layout = BY_NAME[name]
-    assert (layout.target_floats, list(layout.target_fields)) == (floats, fields)
-
-
-@pytest.mark.parametrize(
-    ("name", "field", "fitting", "strange"),
-    [
-        (STATE, "airbrake_state", ["0", "1", "2"], ["3", "255"]),
-        (DEPLOYMENT, "airbrake_deployment", ["0", "0.5", "1", "-0"], ["1.01", "-1", "NaN", "inf"]),
-    ],
-)
-def test_field_32_is_as_expected_or_not(name, field, fitting, strange):
-    layout = BY_NAME[name]
-    for text in fitting + strange:
-        values = layout.decode(body(layout, **{field: text}))
-        assert layout.is_as_expected(values) == (text in fitting)
-
-
-# -- files with a mistake in them ---------------------------------------------------------------
+def test_field_32_is_as_expected_or_not():
+    for name, field, fitting, strange in (
+        (STATE, "airbrake_state", "0 1 2", "3 255"),
+        (DEPLOYMENT, "airbrake_deployment", "0 0.5 1 -0", "1.01 -1 NaN inf"),
+    ):
+        layout = BY_NAME[name]
+        for text in (fitting + " " + strange).split():
+            values = layout.decode(body(layout, **{field: text}))
+            assert layout.is_as_expected(values) == (text in fitting.split()), text
 
 
 def content():
@@ -239,6 +172,8 @@ MISTAKES = {
     "limits that are none": (field("airbrake_state", expected=[]), "no layout of"),
     "half the limits": (field("airbrake_state", expected=[0]), "no layout of"),
     "limits in words": (field("airbrake_state", expected=["low", "high"]), "no layout of"),
+    "a list of lists as a name": (spoilt(name=[["x"]]), "a word is needed, not a list"),
+    "lists as target fields": (spoilt(target_fields=[["x"]]), "a word is needed, not a list"),
 }
 
 
@@ -254,20 +189,37 @@ def test_a_file_without_a_mistake_is_taken():
     assert layout_from(content(), "here").fields == LAYOUT.fields
 
 
-def test_a_folder_without_layouts(tmp_path):
+def test_a_folder_without_layouts_or_with_two_of_one_name(tmp_path):
     with pytest.raises(ParameterError, match=r"layouts is .* there is no layout"):
+        load_layouts(str(tmp_path), "layouts")
+    with pytest.raises(ParameterError, match="there is no layout"):
+        load_layouts(str(tmp_path / "none"), "layouts")
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.yaml").write_text((FOLDER / "telem50.yaml").read_text())
+    with pytest.raises(ParameterError, match="two layouts have one name"):
         load_layouts(str(tmp_path), "layouts")
 
 
-def test_a_folder_that_is_not_there(tmp_path):
-    with pytest.raises(ParameterError, match="there is no layout"):
-        load_layouts(str(tmp_path / "none"), "layouts")
+def test_the_references_layout_comes_first_and_the_others_by_file(tmp_path):
+    for name in ("telem54", STATE, "telem50"):
+        (tmp_path / f"{name}.yaml").write_text((FOLDER / f"{name}.yaml").read_text())
+    names = [layout.name for layout in load_layouts(str(tmp_path), "layouts")]
+    assert names == [STATE, "telem50", "telem54"]
 
 
-@pytest.mark.parametrize("text", [b"a: [", b"\xff\xfe\xfa", b"", b"- 1"])
-def test_a_file_that_cannot_be_read(tmp_path, text):
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        *((text, "") for text in (b"a: [", b"\xff\xfe\xfa", b"", b"- 1")),
+        # What only the reader of YAML stumbles over.
+        (b"[" * 3000, "cannot be read"),
+        (b"a: 2001-12-14t21:59:43.10-99:99", "cannot be read"),
+        (b"a: 0b_", "cannot be read"),
+    ],
+)
+def test_a_file_that_cannot_be_read(tmp_path, text, told):
     (tmp_path / "mine.yaml").write_bytes(text)
-    with pytest.raises(ParameterError, match=r"mine\.yaml: "):
+    with pytest.raises(ParameterError, match=rf"mine\.yaml: {told}"):
         load_layouts(str(tmp_path), "layouts")
 
 
@@ -287,31 +239,3 @@ def test_what_yaml_reads_as_another_value_is_told_with_its_line(tmp_path, old, n
     with pytest.raises(ParameterError, match=r"line [0-9]+") as caught:
         load_layouts(str(tmp_path), "layouts")
     assert told in str(caught.value)
-
-
-def test_two_files_with_one_name(tmp_path):
-    for name in ("a", "b"):
-        (tmp_path / f"{name}.yaml").write_text((FOLDER / "telem50.yaml").read_text())
-    with pytest.raises(ParameterError, match="two layouts have one name"):
-        load_layouts(str(tmp_path), "layouts")
-
-
-def test_the_references_layout_comes_first_and_the_others_by_file(tmp_path):
-    for name in ("telem54", STATE, "telem50"):
-        (tmp_path / f"{name}.yaml").write_text((FOLDER / f"{name}.yaml").read_text())
-    names = [layout.name for layout in load_layouts(str(tmp_path), "layouts")]
-    assert names == [STATE, "telem50", "telem54"]
-
-
-@pytest.mark.parametrize("text", ["[" * 3000, "a: 2001-12-14t21:59:43.10-99:99", "a: 0b_"])
-def test_a_file_that_only_the_reader_of_yaml_stumbles_over(tmp_path, text):
-    (tmp_path / "mine.yaml").write_text(text)
-    with pytest.raises(ParameterError, match=r"mine\.yaml: cannot be read"):
-        load_layouts(str(tmp_path), "parameter layouts")
-
-
-@pytest.mark.parametrize("key", ["name", "target_fields"])
-def test_a_list_of_lists_is_no_word(key):
-    content = yaml.safe_load((FOLDER / f"{STATE}.yaml").read_text())
-    with pytest.raises(ParameterError, match="a word is needed, not a list"):
-        layout_from({**content, key: [["x"]]}, "here")

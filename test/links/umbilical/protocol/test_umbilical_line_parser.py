@@ -58,73 +58,43 @@ KNOWN = {
     b"$TELEM,": Telemetry(""),
     b"$TELEM,1,x": Telemetry("1,x"),
 }
-KNOWN_STORIES = [pytest.param(line, said, id=ascii(line[:40])) for line, said in KNOWN.items()]
 #: Cut off here, on a multiple of the 64 bytes of a packet, or in the middle of anything else.
 CUTS = [1, 7, 8, 9, *range(64, len(WHOLE), 64), len(WHOLE) - 1, len(WHOLE)]
 
 
-@pytest.mark.parametrize(("line", "said"), KNOWN_STORIES)
-def test_a_line_says(line, said):
+@pytest.mark.parametrize("line", KNOWN, ids=lambda line: ascii(line[:40]))
+def test_a_line_says_its_own_also_on_the_heels_of_one_that_was_cut(line):
+    said = KNOWN[line]
     assert recognise(line) == (said, "")
+    for cut in CUTS:
+        assert recognise(WHOLE[:cut] + line) == (said, CUT_LINE), cut
+    for first in (b"Wipe progress: 3/56 sectors", b"Wiping QSPI Flash... Please"):
+        for cut in (1, 10, 13, 19):
+            assert recognise(first[:cut] + line) == (said, CUT_LINE), (first, cut)
 
 
-@pytest.mark.parametrize("cut", CUTS)
-@pytest.mark.parametrize(("line", "said"), KNOWN_STORIES)
-def test_a_record_that_was_cut_is_counted_and_what_is_on_its_heels_is_said(line, said, cut):
-    assert recognise(WHOLE[:cut] + line) == (said, CUT_LINE)
-
-
-@pytest.mark.parametrize("cut", [1, 10, 13, 19])
-@pytest.mark.parametrize("first", [b"Wipe progress: 3/56 sectors", b"Wiping QSPI Flash... Please"])
-@pytest.mark.parametrize(("line", "said"), KNOWN_STORIES)
-def test_so_is_what_follows_another_cut_line(line, said, first, cut):
-    assert recognise(first[:cut] + line) == (said, CUT_LINE)
-
-
-@pytest.mark.parametrize("cut", range(64, len(WHOLE), 64))
-def test_of_several_cut_records_the_last_is_taken(cut):
-    assert recognise(WHOLE[:cut] * 3 + WHOLE) == (Telemetry(BODY), CUT_LINE)
-
-
-def test_a_cut_record_at_the_end_is_a_record_of_too_few_fields():
+def test_of_cut_records_the_last_is_taken_and_one_at_the_end_has_too_few_fields():
+    for cut in range(64, len(WHOLE), 64):
+        assert recognise(WHOLE[:cut] * 3 + WHOLE) == (Telemetry(BODY), CUT_LINE), cut
     assert recognise(WHOLE[:64]) == (Telemetry(BODY[:57]), "")
+    assert recognise(b"") == (None, ""), "nothing is nothing, and not counted"
 
 
-def test_an_empty_line_says_nothing_and_is_not_counted():
-    assert recognise(b"") == (None, "")
+NOTHING_KNOWN = [
+    *(b"hello", b" ", b"\r", b"\0", b"\xff\xfe", b"$TELEM", b"$telem,1,2", b"TELEM,1,2", b"1,2,3"),
+    *(b"[info] lower case", b"[INFO]no space", b"[FATAL] strange level"),
+    *(b"Flash: 1024/14336 KB used (7.1%) or so", b"Flash: -1/14336 KB used (7.1%)"),
+    b"Flash: 1234567890/14336 KB used (7.1%)",
+    "Flash: \u0661/14336 KB used (7.1%)".encode(),
+    *(b"Wipe progress: 3/56 sectors of many", b"Wipe progress: three/56 sectors"),
+    *(b"Flash wiped successfully", b"ERASE FAILED", b"--- BEGIN FLASH CSV DUMP --"),
+    *(b"--- END FLASH OTHER DUMP ---", b"arming blocked: no", b"x" * 8192),
+]
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        b"hello",
-        b" ",
-        b"\r",
-        b"\0",
-        b"\xff\xfe",
-        b"$TELEM",
-        b"$telem,1,2",
-        b"TELEM,1,2",
-        b"1,2,3",
-        b"[info] lower case",
-        b"[INFO]no space",
-        b"[FATAL] strange level",
-        b"Flash: 1024/14336 KB used (7.1%) or so",
-        b"Flash: -1/14336 KB used (7.1%)",
-        b"Flash: 1234567890/14336 KB used (7.1%)",
-        "Flash: \u0661/14336 KB used (7.1%)".encode(),
-        b"Wipe progress: 3/56 sectors of many",
-        b"Wipe progress: three/56 sectors",
-        b"Flash wiped successfully",
-        b"ERASE FAILED",
-        b"--- BEGIN FLASH CSV DUMP --",
-        b"--- END FLASH OTHER DUMP ---",
-        b"arming blocked: no",
-        b"x" * 8192,
-    ],
-)
-def test_what_is_nothing_known(line):
-    assert recognise(line) == (None, UNKNOWN_LINE)
+def test_what_is_nothing_known():
+    for line in NOTHING_KNOWN:
+        assert recognise(line) == (None, UNKNOWN_LINE), line
 
 
 @pytest.mark.parametrize("start", [b"[INFO] ", b"SNAP seq=", b"FRAM ", b"Arming blocked: "])
@@ -136,42 +106,26 @@ def test_nothing_of_a_line_reaches_a_terminal_that_could_move_it(start):
     assert reason == ""
 
 
-def test_bytes_that_are_no_text_are_shown_as_marks():
+def test_what_can_be_seen_is_left_as_it_is_and_what_is_no_text_is_shown_as_marks():
+    assert printable("21 °C ✓") == "21 °C ✓"
+    assert printable("") == ""
     assert recognise(b"[WARN] \xff\xc3") == (LogLine(Severity.WARNING, MARK * 2), "")
-
-
-def test_a_character_that_was_cut_does_not_swallow_what_follows():
+    # A character that was cut does not swallow what follows.
     assert recognise("[INFO] 21 °".encode()[:-1] + WHOLE) == (Telemetry(BODY), CUT_LINE)
 
 
-def test_what_can_be_seen_is_left_as_it_is():
-    assert printable("21 °C ✓") == "21 °C ✓"
-    assert printable("") == ""
-
-
 def test_the_first_level_counts_where_a_log_line_quotes_another():
-    assert recognise(b"[WARN] said: [ERROR] no") == (
-        LogLine(Severity.WARNING, "said: [ERROR] no"),
-        "",
-    )
+    quotes = LogLine(Severity.WARNING, "said: [ERROR] no")
+    assert recognise(b"[WARN] said: [ERROR] no") == (quotes, "")
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        b"Flash wiped successfully.",
-        b"ERASE FAILED!",
-        b"ERASE TIMEOUT!",
-        b"Wipe progress: 3/56 sectors",
-        b"Arming blocked: wipe flash first",
+def test_what_matters_is_not_lost_on_the_heels_of_a_cut_log_line():
+    for line in (
+        *(b"Flash wiped successfully.", b"ERASE FAILED!", b"ERASE TIMEOUT!"),
+        *(b"Wipe progress: 3/56 sectors", b"Arming blocked: wipe flash first"),
         b"Flash: 1024/14336 KB used (7.1%)",
-    ],
-)
-def test_what_matters_is_not_lost_on_the_heels_of_a_cut_log_line(line):
-    assert recognise(b"[INFO] Refere" + line) == (recognise(line)[0], CUT_LINE)
-    echo, reason = recognise(b"[INFO] " + line)
-    assert isinstance(echo, LogLine)
-    assert reason == ""
+    ):
+        assert recognise(b"[INFO] Refere" + line) == (recognise(line)[0], CUT_LINE), line
 
 
 def test_a_log_line_that_speaks_of_telemetry_or_of_the_fram_is_a_log_line():

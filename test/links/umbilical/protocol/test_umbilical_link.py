@@ -26,13 +26,11 @@ from chute_ros.protocol.events import (
 from chute_ros.protocol.liveness import LivenessLimits
 
 BEGIN, END = "--- BEGIN FLASH CSV DUMP ---", "--- END FLASH CSV DUMP ---"
+WIPING = "Wiping QSPI Flash... Please wait."
 
 
 def state(bench):
     return bench.link.computer.liveness.state
-
-
-# -- states -------------------------------------------------------------------------------------
 
 
 def test_a_flight_computer_that_was_never_seen():
@@ -40,9 +38,7 @@ def test_a_flight_computer_that_was_never_seen():
     assert state(bench) is LinkState.NEVER_SEEN
     assert bench.events == []
     assert len(bench.times("<H>")) == 60
-
-
-def test_bytes_that_are_no_record_do_not_make_it_seen():
+    # Nor do bytes that are no record make it seen.
     bench = Bench().hear("x").after(0.3).hear("x", "[INFO] hello", "Flash: 1/2 KB used (50.0%)")
     assert state(bench) is LinkState.NEVER_SEEN
     assert bench.of(DeviceLinkChanged, ParachuteChanged, VehicleChanged) == []
@@ -83,34 +79,23 @@ def test_each_record_is_told_with_its_number():
     assert records[0].record.received == pytest.approx(1000.7)
 
 
-def test_our_heartbeat_goes_on_in_every_state():
+def test_our_heartbeat_goes_on_in_every_state_until_the_owner_hangs_or_the_cable_is_out():
     bench = Bench(always_alive=True).talk(flight_mode=STANDBY).at(5.0).silent().at(30.0)
     bench.hear(BEGIN).at(40.0).talk().at(50.0)
     beats = [0.0, *bench.times("<H>"), 50.0]
     assert max(b - a for a, b in itertools.pairwise(beats)) <= 1.62
     assert bench.link.scheduler.heartbeats_sent == len(beats) - 2
-
-
-def test_our_heartbeat_ends_when_the_owner_hangs():
     bench = Bench()
     bench.link.owner_alive(bench.now + 3.5)
     assert bench.at(20.0).times("<H>") == [0.12, 1.12, 2.12, 3.12]
-
-
-def test_no_heartbeat_while_the_cable_is_out():
     bench = Bench(always_alive=True).at(5.0).pull()
     before = len(bench.times("<H>"))
     assert len(bench.at(15.0).times("<H>")) == before
     assert bench.plug().at(15.5).times("<H>")[before:] == [15.12]
 
 
-# -- pauses -------------------------------------------------------------------------------------
-
-
 def test_a_dump_is_not_taken_for_a_lost_link():
-    bench = ready()
-    bench.order("dump_flash")
-    bench.after(0.1).silent().hear(BEGIN)
+    bench = under_way("dump_flash", BEGIN)
     for _ in range(40):
         bench.after(1.0).hear_bytes(b"1,2,3\n")
         assert state(bench) is LinkState.OK
@@ -123,9 +108,7 @@ def test_a_dump_is_not_taken_for_a_lost_link():
 
 
 def test_a_wipe_is_not_taken_for_a_lost_link_though_nothing_comes_for_long():
-    bench = ready()
-    bench.order("wipe_flash")
-    bench.after(0.1).silent().hear("Wiping QSPI Flash... Please wait.").after(55.0)
+    bench = under_way("wipe_flash", WIPING).after(55.0)
     assert state(bench) is LinkState.OK
     assert bench.status().state is ParachuteState.NOT_READY
     assert bench.status().faults == ("no telemetry: wipe flash in progress",)
@@ -134,38 +117,28 @@ def test_a_wipe_is_not_taken_for_a_lost_link_though_nothing_comes_for_long():
     assert bench.link_states() == []
 
 
-@pytest.mark.parametrize("end", ["Flash wiped successfully.", "ERASE FAILED!", None])
-def test_no_line_of_a_wipe_comes_too_late_for_the_link(end):
+def under_way(name, *said):
+    """This work was ordered, and the flight computer says no more than this."""
     bench = ready()
-    bench.order("wipe_flash")
-    bench.after(0.1).silent().hear("Wiping QSPI Flash... Please wait.")
-    bench.after(50.0).hear("Wipe progress: 1/2 sectors").after(50.0)
-    if end:
-        bench.hear(end)
-    bench.talk().after(0.5)
-    assert bench.link_states() == []
-    assert bench.status().faults == ()
+    bench.order(name)
+    return bench.after(0.1).silent().hear(*said)
 
 
-def test_a_wipe_that_falls_silent_for_too_long_is_a_lost_link():
-    bench = ready()
-    bench.order("wipe_flash")
-    bench.silent().hear("Wiping QSPI Flash... Please wait.").after(61.0)
-    assert bench.link_states() == ["STALE", "LOST"]
+def test_no_line_of_a_wipe_comes_too_late_for_the_link():
+    for end in ("Flash wiped successfully.", "ERASE FAILED!", None):
+        bench = under_way("wipe_flash", WIPING)
+        bench.after(50.0).hear("Wipe progress: 1/2 sectors").after(50.0)
+        if end:
+            bench.hear(end)
+        bench.talk().after(0.5)
+        assert bench.link_states() == [], end
+        assert bench.status().faults == (), end
 
 
-def test_silence_after_a_pause_is_a_lost_link_again():
-    bench = ready()
-    bench.order("dump_flash")
-    bench.silent().hear(BEGIN, END).after(3.5)
-    assert bench.link_states() == ["STALE"]
-
-
-def test_a_dump_that_falls_silent_leaves_a_link_that_is_stale_and_then_lost():
-    bench = ready()
-    bench.order("dump_flash")
-    bench.silent().hear(BEGIN).after(30.0)
-    assert bench.link_states() == ["STALE", "LOST"]
+def test_silence_for_too_long_or_after_a_pause_is_a_lost_link_again():
+    assert under_way("wipe_flash", WIPING).after(61.0).link_states() == ["STALE", "LOST"]
+    assert under_way("dump_flash", BEGIN, END).after(3.5).link_states() == ["STALE"]
+    assert under_way("dump_flash", BEGIN).after(30.0).link_states() == ["STALE", "LOST"]
 
 
 def test_a_deploy_during_a_dump_in_flight_is_not_refused():
@@ -175,9 +148,6 @@ def test_a_deploy_during_a_dump_in_flight_is_not_refused():
     bench.hear_bytes(b"1\n").after(2.5).hear_bytes(b"1\n")
     bench.clear().deploy()
     assert bench.after(0.2).tokens == ["<D>"], "what was in the air is so still"
-
-
-# -- the opening --------------------------------------------------------------------------------
 
 
 def test_what_comes_right_after_the_opening_does_not_pass_for_fresh():
@@ -190,45 +160,30 @@ def test_what_comes_right_after_the_opening_does_not_pass_for_fresh():
     assert bench.link.counts["bytes right after the opening"] >= 40 * len(bench.line())
 
 
-def test_a_line_that_began_before_the_opening_is_dropped():
+def test_a_line_or_a_dump_that_began_before_the_opening_is_dropped():
     bench = ready().pull().plug().clear()
     bench.hear_bytes(b"1").after(0.3)
     cut = bench.line()[40:]
     bench.hear_bytes(cut[:30]).hear_bytes(cut[30:] + bench.line())
     assert len(bench.of(TelemetryReceived)) == 1
     assert bench.link.counts["first line after the opening"] == 2
-
-
-def test_the_layout_is_known_again_at_once_after_the_cable_was_out():
+    bench = ready().pull().plug().clear()
+    bench.hear_bytes(b"1").after(0.3).hear("1,2", "3,4", END)
+    assert bench.link.counts["mark of a dump that was not under way"] == 1
+    # The layout is known again at once.
     bench = ready().pull().after(5.0).plug().clear().after(0.05)
     bench.talk().after(0.5)
     assert len(bench.of(TelemetryReceived)) == 2
 
 
-def test_a_dump_is_read_on_a_new_port_from_its_beginning_only():
-    bench = ready().pull().plug().clear()
-    bench.hear_bytes(b"1").after(0.3).hear("1,2", "3,4", END)
-    assert bench.link.counts["mark of a dump that was not under way"] == 1
-
-
-# -- restarts -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("mode", "told"),
-    [
-        (STANDBY, "flight computer restarted"),
-        (ASCENT, "flight computer restarted IN FLIGHT"),
-        (DROGUE, "flight computer restarted IN FLIGHT"),
-    ],
-)
-def test_a_restart_is_told(mode, told):
-    bench = ready(mode).restarts(flight_mode=STARTUP).after(0.5)
-    assert bench.notices() == [told]
-    assert bench.link_states() == []
-    vehicle = bench.of(VehicleChanged)[-1].state
-    assert (vehicle.reboot_count, vehicle.rebooted_in_flight) == (1, mode != STANDBY)
-    assert bench.link.counts[DOUBTED] == 1
+def test_a_restart_is_told():
+    for mode, where in ((STANDBY, ""), (ASCENT, " IN FLIGHT"), (DROGUE, " IN FLIGHT")):
+        bench = ready(mode).restarts(flight_mode=STARTUP).after(0.5)
+        assert bench.notices() == [f"flight computer restarted{where}"]
+        assert bench.link_states() == []
+        vehicle = bench.of(VehicleChanged)[-1].state
+        assert (vehicle.reboot_count, vehicle.rebooted_in_flight) == (1, mode != STANDBY)
+        assert bench.link.counts[DOUBTED] == 1
 
 
 def test_after_a_restart_in_flight_nothing_is_taken_for_the_ground():
@@ -240,18 +195,10 @@ def test_after_a_restart_in_flight_nothing_is_taken_for_the_ground():
     assert bench.tokens == ["<D>"]
 
 
-# -- what must not hide that it is lost ---------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "mark", ["Wiping QSPI Flash... Please wait.", "--- BEGIN FLASH CSV DUMP ---"]
-)
-def test_a_line_that_nobody_asked_for_is_no_pause_in_flight(mark):
-    bench = ready(COAST, altitude=2000).hear(mark).silent().after(16.0)
-    assert [one.change.after for one in bench.of(DeviceLinkChanged)] == [
-        LinkState.STALE,
-        LinkState.LOST,
-    ]
+def test_a_line_that_nobody_asked_for_is_no_pause_in_flight():
+    for mark in (WIPING, BEGIN):
+        bench = ready(COAST, altitude=2000).hear(mark).silent().after(16.0)
+        assert bench.link_states() == ["STALE", "LOST"], mark
 
 
 def test_a_work_that_has_not_begun_is_no_fault_while_telemetry_comes():
@@ -268,9 +215,6 @@ def test_a_clock_that_stands_still_is_a_fault():
     assert "its clock stands still" in bench.of(ParachuteChanged)[-1].status.faults
     number = bench.order("launch", force=True)
     assert "no fresh telemetry" in bench.end(number).message
-
-
-# -- more than a person can read ----------------------------------------------------------------
 
 
 def test_of_lines_for_the_log_fifty_a_second_are_told_and_no_error_is_left_out():

@@ -10,6 +10,7 @@ from umbilical_rocket import (
     STANDBY,
     STARTUP,
     Rocket,
+    flown,
     status,
     vehicle,
 )
@@ -18,8 +19,6 @@ from chute_ros.links.umbilical.protocol.gate import Situation
 from chute_ros.links.umbilical.protocol.modes import FlightMode
 from chute_ros.model import LandedState, ParachuteState
 from chute_ros.protocol.boot_clock import Age
-
-# -- restart ------------------------------------------------------------------------------------
 
 
 def test_a_restart_is_believed_at_the_second_record_that_shows_it():
@@ -38,57 +37,43 @@ def test_a_restart_is_believed_at_the_second_record_that_shows_it():
 
 @pytest.mark.parametrize("mode", [ASCENT, COAST, DROGUE, MAIN])
 def test_a_restart_in_flight_is_told_until_the_next_one_on_the_ground(mode):
-    rocket = Rocket()
-    rocket.says(0.0, mode)
-    rocket.restarts(1.0)
-    rocket.says(1.0, STARTUP)
-    rocket.says(1.1, STARTUP)
+    rocket = flown((0.0, mode))
+    restarts(rocket, 1.0)
     assert vehicle(rocket, 1.1).rebooted_in_flight
     assert status(rocket, 1.1).state is ParachuteState.ABNORMAL
     assert status(rocket, 1.1).faults == ("it restarted in flight",)
     rocket.says(60.0, STARTUP)
-    rocket.restarts(70.0)
-    rocket.says(70.0, STARTUP)
-    rocket.says(70.1, STARTUP)
+    restarts(rocket, 70.0)
     assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (2, False)
 
 
-def test_a_restart_in_flight_is_one_after_a_long_silence_too():
+def restarts(rocket, at):
+    """It says Startup twice, by a new clock."""
+    rocket.restarts(at)
+    rocket.says(at, STARTUP)
+    rocket.says(at + 0.1, STARTUP)
+
+
+def test_a_restart_in_flight_is_one_after_a_long_silence_too_but_not_after_the_landing():
     rocket = Rocket()
-    end = rocket.descends(0.0, 10.0)
-    rocket.restarts(end + 30.0)
-    rocket.says(end + 30.0, STARTUP)
-    rocket.says(end + 30.1, STARTUP)
+    restarts(rocket, rocket.descends(0.0, 10.0) + 30.0)
     assert rocket.computer.restarted_in_flight
-
-
-def test_a_restart_after_the_landing_is_not_in_flight():
     rocket = Rocket()
-    end = rocket.descends(0.0, 6.0, MAIN, 10.0, 0.0)
-    rocket.restarts(end + 1.0)
-    rocket.says(end + 1.0, STARTUP)
-    rocket.says(end + 1.1, STARTUP)
+    restarts(rocket, rocket.descends(0.0, 6.0, MAIN, 10.0, 0.0) + 1.0)
     assert (rocket.computer.restarts, rocket.computer.restarted_in_flight) == (1, False)
 
 
 def test_a_record_that_is_older_than_the_one_before_changes_nothing():
-    rocket = Rocket()
-    rocket.says(0.0, ASCENT, altitude="100")
+    rocket = flown((0.0, ASCENT, {"altitude": "100"}))
     old = {"ms_since_boot_cfc": "99900", "altitude": "90"}
     assert rocket.says(0.1, STANDBY, **old) == ([], Age.OLD)
     assert (rocket.computer.mode, rocket.computer.records) == (FlightMode.ASCENT, 1)
     assert vehicle(rocket, 0.1).height == 100.0
     assert not rocket.computer.fresh(3.0)
-
-
-def test_a_clock_that_wraps_is_no_restart():
-    rocket = Rocket()
-    rocket.says(0.0, STANDBY, ms_since_boot_cfc="4294967295")
+    # Nor is a clock that wraps a restart.
+    rocket = flown((0.0, STANDBY, {"ms_since_boot_cfc": "4294967295"}))
     assert rocket.says(0.1, STANDBY, ms_since_boot_cfc="50") == ([], Age.NEW)
     assert rocket.computer.restarts == 0
-
-
-# -- and what it says after that is no word on whether it flies ------------------------------
 
 
 def restarted_in_flight():
@@ -124,8 +109,7 @@ def test_it_is_on_the_ground_again_once_its_altitude_stays():
 
 
 def test_a_clock_that_starts_at_zero_is_a_restart_as_well():
-    rocket = Rocket()
-    rocket.says(0.0, ASCENT)
+    rocket = flown((0.0, ASCENT))
     for at, clock in ((1.0, 0), (1.07, 70), (1.17, 170)):
         rocket.says(at, STARTUP, ms_since_boot_cfc=str(clock), altitude=f"{900 + 100 * at}")
     assert rocket.computer.restarted_in_flight
@@ -133,57 +117,44 @@ def test_a_clock_that_starts_at_zero_is_a_restart_as_well():
 
 
 def test_a_mode_without_a_name_does_not_make_it_forget_the_flight():
-    rocket = Rocket()
-    rocket.says(0.0, COAST, altitude="2000")
-    rocket.says(0.1, 9, altitude="2010")
+    rocket = flown((0.0, COAST, {"altitude": "2000"}), (0.1, 9, {"altitude": "2010"}))
     assert rocket.computer.situation(0.1) is Situation.LOST_IN_FLIGHT
     rocket.says(0.2, FAULT, altitude="2020")
     assert rocket.computer.situation(0.2) is Situation.LOST_IN_FLIGHT
 
 
-def test_a_fault_on_the_pad_after_a_launch_that_did_not_lift_is_none_in_flight():
+def test_a_fault_at_rest_is_none_in_flight():
+    """On the pad after a launch that did not lift, or where it fell to the ground."""
     rocket = Rocket()
     rocket.descends(0.0, 6.0, mode=ASCENT, height=0.0, speed=0.0)
     rocket.says(6.1, FAULT, altitude="0")
     assert rocket.computer.situation(6.1) is Situation.FAULT
-
-
-def test_a_fault_that_falls_to_the_ground_rests_there():
-    rocket = Rocket()
-    rocket.says(0.0, COAST, altitude="2000")
+    rocket = flown((0.0, COAST, {"altitude": "2000"}))
     rocket.descends(0.1, 5.0, mode=FAULT, height=500.0, speed=100.0)
     assert rocket.computer.situation(5.1) is Situation.LOST_IN_FLIGHT
     rocket.descends(5.2, 5.0, mode=FAULT, height=0.0, speed=0.0)
     assert rocket.computer.situation(10.2) is Situation.FAULT
 
 
-def test_rest_is_counted_from_the_deployment_on():
+def test_rest_before_the_deployment_or_the_ignition_or_of_a_stuck_barometer_is_no_landing():
     rocket = Rocket()
     rocket.descends(0.0, 20.0, mode=COAST, height=2000.0, speed=0.0)
     rocket.descends(20.1, 1.0, mode=DROGUE, height=2000.0, speed=0.0)
     assert vehicle(rocket, 21.1).landed_state is LandedState.IN_AIR
-
-
-def test_a_fault_right_after_the_ignition_is_no_landing():
-    """Given 10 s at rest on the pad, when it fails in the climb, then it is in the air."""
+    # Given 10 s at rest on the pad, when it fails in the climb, then it is in the air.
     rocket = Rocket()
     rocket.descends(0.0, 10.0, mode=STANDBY, height=0.0, speed=0.0)
     rocket.says(10.1, ASCENT, altitude="0.5")
     rocket.says(10.2, FAULT, altitude="2")
     assert rocket.computer.situation(10.2) is Situation.LOST_IN_FLIGHT
     assert vehicle(rocket, 10.2).landed_state is LandedState.IN_AIR
-
-
-def test_a_barometer_that_is_stuck_is_no_landing():
-    rocket = Rocket()
-    for step in range(200):
-        rocket.says(step / 10, DROGUE, altitude="1500", vel_d="28")
+    stuck = {"altitude": "1500", "vel_d": "28"}
+    rocket = flown(*((step / 10, DROGUE, stuck) for step in range(200)))
     assert vehicle(rocket, 20.0).landed_state is LandedState.IN_AIR
 
 
 def test_what_was_in_the_air_a_moment_ago_may_still_be_deployed():
-    rocket = Rocket()
-    rocket.says(0.0, COAST, altitude="2000")
+    rocket = flown((0.0, COAST, {"altitude": "2000"}))
     assert rocket.computer.situation(3.2) is Situation.LOST_IN_FLIGHT
     rocket.computer.update(3.2)
     rocket.computer.update(16.0)
@@ -191,8 +162,7 @@ def test_what_was_in_the_air_a_moment_ago_may_still_be_deployed():
 
 
 def test_a_record_of_before_the_cable_was_pulled_is_not_fresh():
-    rocket = Rocket()
-    rocket.says(0.0, STANDBY)
+    rocket = flown((0.0, STANDBY))
     rocket.computer.cable_pulled()
     assert rocket.computer.situation(0.5) is Situation.UNKNOWN
     rocket.says(0.6, STANDBY)

@@ -1,5 +1,7 @@
 """Dumps and wipes: long works that pause the telemetry, and how each of them ends."""
 
+import itertools
+
 import pytest
 from umbilical_link_bench import ASCENT, STANDBY, STARTUP, Bench, ready
 
@@ -35,19 +37,22 @@ def wiping(name="wipe_flash"):
     return bench, number
 
 
-@pytest.mark.parametrize("step", Step, ids=lambda one: one.name)
-@pytest.mark.parametrize("sign", Sign, ids=lambda one: one.name)
-def test_a_step_is_in_the_table_or_raises(step, sign):
-    if (step, sign) == (Step.SENT, Sign.TOKEN_SENT):
-        with pytest.raises(TransitionError, match="its token was sent"):
-            after(STEPS, step, sign)
-    else:
-        began = sign is Sign.FIRST_SIGN or step is Step.BEGUN
-        wanted = Step.BEGUN if began else Step.SENT
-        assert after(STEPS, step, sign) is STEPS[step, sign] is wanted
+def failed(bench, number, text):
+    """The dump is over, and so is its request."""
+    assert bench.of(DumpFinished) == [DumpFinished(number, False, text)]
+    (end,) = bench.ends(number)
+    assert (end.success, end.message) == (False, text)
 
 
-# -- flash dump ---------------------------------------------------------------------------------
+def test_a_step_is_in_the_table_or_raises():
+    for step, sign in itertools.product(Step, Sign):
+        if (step, sign) == (Step.SENT, Sign.TOKEN_SENT):
+            with pytest.raises(TransitionError, match="its token was sent"):
+                after(STEPS, step, sign)
+        else:
+            began = sign is Sign.FIRST_SIGN or step is Step.BEGUN
+            wanted = Step.BEGUN if began else Step.SENT
+            assert after(STEPS, step, sign) is STEPS[step, sign] is wanted, (step, sign)
 
 
 @pytest.mark.parametrize(("kind", "data"), [("csv", CSV), ("binary", BINARY)])
@@ -81,19 +86,16 @@ def test_a_long_dump_tells_how_far_it_is():
 
 
 def test_a_dump_that_does_not_begin_is_given_up():
-    bench = ready()
-    number = bench.order("dump_flash")
-    bench.after(4.9)
-    assert bench.ends(number) == []
-    bench.after(0.2)
-    end = bench.end(number)
-    assert (end.success, end.sent, end.message) == (
-        False,
-        True,
-        "dump flash failed, 0 bytes: no sign of it within 5 s",
-    )
-    assert bench.of(DumpStarted, DumpFinished) == []
-    assert bench.after(9.0).tokens == ["<G>"]
+    for memory, token in (("flash", "<G>"), ("fram", "<f>")):
+        bench = ready()
+        number = bench.order(f"dump_{memory}")
+        bench.after(4.9)
+        assert bench.ends(number) == []
+        end = bench.after(0.2).end(number)
+        text = f"dump {memory} failed, 0 bytes: no sign of it within 5 s"
+        assert (end.success, end.sent, end.message) == (False, True, text)
+        assert bench.of(DumpStarted, DumpFinished) == []
+        assert bench.after(9.0).tokens == [token]
 
 
 def test_a_dump_that_falls_silent_is_given_up_with_what_came():
@@ -102,48 +104,34 @@ def test_a_dump_that_falls_silent_is_given_up_with_what_came():
     assert bench.ends(number) == []
     bench.after(0.2)
     assert dumped(bench) == b"1,2\n-"
-    text = "dump flash failed, 5 bytes: silent for 3 s, no end mark"
-    assert bench.of(DumpFinished) == [DumpFinished(number, False, text)]
-    assert bench.end(number).message == text
+    failed(bench, number, "dump flash failed, 5 bytes: silent for 3 s, no end mark")
     # What is said after is read as lines again.
     records = bench.link.computer.records
     bench.talk().after(0.5)
     assert bench.link.computer.records > records
 
 
-def test_a_dump_without_its_end_mark_ends_when_telemetry_goes_on():
+def test_a_dump_ends_when_telemetry_goes_on_the_cable_is_pulled_or_it_restarts():
     bench, number = dumping()
     bench.hear_bytes(b"1,2\n").after(0.5).talk().after(0.5)
     assert dumped(bench) == b"1,2\n"
-    text = "dump flash failed, 4 bytes: no end mark before telemetry resumed"
-    assert bench.of(DumpFinished) == [DumpFinished(number, False, text)]
-    assert not bench.end(number).success
-
-
-def test_a_dump_ends_when_the_cable_is_pulled():
+    failed(bench, number, "dump flash failed, 4 bytes: no end mark before telemetry resumed")
     bench, number = dumping()
     bench.hear_bytes(b"1,2\n-").pull()
-    text = "dump flash failed, 5 bytes: the cable was pulled, or the port closed"
-    assert bench.of(DumpFinished) == [DumpFinished(number, False, text)]
-    assert bench.end(number).message == text
     assert dumped(bench) == b"1,2\n-"
+    text = "dump flash failed, 5 bytes: the cable was pulled, or the port closed"
+    failed(bench, number, text)
     bench.plug().after(0.3).hear("x", END["csv"]).talk().after(1.0)
-    assert len(bench.ends(number)) == 1
-
-
-def test_a_dump_in_the_middle_of_which_it_restarts_ends():
+    failed(bench, number, text)
     bench, number = dumping()
     bench.hear_bytes(b"1,2\n").after(0.5).restarts(flight_mode=STARTUP).after(0.5)
     assert not bench.end(number).success
     assert len(bench.of(DumpFinished)) == 1
     assert dumped(bench) == b"1,2\n"
-
-
-def test_a_restart_before_its_first_sign_ends_it():
     bench = ready()
     number = bench.order("dump_flash")
     bench.after(0.2).restarts(flight_mode=STARTUP).after(0.5)
-    assert bench.end(number).message.endswith("the flight computer restarted")
+    assert bench.end(number).message.endswith("the flight computer restarted"), "before its sign"
 
 
 def test_a_dump_that_nobody_asked_for_is_followed():
@@ -167,8 +155,6 @@ def test_dumps_that_nobody_asked_for_are_not_followed_without_end():
     bench.after(60.0).hear(BEGIN["csv"]).hear_bytes(CSV).hear(END["csv"])
     assert len(bench.of(DumpFinished)) == 2
 
-
-# -- FRAM dump ----------------------------------------------------------------------------------
 
 SNAP = ["SNAP seq=1 mode=2", "Snapshot: alt=3", "FRAM end"]
 
@@ -194,21 +180,10 @@ def test_a_fram_dump_is_over_when_no_more_lines_come():
     assert bench.after(0.2).end(number).success
 
 
-def test_a_fram_dump_of_which_nothing_comes_is_given_up():
-    bench = ready()
-    number = bench.order("dump_fram")
-    end = bench.after(5.1).end(number)
-    assert (end.success, end.sent) == (False, True)
-    assert "no sign of it within 5 s" in end.message
-
-
 def test_lines_of_the_fram_that_nobody_asked_for_are_told():
     bench = ready().hear("SNAP seq=9")
     assert bench.notices() == ["flight computer: SNAP seq=9"]
     assert bench.of(DumpStarted) == []
-
-
-# -- wipes --------------------------------------------------------------------------------------
 
 
 def test_a_wipe_tells_its_progress_and_its_end():
@@ -223,21 +198,15 @@ def test_a_wipe_tells_its_progress_and_its_end():
     assert bench.tokens == ["<W>"]
 
 
-@pytest.mark.parametrize("text", ["ERASE FAILED!", "ERASE TIMEOUT!"])
-def test_a_wipe_that_fails_says_so(text):
-    bench, number = wiping()
-    end = bench.after(1.0).hear(text).end(number)
-    assert (end.success, end.message) == (False, f"wipe flash failed: {text}")
-
-
-def test_a_wipe_whose_end_was_lost_ends_when_telemetry_goes_on():
+def test_a_wipe_that_fails_falls_silent_or_whose_end_was_lost_says_so():
+    for text in ("ERASE FAILED!", "ERASE TIMEOUT!"):
+        bench, number = wiping()
+        end = bench.after(1.0).hear(text).end(number)
+        assert (end.success, end.message) == (False, f"wipe flash failed: {text}")
     bench, number = wiping()
     end = bench.after(9.0).talk().after(0.3).end(number)
     assert not end.success
     assert end.message == "wipe flash failed: telemetry resumed, but its end was not reported"
-
-
-def test_a_wipe_that_falls_silent_is_given_up():
     bench, number = wiping()
     bench.after(59.0).hear("Wipe progress: 1/2 sectors").after(59.0)
     assert bench.ends(number) == []
@@ -253,12 +222,13 @@ def test_the_end_of_a_wipe_of_which_nothing_is_known_is_told(said):
     assert bench.end(number).success
 
 
-@pytest.mark.parametrize("name", ["answer_within", "dump_silence", "wipe_silence", "fram_quiet"])
-@pytest.mark.parametrize("value", [0.0, -1.0, float("inf"), float("nan")])
-def test_its_limits_are_times(name, value):
-    with pytest.raises(ParameterError) as raised:
-        MemoryLimits(**{name: value})
-    assert f"{name} is {value}: need a number (1.0, not 1) from 0.1 to " in str(raised.value)
+def test_its_limits_are_times():
+    for name in ("answer_within", "dump_silence", "wipe_silence", "fram_quiet"):
+        for value in (0.0, -1.0, float("inf"), float("nan")):
+            with pytest.raises(ParameterError) as raised:
+                MemoryLimits(**{name: value})
+            told = f"{name} is {value}: need a number (1.0, not 1) from 0.1 to "
+            assert told in str(raised.value)
 
 
 def test_a_wipe_by_somebody_else_is_followed():
@@ -269,43 +239,32 @@ def test_a_wipe_by_somebody_else_is_followed():
     assert bench.end(number).success
 
 
-@pytest.mark.parametrize("said", ["Flash wiped successfully.", "ERASE FAILED!"])
-def test_wiping_the_fram_and_rebooting_is_done_when_it_restarts(said):
-    bench, number = wiping("wipe_fram_and_reboot")
-    bench.after(20.0).hear(said).after(2.0)
-    assert bench.ends(number) == []
-    bench.restarts(flight_mode=STARTUP).after(0.3)
-    assert bench.end(number).success
-    assert bench.tokens == ["<X>"]
-
-
-def test_wiping_the_fram_and_rebooting_without_a_word_is_done_when_it_restarts():
+def test_wiping_the_fram_and_rebooting_is_done_when_it_restarts_and_not_before():
+    for said in ("Flash wiped successfully.", "ERASE FAILED!"):
+        bench, number = wiping("wipe_fram_and_reboot")
+        bench.after(20.0).hear(said).after(2.0)
+        assert bench.ends(number) == []
+        bench.restarts(flight_mode=STARTUP).after(0.3)
+        assert bench.end(number).success
+        assert bench.tokens == ["<X>"]
     bench = ready()
     number = bench.order("wipe_fram_and_reboot")
     bench.after(0.5).silent().after(2.0).restarts(flight_mode=STARTUP).after(0.5)
-    assert bench.end(number).message == "wipe fram and reboot complete"
-
-
-def test_wiping_the_fram_and_rebooting_without_the_restart_is_not_done():
+    assert bench.end(number).message == "wipe fram and reboot complete", "without a word"
     bench, number = wiping("wipe_fram_and_reboot")
     bench.after(1.0).hear("Flash wiped successfully.").talk().after(59.0)
     assert bench.ends(number) == []
     assert not bench.after(2.0).end(number).success
 
 
-# -- one at a time ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("second", LASTING)
-@pytest.mark.parametrize("first", LASTING)
-def test_a_second_work_is_refused_while_one_is_under_way(first, second):
-    bench = ready()
-    one = bench.order(first)
-    two = bench.order(second)
-    text = f"{second} refused: a {first.replace('_', ' ')} is sent, no sign of it yet"
-    assert bench.end(two).message == text
-    assert bench.ends(one) == []
-    assert len(bench.after(1.0).tokens) == 1
+def test_a_second_work_is_refused_while_one_is_under_way():
+    for first, second in itertools.product(LASTING, LASTING):
+        bench = ready()
+        one, two = bench.order(first), bench.order(second)
+        text = f"{second} refused: a {first.replace('_', ' ')} is sent, no sign of it yet"
+        assert bench.end(two).message == text
+        assert bench.ends(one) == []
+        assert len(bench.after(1.0).tokens) == 1, text
 
 
 def test_after_one_is_over_the_next_can_begin():
@@ -337,24 +296,22 @@ def test_a_wipe_that_somebody_else_ends_before_ours_was_sent_is_not_begun_again(
     assert bench.tokens == ["<I>"]
 
 
-@pytest.mark.parametrize("name", LASTING)
-def test_one_that_never_has_its_turn_is_given_up_and_does_not_leave(name):
-    bench = Bench(always_alive=True, memory=MemoryLimits(answer_within=0.1)).talk(
-        flight_mode=STANDBY
-    )
-    bench.at(1.05)
-    bench.order("flash_info")
-    number = bench.order(name)
-    bench.after(0.11)
-    assert "not sent within 0.1 s: the wire is busy or closed" in bench.end(number).message
-    assert not bench.end(number).sent
-    assert bench.after(3.0).tokens == ["<I>"]
+def test_one_that_never_has_its_turn_is_given_up_and_does_not_leave():
+    for name in LASTING:
+        bench = Bench(always_alive=True, memory=MemoryLimits(answer_within=0.1))
+        bench.talk(flight_mode=STANDBY).at(1.05)
+        bench.order("flash_info")
+        number = bench.order(name)
+        end = bench.after(0.11).end(number)
+        assert "not sent within 0.1 s: the wire is busy or closed" in end.message, name
+        assert not end.sent
+        assert bench.after(3.0).tokens == ["<I>"]
 
 
-@pytest.mark.parametrize("name", LASTING)
-def test_in_flight_it_is_refused_unless_forced(name):
-    bench = ready(ASCENT)
-    refused, forced = bench.order(name), bench.order(name, force=True)
-    assert "flight mode Ascent" in bench.end(refused).message
-    assert bench.ends(forced) == []
-    assert len(bench.tokens) == 1
+def test_in_flight_it_is_refused_unless_forced():
+    for name in LASTING:
+        bench = ready(ASCENT)
+        refused, forced = bench.order(name), bench.order(name, force=True)
+        assert "flight mode Ascent" in bench.end(refused).message, name
+        assert bench.ends(forced) == []
+        assert len(bench.tokens) == 1

@@ -11,8 +11,6 @@ from umbilical_link_bench import (
 from chute_ros.links.umbilical.protocol.config import EffectLimits
 from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits
 
-# -- sent, confirmed or not ---------------------------------------------------------------------
-
 
 def test_an_effect_that_does_not_show_is_ordered_again_until_the_time_is_up():
     bench = ready()
@@ -31,9 +29,7 @@ def test_nothing_is_sent_again_once_the_effect_shows():
     bench.after(2.0).talk(mav_open=1).after(0.2)
     assert bench.end(number).message == "telemetry reports mav_open 1 after 2.05 s; sent 2 times"
     assert bench.after(9.0).times("<M>") == [1.05, 2.55]
-
-
-def test_the_time_limits_are_settings():
+    # The time limits are settings.
     bench = ready(effect=EffectLimits(0.5, 0.25, 1.2))
     number = bench.order("open_mav")
     bench.after(3.0)
@@ -103,21 +99,11 @@ def test_a_limit_that_is_seen_late_is_no_leave_to_send_what_is_out_of_time():
     assert not bench.end(number).sent
 
 
-# -- what ends an order -------------------------------------------------------------------------
-
 NEWER = [
-    ("open_mav", "close_mav"),
-    ("close_mav", "open_mav"),
-    ("open_sv", "close_sv"),
-    ("close_sv", "open_sv"),
-    ("key_arm", "key_disarm"),
-    ("key_disarm", "key_arm"),
-    ("open_mav", "safe"),
-    ("open_sv", "safe"),
-    ("launch", "safe"),
-    ("launch", "close_mav"),
-    ("launch", "key_disarm"),
-    ("close_mav", "launch"),
+    *(("open_mav", "close_mav"), ("close_mav", "open_mav"), ("open_sv", "close_sv")),
+    *(("close_sv", "open_sv"), ("key_arm", "key_disarm"), ("key_disarm", "key_arm")),
+    *(("open_mav", "safe"), ("open_sv", "safe"), ("launch", "safe"), ("launch", "close_mav")),
+    *(("launch", "key_disarm"), ("close_mav", "launch")),
 ]
 
 
@@ -135,20 +121,15 @@ def test_the_newer_of_two_that_contradict_counts(older, newer):
     bench.after(9.0)
     assert bench.tokens.count(bench.tokens[0]) == 1  # it is not sent again
     assert len(bench.ends(second)) == 1
-
-
-@pytest.mark.parametrize(("older", "newer"), NEWER)
-@pytest.mark.parametrize("pause", [0.0, 0.05, 0.12, 0.5])
-def test_what_gave_way_before_it_left_does_not_leave(older, newer, pause):
-    bench = ready()
-    bench.order("payload_n1")
-    first = bench.order(older, force=True)
-    bench.t += min(pause, 0.12)  # the slot may be free already, and nobody has looked
-    bench.order(newer, force=True)
-    end = bench.end(first)
-    assert not end.sent
-    bench.after(0.5)
-    assert len(bench.tokens) == 2
+    # What gave way before it left does not leave: the slot may be free, and nobody has looked.
+    for pause in (0.0, 0.05, 0.12):
+        bench = ready()
+        bench.order("payload_n1")
+        first = bench.order(older, force=True)
+        bench.t += pause
+        bench.order(newer, force=True)
+        assert not bench.end(first).sent, pause
+        assert len(bench.after(0.5).tokens) == 2, pause
 
 
 def test_a_target_that_was_set_anew_is_not_set_back():
@@ -162,40 +143,30 @@ def test_a_target_that_was_set_anew_is_not_set_back():
 
 
 def test_what_is_not_allowed_any_more_when_its_turn_comes_does_not_leave():
-    bench = ready(scheduler=SchedulerLimits(0.5, 1.0, 0.5))
-    bench.order("flash_info")
-    valve, reboot = bench.order("open_mav"), bench.order("reboot")
-    forced = bench.order("open_sv", force=True)
-    bench.talk(flight_mode=ASCENT).after(2.0)
-    assert bench.tokens == ["<I>", "<S>", "<S>"]
-    for number in (valve, reboot):
-        assert "flight mode Ascent" in bench.end(number).message
-        assert not bench.end(number).sent
-    assert bench.ends(forced) == []
+    for names in (("open_mav", "reboot"), *([name] for name in LONG)):
+        bench = ready(scheduler=SchedulerLimits(0.5, 1.0, 0.5))
+        bench.order("flash_info")
+        numbers = [bench.order(name) for name in names]
+        forced = bench.order("open_sv", force=True)
+        bench.talk(flight_mode=ASCENT).after(2.0)
+        assert bench.tokens == ["<I>", "<S>", "<S>"], names
+        for number in numbers:
+            assert "flight mode Ascent" in bench.end(number).message
+            assert not bench.end(number).sent
+        assert bench.ends(forced) == []
 
 
-@pytest.mark.parametrize("name", ["wipe_flash", "dump_flash", "dump_fram", "wipe_fram_and_reboot"])
-def test_a_long_work_that_is_not_allowed_any_more_when_its_turn_comes_does_not_leave(name):
-    bench = ready(scheduler=SchedulerLimits(0.5, 1.0, 0.5))
-    bench.order("flash_info")
-    number = bench.order(name)
-    bench.talk(flight_mode=ASCENT).after(2.0)
-    assert bench.tokens == ["<I>"]
-    assert "flight mode Ascent" in bench.end(number).message
-    assert not bench.end(number).sent
-
-
-@pytest.mark.parametrize("name", ["close_mav", "open_mav", "open_sv", "key_disarm"])
-def test_what_is_not_allowed_any_more_is_not_sent_again(name):
+def test_what_is_not_allowed_any_more_is_not_sent_again():
     """A MAV that is closed in Ascent stops the motor, though the order was given on the pad."""
-    bench = ready(mav_open=int(name == "close_mav"))
-    number = bench.order(name)
-    bench.after(0.5).talk(flight_mode=ASCENT).after(9.0)
-    assert len(bench.tokens) == 1
-    end = bench.end(number)
-    why = "not to be sent again (flight mode Ascent); it had been sent once"
-    assert end.message == f"{name} given up: {why}"
-    assert (end.success, end.sent) == (False, True)
+    for name in ("close_mav", "open_mav", "open_sv", "key_disarm"):
+        bench = ready(mav_open=int(name == "close_mav"))
+        number = bench.order(name)
+        bench.after(0.5).talk(flight_mode=ASCENT).after(9.0)
+        assert len(bench.tokens) == 1
+        end = bench.end(number)
+        why = "not to be sent again (flight mode Ascent); it had been sent once"
+        assert end.message == f"{name} given up: {why}"
+        assert (end.success, end.sent) == (False, True)
 
 
 def test_an_effect_that_shows_together_with_another_mode_counts():
@@ -236,31 +207,26 @@ def test_arming_single_triggers_is_refused():
     assert bench.after(1.0).tokens == []
 
 
-# -- the cable ----------------------------------------------------------------------------------
+def test_without_a_port_what_is_not_urgent_is_refused():
+    for name in ("open_mav", "launch", "reboot", "flash_info", "wipe_flash"):
+        bench = ready().pull()
+        number = bench.order(name, force=True)
+        text = f"{name} refused: the port is not open; nothing was sent"
+        assert bench.end(number).message == text
+        assert bench.plug().after(2.0).tokens == []
 
 
-@pytest.mark.parametrize("name", ["open_mav", "launch", "reboot", "flash_info", "wipe_flash"])
-def test_without_a_port_what_is_not_urgent_is_refused(name):
-    bench = ready().pull()
-    number = bench.order(name, force=True)
-    assert bench.end(number).message == f"{name} refused: the port is not open; nothing was sent"
-    assert bench.plug().after(2.0).tokens == []
-
-
-@pytest.mark.parametrize("name", ["open_mav", "launch", "reboot", "wipe_flash", "dump_fram"])
-def test_what_waits_when_the_cable_is_pulled_ends_and_does_not_leave_later(name):
-    bench = ready()
-    bench.order("payload_n1")
-    number = bench.order(name, force=True)
-    bench.pull()
-    end = bench.end(number)
-    assert "the cable was pulled" in end.message
-    assert not end.sent
-    bench.after(0.5).plug().after(9.0)
-    assert bench.tokens == ["<1>"]
-
-
-def test_what_was_sent_when_the_cable_is_pulled_ends_as_sent():
+def test_what_waits_when_the_cable_is_pulled_ends_and_does_not_leave_later():
+    for name in ("open_mav", "launch", "reboot", "wipe_flash", "dump_fram"):
+        bench = ready()
+        bench.order("payload_n1")
+        number = bench.order(name, force=True)
+        bench.pull()
+        end = bench.end(number)
+        assert "the cable was pulled" in end.message, name
+        assert not end.sent
+        bench.after(0.5).plug().after(9.0)
+        assert bench.tokens == ["<1>"], name
     bench = ready()
     number = bench.order("open_mav")
     bench.after(0.05).pull()
@@ -276,33 +242,22 @@ def test_safe_waits_for_the_cable():
     assert bench.tokens == ["<V>"]
 
 
-# -- around a launch ----------------------------------------------------------------------------
+LONG = ("wipe_flash", "dump_flash", "dump_fram", "wipe_fram_and_reboot")
 
 
-def test_a_launch_that_is_under_way_is_not_ordered_twice():
-    bench = ready(STANDBY)
-    bench.order("launch", True)
-    second = bench.order("launch", True)
-    assert "launch refused: a launch is under way" in bench.end(second).message
-    assert bench.after(4.0).tokens == ["<L>"]
+def test_nothing_disturbs_a_launch_that_is_under_way_nor_is_it_ordered_twice():
+    for name in ("launch", "reboot", "reset_fram", *LONG):
+        bench = ready(STANDBY)
+        bench.order("launch", True)
+        number = bench.order(name, True)
+        assert f"{name} refused: a launch is under way" in bench.end(number).message
+        assert bench.after(4.0).tokens == ["<L>"]
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["reboot", "reset_fram", "dump_fram", "dump_flash", "wipe_flash", "wipe_fram_and_reboot"],
-)
-def test_nothing_disturbs_a_launch_that_is_under_way(name):
-    bench = ready(STANDBY)
-    bench.order("launch", True)
-    number = bench.order(name, True)
-    assert f"{name} refused: a launch is under way" in bench.end(number).message
-    assert bench.after(4.0).tokens == ["<L>"]
-
-
-@pytest.mark.parametrize("name", ["dump_flash", "wipe_flash", "dump_fram"])
-def test_nothing_launches_during_a_long_work(name):
-    bench = ready(STANDBY)
-    bench.order(name)
-    number = bench.after(0.5).order("launch", True)
-    assert "is under way; nothing was sent" in bench.end(number).message
-    assert "<L>" not in bench.after(4.0).tokens
+def test_nothing_launches_during_a_long_work():
+    for name in LONG[:3]:
+        bench = ready(STANDBY)
+        bench.order(name)
+        number = bench.after(0.5).order("launch", True)
+        assert "is under way; nothing was sent" in bench.end(number).message, name
+        assert "<L>" not in bench.after(4.0).tokens

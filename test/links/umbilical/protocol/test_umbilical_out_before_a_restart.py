@@ -2,7 +2,7 @@
 
 import pytest
 from umbilical_link_bench import ASCENT, COAST, DROGUE, FAULT, MAIN, STANDBY, STARTUP, ready
-from umbilical_rocket import Rocket, status, vehicle
+from umbilical_rocket import Rocket, flown, status, vehicle
 
 from chute_ros.links.umbilical.protocol.config import DeployStage
 from chute_ros.links.umbilical.protocol.gate import Situation
@@ -18,9 +18,6 @@ def restarted_under(mode=DROGUE, told=0.5, **config):
     bench = ready(COAST, altitude=2000, **config)
     bench.talk(flight_mode=mode, ssa_drogue_deployed=1, altitude=1900).after(told)
     return bench.restarts(**FORGETS, altitude=1700).after(0.5).clear()
-
-
-# -- what came out ------------------------------------------------------------------------------
 
 
 def test_what_was_out_before_a_restart_in_flight_is_not_fired_again():
@@ -63,18 +60,13 @@ def test_a_flag_that_a_test_on_the_ground_left_does_not_count():
     assert bench.after(0.1).tokens == ["<D>"]
 
 
-def test_the_drogue_says_nothing_of_the_main():
-    bench = restarted_under(deploy=DeployStage.MAIN)
-    assert not bench.talk(altitude=1650).after(0.2).status().deployed
-    bench.deploy()
-    assert bench.after(0.1).tokens == ["<d>"]
-
-
-def test_the_main_is_not_forgotten_either():
-    bench = restarted_under(MAIN, deploy=DeployStage.MAIN)
-    assert bench.talk(altitude=1650).after(0.2).status().deployed
-    bench.deploy()
-    assert bench.after(2.0).tokens == []
+def test_the_drogue_says_nothing_of_the_main_which_is_not_forgotten_either():
+    for mode, deployed, tokens in ((DROGUE, False, ["<d>"]), (MAIN, True, [])):
+        bench = restarted_under(mode, deploy=DeployStage.MAIN)
+        assert bench.talk(altitude=1650).after(0.2).status().deployed is deployed
+        bench.deploy()
+        assert bench.after(0.1).tokens == tokens, mode
+        assert deployed is False or bench.after(2.0).tokens == []
 
 
 def test_ordered_in_the_silence_of_a_restart_it_is_sent_once():
@@ -93,9 +85,6 @@ def test_once_it_has_landed_nothing_is_known_any_more():
     bench.talk(flight_mode=ASCENT, altitude=200).after(0.5).talk(flight_mode=COAST).after(0.5)
     bench.clear().deploy()
     assert bench.after(0.1).tokens == ["<D>"]
-
-
-# -- a restart that its clock does not show -----------------------------------------------------
 
 
 def launched_soon_after_its_start():
@@ -133,19 +122,14 @@ def test_what_is_fired_after_such_a_restart_is_not_fired_again():
     assert rocket.computer.was_fired("drogue", 3.0)
 
 
-def test_a_clock_that_runs_on_is_no_restart():
+def test_neither_a_clock_that_runs_on_nor_a_record_that_comes_late_is_a_restart():
     """It says Standby again by itself, as after a launch that was broken off."""
-    rocket = Rocket()
-    rocket.says(0.0, ASCENT, altitude="1")
-    rocket.says(0.5, STANDBY, altitude="1")
+    rocket = flown((0.0, ASCENT, {"altitude": "1"}), (0.5, STANDBY, {"altitude": "1"}))
     assert rocket.says(0.6, STANDBY, altitude="1")[1] is Age.NEW
     assert rocket.computer.restarts == 0
     assert rocket.computer.situation(0.6) is Situation.STANDBY
-
-
-def test_a_record_that_comes_late_is_no_restart():
-    rocket = Rocket()
-    rocket.says(0.0, ASCENT, altitude="100")
-    rocket.says(2.0, COAST, altitude="150", ms_since_boot_cfc="100200")
-    rocket.says(2.1, COAST, altitude="160", ms_since_boot_cfc="101900")
+    late = ((2.0, "100200", "150"), (2.1, "101900", "160"))
+    rocket = flown((0.0, ASCENT, {"altitude": "100"}))
+    for at, clock, altitude in late:
+        rocket.says(at, COAST, altitude=altitude, ms_since_boot_cfc=clock)
     assert rocket.computer.restarts == 0

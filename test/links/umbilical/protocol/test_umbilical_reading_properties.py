@@ -1,5 +1,6 @@
 """What holds for any bytes: nothing raises, nothing is mixed up, all is accounted for."""
 
+import itertools
 import json
 import math
 from collections import Counter
@@ -10,14 +11,19 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from umbilical_lines import (
+    BEGIN,
+    BEGIN_CSV,
     BY_NAME,
     DEPLOYMENT,
+    END,
+    END_CSV,
     LAYOUT,
     LAYOUTS,
     PAD,
     as_f32,
     as_rust_prints,
     body,
+    joined,
     line,
 )
 
@@ -35,8 +41,6 @@ from chute_ros.links.umbilical.protocol.stream import (
     StreamReader,
 )
 
-BEGIN_CSV, END_CSV = b"--- BEGIN FLASH CSV DUMP ---\n", b"--- END FLASH CSV DUMP ---\n"
-BEGIN, END = b"--- BEGIN FLASH BINARY DUMP ---\n", b"--- END FLASH BINARY DUMP ---\n"
 WHOLE = PAD.removesuffix(b"\n")
 #: What the stream is made of, and what it is easily confused with.
 PIECES = st.one_of(
@@ -85,13 +89,15 @@ class Ear:
 
     def what_came(self):
         """Lines and dumps; neighbouring bytes of a dump as one."""
-        found = []
-        for item in [*self.items, *self.reader.end_dump()]:
-            if found and isinstance(item, DumpBytes) and isinstance(found[-1], DumpBytes):
-                found[-1] = DumpBytes(found[-1].data + item.data)
-            else:
-                found.append(item)
-        return found
+        return joined([*self.items, *self.reader.end_dump()])
+
+
+def heard(*pieces):
+    """An ear that heard these."""
+    ear = Ear()
+    for piece in pieces:
+        ear.feed(piece)
+    return ear
 
 
 def by_problem_of(layout, text):
@@ -117,28 +123,15 @@ def by_decode(layout, text):
     return only
 
 
-# -- the stream ---------------------------------------------------------------------------------
-
-
 @given(STREAMS, st.data())
 def test_any_split_of_any_stream_gives_the_same_as_the_whole(stream, data):
-    whole, split = Ear(), Ear()
-    whole.feed(stream)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=8)))
-    for start, end in zip([0, *cuts], [*cuts, len(stream)], strict=True):
-        split.feed(stream[start:end])
-    assert split.what_came() == whole.what_came()
-    assert split.counts == whole.counts
-
-
-@given(STREAMS)
-def test_byte_by_byte_too(stream):
-    whole, split = Ear(), Ear()
-    whole.feed(stream)
-    for at in range(len(stream)):
-        split.feed(stream[at : at + 1])
-    assert split.what_came() == whole.what_came()
-    assert split.counts == whole.counts
+    whole = heard(stream)
+    came = whole.what_came()
+    for places in ([0, *cuts, len(stream)], range(len(stream) + 1)):
+        split = heard(*[stream[start:end] for start, end in itertools.pairwise(places)])
+        assert split.what_came() == came
+        assert split.counts == whole.counts
 
 
 @given(st.lists(st.binary(max_size=300) | STREAMS, max_size=6))
@@ -151,29 +144,15 @@ def test_no_bytes_ever_raise_or_pile_up(chunks):
 
 
 @given(STREAMS)
-def test_whatever_comes_out_stands_in_the_stream_in_one_piece_and_in_this_order(stream):
-    ear = Ear()
-    ear.feed(stream)
-    at = 0
-    for item in ear.what_came():
-        if isinstance(item, (Line, DumpBytes)):
-            at = stream.index(item.data, at) + len(item.data)
-
-
-@given(STREAMS)
-def test_dumps_begin_and_end_in_turn(stream):
-    ear = Ear()
-    ear.feed(stream)
-    inside = False
-    for item in ear.what_came():
-        if isinstance(item, DumpBegan):
-            assert not inside
-            inside = True
-        elif isinstance(item, DumpEnded):
-            assert inside
-            inside = False
+def test_what_comes_out_stands_in_the_stream_in_this_order_and_dumps_begin_and_end_in_turn(stream):
+    at, inside = 0, False
+    for item in heard(stream).what_came():
+        if isinstance(item, (DumpBegan, DumpEnded)):
+            assert inside == isinstance(item, DumpEnded)
+            inside = not inside
         else:
             assert isinstance(item, DumpBytes if inside else Line)
+            at = stream.index(item.data, at) + len(item.data)
     assert not inside
 
 
@@ -224,9 +203,6 @@ def test_good_lines_on_the_heels_of_garbage_do_as_well(lines):
     )
     good = [number for number, one in enumerate(lines) if one is None]
     assert [one["ms_since_boot_cfc"] for one in ear.feed(stream)] == good
-
-
-# -- one line -----------------------------------------------------------------------------------
 
 
 @given(st.binary(max_size=200) | STREAMS)

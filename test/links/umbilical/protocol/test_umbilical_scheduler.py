@@ -62,75 +62,45 @@ class Bench:
         return [t for t, written in self.writes if written == token]
 
 
-def test_commands_leave_one_by_one_in_their_order_with_the_spacing_between():
+def test_commands_leave_one_by_one_in_their_order_and_the_urgent_before_them():
+    assert Bench().order(VALVE).at(1.0).writes == [(0.125, "<M>")], "a spacing after the opening"
     bench = Bench().at(1.0).order(VALVE, INFO, VALVE).at(3.0)
     assert bench.writes == [(1.0, "<M>"), (1.125, "<I>"), (1.25, "<M>")]
     assert (bench.scheduler.commands_sent, bench.scheduler.waiting) == (3, 0)
-
-
-def test_after_the_opening_one_spacing_passes_first():
-    assert Bench().order(VALVE).at(1.0).writes == [(0.125, "<M>")]
-
-
-def test_an_urgent_one_leaves_before_all_that_wait():
     bench = Bench().at(1.0).order(VALVE, INFO, INFO)
     assert bench.order(FIRE, urgent=True).at(3.0).tokens() == "<M><D><I><I>"
-
-
-def test_urgent_ones_leave_in_their_own_order():
     bench = Bench().at(1.0).order(INFO).order(VALVE, FIRE, urgent=True)
     assert bench.at(3.0).tokens() == "<I><M><D>"
 
 
-# -- heartbeat ----------------------------------------------------------------------------------
-
-
-def test_heartbeats_leave_at_their_own_rate():
+def test_heartbeats_leave_at_their_own_rate_while_the_owner_is_known_to_live():
     bench = Bench(alive=True).at(4.5)
     assert bench.writes == [(t, "<H>") for t in (0.125, 1.125, 2.125, 3.125, 4.125)]
     assert bench.scheduler.heartbeats_sent == 5
     assert bench.scheduler.last_heartbeat == 4.125
-
-
-def test_no_heartbeat_before_the_owner_was_alive():
     assert Bench().at(5.0).writes == []
-
-
-def test_heartbeats_end_when_the_owner_is_not_known_to_live_and_go_on_when_it_is():
     bench = Bench()
     bench.scheduler.owner_alive(2.125)
     assert bench.at(5.0).times("<H>") == [0.125, 1.125]
     bench.scheduler.owner_alive(6.5)
     assert bench.at(9.0).times("<H>") == [0.125, 1.125, 5.0, 6.0]
     assert bench.scheduler.next_deadline() == math.inf
+    bench = Bench(alive=True)
+    bench.scheduler.send_next(0.2)
+    (send,) = bench.scheduler.take_output()
+    assert (send.command, send.token) == (HEARTBEAT, None), "it has no number"
 
 
-def test_a_heartbeat_that_is_due_leaves_before_commands_that_wait():
+def test_a_heartbeat_that_is_due_lets_only_an_urgent_one_pass_until_it_is_overdue():
     bench = Bench(alive=True).at(1.0).order(*[INFO] * 20).at(6.0)
     assert len(bench.times("<I>")) == 20
     beats = bench.times("<H>")
     assert max(b - a for a, b in itertools.pairwise(beats)) <= 1.0 + LIMITS.spacing
-
-
-def test_a_heartbeat_that_is_due_lets_an_urgent_one_pass():
     bench = Bench(alive=True).at(1.0625).order(INFO).order(FIRE, urgent=True).at(1.5)
     assert bench.writes[1:] == [(1.0625, "<I>"), (1.1875, "<D>"), (1.3125, "<H>")]
-
-
-def test_a_heartbeat_that_is_overdue_leaves_before_the_urgent():
     bench = Bench(alive=True).at(1.0).order(*[FIRE] * 20, urgent=True).at(8.0)
     assert len(bench.times("<D>")) == 20
     assert bench.times("<H>")[:3] == [0.125, 1.625, 3.125]
-
-
-def test_heartbeats_cannot_be_told_from_others_by_number():
-    bench = Bench(alive=True)
-    bench.scheduler.send_next(0.2)
-    (send,) = bench.scheduler.take_output()
-    assert (send.command, send.token) == (HEARTBEAT, None)
-
-
-# -- the wire -----------------------------------------------------------------------------------
 
 
 def test_nothing_leaves_while_the_wire_is_closed_and_what_waits_leaves_after():
@@ -141,20 +111,14 @@ def test_nothing_leaves_while_the_wire_is_closed_and_what_waits_leaves_after():
     assert bench.at(6.0).writes == [(5.125, "<D>"), (5.25, "<H>"), (5.375, "<I>")]
 
 
-def test_closing_stops_it_at_once():
+def test_closing_stops_it_at_once_and_an_opening_right_after_a_write_keeps_the_spacing():
     bench = Bench(alive=True).at(1.0).order(INFO, INFO)
     bench.scheduler.wire_closed()
     assert bench.at(9.0).tokens() == "<H><I>"
-
-
-def test_an_opening_right_after_a_write_keeps_the_spacing():
     bench = Bench().at(1.0).order(INFO, INFO)
     bench.scheduler.wire_closed()
     bench.scheduler.wire_opened(1.0)
     assert bench.at(2.0).writes == [(1.0, "<I>"), (1.125, "<I>")]
-
-
-# -- what does not leave ------------------------------------------------------------------------
 
 
 def test_a_full_queue_is_told_but_the_urgent_find_a_place():
@@ -169,18 +133,20 @@ def test_a_full_queue_is_told_but_the_urgent_find_a_place():
     assert bench.at(2.0).tokens() == "<D><I><I>"
 
 
-@pytest.mark.parametrize("urgent", [False, True])
-def test_a_cancelled_one_does_not_leave(urgent):
-    bench = Bench().order(INFO, VALVE, FIRE, urgent=urgent)
-    bench.scheduler.cancel(2, 0.0)
-    bench.scheduler.cancel(99, 0.0)
-    assert bench.at(2.0).tokens() == "<I><D>"
-
-
-def test_what_was_sent_cannot_be_cancelled_and_nothing_else_is():
+def test_a_cancelled_one_does_not_leave_and_what_was_sent_cannot_be_cancelled():
+    for urgent in (False, True):
+        bench = Bench().order(INFO, VALVE, FIRE, urgent=urgent)
+        bench.scheduler.cancel(2, 0.0)
+        bench.scheduler.cancel(99, 0.0)
+        assert bench.at(2.0).tokens() == "<I><D>"
     bench = Bench().at(1.0).order(INFO, VALVE)
     bench.scheduler.cancel(1, 1.0)
     assert bench.at(2.0).tokens() == "<I><M>"
+    bench = Bench().order(VALVE)
+    bench.now = 1.0
+    bench.scheduler.start(7, INFO, 1.0, False, 0)
+    bench.scheduler.cancel(1, 1.0)
+    assert bench.at(2.0).tokens() == "<I>", "what waits does not leave by starting another"
 
 
 def test_one_without_a_number_leaves_in_its_turn_unless_it_is_withdrawn():
@@ -190,14 +156,6 @@ def test_one_without_a_number_leaves_in_its_turn_unless_it_is_withdrawn():
     bench.scheduler.withdraw(lambda command: command == WIPE)
     bench.scheduler.withdraw(lambda command: command == INFO)  # it has a number
     assert bench.at(2.0).tokens() == "<I><M>"
-
-
-def test_what_waits_does_not_leave_by_starting_another():
-    bench = Bench().order(VALVE)
-    bench.now = 1.0
-    bench.scheduler.start(7, INFO, 1.0, False, 0)
-    bench.scheduler.cancel(1, 1.0)
-    assert bench.at(2.0).tokens() == "<I>"
 
 
 def test_looking_late_sends_one_and_then_waits_again():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.protocol.layouts import Record
+from chute_ros.links.umbilical.protocol.stream import DumpBytes
 
 FOLDER = Path(__file__).parents[4] / "msg_defs" / "telem"
 
@@ -37,65 +38,20 @@ PAD = (
     b"0.022360679774997897,120,500000,3,-17950000,0.5,-1,0.25,0.125,270.5,-3,90,-1.5,0.0625,"
     b"1250.5,42.4419,-76.4879,225,123456\n"
 )
-PAD_VALUES = {
-    "flight_mode": 1,
-    "pressure": 101325.5,
-    "temp": 21.25,
-    "altitude": 12.5,
-    "latitude": 42.441914,
-    "longitude": -76.4878,
-    "num_satellites": 11,
-    "timestamp": 43200.25,
-    "mag_x": -12.5,
-    "mag_y": 30.0,
-    "mag_z": 48.75,
-    "accel_x": 0.1,
-    "accel_y": -0.2,
-    "accel_z": 9.80665,
-    "gyro_x": 0.5,
-    "gyro_y": -0.25,
-    "gyro_z": 0.125,
-    "pt3": 512.0,
-    "pt4": 1023.5,
-    "rtd": -1.0,
-    "sv_open": 0,
-    "mav_open": 0,
-    "ssa_drogue_deployed": 0,
-    "ssa_main_deployed": 0,
-    "cmd_n1": 0,
-    "cmd_n2": 0,
-    "cmd_n3": 0,
-    "cmd_n4": 0,
-    "cmd_a1": 0,
-    "cmd_a2": 0,
-    "cmd_a3": 0,
-    "airbrake_state": 0,
-    "predicted_apogee": 12.75,
-    "h_acc": 1500,
-    "v_acc": 2500,
-    "vel_n": 0.01,
-    "vel_e": -0.02,
-    "vel_d": 0.03,
-    "g_speed": 0.022360679774997897,
-    "s_acc": 120,
-    "head_acc": 500000,
-    "fix_type": 3,
-    "head_mot": -17950000,
-    "blims_motor_position": 0.5,
-    "blims_phase_id": -1,
-    "blims_pid_p": 0.25,
-    "blims_pid_i": 0.125,
-    "blims_bearing": 270.5,
-    "blims_loiter_step": -3,
-    "blims_heading_des": 90.0,
-    "blims_heading_error": -1.5,
-    "blims_error_integral": 0.0625,
-    "blims_dist_to_target_m": 1250.5,
-    "blims_target_lat": 42.4419,
-    "blims_target_lon": -76.4879,
-    "blims_wind_from_deg": 225.0,
-    "ms_since_boot_cfc": 123456,
-}
+PAD_VALUES = dict(
+    zip(
+        (name for name, _ in REFERENCE_FIELDS),
+        (
+            *(1, 101325.5, 21.25, 12.5, 42.441914, -76.4878, 11, 43200.25, -12.5, 30.0, 48.75),
+            *(0.1, -0.2, 9.80665, 0.5, -0.25, 0.125, 512.0, 1023.5, -1.0, 0, 0, 0, 0),
+            *(0, 0, 0, 0, 0, 0, 0, 0, 12.75, 1500, 2500, 0.01, -0.02, 0.03),
+            *(0.022360679774997897, 120, 500000, 3, -17950000, 0.5, -1, 0.25, 0.125, 270.5, -3),
+            *(90.0, -1.5, 0.0625, 1250.5, 42.4419, -76.4879, 225.0, 123456),
+        ),
+        strict=True,
+    )
+)
+
 
 _ORDINARY = {
     "bool01": "0",
@@ -163,3 +119,19 @@ def as_rust_prints(value, kind):
 def as_f32(value):
     """The 32-bit float next to a value."""
     return struct.unpack("f", struct.pack("f", value))[0]
+
+
+#: What the dumps of flash begin and end with.
+BEGIN_CSV, END_CSV = b"--- BEGIN FLASH CSV DUMP ---\n", b"--- END FLASH CSV DUMP ---\n"
+BEGIN, END = b"--- BEGIN FLASH BINARY DUMP ---\n", b"--- END FLASH BINARY DUMP ---\n"
+
+
+def joined(items):
+    """What a stream gave, neighbouring bytes of a dump as one."""
+    found = []
+    for item in items:
+        if found and isinstance(item, DumpBytes) and isinstance(found[-1], DumpBytes):
+            found[-1] = DumpBytes(found[-1].data + item.data)
+        else:
+            found.append(item)
+    return found

@@ -37,6 +37,14 @@ class Rocket:
         self.started = at - 0.5
 
 
+def flown(*records):
+    """A rocket that said these: (time, mode) or (time, mode, fields)."""
+    rocket = Rocket()
+    for at, mode, *texts in records:
+        rocket.says(at, mode, **(texts[0] if texts else {}))
+    return rocket
+
+
 def status(rocket, at, pause=""):
     return rocket.computer.status(at, pause)
 

@@ -20,6 +20,11 @@ def flags(host):
 # The key
 
 
+def seen(host):
+    """Mode and what is out."""
+    return (host.newest["flight_mode"], *flags(host))
+
+
 def test_key_arm_leads_to_standby_and_key_disarm_back():
     host = Host()
     host.send("<KA>")
@@ -28,12 +33,9 @@ def test_key_arm_leads_to_standby_and_key_disarm_back():
     assert host.newest["flight_mode"] == Mode.Startup
     assert "Startup -> Standby" in host.log
     assert "Standby -> Startup" in host.log
-
-
-def test_key_disarm_in_flight_changes_nothing():
     host = in_mode("Coast")
     host.send("<KD>")
-    assert host.newest["flight_mode"] == Mode.Coast
+    assert host.newest["flight_mode"] == Mode.Coast, "in flight it changes nothing"
 
 
 def test_with_the_interlock_arming_needs_a_wiped_flash():
@@ -44,34 +46,18 @@ def test_with_the_interlock_arming_needs_a_wiped_flash():
     host.send("<W>", 1.5)
     host.send("<KA>")
     assert host.newest["flight_mode"] == Mode.Standby
-
-
-def used_up(host):
-    host.send("<KA>")
-    host.send("<KD>")
-
-
-def rebooted(host):
-    host.send("<R>", 1.0)
-
-
-@pytest.mark.parametrize("end", [used_up, rebooted])
-def test_the_permission_to_arm_ends(end):
-    host = Host(interlock=True, wipe_time=1.0)
-    host.send("<W>", 1.5)
-    end(host)
-    host.forget()
-    host.send("<KA>")
-    assert host.others == ["Arming blocked: wipe flash first"]
-    assert host.newest["flight_mode"] == Mode.Startup
-
-
-def test_a_failed_wipe_is_no_permission():
-    host = Host(interlock=True, wipe_time=1.0)
-    host.act("wipe-fails")
-    host.send("<W>", 1.5)
-    host.send("<KA>")
-    assert host.newest["flight_mode"] == Mode.Startup
+    # The permission is used up, or forgotten by a reboot; and a failed wipe is none.
+    for ends in (["<KA>", "<KD>"], ["<R>"], []):
+        host = Host(interlock=True, wipe_time=1.0)
+        if not ends:
+            host.act("wipe-fails")
+        host.send("<W>", 1.5)
+        for token in ends:
+            host.send(token, 1.0)
+        host.forget()
+        host.send("<KA>")
+        assert host.others == ["Arming blocked: wipe flash first"], ends
+        assert host.newest["flight_mode"] == Mode.Startup
 
 
 # The flight
@@ -106,12 +92,12 @@ def test_in_real_time_the_flight_takes_as_long_as_it_does():
     assert host.until(lambda: host.device.mode is Mode.Coast) == pytest.approx(6.1, abs=0.2)
 
 
-@pytest.mark.parametrize("name", ["Startup", "Ascent", "Coast", "MainDeployed", "Fault"])
-def test_launch_is_for_standby_only(name):
-    host = in_mode(name)
-    host.send("<L>", 0.1)
-    assert host.newest["flight_mode"] == Mode[name]
-    assert host.newest["mav_open"] == (name == "Ascent")
+def test_launch_is_for_standby_only():
+    for name in ("Startup", "Ascent", "Coast", "MainDeployed", "Fault"):
+        host = in_mode(name)
+        host.send("<L>", 0.1)
+        assert host.newest["flight_mode"] == Mode[name]
+        assert host.newest["mav_open"] == (name == "Ascent"), name
 
 
 def test_the_main_waits_until_the_drogue_has_been_out_for_3_s():
@@ -137,28 +123,22 @@ def test_a_drogue_that_fails_by_itself_comes_by_command():
     assert host.newest["vel_d"] < 30.0
 
 
-def test_drogue_and_main_come_by_command_in_turn():
+def test_drogue_and_main_come_by_command():
     host = in_mode("Coast")
     host.send("<D>")
-    assert (host.newest["flight_mode"], *flags(host)) == (Mode.DrogueDeployed, 1, 0)
+    assert seen(host) == (Mode.DrogueDeployed, 1, 0)
     host.send("<d>")
-    assert (host.newest["flight_mode"], *flags(host)) == (Mode.MainDeployed, 1, 1)
+    assert seen(host) == (Mode.MainDeployed, 1, 1)
     host.run(10.0)
     assert host.newest["vel_d"] < 8.0
-
-
-def test_the_main_by_command_in_coast_does_not_change_the_mode():
     host = in_mode("Coast")
     host.send("<d>")
-    assert (host.newest["flight_mode"], *flags(host)) == (Mode.Coast, 0, 1)
-
-
-@pytest.mark.parametrize("name", ["Startup", "Standby", "Fault"])
-def test_on_the_ground_the_flags_are_set_and_nothing_else(name):
-    host = in_mode(name)
-    host.send("<D>")
-    host.send("<d>")
-    assert (host.newest["flight_mode"], *flags(host)) == (Mode[name], 1, 1)
+    assert seen(host) == (Mode.Coast, 0, 1), "the main alone does not change the mode"
+    for name in ("Startup", "Standby", "Fault"):
+        host = in_mode(name)
+        host.send("<D>")
+        host.send("<d>")
+        assert seen(host) == (Mode[name], 1, 1), "on the ground the flags alone are set"
 
 
 def test_stuck_it_takes_commands_but_nothing_comes_out():
@@ -193,39 +173,29 @@ def test_after_a_reboot_in_the_air_a_canopy_that_is_out_stays_out():
 # Jumps
 
 
-@pytest.mark.parametrize(
-    ("name", "lowest", "highest", "falls"),
-    [
+def test_a_jump_puts_it_where_it_plausibly_is():
+    for name, lowest, highest, falls in (
         ("Ascent", 250.0, 400.0, False),
         ("Coast", 1990.0, 2020.0, False),
         ("DrogueDeployed", 2450.0, 2510.0, True),
         ("MainDeployed", 390.0, 401.0, True),
-    ],
-)
-def test_a_jump_puts_it_where_it_plausibly_is(name, lowest, highest, falls):
-    host = in_mode(name)
-    assert host.newest["flight_mode"] == Mode[name]
-    assert lowest < host.newest["altitude"] < highest
-    assert (host.newest["vel_d"] > 0.0) is falls
-    assert flags(host) == (falls, name == "MainDeployed")
-
-
-def test_from_a_jump_to_ascent_the_flight_goes_on():
+    ):
+        host = in_mode(name)
+        assert host.newest["flight_mode"] == Mode[name]
+        assert lowest < host.newest["altitude"] < highest, name
+        assert (host.newest["vel_d"] > 0.0) is falls, name
+        assert flags(host) == (falls, name == "MainDeployed")
     host = in_mode("Ascent", speed=20.0)
     host.until(lambda: host.newest["flight_mode"] == Mode.DrogueDeployed)
-    assert host.newest["altitude"] == pytest.approx(3000.0, abs=100.0)
+    assert host.newest["altitude"] == pytest.approx(3000.0, abs=100.0), "and flies on"
 
 
-def test_it_can_be_put_on_the_ground():
-    host = in_mode("MainDeployed")
+def test_it_can_be_put_on_the_ground_and_on_the_pad():
+    host = in_mode("MainDeployed", speed=20.0)
     host.act("land")
     host.run(1.0)
-    assert host.newest["altitude"] == 0.0
-    assert host.newest["vel_d"] == 0.0
+    assert (host.newest["altitude"], host.newest["vel_d"]) == (0.0, 0.0)
     assert host.newest["flight_mode"] == Mode.MainDeployed
-
-
-def test_a_jump_to_the_pad_makes_it_ready_again():
     host = in_mode("MainDeployed", speed=20.0)
     host.act("jump=Standby")
     host.run(0.2)

@@ -200,30 +200,24 @@ def test_help_names_every_action_and_layout_default():
         assert word in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (
-            ("--layout", "telem99"),
-            "--layout 'telem99': need one of telem57_airbrake_state, telem5",
-        ),
-        (("--telem-path", "/no/folder"), "--telem-path is '/no/folder': there is no layout"),
-        (("--at", "5:explode"), "action 'explode' is not known: need one of dump-stalls, fault"),
-        (("--at", "5:jump=Moon"), "is no argument of jump: need jump=one of Startup, "),
-        (("--at", "soon:land"), "--at 'soon:land': need SECONDS:ACTION"),
-        (("--rate", "0"), "rate is 0.0: need 0.01 to 100 Hz"),
-        (("--speed", "-1"), "speed is -1.0: need 0.01 to 1000"),
-        (("--cut", "30"), "cut is 30.0: need 0 to 1"),
-        (("--heartbeat-timeout", "nan"), "heartbeat-timeout is nan: need 0 to 3600 s"),
-        (
-            ("--link", "/no/folder/link"),
-            "--link '/no/folder/link': the folder /no/folder does not exist",
-        ),
-        (("--warp", "9"), "unrecognized arguments: --warp 9"),
-    ],
-)
-def test_a_mistake_is_told_in_one_line(arguments, said):
-    assert said in fail(*arguments).splitlines()[-1]
+MISTAKES = {
+    "--layout telem99": "--layout 'telem99': need one of telem57_airbrake_state, telem5",
+    "--telem-path /no/folder": "--telem-path is '/no/folder': there is no layout",
+    "--at 5:explode": "action 'explode' is not known: need one of dump-stalls, fault",
+    "--at 5:jump=Moon": "is no argument of jump: need jump=one of Startup, ",
+    "--at soon:land": "--at 'soon:land': need SECONDS:ACTION",
+    "--rate 0": "rate is 0.0: need 0.01 to 100 Hz",
+    "--speed -1": "speed is -1.0: need 0.01 to 1000",
+    "--cut 30": "cut is 30.0: need 0 to 1",
+    "--heartbeat-timeout nan": "heartbeat-timeout is nan: need 0 to 3600 s",
+    "--link /no/folder/link": "--link '/no/folder/link': the folder /no/folder does not exist",
+    "--warp 9": "unrecognized arguments: --warp 9",
+}
+
+
+@pytest.mark.parametrize("arguments", MISTAKES)
+def test_a_mistake_is_told_in_one_line(arguments):
+    assert MISTAKES[arguments] in fail(*arguments.split()).splitlines()[-1]
 
 
 def test_a_mistake_leaves_no_link_behind(link):

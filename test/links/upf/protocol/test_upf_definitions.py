@@ -40,12 +40,11 @@ def changed(tmp_path):
     return make
 
 
-@pytest.mark.parametrize("file", SEVEN)
-def test_each_of_the_seven_types_of_the_document_is_there_with_its_id(layout, file):
-    name, mode = SEVEN[file]
-    kind = layout.types.find(name, mode)
-    assert kind is not None
-    assert kind.id == int(file.partition(".")[0])
+def test_each_of_the_seven_types_of_the_document_is_there_with_its_id(layout):
+    for file, (name, mode) in SEVEN.items():
+        kind = layout.types.find(name, mode)
+        assert kind is not None, file
+        assert kind.id == int(file.partition(".")[0])
 
 
 def test_ours_has_everything_that_is_told_and_nothing_that_is_new():
@@ -76,16 +75,10 @@ def test_no_number_of_the_other_layout_is_read_by_ours():
         assert mine["MAGIC_NUMBER"] != theirs["MAGIC_NUMBER"]
 
 
-@pytest.mark.parametrize("state", STATES)
-def test_state_goes_to_its_number_and_back(definitions, state):
-    assert definitions.state(definitions.state_number(state)) is state
-
-
-def test_number_of_no_state_is_none(definitions):
+def test_state_goes_to_its_number_and_back(definitions):
+    for state in STATES:
+        assert definitions.state(definitions.state_number(state)) is state
     assert definitions.state(15) is None
-
-
-# -- what is missing --------------------------------------------------------------------------
 
 
 def test_everything_that_is_missing_is_named_at_once(changed):
@@ -135,9 +128,6 @@ def test_new_fields_are_kept_for_who_looks():
     assert story.link.devices.triggers[34].unknown_fields["temperature"] == 19
 
 
-# -- names ------------------------------------------------------------------------------------
-
-
 def test_results_are_told_by_name(definitions):
     for name in ("SUCCESS", "REJECTED", "TEMPORARILY_REJECTED"):
         said = definitions.result(names.PARACHUTE_SERVICE, name)
@@ -168,32 +158,22 @@ def test_state_is_told_by_name_and_is_empty_where_there_is_none(definitions):
     assert definitions.constant(names.TRIGGER_STATUS, "STATE_ASLEEP") is None
 
 
-# -- faults -----------------------------------------------------------------------------------
-
-
-def test_faults_come_from_the_bits_of_the_flags():
-    ours = layout_of("ours").definitions
+def test_faults_come_from_the_bits_of_the_flags_or_from_fields_of_their_own(definitions):
+    ours, other = layout_of("ours").definitions, layout_of("other").definitions
     assert ours.faults(names.PARACHUTE_STATUS, {"error_flags": 0}) == []
     faults = ours.faults(names.PARACHUTE_STATUS, {"error_flags": 1 | 8 | 128})
     assert faults == ["IMU", "LOW_POWER", "error bit 7"]
-
-
-def test_faults_come_from_fields_of_their_own():
-    other = layout_of("other").definitions
     values = {"error_imu": True, "error_barometer": False, "fault_code": 7, "temperature": 3}
     assert other.faults(names.PARACHUTE_STATUS, values) == ["error_imu", "fault_code 7"]
+    no_number = {"error_flags": [1]}
+    assert definitions.faults(names.PARACHUTE_STATUS, no_number) == []
 
 
-def test_flags_that_are_no_number_tell_nothing(definitions):
-    assert definitions.faults(names.PARACHUTE_STATUS, {"error_flags": [1]}) == []
-
-
-@pytest.mark.parametrize(
-    ("layout_name", "said"), [("ours", {"error_flags": 1 | 2}), ("other", None)]
-)
-def test_error_has_its_flag_in_the_picture_in_either_form(layout_name, said):
-    said = said or {"error_imu": True, "error_barometer": True}
-    story = Bench(layout_of(layout_name), "").status("ABNORMAL", **said)
-    wanted = ErrorFlags.IMU_ERROR | ErrorFlags.BAROMETER_ERROR
-    assert story.picture().error_flags == wanted
-    assert len(story.picture().faults) == 2
+def test_error_has_its_flag_in_the_picture_in_either_form():
+    for layout, said in (
+        ("ours", {"error_flags": 1 | 2}),
+        ("other", {"error_imu": True, "error_barometer": True}),
+    ):
+        picture = Bench(layout_of(layout), "").status("ABNORMAL", **said).picture()
+        assert picture.error_flags == ErrorFlags.IMU_ERROR | ErrorFlags.BAROMETER_ERROR
+        assert len(picture.faults) == 2, layout

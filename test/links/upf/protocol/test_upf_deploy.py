@@ -13,8 +13,7 @@ SERVICE, TRIGGER, LAUNCH = (
 
 
 def deploy(story, force=False, token=1, node_id=0):
-    story.link.deploy(token, force, story.now, node_id)
-    return story.step()
+    return story.call("deploy", token, force, node_id=node_id)
 
 
 def armed(story):
@@ -22,12 +21,14 @@ def armed(story):
     return story.trigger_status().status("ARMED").at(0.1).clear()
 
 
+def answered(story, result):
+    """The controller answers the first request."""
+    return story.answer_result(story.requests(SERVICE)[0], result)
+
+
 def fired_at(story):
     """Whether the triggers were fired directly."""
     return bool(story.requests(TRIGGER) or story.messages(LAUNCH))
-
-
-# -- through the controller -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("force", [False, True])
@@ -49,11 +50,8 @@ def test_forced_deploy_works_on_the_ground_where_a_plain_one_does_not(bench):
 
 
 def test_deploy_through_the_service_is_the_same(bench):
-    story = bench().in_flight()
-    story.link.service(1, "TYPE_DEPLOY", 0, story.now)
-    assert story.after(2.0).end(1).success
-    story = bench().ready()
-    story.link.service(1, "TYPE_DEPLOY_FORCE", 33, story.now)
+    assert bench().in_flight().call("service", 1, "TYPE_DEPLOY", 0).after(2.0).end(1).success
+    story = bench().ready().call("service", 1, "TYPE_DEPLOY_FORCE", 33)
     assert story.after(2.0).end(1).success
 
 
@@ -75,24 +73,20 @@ def test_deploy_that_is_lost_is_sent_again(bench):
     assert not fired_at(story)
 
 
-def test_deploy_whose_answers_are_lost_is_done_by_the_status(bench):
+def test_deploy_whose_answers_are_lost_is_done_by_the_status_or_the_triggers(bench):
     story = deploy(armed(bench(""))).at(0.3).status("LAUNCHED")
     assert (story.end(1).success, story.end(1).accepted) == (True, False)
     assert not fired_at(story.at(9.0))
+    assert deploy(armed(bench(""))).at(0.3).trigger_fired().end(1).success
 
 
-def test_deploy_is_done_when_a_trigger_says_so(bench):
-    story = deploy(armed(bench(""))).at(0.3).trigger_fired()
-    assert story.end(1).success
-
-
-@pytest.mark.parametrize("state", ["LAUNCHED", "TOUCHDOWN"])
-def test_deploy_of_a_parachute_that_is_out_sends_nothing(bench, state):
-    story = deploy(bench("").status(state).clear())
-    assert story.end(1).success
-    assert "nothing was sent" in story.end(1).message
-    assert story.requests(SERVICE) == []
-    assert not fired_at(story.at(9.0))
+def test_deploy_of_a_parachute_that_is_out_sends_nothing(bench):
+    for state in ("LAUNCHED", "TOUCHDOWN"):
+        story = deploy(bench("").status(state).clear())
+        assert story.end(1).success, state
+        assert "nothing was sent" in story.end(1).message
+        assert story.requests(SERVICE) == []
+        assert not fired_at(story.at(9.0)), state
 
 
 def test_deploy_believes_no_status_from_before_a_loss(bench):
@@ -110,12 +104,8 @@ def test_deploy_can_name_its_controller(bench):
     assert "no controller 77" in deploy(story, token=2, node_id=77).end(2).message
 
 
-# -- refusals ---------------------------------------------------------------------------------
-
-
 def test_refused_deploy_fails_and_is_not_gone_round(bench):
-    story = deploy(armed(bench("")))
-    story.answer_result(story.requests(SERVICE)[0], "REJECTED").at(9.0)
+    story = answered(deploy(armed(bench(""))), "REJECTED").at(9.0)
     assert not story.end(1).success
     assert "rejected" in story.end(1).message
     assert not fired_at(story)
@@ -150,39 +140,28 @@ def test_acknowledged_deploy_that_is_never_shown_is_a_failure_that_says_so(bench
 
 
 def test_answer_to_another_request_is_no_answer_to_a_deploy(bench):
-    story = armed(bench("").status("READY"))
-    story.link.service(2, "TYPE_DISARM", 33, story.now)
+    story = armed(bench("").status("READY")).call("service", 2, "TYPE_DISARM", 33)
     (disarm,) = story.step().requests(SERVICE)
     deploy(story).answer_result(disarm, "REJECTED")
     assert fired_at(story.at(1.3))
 
 
-# -- the last resort --------------------------------------------------------------------------
+ROUND = "the controller does not answer: firing the triggers directly"
 
 
-def test_silent_controller_is_gone_round_after_a_while(bench):
+def test_silent_controller_is_gone_round_again_and_again_until_a_trigger_says_that_it_has(bench):
     story = deploy(armed(bench("")))
     assert not fired_at(story.at(1.0))
     story.at(1.15)
-    assert len(story.requests(TRIGGER, "TYPE_LAUNCH")) == 1
-    assert len(story.messages(LAUNCH)) == 1
-    text = "the controller does not answer: firing the triggers directly"
-    assert text in story.notices()
+    assert len(story.requests(TRIGGER, "TYPE_LAUNCH")) == len(story.messages(LAUNCH)) == 1
     constants = story.layout.types.message(LAUNCH).constants
     assert story.messages(LAUNCH)[0]["magic_number"] == constants["MAGIC_NUMBER"]
-
-
-def test_triggers_are_fired_again_until_one_says_that_it_has(bench):
-    story = deploy(armed(bench(""))).at(2.0)
-    assert 4 <= len(story.messages(LAUNCH)) <= 5
+    assert 4 <= len(story.at(2.0).messages(LAUNCH)) <= 5
     assert len(story.requests(TRIGGER)) == len(story.messages(LAUNCH))
-    story.trigger_fired()
-    assert story.end(1).success
+    assert story.trigger_fired().end(1).success
     count = len(story.messages(LAUNCH))
     assert len(story.at(9.0).messages(LAUNCH)) == count
-    assert (
-        story.notices().count("the controller does not answer: firing the triggers directly") == 1
-    )
+    assert story.notices().count(ROUND) == 1
 
 
 def test_real_trigger_is_fired_round_a_mute_controller(bench):
@@ -217,12 +196,42 @@ def test_controller_that_answers_late_stops_the_last_resort(bench):
     assert len(story.messages(LAUNCH)) == count
 
 
-def test_controller_that_accepts_and_then_falls_silent_is_gone_round(bench):
-    story = deploy(armed(bench("")))
-    story.answer_result(story.requests(SERVICE)[0], "SUCCESS").at(1.4).trigger_status()
-    assert not fired_at(story), "its last status is not too old yet"
-    assert fired_at(story.at(1.8))
-    assert story.trigger_fired().end(1).success
+def restarts(story):
+    return story.after(0.5).trigger_status().node_status(uptime=0).status("NOT_READY")
+
+
+def accepts(story):
+    return answered(story, "SUCCESS")
+
+
+#: Settings, what the controller does once it is ordered, and whether it is gone round by then.
+WHEN_ROUND = [
+    ({}, [accepts], {1.4: False, 1.8: True}),
+    ({}, [lambda story: answered(story, "TEMPORARILY_REJECTED")], {1.2: False, 2.5: True}),
+    ({}, [restarts], {1.05: False, 1.15: True}),
+    ({}, [accepts, restarts], {0.65: True}),
+    ({"last_resort": False}, [], {9.0: False}),
+    ({"last_resort_after": 0.3}, [], {0.39: False, 0.41: True}),
+]
+
+
+@pytest.mark.parametrize(("config", "happens", "fired"), WHEN_ROUND)
+def test_when_a_controller_that_falls_silent_is_gone_round(bench, config, happens, fired):
+    story = deploy(armed(bench("", **config)).node_status(uptime=60), force=True)
+    for step in happens:
+        step(story)
+    for t, expected in fired.items():
+        assert fired_at(story.at(t).trigger_status()) is expected, t
+    if config.get("last_resort", True):
+        assert story.trigger_fired().end(1).success
+    else:
+        assert not story.end(1).success
+
+
+def test_parachute_that_is_switched_off_is_not_gone_round(bench):
+    story = armed(bench(""))
+    story.link.devices.controllers[33].parameters[p.ENABLE_PARACHUTE] = False
+    assert not fired_at(deploy(story).at(4.0))
 
 
 def test_controller_that_accepts_and_goes_on_speaking_is_not_gone_round(bench):
@@ -249,9 +258,7 @@ def test_refusal_that_comes_after_the_call_was_given_up_counts(bench):
 
 
 def test_refusal_of_one_deploy_says_nothing_of_another(bench):
-    story = deploy(armed(bench("")), True)
-    story.link.deploy(2, False, story.now)
-    story.step()
+    story = deploy(armed(bench("")), True).call("deploy", 2, False)
     plain = [
         one
         for one in story.requests(SERVICE)
@@ -262,57 +269,23 @@ def test_refusal_of_one_deploy_says_nothing_of_another(bench):
     assert fired_at(story.at(1.3)), "the forced one has no answer"
 
 
-def test_controller_that_refused_once_and_then_died_is_gone_round(bench):
-    story = deploy(armed(bench("")), True)
-    story.answer_result(story.requests(SERVICE)[0], "TEMPORARILY_REJECTED")
-    story.at(1.2).trigger_status()
-    assert not fired_at(story)
-    assert fired_at(story.at(2.5))
-
-
 def test_controller_that_falls_silent_is_gone_round_for_each_deploy(bench):
     """The one that it had accepted, and the one that it had not answered."""
-    story = deploy(armed(bench("")), True)
-    story.answer_result(story.requests(SERVICE)[0], "SUCCESS")
+    story = answered(deploy(armed(bench("")), True), "SUCCESS")
     deploy(story, token=2).at(1.4).trigger_status()
-    text = "the controller does not answer: firing the triggers directly"
-    assert story.notices().count(text) == 1, "of the first its silence says nothing yet"
-    story.at(1.8)
-    assert story.notices().count(text) == 2
+    assert story.notices().count(ROUND) == 1, "of the first its silence says nothing yet"
+    assert story.at(1.8).notices().count(ROUND) == 2
     story.trigger_fired()
     assert (story.end(1).success, story.end(2).success) == (True, True)
 
 
-def test_controller_that_restarts_before_its_answer_has_the_time_that_it_had(bench):
-    story = armed(bench("")).node_status(uptime=60)
-    deploy(story).after(0.5).trigger_status().node_status(uptime=0).status("NOT_READY")
-    assert not fired_at(story.at(1.05).trigger_status())
-    assert fired_at(story.at(1.15))
-
-
-def test_controller_that_accepted_and_restarts_is_gone_round_at_once(bench):
-    story = armed(bench("")).node_status(uptime=60)
-    deploy(story).answer_result(story.requests(SERVICE)[0], "SUCCESS")
-    story.after(0.5).trigger_status().node_status(uptime=0).status("NOT_READY")
-    assert fired_at(story.after(0.05))
-
-
-def test_named_one_of_several_controllers_is_not_gone_round(bench):
+def test_named_one_of_several_controllers_is_not_gone_round_nor_confirmed_by_a_trigger(bench):
     """Nobody says which trigger is whose."""
     story = armed(bench("")).status("ARMED", 40).clear()
     assert not fired_at(deploy(story, node_id=33).at(9.0))
-
-
-def test_trigger_of_another_controller_is_no_confirmation(bench):
     story = armed(bench("")).status("ARMED", 40).trigger_out().clear()
     assert deploy(story, node_id=40).after(0.2).ends(1) == []
     assert len(story.requests(SERVICE)) == 1
-
-
-def test_parachute_that_is_switched_off_is_not_gone_round(bench):
-    story = armed(bench(""))
-    story.link.devices.controllers[33].parameters[p.ENABLE_PARACHUTE] = False
-    assert not fired_at(deploy(story).at(4.0))
 
 
 def test_only_our_trigger_is_launched_where_it_is_named(bench):
@@ -333,21 +306,6 @@ def test_after_a_stall_nothing_is_fired_for_a_request_that_has_ended(bench):
     story.step()
     assert not story.end(1).success
     assert not fired_at(story)
-
-
-def test_last_resort_can_be_switched_off(bench):
-    story = deploy(armed(bench("", last_resort=False))).at(9.0)
-    assert not fired_at(story)
-    assert not story.end(1).success
-
-
-def test_last_resort_waits_as_long_as_it_is_told(bench):
-    story = deploy(armed(bench("", last_resort_after=0.3)))
-    assert not fired_at(story.at(0.39))
-    assert fired_at(story.at(0.41))
-
-
-# -- without a controller ---------------------------------------------------------------------
 
 
 def test_trigger_is_fired_where_there_is_no_controller(bench):
@@ -384,31 +342,23 @@ def test_trigger_that_refuses_is_asked_until_time_is_up(bench):
 
 
 def test_trigger_that_has_fired_is_not_fired_again(bench):
-    story = deploy(bench("").trigger_out().clear())
-    assert story.end(1).success
-    assert not fired_at(story.at(9.0))
+    for order in (deploy, fire):
+        story = order(bench("").trigger_out().clear())
+        assert story.end(1).success
+        assert not fired_at(story.at(9.0))
 
 
-def test_deploy_without_anybody_is_refused(bench):
+def test_deploy_without_anybody_is_refused_and_waits_until_somebody_was_heard(bench):
     story = deploy(bench(""))
     assert story.end(1).message == "no controller was received on this link (received: none)"
     assert not fired_at(story)
-
-
-@pytest.mark.parametrize("type_name", ["STATUS", "TRIGGER_STATUS"])
-def test_deploy_need_not_wait_once_a_controller_or_a_trigger_was_heard(bench, type_name):
-    story = bench("")
-    assert not story.link.has_parachute()
-    (story.status("READY") if type_name == "STATUS" else story.trigger_status()).at(60.0)
-    assert story.link.has_parachute()
-
-
-# -- the triggers themselves: the end of a ladder ---------------------------------------------
+    for story in (bench("").status("READY"), bench("").trigger_status()):
+        assert story.at(60.0).link.has_parachute()
+    assert not bench("").link.has_parachute()
 
 
 def fire(story, token=1):
-    story.link.fire_triggers(token, story.now)
-    return story.step()
+    return story.call("fire_triggers", token)
 
 
 def test_triggers_are_fired_past_a_controller_that_is_well(bench):
@@ -427,12 +377,6 @@ def test_triggers_are_fired_at_once_and_again_until_one_says_that_it_has(bench):
     assert story.trigger_fired().end(1).success
     count = len(story.messages(LAUNCH))
     assert len(story.at(9.0).messages(LAUNCH)) == count
-
-
-def test_triggers_that_have_fired_are_not_fired_again_at_the_end_of_a_ladder(bench):
-    story = fire(bench("").trigger_out().clear())
-    assert story.end(1).success
-    assert not fired_at(story.at(9.0))
 
 
 def test_triggers_that_were_never_heard_may_listen(bench):
@@ -466,39 +410,23 @@ def test_without_controller_the_trigger_is_the_parachute_whoever_else_speaks(ben
     assert story.picture().deployed
 
 
-def test_what_makes_it_less_ready_gives_way_to_the_triggers(bench):
-    story = armed(bench(""))
-    story.link.service(2, "TYPE_DISARM", 0, story.now)
-    fire(story.step())
-    assert "given up: a release was ordered" in story.end(2).message
-
-
 def test_a_deploy_that_is_overdue_when_the_triggers_are_ordered_goes_on_as_well(bench):
     """After a stall both are due in the same moment."""
     story = deploy(armed(bench("")))
     story.t += 1.2
     fire(story, token=2)
-    assert "the controller does not answer: firing the triggers directly" in story.notices()
+    assert ROUND in story.notices()
     assert len(story.messages(LAUNCH)) == 2
     story.trigger_fired()
     assert (story.end(1).success, story.end(2).success) == (True, True)
 
 
-# -- what may not come between ----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("type_name", ["TYPE_DISARM", "TYPE_LAND"])
-def test_nothing_makes_the_parachute_less_ready_during_a_deploy(bench, type_name):
-    story = deploy(armed(bench("")))
-    story.link.service(2, type_name, 0, story.now)
-    assert "a deploy is under way" in story.step().end(2).message
-    assert len(story.requests(SERVICE)) == 1
-
-
-@pytest.mark.parametrize("type_name", ["TYPE_DISARM", "TYPE_LAND"])
-def test_what_makes_it_less_ready_gives_way_to_a_deploy(bench, type_name):
-    story = armed(bench(""))
-    story.link.service(2, type_name, 0, story.now)
-    deploy(story.step())
-    assert not story.end(2).success
-    assert "given up: a release was ordered" in story.end(2).message
+def test_what_makes_the_parachute_less_ready_gives_way(bench):
+    for type_name in ("TYPE_DISARM", "TYPE_LAND"):
+        story = deploy(armed(bench(""))).call("service", 2, type_name, 0)
+        assert "a deploy is under way" in story.end(2).message, type_name
+        assert len(story.requests(SERVICE)) == 1
+        for order in (deploy, fire):
+            story = order(armed(bench("")).call("service", 2, type_name, 0))
+            assert not story.end(2).success, type_name
+            assert "given up: a release was ordered" in story.end(2).message

@@ -9,15 +9,15 @@ LOUD = "STOP THEM"
 def answer_of(story, vehicle=None, kill=False, by_triggers=False):
     """The answer to a deploy beside this vehicle, which goes on saying what it said."""
     if vehicle is not None:
-        story.link.vehicle(vehicle, story.now)
+        story.call("vehicle", vehicle)
     if kill:
-        story.link.kill_confirmed(story.now)
+        story.call("kill_confirmed")
     begin = story.link.fire_triggers if by_triggers else story.link.deploy
     begin(1, *(() if by_triggers else (True,)), story.now)
     for _ in range(20):
         story.after(0.1)
         if vehicle is not None and not kill:
-            story.link.vehicle(vehicle, story.now)
+            story.call("vehicle", vehicle)
     end = story.end(1)
     assert end.success
     return end.message

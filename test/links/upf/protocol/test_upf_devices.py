@@ -26,9 +26,6 @@ def triggers(story):
     return [one.picture for one in story.events if isinstance(one, TriggerChanged)]
 
 
-# -- the link ---------------------------------------------------------------------------------
-
-
 def test_nothing_is_there_before_it_is_heard(bench):
     story = bench("").at(5.0)
     assert story.picture() is None
@@ -78,21 +75,17 @@ def test_limit_of_the_status_is_a_parameter(bench):
     assert story.picture().state is S.ABNORMAL
 
 
-@pytest.mark.parametrize("state", ["NOT_READY", "LAUNCHED", "TOUCHDOWN"])
-def test_state_that_says_more_than_overdue_stays(bench, state):
-    story = bench("").status(state).at(5.0)
-    assert story.picture().state.name == state
+def test_state_that_says_more_than_overdue_stays(bench):
+    for state in ("NOT_READY", "LAUNCHED", "TOUCHDOWN"):
+        assert bench("").status(state).at(5.0).picture().state.name == state
 
 
-@pytest.mark.parametrize(("health", "name"), [(1, "WARNING"), (2, "ERROR"), (3, "CRITICAL")])
-def test_health_of_its_node_status_counts(bench, health, name):
-    story = bench("").status("READY").node_status(health=health)
-    assert f"NodeStatus of 33 reports {name}" in story.picture().faults
-    assert (story.picture().state is S.ABNORMAL) is (health >= 2)
-    assert story.picture().uptime == 5.0
-
-
-# -- what the picture says --------------------------------------------------------------------
+def test_health_of_its_node_status_counts(bench):
+    for health, name in ((1, "WARNING"), (2, "ERROR"), (3, "CRITICAL")):
+        picture = bench("").status("READY").node_status(health=health).picture()
+        assert f"NodeStatus of 33 reports {name}" in picture.faults
+        assert (picture.state is S.ABNORMAL) is (health >= 2), name
+        assert picture.uptime == 5.0
 
 
 def test_picture_of_an_armed_controller(bench):
@@ -112,33 +105,22 @@ def test_picture_after_touchdown(bench):
     assert picture.safety_flags == SafetyFlags.ON_GROUND
 
 
-def test_abnormal_state_without_a_reason_is_a_fault_by_itself(bench):
+def test_what_is_switched_off_or_abnormal_without_a_reason_is_a_fault(bench):
     assert "state ABNORMAL" in bench("").status("ABNORMAL").picture().faults
-
-
-def test_controller_that_never_deploys_is_abnormal(bench):
-    story = bench(parameters={**BY_REQUEST, p.ENABLE_PARACHUTE: False}).ready()
-    assert story.picture().state is S.ABNORMAL
-    assert "Enable Parachute is off: it never deploys" in story.picture().faults
-
-
-def test_controller_without_aps_says_so(bench):
-    story = bench(parameters={**BY_REQUEST, p.ENABLE_APS: False}).ready()
-    assert story.picture().healthy
-    assert "Enable APS is off: it deploys only by command" in story.picture().faults
-
-
-def test_aps_that_is_off_by_the_status_alone_is_told():
+    picture = bench(parameters={**BY_REQUEST, p.ENABLE_PARACHUTE: False}).ready().picture()
+    assert picture.state is S.ABNORMAL
+    assert "Enable Parachute is off: it never deploys" in picture.faults
+    no_aps = "Enable APS is off: it deploys only by command"
+    picture = bench(parameters={**BY_REQUEST, p.ENABLE_APS: False}).ready().picture()
+    assert picture.healthy
+    assert no_aps in picture.faults
     story = Bench(layout_of("ours"), "").status("READY", is_enable_auto_launch=False)
-    assert "Enable APS is off: it deploys only by command" in story.picture().faults
+    assert no_aps in story.picture().faults, "by the status alone"
 
 
 def test_status_says_how_often_it_comes(bench):
     story = bench("").status("READY").at(0.25).status("READY")
     assert story.link.devices.controllers[33].status_interval == pytest.approx(0.25)
-
-
-# -- who is ours ------------------------------------------------------------------------------
 
 
 def test_first_controller_that_is_not_lost_is_chosen(bench):
@@ -173,17 +155,13 @@ def test_node_ids_by_parameter_let_no_other_in(bench):
 
 def test_made_up_devices_do_not_grow_it(bench):
     story = bench("")
+    story.link.devices.parachute_status(0, {"state": 1}, story.now)
+    assert not story.link.devices.controllers, "nobody is no device"
     for node_id in range(20, 60):
         story.status("READY", node_id).trigger_status(node_id=node_id)
     assert len(story.link.devices.controllers) == MOST_DEVICES
     assert len(story.link.devices.triggers) == MOST_DEVICES
     assert story.link.counts["status of devices not followed"] == 2 * (40 - MOST_DEVICES)
-
-
-def test_status_of_nobody_makes_no_device(bench):
-    story = bench("")
-    story.link.devices.parachute_status(0, {"state": 1}, story.now)
-    assert not story.link.devices.controllers
 
 
 def test_one_node_can_be_both(bench):
@@ -211,9 +189,6 @@ def test_trigger_that_restarts_is_counted(bench):
     assert story.link.devices.triggers[34].restart_count == 1
 
 
-# -- triggers ---------------------------------------------------------------------------------
-
-
 def test_picture_of_a_trigger(bench):
     story = bench("").trigger_status("READY", supply_voltage=12.0)
     assert triggers(story)[-1] == {
@@ -228,17 +203,16 @@ def test_picture_of_a_trigger(bench):
     assert story.link.devices.triggers[34].sound
 
 
-@pytest.mark.parametrize("state", ["ABNORMAL", "NOT_READY", "LAUNCHED"])
-def test_trigger_that_cannot_fire_is_not_sound(bench, state):
-    assert not bench("").trigger_status(state).link.devices.triggers[34].sound
-
-
-def test_trigger_that_is_ill_or_silent_is_not_sound(bench):
+def test_trigger_that_cannot_fire_is_ill_or_silent_is_not_sound(bench):
+    for state in ("ABNORMAL", "NOT_READY", "LAUNCHED"):
+        assert not bench("").trigger_status(state).link.devices.triggers[34].sound, state
     story = bench("").trigger_status().node_status(34, health=2)
-    assert not story.link.devices.triggers[34].sound
+    trigger = story.link.devices.triggers[34]
+    assert not trigger.sound
     story.node_status(34, health=0)
-    assert story.link.devices.triggers[34].sound
-    assert not story.at(2.0).link.devices.triggers[34].sound
+    assert trigger.sound
+    story.at(2.0)
+    assert not trigger.sound
 
 
 def test_trigger_with_an_error_is_a_fault_of_the_parachute(bench):
@@ -274,75 +248,55 @@ def test_trigger_that_falls_silent_is_told_with_the_picture_of_its_controller(be
     assert any("trigger 34 LOST" in fault for fault in story.pictures()[-1].faults)
 
 
-# -- without a controller ---------------------------------------------------------------------
-
-
-def test_trigger_alone_is_no_parachute_unless_the_parameter_says_so(bench):
+def test_trigger_is_the_parachute_where_the_parameter_says_that_there_is_no_controller(bench):
     story = bench("").trigger_status()
-    assert story.picture() is None
-    assert story.pictures() == []
-
-
-@pytest.mark.parametrize(
-    ("said", "state"),
-    [
-        ("NOT_READY", S.NOT_READY),
-        ("READY", S.READY),
-        ("LAUNCHED", S.LAUNCHED),
-        ("ABNORMAL", S.ABNORMAL),
-    ],
-)
-def test_trigger_is_the_parachute_where_there_is_no_controller(bench, said, state):
-    story = bench("", without_controller=True)
-    for _ in range(3):
-        story.trigger_status(said, supply_voltage=12.0)
-    picture = story.picture()
-    assert (picture.device, picture.state, picture.backup_voltage) == ("34", state, 12.0)
-    assert picture.deployed is (said == "LAUNCHED")
-    assert story.pictures()[-1] == picture
-
-
-def test_trigger_that_is_silent_is_no_healthy_parachute(bench):
+    assert (story.picture(), story.pictures()) == (None, [])
+    for state in (S.NOT_READY, S.READY, S.LAUNCHED, S.ABNORMAL):
+        story = bench("", without_controller=True)
+        for _ in range(3):
+            story.trigger_status(state.name, supply_voltage=12.0)
+        picture = story.picture()
+        assert (picture.device, picture.state, picture.backup_voltage) == ("34", state, 12.0)
+        assert picture.deployed is (state is S.LAUNCHED)
+        assert story.pictures()[-1] == picture
     story = bench("", without_controller=True).trigger_status().at(2.0)
-    assert story.picture().state is S.ABNORMAL
+    assert story.picture().state is S.ABNORMAL, "one that is silent is not healthy"
     assert story.pictures()[-1].state is S.ABNORMAL
 
 
 def test_stray_controller_does_not_take_the_place_of_the_trigger(bench):
     story = bench("", without_controller=True).trigger_status().status("ARMED")
     assert story.link.devices.picture(story.now).device == "34"
-    story.link.deploy(1, False, story.now)
+    story.call("deploy", 1, False)
     assert story.step().requests("flyfire.TriggerService")
     assert not story.requests("flyfire.ParachuteService")
 
 
-# -- settings ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
-    ("settings", "text"),
+    ("name", "value", "text"),
     [
-        ({"node_id": 0}, "node_id is 0: need a whole number from 1 to 127"),
-        ({"node_id": 128}, "node_id is 128: need a whole number from 1 to 127"),
+        ("node_id", 0, "node_id is 0: need a whole number from 1 to 127"),
+        ("node_id", 128, "node_id is 128: need a whole number from 1 to 127"),
         (
-            {"controller_node_id": 128},
+            "controller_node_id",
+            128,
             "controller_node_id is 128: need a whole number from 0 to 127 (",
         ),
-        ({"trigger_node_id": -1}, "trigger_node_id is -1: need a whole number from 0 to 127 ("),
-        ({"controller_node_id": 100}, "controller_node_id is 100 and node_id is 100: a node id"),
-        ({"status_timeout": 0.0}, "status_timeout is 0.0: need a number (1.0, not 1) from 0.05"),
-        ({"last_resort_after": math.inf}, "last_resort_after is inf"),
-        ({"vehicle_service_timeout": math.nan}, "vehicle_service_timeout is nan"),
-        ({"vehicle_status_rate": -1.0}, "vehicle_status_rate is -1.0"),
-        ({"vehicle_state_age": 0.0}, "vehicle_state_age is 0.0"),
-        ({"unique_id": b"short"}, "unique_id has 5 bytes: need 16"),
-        ({"node_name": ""}, "node_name is '': need 1 to 80 bytes"),
-        ({"node_name": "x" * 81}, "need 1 to 80 bytes"),
+        ("trigger_node_id", -1, "trigger_node_id is -1: need a whole number from 0 to 127 ("),
+        ("controller_node_id", 100, "controller_node_id is 100 and node_id is 100: a node id"),
+        ("status_timeout", 0.0, "status_timeout is 0.0: need a number (1.0, not 1) from 0.05"),
+        ("last_resort_after", math.inf, "last_resort_after is inf"),
+        ("vehicle_service_timeout", math.nan, "vehicle_service_timeout is nan"),
+        ("vehicle_status_rate", -1.0, "vehicle_status_rate is -1.0"),
+        ("vehicle_state_age", 0.0, "vehicle_state_age is 0.0"),
+        ("unique_id", b"short", "unique_id has 5 bytes: need 16"),
+        ("node_name", "", "node_name is '': need 1 to 80 bytes"),
+        ("node_name", "x" * 81, "need 1 to 80 bytes"),
     ],
 )
-def test_setting_that_makes_no_sense_is_refused(settings, text):
+def test_setting_that_makes_no_sense_is_refused(name, value, text):
     with pytest.raises(ParameterError) as raised:
-        UpfConfig(**settings)
+        UpfConfig(**{name: value})
     assert text in str(raised.value)
 
 

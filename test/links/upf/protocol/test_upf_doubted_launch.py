@@ -78,43 +78,30 @@ def test_two_triggers_do_not_speak_for_each_other(bench):
     assert story.trigger_status("LAUNCHED").picture().deployed
 
 
-def test_first_is_believed_when_the_controller_says_so_too(bench):
+def test_first_is_believed_when_the_controller_says_so_before_or_after_it(bench):
+    """Whichever is heard first: a node that started anew must not order what is out."""
     story = flying(bench).status("LAUNCHED").trigger_status("LAUNCHED")
     assert story.link.devices.triggers[34].launched
     assert not story.link.counts[COUNT]
-
-
-def test_first_is_believed_when_the_controller_says_so_after_it(bench):
-    """Whichever is heard first: a node that started anew must not order what is out."""
-    story = flying(bench).trigger_status("LAUNCHED").after(0.05)
-    assert not story.picture().deployed
-    story.status("LAUNCHED")
+    story = flying(bench).trigger_status("LAUNCHED")
+    assert not story.after(0.05).picture().deployed
+    assert story.status("LAUNCHED").picture().deployed
     assert story.link.devices.triggers[34].launched
     assert story.notices()[-1] == "trigger 34 has fired"
-    story.link.fire_triggers(1, story.now)
-    story.step()
-    assert story.end(1).success
+    assert story.call("fire_triggers", 1).end(1).success
     assert story.requests("flyfire.TriggerService") == []
 
 
-def test_controller_that_says_so_needs_no_trigger(bench):
-    assert flying(bench).trigger_status("LAUNCHED").status("LAUNCHED").picture().deployed
-
-
-def test_one_of_several_controllers_does_not_speak_for_a_trigger_before_it(bench):
+def test_one_of_several_controllers_does_not_speak_for_a_trigger(bench):
     story = flying(bench).status("ARMED", 37).trigger_status("LAUNCHED").status("LAUNCHED", 37)
     assert story.link.devices.triggers[34].doubted
-
-
-def test_one_of_several_controllers_does_not_speak_for_a_trigger(bench):
     story = flying(bench).status("READY", 35).status("LAUNCHED").trigger_status("LAUNCHED")
     assert not story.link.devices.triggers[34].launched
 
 
 @pytest.mark.parametrize("config", [{}, {"without_controller": True}])
 def test_second_is_believed_when_a_deploy_is_under_way(bench, config):
-    story = flying(bench, **config)
-    story.link.deploy(1, False, story.now)
+    story = flying(bench, **config).call("deploy", 1, False)
     story.after(0.05).trigger_status("LAUNCHED")
     assert story.ends(1) == []
     assert not story.picture().deployed
@@ -128,9 +115,7 @@ def test_second_is_believed_when_a_deploy_is_under_way(bench, config):
 @pytest.mark.parametrize("config", [{}, {"without_controller": True}])
 def test_one_damaged_status_after_an_order_does_not_end_it(bench, config):
     """Given an order that was lost on its way."""
-    story = flying(bench, **config)
-    story.link.deploy(1, True, story.now)
-    story.clear()
+    story = flying(bench, **config).call("deploy", 1, True).clear()
     damaged(story.after(0.02)).after(0.1).trigger_status()
     story.after(0.3)
     assert story.ends(1) == []
@@ -144,8 +129,7 @@ def test_one_damaged_status_after_an_order_does_not_end_it(bench, config):
 def test_damage_before_an_order_keeps_nothing_from_being_sent(bench, config):
     story = flying(bench, **config)
     damaged(story)
-    story.link.deploy(1, False, story.now)
-    story.step()
+    story.call("deploy", 1, False)
     assert story.requests("flyfire.ParachuteService") or story.requests("flyfire.TriggerService")
     assert story.ends(1) == []
     assert story.after(0.05).trigger_status("LAUNCHED").end(1).success

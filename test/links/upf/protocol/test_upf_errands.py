@@ -15,39 +15,45 @@ def parameter(name, union, **more):
 
 
 def set_it(story, name, text, force=False, node_id=0, token=1):
-    story.link.set_parameter(token, node_id, name, text, force, story.now)
-    return story.after(0.5)
+    return story.call("set_parameter", token, node_id, name, text, force).after(0.5)
 
 
-# -- one parameter ----------------------------------------------------------------------------
+def get_it(story, name, token=1):
+    return story.call("errand", token, 0, lambda node_id: errands.get_parameter(node_id, name))
 
 
-@pytest.mark.parametrize("name", list(p.BY_NAME))
-def test_each_parameter_of_the_document_can_be_read(bench, name):
+def setting(bench, name, text):
+    """A made-up controller is told to take this."""
+    return bench("").status("READY").clear().call("set_parameter", 1, 33, name, text, False)
+
+
+def answer(story, name, union, node_id=33, **more):
+    """The newest question is answered with this parameter."""
+    return story.answer_values(
+        story.requests(GET_SET)[-1], parameter(name, union, **more), node_id
+    )
+
+
+OFF = {"boolean_value": 0}
+
+
+def test_each_parameter_of_the_document_can_be_read_and_set_and_is_read_back(bench):
     story = bench().ready()
-    story.link.errand(1, 0, lambda node_id: errands.get_parameter(node_id, name), story.now)
-    done = story.after(0.5).errand(1)
-    known = p.words(story.controller.values[name])
-    assert done.success
-    assert done.message.startswith(f"{name} is {known}")
-    assert done.parameters[0].default == story.controller.settings.values[name]
-
-
-@pytest.mark.parametrize("one", p.PARAMETERS, ids=lambda one: one.name)
-def test_each_parameter_of_the_document_can_be_set_and_is_read_back(bench, one):
-    story = bench().ready()
-    wanted = 50 if one.kind is int else not story.controller.values[one.name]
-    done = set_it(story, one.name, p.words(wanted)).errand(1)
-    assert done.success, done.message
-    assert story.controller.values[one.name] == wanted
-    assert done.parameters[0].value == wanted
-    assert story.link.devices.controllers[33].parameters[one.name] == wanted
+    values, delivered = story.controller.values, story.controller.settings.values
+    for token, one in enumerate(p.PARAMETERS):
+        done = get_it(story, one.name, 100 + token).after(0.5).errand(100 + token)
+        assert done.success, one.name
+        assert done.message.startswith(f"{one.name} is {p.words(values[one.name])}")
+        assert done.parameters[0].default == delivered[one.name]
+        wanted = 50 if one.kind is int else not values[one.name]
+        done = set_it(story, one.name, p.words(wanted), token=token).errand(token)
+        assert done.success, done.message
+        assert values[one.name] == done.parameters[0].value == wanted, one.name
+        assert story.link.devices.controllers[33].parameters[one.name] == wanted
 
 
 def test_parameter_that_the_device_does_not_have_is_said_with_the_known_ones(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, lambda one: errands.get_parameter(one, "Enable Music"), story.now)
-    set_it(story, "Enable Music", "true", token=2)
+    story = set_it(get_it(bench().ready(), "Enable Music"), "Enable Music", "true", token=2)
     for token in (1, 2):
         done = story.errand(token)
         assert not done.success
@@ -55,75 +61,56 @@ def test_parameter_that_the_device_does_not_have_is_said_with_the_known_ones(ben
         assert "Static Node ID" in done.message
 
 
-@pytest.mark.parametrize("name", ["", "x" * 93])
-def test_name_that_no_parameter_can_have_is_refused_before_anything_is_sent(bench, name):
+def test_name_that_no_parameter_can_have_is_refused_before_anything_is_sent(bench):
     """An empty one asks by index: it would set whatever comes first, the node id."""
-    story = bench().ready()
-    story.link.errand(1, 0, lambda node_id: errands.get_parameter(node_id, name), story.now)
-    set_it(story, name, "50", token=2)
-    assert "need 1 to 92 bytes" in story.errand(1).message
-    assert "need 1 to 92 bytes" in story.errand(2).message
-    assert not story.requests(GET_SET)
-    assert story.controller.values[p.STATIC_NODE_ID] == 33
+    for name in ("", "x" * 93):
+        story = set_it(get_it(bench().ready(), name), name, "50", token=2)
+        assert "need 1 to 92 bytes" in story.errand(1).message
+        assert "need 1 to 92 bytes" in story.errand(2).message
+        assert not story.requests(GET_SET), name
+        assert story.controller.values[p.STATIC_NODE_ID] == 33
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "why"),
-    [
+def test_value_that_does_not_fit_is_refused_before_it_is_sent(bench):
+    for name, text, why in (
         (p.LIGHT, "maybe", "need true or false"),
         (p.STATIC_NODE_ID, "many", "need a number (integer)"),
         (p.STATIC_NODE_ID, "126", "need 0 to 125"),
         (p.NODE_STATUS_INTERVAL, "1", "need 2 to 1000"),
         (p.PARACHUTE_STATUS_INTERVAL, "60001", "need 2 to 60000"),
         (p.PARACHUTE_STATUS_INTERVAL, "9" * 30, "no parameter can hold it"),
-    ],
-)
-def test_value_that_does_not_fit_is_refused_before_it_is_sent(bench, name, text, why):
-    story = bench().ready()
-    before = dict(story.controller.values)
-    done = set_it(story, name, text).errand(1)
-    assert not done.success
-    assert why in done.message
-    assert "nothing was sent" in done.message
-    assert story.controller.values == before
+    ):
+        story = bench().ready()
+        before = dict(story.controller.values)
+        done = set_it(story, name, text).errand(1)
+        assert not done.success, text
+        assert why in done.message
+        assert "nothing was sent" in done.message
+        assert story.controller.values == before
 
 
 def test_limits_of_the_document_count_where_the_device_has_none(bench):
-    story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, p.STATIC_NODE_ID, "126", False, story.now)
-    (question,) = story.step().requests(GET_SET)
-    story.answer_values(question, parameter(p.STATIC_NODE_ID, {"integer_value": 33}), 33)
+    story = setting(bench, p.STATIC_NODE_ID, "126")
+    answer(story, p.STATIC_NODE_ID, {"integer_value": 33})
     assert "need 0 to 125" in story.errand(1).message
 
 
 def test_number_of_a_device_with_its_own_range(bench):
-    story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, "Gain", "2.5", False, story.now)
     limits = {"min_value": {"real_value": 0.0}, "max_value": {"real_value": 2.0}}
-    (question,) = story.step().requests(GET_SET)
-    story.answer_values(question, parameter("Gain", {"real_value": 1.0}, **limits), 33)
+    story = answer(setting(bench, "Gain", "2.5"), "Gain", {"real_value": 1.0}, **limits)
     assert "need 0.0 to 2.0" in story.errand(1).message
-    story.clear().link.set_parameter(2, 33, "Gain", "0.1", False, story.now)
+    story.clear().call("set_parameter", 2, 33, "Gain", "0.1", False)
     for now_is in (1.0, 0.1, 0.1):
-        answer = parameter("Gain", {"real_value": now_is}, **limits)
-        story.answer_values(story.step().requests(GET_SET)[-1], answer, 33)
+        answer(story, "Gain", {"real_value": now_is}, **limits)
     assert story.errand(2).success  # as near as 32 bits come
 
 
-def test_device_that_answers_for_another_parameter_has_none_of_this_name(bench):
-    story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
-    (question,) = story.step().requests(GET_SET)
-    story.answer_values(question, parameter("Enable Music", {"boolean_value": 0}), 33)
+def test_device_that_does_not_take_a_value_or_answers_for_another_parameter_is_believed(bench):
+    story = answer(setting(bench, p.LIGHT, "true"), "Enable Music", OFF)
     assert "no parameter 'Enable Light'" in story.errand(1).message
-
-
-def test_device_that_does_not_take_a_value_is_believed(bench):
-    story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
+    story = setting(bench, p.LIGHT, "true")
     for _ in range(3):
-        off = parameter(p.LIGHT, {"boolean_value": 0})
-        story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
+        answer(story, p.LIGHT, OFF)
     assert story.errand(1).message == "Enable Light was not accepted: it is still false"
     assert not story.errand(1).success
 
@@ -131,70 +118,51 @@ def test_device_that_does_not_take_a_value_is_believed(bench):
 def test_device_that_answers_late_is_asked_again_and_heard(bench):
     story = bench().ready()
     story.controller.mute = True
-    story.link.set_parameter(1, 33, p.LIGHT, "false", False, story.now)
-    story.after(0.4)
+    story.call("set_parameter", 1, 33, p.LIGHT, "false", False).after(0.4)
     story.controller.mute = False
     assert story.after(1.0).errand(1).success
 
 
-@pytest.mark.parametrize(
-    ("answered", "text"),
-    [
-        (0, "Enable Light: no acknowledgement"),
-        (1, "Enable Light may or may not be set: no acknowledgement"),
-        (2, "Enable Light was sent, but not read back: no acknowledgement"),
-    ],
-)
-def test_device_that_falls_silent_on_the_way_leaves_what_is_not_known_open(bench, answered, text):
-    story = bench("").status("READY")
-    controller = story.link.devices.controllers[33]
-    controller.parameters[p.LIGHT] = False
-    story.after(1.0).clear()
-    story.link.set_parameter(1, 33, p.LIGHT, "true", False, story.now)
-    for _ in range(answered):
-        off = parameter(p.LIGHT, {"boolean_value": 0})
-        story.answer_values(story.step().requests(GET_SET)[-1], off, 33)
-    done = story.after(2.0).errand(1)
-    assert not done.success
-    assert done.message.startswith(text)
-    assert controller.switch(p.LIGHT) is (False if answered == 0 else None)
+def test_device_that_falls_silent_on_the_way_leaves_what_is_not_known_open(bench):
+    for answered, text in enumerate(
+        (
+            "Enable Light: no acknowledgement",
+            "Enable Light may or may not be set: no acknowledgement",
+            "Enable Light was sent, but not read back: no acknowledgement",
+        )
+    ):
+        story = bench("").status("READY")
+        controller = story.link.devices.controllers[33]
+        controller.parameters[p.LIGHT] = False
+        story.after(1.0).clear().call("set_parameter", 1, 33, p.LIGHT, "true", False)
+        for _ in range(answered):
+            answer(story, p.LIGHT, OFF)
+        done = story.after(2.0).errand(1)
+        assert not done.success
+        assert done.message.startswith(text)
+        assert controller.switch(p.LIGHT) is (False if answered == 0 else None), text
 
 
 def test_text_parameter(bench):
-    story = bench("").status("READY").clear()
-    story.link.set_parameter(1, 33, "Owner", "us", False, story.now)
+    story = setting(bench, "Owner", "us")
     for now_is in (b"them", b"us", b"us"):
-        answer = parameter("Owner", {"string_value": now_is})
-        story.answer_values(story.step().requests(GET_SET)[-1], answer, 33)
+        answer(story, "Owner", {"string_value": now_is})
     assert story.errand(1).message == "Owner is us"
 
 
-# -- what becomes of it -----------------------------------------------------------------------
-
-
-def test_value_is_kept_where_auto_save_is_on(bench):
+def test_value_is_kept_where_auto_save_is_on_or_once_it_is_saved(bench):
     done = set_it(bench().ready(), p.LIGHT, "false").errand(1)
     assert done.message == "Enable Light is false; kept"
-
-
-def test_value_is_not_kept_where_auto_save_is_off(bench):
-    story = bench(parameters={p.AUTO_SAVE: False}).ready()
-    done = set_it(story, p.LIGHT, "false").errand(1)
-    assert done.message == (
-        "Enable Light is false; lost at a restart until ~/save_params: Enable Auto-Save is off"
-    )
-    story.link.errand(2, 0, errands.restart, story.now)
-    story.after(1.0)
-    assert story.controller.values[p.LIGHT] is True
-
-
-def test_value_that_was_saved_survives(bench):
-    story = set_it(bench(parameters={p.AUTO_SAVE: False}).ready(), p.LIGHT, "false")
-    story.link.errand(2, 0, lambda one: errands.execute_opcode(one, 0), story.now)
-    assert story.after(0.5).errand(2).message == "save: done"
-    story.link.errand(3, 0, errands.restart, story.now)
-    story.after(1.0)
-    assert story.controller.values[p.LIGHT] is False
+    for saved in (False, True):
+        story = set_it(bench(parameters={p.AUTO_SAVE: False}).ready(), p.LIGHT, "false")
+        assert story.errand(1).message == (
+            "Enable Light is false; lost at a restart until ~/save_params: Enable Auto-Save is off"
+        )
+        if saved:
+            story.call("errand", 2, 0, lambda one: errands.execute_opcode(one, 0))
+            assert story.after(0.5).errand(2).message == "save: done"
+        story.call("errand", 3, 0, errands.restart).after(1.0)
+        assert story.controller.values[p.LIGHT] is not saved
 
 
 def test_nothing_is_said_of_what_is_kept_where_auto_save_is_not_known(bench):
@@ -222,19 +190,14 @@ def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
         "Static Node ID is 0; takes effect at the next start "
         "(0: requests a node id at each start); kept"
     )
-    story.link.errand(2, 33, errands.restart, story.now)
-    story.after(6.0)
+    story.call("errand", 2, 33, errands.restart).after(6.0)
     (given,) = [node_id for node_id in story.link.devices.controllers if node_id != 33]
     assert story.controller.node_id == given
     assert 1 <= given <= 125
 
 
-# -- the list ---------------------------------------------------------------------------------
-
-
 def test_list_has_all_twelve(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, errands.list_parameters, story.now)
+    story = bench().ready().call("errand", 1, 0, errands.list_parameters)
     done = story.after(0.5).errand(1)
     assert (done.success, done.message) == (True, "12 parameters")
     assert [one.name for one in done.parameters] == list(p.BY_NAME)
@@ -246,28 +209,21 @@ def test_list_is_read_from_a_new_controller_unasked(bench):
     assert known == story.controller.values
 
 
-def test_list_of_a_device_that_falls_silent_tells_how_far_it_came(bench):
-    story = bench("").trigger_status().clear()
-    story.link.errand(1, 0, errands.list_parameters, story.now)
-    story.answer_values(
-        story.step().requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 34
-    )
-    done = story.after(3.0).errand(1)
-    assert not done.success
-    assert done.message.startswith("stopped after 1 parameters: no acknowledgement")
-    assert [one.name for one in done.parameters] == [p.LIGHT]
-
-
-def test_list_that_never_ends_is_ended(bench):
-    story = bench("").trigger_status().clear()
-    story.link.errand(1, 0, errands.list_parameters, story.now)
-    for _ in range(errands.MOST_PARAMETERS):
-        story.answer_values(
-            story.step().requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 34
-        )
-    done = story.errand(1)
-    assert not done.success
-    assert done.message == "stopped after 128 parameters: the device does not end its list"
+def test_list_of_a_device_that_falls_silent_or_never_ends_tells_how_far_it_came(bench):
+    for answered, text in (
+        (1, "stopped after 1 parameters: no acknowledgement"),
+        (
+            errands.MOST_PARAMETERS,
+            "stopped after 128 parameters: the device does not end its list",
+        ),
+    ):
+        story = bench("").trigger_status().clear().call("errand", 1, 0, errands.list_parameters)
+        for _ in range(answered):
+            answer(story, p.LIGHT, OFF, 34)
+        done = story.after(3.0).errand(1)
+        assert not done.success
+        assert done.message.startswith(text)
+        assert [one.name for one in done.parameters] == [p.LIGHT] * answered
 
 
 def test_controller_that_did_not_tell_its_parameters_is_asked_again(bench):
@@ -290,23 +246,18 @@ def test_controller_that_is_lost_is_not_asked_again_until_it_is_back(bench):
 def test_list_of_a_controller_that_never_ends_is_not_begun_again(bench):
     story = bench("").status("READY")
     for _ in range(errands.MOST_PARAMETERS):
-        story.answer_values(
-            story.requests(GET_SET)[-1], parameter(p.LIGHT, {"boolean_value": 0}), 33
-        )
+        answer(story, p.LIGHT, OFF)
     story.clear()
     for _ in range(40):
         story.after(0.5).status("READY")
     assert not story.requests(GET_SET)
 
 
-# -- memory, restart, who it is ---------------------------------------------------------------
-
-
 def test_erased_parameters_are_those_of_delivery_after_a_restart(bench):
     story = set_it(bench().ready(), p.LIGHT, "false")
-    story.link.disturb(2, 0, False, lambda one: errands.execute_opcode(one, 1), story.now)
+    story.call("disturb", 2, 0, False, lambda one: errands.execute_opcode(one, 1))
     assert story.after(0.5).errand(2).message == "erase: done"
-    story.link.disturb(3, 0, False, errands.restart, story.now)
+    story.call("disturb", 3, 0, False, errands.restart)
     done = story.after(3.0).errand(3)
     assert (done.success, done.message) == (True, "restart: the device answered that it will")
     assert story.controller.values[p.LIGHT] is True
@@ -316,8 +267,7 @@ def test_erased_parameters_are_those_of_delivery_after_a_restart(bench):
 
 
 def test_restart_carries_the_magic_number_of_its_type(bench):
-    story = bench("").status("READY").clear()
-    story.link.errand(1, 0, errands.restart, story.now)
+    story = bench("").status("READY").clear().call("errand", 1, 0, errands.restart)
     (request,) = story.step().requests(errands.RESTART_NODE)
     assert request.values == {"magic_number": 0xACCE551B1E}
     story.answer_values(request, {"ok": False}, 33)
@@ -325,86 +275,63 @@ def test_restart_carries_the_magic_number_of_its_type(bench):
 
 
 def test_opcode_that_the_device_refuses(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, lambda one: errands.execute_opcode(one, 7), story.now)
+    story = bench().ready().call("errand", 1, 0, lambda one: errands.execute_opcode(one, 7))
     done = story.after(0.5).errand(1)
     assert done.message == "erase: the device answered: not done"
     assert not done.success
 
 
-@pytest.mark.parametrize(
-    ("make", "what"),
-    [
+def test_device_that_does_not_answer_ends_the_errand(bench):
+    for make, what in (
         (lambda one: errands.execute_opcode(one, 0), "save"),
         (errands.restart, "restart"),
         (errands.node_info, "node information"),
         (errands.transport_stats, "transport statistics"),
         (lambda one: errands.get_parameter(one, p.LIGHT), p.LIGHT),
-    ],
-)
-def test_device_that_does_not_answer_ends_the_errand(bench, make, what):
-    story = bench("").status("READY").after(3.0).clear()
-    story.link.errand(1, 33, make, story.now)
-    done = story.after(2.0).errand(1)
-    assert not done.success
-    assert done.message.startswith(f"{what}: no acknowledgement after 3 sends")
+    ):
+        story = bench("").status("READY").after(3.0).clear().call("errand", 1, 33, make)
+        done = story.after(2.0).errand(1)
+        assert not done.success
+        assert done.message.startswith(f"{what}: no acknowledgement after 3 sends")
 
 
 def test_node_information_and_statistics(bench):
-    story = bench().ready()
-    story.link.errand(1, 0, errands.node_info, story.now)
-    story.link.errand(2, 34, errands.transport_stats, story.now)
-    story.after(0.5)
+    story = bench().ready().call("errand", 1, 0, errands.node_info)
+    story.call("errand", 2, 34, errands.transport_stats).after(0.5)
     assert bytes(story.errand(1).values["name"]) == b"upf.controller"
     assert story.errand(2).values["transfers_tx"] > 0
     assert story.errand(2).node_id == 34
 
 
 def test_errand_goes_to_the_trigger_where_there_is_no_controller(bench):
-    story = bench("trigger").ready()
-    story.link.errand(1, 0, errands.node_info, story.now)
+    story = bench("trigger").ready().call("errand", 1, 0, errands.node_info)
     assert bytes(story.after(0.5).errand(1).values["name"]) == b"upf.trigger"
 
 
-@pytest.mark.parametrize(
-    ("node_id", "why"), [(0, "no UPF device was received"), (128, "there is no node id 128")]
-)
-def test_errand_without_a_device_ends_at_once(bench, node_id, why):
-    story = bench("")
-    story.link.errand(1, node_id, errands.node_info, story.now)
-    done = story.step().errand(1)
-    assert not done.success
-    assert done.message == f"{why} on this link; name a node id from 1 to 127"
-
-
-# -- in the air -------------------------------------------------------------------------------
+def test_errand_without_a_device_ends_at_once(bench):
+    for node_id, why in ((0, "no UPF device was received"), (128, "there is no node id 128")):
+        done = bench("").call("errand", 1, node_id, errands.node_info).errand(1)
+        assert not done.success
+        assert done.message == f"{why} on this link; name a node id from 1 to 127"
 
 
 @pytest.mark.parametrize("name", p.PROTECTION)
-@pytest.mark.parametrize("text", ["false", "0", "0x0", "OFF"])
-def test_protection_is_not_switched_off_in_the_air(bench, name, text):
-    story = bench().in_flight()
-    done = set_it(story, name, text).errand(1)
-    assert not done.success
-    assert "force does it all the same" in done.message
-    assert not story.requests(GET_SET)
-    assert story.controller.values[name] is True
-
-
-@pytest.mark.parametrize("name", p.PROTECTION)
-def test_protection_is_switched_off_in_the_air_by_force_and_said_loudly(bench, name):
+def test_protection_is_switched_off_in_the_air_only_by_force_which_is_said_loudly(bench, name):
+    for text in ("false", "0", "0x0", "OFF"):
+        story = bench().in_flight()
+        done = set_it(story, name, text).errand(1)
+        assert not done.success, text
+        assert "force does it all the same" in done.message
+        assert not story.requests(GET_SET)
+        assert story.controller.values[name] is True
     story = set_it(bench().in_flight(), name, "false", force=True)
     assert story.errand(1).success
     assert f"{name} is being switched off" in story.notices()
     assert any(f"{name} is off" in fault for fault in story.picture().faults)
-
-
-@pytest.mark.parametrize("name", p.PROTECTION)
-def test_protection_is_switched_off_on_the_ground_and_on_anywhere(bench, name):
+    # On the ground without force, and on anywhere.
     story = set_it(bench().ready(), name, "false")
     assert story.errand(1).success
-    story.link.vehicle(flying(), story.now)
-    story.clear()
+    story.call("vehicle", flying()).clear()
     assert set_it(story, name, "true", token=2).errand(2).success
     assert not story.notices()
 
@@ -413,41 +340,33 @@ def test_protection_is_switched_off_on_the_ground_and_on_anywhere(bench, name):
     "make", [errands.restart, lambda one: errands.execute_opcode(one, errands.OPCODE_ERASE)]
 )
 def test_device_is_not_taken_away_in_the_air_unless_forced(bench, make):
-    story = bench("").status("ARMED").clear()
-    story.link.disturb(1, 0, False, make, story.now)
+    story = bench("").status("ARMED").clear().call("disturb", 1, 0, False, make)
     assert "refused while the vehicle is in the air" in story.step().errand(1).message
     assert not story.requests(OPCODE) + story.requests(errands.RESTART_NODE)
-    story.link.disturb(2, 0, True, make, story.now)
+    story.call("disturb", 2, 0, True, make)
     assert story.step().requests(OPCODE) + story.requests(errands.RESTART_NODE)
 
 
 def test_vehicle_is_in_the_air_by_its_own_word_or_the_controllers(bench):
     story = bench("")
-    said = [
+    for state, in_air in (
         (flying(), True),
         (flying(landed_state_age=2.0), True),  # armed
         (flying(landed_state_age=2.0, armed_age=2.0), True),  # it has stopped to say so
         (landed(), False),
         (landed(armed=flying().armed), True),
-    ]
-    for state, in_air in said:
+        (landed(), False),
+    ):
         story.link.vehicle(state, story.now)
         assert story.link.in_air(story.now) is in_air
-    story.link.vehicle(landed(), story.now)
-    assert not story.link.in_air(story.now)
     assert story.link.in_air(story.now + 1.1)  # nobody says any more that it is on the ground
 
 
 def test_controllers_word_counts_where_no_vehicle_ever_spoke(bench):
     story = bench("")
-    for name, in_air in {
-        "READY": False,
-        "TAKEOFF": True,
-        "ARMED": True,
-        "LAUNCHED": False,
-    }.items():
+    for name in ("READY", "TAKEOFF", "ARMED", "LAUNCHED"):
         story.status(name)
-        assert story.link.in_air(story.now + 1.1) is in_air
+        assert story.link.in_air(story.now + 1.1) is (name in ("TAKEOFF", "ARMED")), name
     story.status("NOT_READY").status("READY").status("TAKEOFF").after(4.0)
     assert not story.link.in_air(story.now)  # lost: its word is too old
 

@@ -26,9 +26,9 @@ class Slow:
 def test_a_disarm_that_follows_an_arm_at_once_leaves_it_disarmed(bench):
     story = bench().ready()
     slow = Slow(story, 0.02)
-    story.link.arm(1, True, 0, story.now)
+    story.call("arm", 1, True, 0)
     slow.after(0.005)
-    story.link.arm(2, False, 0, story.now)
+    story.call("arm", 2, False, 0)
     slow.after(3.0)
     assert story.controller.state.name in ("READY", "TAKEOFF")
     assert "given up: TYPE_DISARM was ordered" in story.end(1).message
@@ -40,10 +40,7 @@ def test_a_disarm_that_was_lost_is_not_sent_again_after_an_arm(bench):
     story = bench().in_flight()
     lost_until = story.t + 0.3
     story.loses = lambda from_link, data: from_link and story.t < lost_until
-    story.link.arm(1, False, 0, story.now)
-    story.after(0.1)
-    story.link.arm(2, True, 0, story.now)
-    story.after(5.0)
+    story.call("arm", 1, False, 0).after(0.1).call("arm", 2, True, 0).after(5.0)
     assert story.controller.state.name == "ARMED"
     assert "given up: TYPE_ARM was ordered" in story.end(1).message
     assert story.end(2).success
@@ -52,7 +49,5 @@ def test_a_disarm_that_was_lost_is_not_sent_again_after_an_arm(bench):
 
 def test_another_controllers_request_goes_on(bench):
     story = bench("").status("READY", 33).status("ARMED", 125).clear()
-    story.link.service(1, "TYPE_TAKEOFF", 33, story.now)
-    story.link.service(2, "TYPE_DISARM", 125, story.now)
-    story.step()
+    story.call("service", 1, "TYPE_TAKEOFF", 33).call("service", 2, "TYPE_DISARM", 125)
     assert not story.ends(1)

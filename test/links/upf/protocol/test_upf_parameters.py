@@ -61,55 +61,43 @@ def test_each_request_is_excluded_by_its_automatic_counterpart():
     assert p.PROTECTION == ("Enable Parachute", "Enable APS")
 
 
-@pytest.mark.parametrize(
-    ("text", "kind", "value"),
-    [
-        ("33", "integer", 33),
-        (" 0x21 ", "integer", 33),
-        ("-4", "integer", -4),
-        ("2.5", "real", 2.5),
-        ("1e-3", "real", 0.001),
-        *[(word, "boolean", True) for word in ("true", "True", "on", "yes", "1", " ON ")],
-        *[(word, "boolean", False) for word in ("false", "FALSE", "off", "no", "0")],
-        (" as it is ", "string", " as it is "),
-    ],
-)
-def test_text_is_read_by_the_kind_of_the_parameter(text, kind, value):
-    read = p.parse(text, kind, "any")
-    assert (read, type(read)) == (value, type(value))
+def test_text_is_read_by_the_kind_of_the_parameter():
+    for kind, values in {
+        "integer": {"33": 33, " 0x21 ": 33, "-4": -4},
+        "real": {"2.5": 2.5, "1e-3": 0.001},
+        "boolean": {
+            **dict.fromkeys(("true", "True", "on", "yes", "1", " ON "), True),
+            **dict.fromkeys(("false", "FALSE", "off", "no", "0"), False),
+        },
+        "string": {" as it is ": " as it is "},
+    }.items():
+        for text, value in values.items():
+            read = p.parse(text, kind, "any")
+            assert (read, type(read)) == (value, type(value)), (kind, text)
 
 
-@pytest.mark.parametrize(
-    ("text", "kind", "need"),
-    [
-        ("many", "integer", "need a number (integer)"),
-        ("2.5", "integer", "need a number (integer)"),
-        ("", "integer", "need a number (integer)"),
-        ("much", "real", "need a number (real)"),
-        ("maybe", "boolean", "need true or false"),
-        ("", "boolean", "need true or false"),
-        ("9" * 30, "integer", "no parameter can hold it"),
-        ("nan", "real", "no parameter can hold it"),
-        ("-inf", "real", "no parameter can hold it"),
-        ("1e300", "real", "no parameter can hold it"),
-        ("x" * 129, "string", "need at most 128 bytes"),
-    ],
-)
-def test_text_that_fits_no_value_is_refused_with_what_is_needed(text, kind, need):
-    with pytest.raises(ParameterError) as raised:
-        p.parse(text, kind, "Enable Light" if kind == "boolean" else "any")
-    assert need in str(raised.value)
+def test_text_that_fits_no_value_is_refused_with_what_is_needed():
+    for kind, need, texts in (
+        ("integer", "need a number (integer)", ("many", "2.5", "")),
+        ("real", "need a number (real)", ("much",)),
+        ("boolean", "need true or false", ("maybe", "")),
+        ("integer", "no parameter can hold it", ("9" * 30,)),
+        ("real", "no parameter can hold it", ("nan", "-inf", "1e300")),
+        ("string", "need at most 128 bytes", ("x" * 129,)),
+    ):
+        for text in texts:
+            with pytest.raises(ParameterError) as raised:
+                p.parse(text, kind, "Enable Light" if kind == "boolean" else "any")
+            assert need in str(raised.value), (kind, text)
 
 
-@pytest.mark.parametrize(("kind", "on", "off"), [("integer", 1, 0), ("real", 1.0, 0.0)])
-def test_switch_that_a_device_keeps_as_a_number_is_still_a_switch(kind, on, off):
-    assert p.parse("true", kind, p.ENABLE_APS) == on
-    assert p.parse("off", kind, p.ENABLE_APS) == off
-    with pytest.raises(ParameterError, match="need true or false"):
-        p.parse("0x0", kind, p.ENABLE_APS)
-
-
-def test_whatever_does_not_surely_switch_on_may_switch_off():
+def test_switch_that_a_device_keeps_as_a_number_is_still_a_switch():
+    for kind, on, off in (("integer", 1, 0), ("real", 1.0, 0.0)):
+        assert p.parse("true", kind, p.ENABLE_APS) == on
+        assert p.parse("off", kind, p.ENABLE_APS) == off
+        with pytest.raises(ParameterError, match="need true or false"):
+            p.parse("0x0", kind, p.ENABLE_APS)
+    # Whatever does not surely switch on may switch off.
     assert p.switches_on(" True ")
     assert not any(p.switches_on(text) for text in ("false", "0", "0x0", "", "+0", "-1", "nay"))
 
@@ -149,22 +137,8 @@ def test_empty_union_has_no_value_and_no_kind():
     assert p.kind_of({}) == ""
 
 
-def test_values_in_words():
-    assert [p.words(value) for value in (None, True, False, 3, 2.5, "text")] == [
-        "",
-        "true",
-        "false",
-        "3",
-        "2.5",
-        "text",
-    ]
-
-
-def test_value_as_a_switch():
-    assert [p.as_switch(value) for value in (True, 0, 1.0, "on", None)] == [
-        True,
-        False,
-        True,
-        None,
-        None,
-    ]
+def test_values_in_words_and_as_a_switch():
+    words = {None: "", True: "true", False: "false", 3: "3", 2.5: "2.5", "text": "text"}
+    assert {value: p.words(value) for value in words} == words
+    switches = [p.as_switch(value) for value in (True, 0, 1.0, "on", None)]
+    assert switches == [True, False, True, None, None]

@@ -22,15 +22,18 @@ def standing_at(story: Bench, state: str) -> Bench:
     story.ready()
     way = {"READY": [], "TAKEOFF": ["TYPE_TAKEOFF"], "ARMED": ["TYPE_TAKEOFF", "TYPE_ARM"]}[state]
     for name in way:
-        story.link.service(-50, name, 0, story.now)
-        story.after(0.3)
+        story.call("service", -50, name, 0).after(0.3)
     assert story.controller.state.name == state
     return story.clear()
 
 
+def made_up(bench, state="READY") -> Bench:
+    """A made-up controller in this state."""
+    return bench("").status(state).after(0.1).clear()
+
+
 def ask(story, type_name, token=1, node_id=0):
-    story.link.service(token, type_name, node_id, story.now)
-    return story.step()
+    return story.call("service", token, type_name, node_id)
 
 
 @EACH
@@ -44,42 +47,30 @@ def test_request_is_sent_once_and_done_when_the_status_shows_it(bench, type_name
 
 
 @EACH
-def test_request_that_is_lost_is_sent_again(bench, type_name):
-    before, _ = CASES[type_name]
+def test_request_that_is_lost_or_whose_answer_is_is_done_by_the_status(bench, type_name):
+    before, shown_by = CASES[type_name]
     story = standing_at(bench(), before)
     story.loses = lambda from_link, data: from_link
     ask(story, type_name).after(0.4)
     assert story.controller.requests_heard == []
     story.loses = lambda from_link, data: False
     assert story.after(2.0).end(1).success
-
-
-@EACH
-def test_request_whose_answer_is_lost_is_done_by_the_status(bench, type_name):
-    before, shown_by = CASES[type_name]
-    story = ask(bench("").status(before).after(0.1).clear(), type_name).after(0.1)
-    story.status(shown_by[0])
+    story = ask(made_up(bench, before), type_name).after(0.1).status(shown_by[0])
     assert (story.end(1).success, story.end(1).accepted) == (True, False)
 
 
 @EACH
-def test_request_that_is_done_already_sends_nothing(bench, type_name):
-    _, shown_by = CASES[type_name]
+def test_request_that_is_done_already_or_excluded_sends_nothing(bench, type_name):
+    before, shown_by = CASES[type_name]
     story = ask(bench("").status(shown_by[0]).clear(), type_name)
     assert story.requests(SERVICE) == []
     assert story.end(1).success
     assert "already; nothing was sent" in story.end(1).message
-
-
-@EACH
-def test_request_that_an_automatic_function_excludes_is_not_sent(bench, type_name):
-    before, _ = CASES[type_name]
-    story = bench(parameters={**BY_REQUEST, p.EXCLUDES[type_name]: True})
     if type_name == "TYPE_TAKEOFF":
-        story.ready()
+        story = bench(parameters={**BY_REQUEST, p.EXCLUDES[type_name]: True}).ready()
     else:
         # The automatic function has nothing to do here: only the request for it is refused.
-        story = bench("").status(before)
+        story = made_up(bench, before)
         story.link.devices.controllers[33].parameters[p.EXCLUDES[type_name]] = True
     ask(story.clear(), type_name)
     assert story.requests(SERVICE) == []
@@ -89,26 +80,21 @@ def test_request_that_an_automatic_function_excludes_is_not_sent(bench, type_nam
 
 
 @EACH
-def test_rejection_while_the_parameters_are_not_known_says_what_may_be_behind(bench, type_name):
-    before, _ = CASES[type_name]
-    story = ask(bench("").status(before).clear(), type_name)
-    story.answer_result(story.requests(SERVICE)[0], "REJECTED")
-    assert not story.end(1).success
-    switch = p.EXCLUDES[type_name]
-    assert story.end(1).message.startswith(type_name)
-    assert "rejected" in story.end(1).message
-    assert f"its state is {before}" in story.end(1).message
-    assert f"it rejects {type_name} while its parameter '{switch}' is on" in story.end(1).message
-
-
-@EACH
-def test_rejection_for_another_reason_tells_the_state_alone(bench, type_name):
-    before, _ = CASES[type_name]
-    story = bench("").status(before).clear()
-    controller = story.link.devices.controllers[33]
-    controller.parameters[p.EXCLUDES[type_name]] = False
-    ask(story, type_name).answer_result(story.requests(SERVICE)[0], "REJECTED")
-    assert story.end(1).message.endswith(f"; its state is {before}")
+def test_rejection_tells_the_state_and_what_may_be_behind(bench, type_name):
+    before, switch = CASES[type_name][0], p.EXCLUDES[type_name]
+    for known in (None, False):
+        story = made_up(bench, before)
+        if known is not None:
+            story.link.devices.controllers[33].parameters[switch] = known
+        ask(story, type_name).answer_result(story.requests(SERVICE)[0], "REJECTED")
+        end = story.end(1)
+        assert not end.success
+        assert end.message.startswith(type_name)
+        assert "rejected" in end.message
+        assert f"; its state is {before}" in end.message
+        behind = f"it rejects {type_name} while its parameter '{switch}' is on"
+        assert (behind in end.message) is (known is None)
+        assert known is None or end.message.endswith(f"; its state is {before}")
 
 
 def test_rejection_after_the_parameter_has_changed_says_so(bench):
@@ -127,8 +113,8 @@ def test_request_that_is_temporarily_rejected_is_tried_again(bench):
     assert story.end(1).success
 
 
-def test_request_that_is_accepted_but_never_shown_fails_in_time(bench):
-    story = ask(bench("").status("READY").clear(), "TYPE_TAKEOFF")
+def test_request_that_is_never_shown_or_not_answered_fails_in_time(bench):
+    story = ask(made_up(bench), "TYPE_TAKEOFF")
     while story.t < 8.0:
         for one in story.requests(SERVICE):
             story.answer_result(one, "SUCCESS")
@@ -136,10 +122,7 @@ def test_request_that_is_accepted_but_never_shown_fails_in_time(bench):
         story.after(0.1).status("READY")
     assert not story.end(1).success
     assert "never showed that ParachuteStatus reports TAKEOFF or ARMED" in story.end(1).message
-
-
-def test_request_that_nobody_answers_fails_in_time(bench):
-    story = ask(bench("").status("READY").clear(), "TYPE_TAKEOFF").after(8.0)
+    story = ask(made_up(bench), "TYPE_TAKEOFF").after(8.0)
     assert not story.end(1).success
     assert "given up after 5.0 s" in story.end(1).message
 
@@ -161,73 +144,51 @@ def test_request_can_name_its_controller(bench):
     assert story.status("TAKEOFF", 35).end(1).success
 
 
-@pytest.mark.parametrize(
-    ("heard", "node_id", "why"),
-    [
-        ("", 0, "no controller was received on this link (received: none)"),
-        ("33", 40, "no controller 40 was received on this link (received: 33)"),
+def test_request_without_its_controller_is_refused(bench):
+    nobody = "no controller was received on this link (received: none"
+    for story, node_id, why in (
+        (bench(""), 0, f"{nobody})"),
         (
-            "34",
-            0,
-            "no controller was received on this link (received: none; triggers received: 34)",
+            bench("").status("READY"),
+            40,
+            "no controller 40 was received on this link (received: 33)",
         ),
-    ],
-)
-def test_request_without_its_controller_is_refused(bench, heard, node_id, why):
-    story = bench("")
-    if heard == "33":
-        story.status("READY")
-    elif heard == "34":
-        story.trigger_status()
-    assert ask(story, "TYPE_ARM", node_id=node_id).end(1).message == why
-    assert story.requests(SERVICE) == []
+        (bench("").trigger_status(), 0, f"{nobody}; triggers received: 34)"),
+    ):
+        assert ask(story, "TYPE_ARM", node_id=node_id).end(1).message == why
+        assert story.requests(SERVICE) == []
 
 
-@pytest.mark.parametrize("type_name", ["", "TYPE_DANCE", "TYPE_DEPLOY_NEVER", "DEPLOY"])
-def test_request_that_the_document_does_not_know_is_the_callers_mistake(bench, type_name):
-    story = bench("").status("READY").clear()
-    with pytest.raises(ParameterError, match="need one of TYPE_TAKEOFF"):
-        ask(story, type_name)
-    assert story.step().requests(SERVICE) == []
-
-
-# -- arm: take-off first ----------------------------------------------------------------------
+def test_request_that_the_document_does_not_know_is_the_callers_mistake(bench):
+    for type_name in ("", "TYPE_DANCE", "TYPE_DEPLOY_NEVER", "DEPLOY"):
+        story = made_up(bench)
+        with pytest.raises(ParameterError, match="need one of TYPE_TAKEOFF"):
+            ask(story, type_name)
+        assert story.step().requests(SERVICE) == [], type_name
 
 
 def arm(story, on=True, token=1, triggers=0):
-    story.link.arm(token, on, triggers, story.now)
-    return story.step()
+    return story.call("arm", token, on, triggers)
 
 
-@pytest.mark.parametrize("on", [True, False])
-def test_single_triggers_are_refused_as_it_has_none_to_choose(bench, on):
-    story = arm(standing_at(bench(), "ARMED"), on, triggers=16)
-    assert story.requests(SERVICE) == []
-    assert story.end(1).message == (
-        "triggers 16: a UPF parachute has none to choose, need 0; nothing was sent"
-    )
-
-
-def test_the_vehicles_own_trigger_is_the_one_that_it_has(bench):
+def test_single_triggers_are_refused_as_it_has_none_to_choose(bench):
+    for on in (True, False):
+        story = arm(standing_at(bench(), "ARMED"), on, triggers=16)
+        assert story.requests(SERVICE) == []
+        assert story.end(1).message == (
+            "triggers 16: a UPF parachute has none to choose, need 0; nothing was sent"
+        )
     story = arm(standing_at(bench(), "TAKEOFF"), triggers=4).after(1.0)
-    assert story.end(1).success
+    assert story.end(1).success, "the vehicle's own is the one that it has"
 
 
 def test_arming_a_ready_controller_takes_off_first(bench):
-    story = arm(standing_at(bench(), "READY")).after(1.0)
-    assert story.controller.requests_heard == ["TYPE_TAKEOFF", "TYPE_ARM"]
-    assert story.controller.state.name == "ARMED"
-    assert story.steps(1) == ["SENT", "ACCEPTED", "CONFIRMED"]
-    assert story.end(1).message.startswith("ParachuteStatus reports ARMED")
-
-
-def test_arming_in_flight_sends_arm_alone(bench):
-    story = arm(standing_at(bench(), "TAKEOFF")).after(1.0)
-    assert story.controller.requests_heard == ["TYPE_ARM"]
-    assert story.end(1).success
-
-
-def test_arming_an_armed_controller_sends_nothing(bench):
+    for state, sent in (("READY", ["TYPE_TAKEOFF", "TYPE_ARM"]), ("TAKEOFF", ["TYPE_ARM"])):
+        story = arm(standing_at(bench(), state)).after(1.0)
+        assert story.controller.requests_heard == sent
+        assert story.controller.state.name == "ARMED"
+        assert story.steps(1) == ["SENT", "ACCEPTED", "CONFIRMED"]
+        assert story.end(1).message.startswith("ParachuteStatus reports ARMED")
     story = arm(standing_at(bench(), "ARMED")).after(1.0)
     assert story.controller.requests_heard == []
     assert story.end(1).success
@@ -242,17 +203,12 @@ def test_arming_ends_with_the_take_off_that_fails(bench):
     assert len(story.requests(SERVICE)) == 1
 
 
-def test_arming_is_refused_where_take_off_is_automatic(bench):
-    story = arm(bench(parameters={**BY_REQUEST, p.AUTO_TAKEOFF: True}).ready())
-    assert "Enable Auto-Takeoff of controller 33 is on" in story.end(1).message
-    assert story.controller.requests_heard == []
-
-
-def test_arming_is_refused_where_it_is_automatic_before_anything_takes_off(bench):
-    story = arm(bench(parameters={**BY_REQUEST, p.AUTO_ARM: True}).ready())
-    assert "Enable Auto-Arm of controller 33 is on" in story.end(1).message
-    assert story.after(1.0).controller.requests_heard == []
-    assert story.controller.state.name == "READY"
+def test_arming_is_refused_where_it_or_take_off_is_automatic_before_anything_takes_off(bench):
+    for automatic, name in ((p.AUTO_TAKEOFF, "Auto-Takeoff"), (p.AUTO_ARM, "Auto-Arm")):
+        story = arm(bench(parameters={**BY_REQUEST, automatic: True}).ready())
+        assert f"Enable {name} of controller 33 is on" in story.end(1).message
+        assert story.after(1.0).controller.requests_heard == []
+        assert story.controller.state.name == "READY"
 
 
 def test_disarming(bench):

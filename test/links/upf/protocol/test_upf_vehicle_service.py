@@ -26,14 +26,15 @@ def failed(story):
     return {"ours": "FAILED", "other": "REJECTED"}[story.layout.name]
 
 
-# -- kill switch ------------------------------------------------------------------------------
+TYPES = pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
+BLOCKED, RELEASED = ("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")
 
 
 def test_kill_is_answered_with_success_once_the_motors_are_off(alone):
     story = alone().ask(KILL)
     assert story.asked() == [("KILL", "33")]
     assert story.at(0.3).answers() == []
-    story.link.kill_confirmed(story.now)
+    story.call("kill_confirmed")
     assert story.step().answers() == ["SUCCESS"]
     assert story.link.vehicle_service.newest_answer == "TYPE_KILLSWITCH of 33: SUCCESS"
     assert story.at(5.0).answers() == ["SUCCESS"]
@@ -43,7 +44,7 @@ def test_a_kill_that_a_decided_deploy_has_waited_for_is_not_waited_for_again(alo
     """Given a kill that nobody confirms; then the deploy is decided all the same."""
     story = alone().ask(KILL).at(0.3)
     assert story.answers() == []
-    story.link.kill_waited_for(story.now)
+    story.call("kill_waited_for")
     assert story.at(0.34).answers() == []
     assert story.at(0.36).answers() == [failed(story)]
     story.ask(KILL, number=1).at(0.42)
@@ -53,45 +54,38 @@ def test_a_kill_that_a_decided_deploy_has_waited_for_is_not_waited_for_again(alo
 
 def test_one_that_was_confirmed_all_the_same_has_happened(alone):
     """Given the word that the motors are off a little behind the deploy that rests on it."""
-    story = alone().ask(KILL)
-    story.link.kill_waited_for(story.now)
+    story = alone().ask(KILL).call("kill_waited_for")
     story.at(0.03).link.kill_confirmed(story.now)
     assert story.step().answers() == ["SUCCESS"]
     assert story.ask(KILL, number=1).step().answers() == ["SUCCESS"] * 2
 
 
 def test_a_kill_long_after_the_deploy_is_another_one(alone):
-    story = alone()
-    story.link.kill_waited_for(story.now)
-    story.at(5.1).ask(KILL).step()
+    story = alone().call("kill_waited_for").at(5.1).ask(KILL).step()
     assert story.answers() == []
     assert story.at(6.0).answers() == [failed(story)]
 
 
 def test_a_flight_block_is_waited_for_also_after_a_deploy(alone):
-    story = alone()
-    story.link.kill_waited_for(story.now)
+    story = alone().call("kill_waited_for")
     assert story.ask(BLOCK).step().answers() == []
 
 
-def test_kill_that_does_not_happen_is_answered_with_a_failure_in_time(alone):
+def test_what_does_not_happen_is_answered_with_a_failure_in_time(alone):
     story = alone().ask(KILL).at(0.79)
     assert story.answers() == []
     assert story.at(0.81).answers() == [failed(story)]
-    story.link.kill_confirmed(story.now)
-    assert story.step().answers() == [failed(story)]
+    assert story.call("kill_confirmed").answers() == [failed(story)]
     assert story.link.counts["KILL not done in time"] == 1
-
-
-def test_limit_of_an_answer_is_a_parameter(alone):
+    story = alone().ask(BLOCK).at(2.0)
+    assert story.answers() == [failed(story)]
     story = alone(vehicle_service_timeout=2.0).ask(KILL).at(1.9)
     assert story.answers() == []
     assert story.at(2.1).answers() == [failed(story)]
 
 
 def test_kill_of_a_moment_ago_answers_a_request_that_comes_after_it(alone):
-    story = alone()
-    story.link.kill_confirmed(story.now)
+    story = alone().call("kill_confirmed")
     assert story.at(KILL_MEMORY - 0.1).ask(KILL).answers() == ["SUCCESS"]
     assert story.at(KILL_MEMORY + 0.1).ask(KILL, number=1).at(9.0).answers() == [
         "SUCCESS",
@@ -100,9 +94,7 @@ def test_kill_of_a_moment_ago_answers_a_request_that_comes_after_it(alone):
 
 
 def test_vehicle_that_is_armed_again_has_forgotten_the_kill(alone):
-    story = alone()
-    story.link.vehicle(flying(), story.now)
-    story.link.kill_confirmed(story.now)
+    story = alone().call("vehicle", flying()).call("kill_confirmed")
     story.at(0.5).link.vehicle(flying(armed_age=0.6), story.now)  # said before the kill
     assert story.ask(KILL, number=1).answers() == ["SUCCESS"]
     story.at(1.0).link.vehicle(landed(), story.now)
@@ -112,8 +104,7 @@ def test_vehicle_that_is_armed_again_has_forgotten_the_kill(alone):
 
 
 def test_every_repetition_of_a_kill_is_answered(alone):
-    story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1)
-    story.link.kill_confirmed(story.now)
+    story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1).call("kill_confirmed")
     assert story.step().answers() == ["SUCCESS"] * 2
     assert set(story.asked()) == {("KILL", "33")}
 
@@ -122,8 +113,7 @@ def test_kill_that_waits_is_asked_for_again_until_it_is_answered(alone):
     """A supervisor that has just started has not heard the first."""
     story = alone().ask(KILL).at(0.5)
     assert len(story.asked()) == 3
-    story.link.kill_confirmed(story.now)
-    story.at(3.0)
+    story.call("kill_confirmed").at(3.0)
     assert len(story.asked()) == 3
 
 
@@ -135,106 +125,70 @@ def test_nodes_that_are_not_our_controller_are_rejected_and_counted(alone):
 
 
 def test_block_of_a_device_that_is_gone_does_not_outlive_a_reset_of_the_supervisor(alone):
-    story = alone().ask(BLOCK)
-    story.link.supervisor_said(True, {"33"}, story.now)
-    story.at(20.0)
+    story = alone().ask(BLOCK).call("supervisor_said", True, {"33"}).at(20.0)
     asked = len(story.asked())
-    story.link.supervisor_said(False, set(), story.now)  # reset by a person
-    story.at(30.0)
-    story.link.supervisor_said(False, set(), story.now)
-    assert len(story.asked()) == asked
-
-
-# -- flight block -----------------------------------------------------------------------------
+    story.call("supervisor_said", False, set()).at(30.0)  # reset by a person
+    assert len(story.call("supervisor_said", False, set()).asked()) == asked
 
 
 def test_block_is_answered_once_the_supervisor_says_so_for_this_device(alone):
     story = alone().ask(BLOCK)
-    assert story.asked() == [("FLIGHT_BLOCK", "33")]
-    story.link.supervisor_said(True, {"34"}, story.now)  # blocked, but for another
-    assert story.step().answers() == []
-    story.link.supervisor_said(False, {"33"}, story.now)  # known, but not in force
-    assert story.step().answers() == []
-    story.link.supervisor_said(True, {"33"}, story.now)
-    assert story.step().answers() == ["SUCCESS"]
-
-
-def test_block_that_does_not_happen_is_answered_with_a_failure(alone):
-    story = alone().ask(BLOCK).at(2.0)
-    assert story.answers() == [failed(story)]
+    assert story.asked() == [BLOCKED]
+    for blocked, whose, answers in (
+        (True, "34", []),  # blocked, but for another
+        (False, "33", []),  # known, but not in force
+        (True, "33", ["SUCCESS"]),
+    ):
+        assert story.call("supervisor_said", blocked, {whose}).answers() == answers
 
 
 def test_release_is_answered_once_the_supervisor_has_let_go(alone):
-    story = alone().ask(BLOCK)
-    story.link.supervisor_said(True, {"33"}, story.now)
-    story.at(1.0).ask(RELEASE, number=1)
-    assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
+    story = alone().ask(BLOCK).call("supervisor_said", True, {"33"}).at(1.0).ask(RELEASE, number=1)
+    assert story.asked() == [BLOCKED, RELEASED]
     assert story.answers() == ["SUCCESS"]
-    story.link.supervisor_said(False, set(), story.now)
-    assert story.step().answers() == ["SUCCESS"] * 2
+    assert story.call("supervisor_said", False, set()).answers() == ["SUCCESS"] * 2
 
 
 def test_supervisor_that_has_not_heard_is_asked_again(alone):
-    story = alone().ask(BLOCK)
-    story.at(0.1).link.supervisor_said(False, set(), story.now)
-    assert len(story.step().asked()) == 1  # too soon to wonder
-    story.at(0.6).link.supervisor_said(False, set(), story.now)
-    assert story.step().asked() == [("FLIGHT_BLOCK", "33")] * 2
+    story = alone().ask(BLOCK).at(0.1).call("supervisor_said", False, set())
+    assert len(story.asked()) == 1  # too soon to wonder
+    assert story.at(0.6).call("supervisor_said", False, set()).asked() == [BLOCKED] * 2
 
 
-def test_supervisor_that_started_anew_is_told_what_stands(bench):
+def test_supervisor_that_started_anew_or_missed_a_release_is_told(bench, alone):
     story = bench("").status("ABNORMAL").at(2.0).clear()
     assert story.standing == {"33"}
     story.standing.clear()
-    story.supervisor_says().step()
-    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+    assert story.supervisor_says().step().asked() == [BLOCKED]
     assert story.standing == {"33"}
+    story = alone().ask(BLOCK).at(0.1).ask(RELEASE, number=1).clear().at(1.0)
+    assert story.call("supervisor_said", True, {"33"}).asked() == [RELEASED]
 
 
-def test_supervisor_that_missed_a_release_is_told_again(alone):
-    story = alone().ask(BLOCK).at(0.1).ask(RELEASE, number=1).clear()
-    story.at(1.0).link.supervisor_said(True, {"33"}, story.now)
-    assert story.step().asked() == [("FLIGHT_BLOCK_RELEASE", "33")]
-
-
-def test_block_from_before_we_started_stands_until_its_device_says_something(alone):
+def test_block_from_before_we_started_stands_until_its_device_is_ready(alone):
     """A link that starts anew knows nothing: that is no reason to let the vehicle fly."""
     story = alone()
     for t in (0.0, 1.0, 2.0):
-        story.at(t).link.supervisor_said(True, {"33"}, story.now)
-    assert story.step().asked() == []
-    story.status("ABNORMAL").after(1.0).link.supervisor_said(True, {"33"}, story.now)
-    assert ("FLIGHT_BLOCK_RELEASE", "33") not in story.asked()
+        story.at(t).call("supervisor_said", True, {"33"})
+    assert story.asked() == []
+    story.status("ABNORMAL").after(1.0).call("supervisor_said", True, {"33"})
+    assert RELEASED not in story.asked()
+    story = alone().status("READY").call("supervisor_said", True, {"33"})
+    assert story.asked() == [RELEASED]
 
 
-def test_block_from_before_we_started_ends_when_its_device_is_ready(alone):
-    story = alone().status("READY")
-    story.link.supervisor_said(True, {"33"}, story.now)
-    assert story.step().asked() == [("FLIGHT_BLOCK_RELEASE", "33")]
-
-
-# -- the state says what a request should have said -------------------------------------------
-
-
-@pytest.mark.parametrize("state", ["NOT_READY", "ABNORMAL"])
-def test_block_follows_the_state_when_its_request_was_lost(alone, state):
-    story = alone().status(state)
-    assert story.asked() == [("FLIGHT_BLOCK", "33")]
-    assert story.asks[0][1].reason == f"it is {state}"
-    story.at(0.1).status(state)
-    assert len(story.asked()) == 1
-
-
-@pytest.mark.parametrize("state", ["READY", "TAKEOFF", "ARMED"])
-def test_release_follows_the_state_when_its_request_was_lost(alone, state):
-    story = alone().status("ABNORMAL").at(0.1).status(state)
-    assert story.asked() == [("FLIGHT_BLOCK", "33"), ("FLIGHT_BLOCK_RELEASE", "33")]
-
-
-@pytest.mark.parametrize("state", ["LAUNCHED", "TOUCHDOWN"])
-def test_one_whose_parachute_is_out_releases_nothing(alone, state):
-    story = alone().status("ABNORMAL").at(0.1).status(state).at(3.0).status(state)
-    assert story.asked() == [("FLIGHT_BLOCK", "33")]
+def test_block_and_release_follow_the_state_when_their_request_was_lost(alone):
+    for state in ("NOT_READY", "ABNORMAL"):
+        story = alone().status(state)
+        assert story.asked() == [BLOCKED], state
+        assert story.asks[0][1].reason == f"it is {state}"
+        assert len(story.at(0.1).status(state).asked()) == 1
+    for state in ("READY", "TAKEOFF", "ARMED"):
+        story = alone().status("ABNORMAL").at(0.1).status(state)
+        assert story.asked() == [BLOCKED, RELEASED], state
+    for state in ("LAUNCHED", "TOUCHDOWN"):
+        story = alone().status("ABNORMAL").at(0.1).status(state).at(3.0).status(state)
+        assert story.asked() == [BLOCKED], "one whose parachute is out releases nothing"
 
 
 def test_state_without_a_name_changes_nothing(alone):
@@ -256,58 +210,32 @@ def test_late_repetition_of_a_block_does_not_stay_when_the_state_is_ready(alone)
 
 def test_request_that_the_state_has_said_before_is_not_passed_on_twice(alone):
     story = alone().status("NOT_READY").ask(BLOCK)
-    assert story.asked() == [("FLIGHT_BLOCK", "33")]
-    story.link.supervisor_said(True, {"33"}, story.now)
-    assert story.step().answers() == ["SUCCESS"]
+    assert story.asked() == [BLOCKED]
+    assert story.call("supervisor_said", True, {"33"}).answers() == ["SUCCESS"]
 
 
 def test_two_controllers_block_each_for_itself(alone):
     story = alone().status("ABNORMAL").status("ABNORMAL", 35).at(1.0).status("READY")
-    assert story.asked() == [
-        ("FLIGHT_BLOCK", "33"),
-        ("FLIGHT_BLOCK", "35"),
-        ("FLIGHT_BLOCK_RELEASE", "33"),
-    ]
+    assert story.asked() == [BLOCKED, ("FLIGHT_BLOCK", "35"), RELEASED]
 
 
-# -- policies ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
-def test_policy_accept_answers_at_once_and_passes_it_on(alone, type_name):
-    policies = {"kill_policy": Policy.ACCEPT, "flight_block_policy": Policy.ACCEPT}
-    story = alone(**policies).ask(type_name)
-    assert story.answers() == ["SUCCESS"]
-    assert len(story.asked()) == 1
-
-
-@pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
-def test_policy_reject_answers_at_once_and_tells_nobody(alone, type_name):
-    policies = {"kill_policy": Policy.REJECT, "flight_block_policy": Policy.REJECT}
-    story = alone(**policies).ask(type_name).status("ABNORMAL")
-    assert story.answers() == ["REJECTED"]
-    assert story.asked() == []
-
-
-@pytest.mark.parametrize("type_name", [KILL, BLOCK, RELEASE])
-def test_policy_forward_passes_it_on_and_waits(alone, type_name):
-    story = alone().ask(BLOCK)
-    story.link.supervisor_said(True, {"33"}, story.now)
-    story.at(1.0).clear().ask(type_name, number=5)
+@TYPES
+def test_policy_accept_or_reject_answers_at_once_and_forward_waits(alone, type_name):
+    story = alone(kill_policy=Policy.ACCEPT, flight_block_policy=Policy.ACCEPT).ask(type_name)
+    assert (story.answers(), len(story.asked())) == (["SUCCESS"], 1)
+    story = alone(kill_policy=Policy.REJECT, flight_block_policy=Policy.REJECT).ask(type_name)
+    assert (story.status("ABNORMAL").answers(), story.asked()) == (["REJECTED"], [])
+    story = alone().ask(BLOCK).call("supervisor_said", True, {"33"}).at(1.0).clear()
+    story.ask(type_name, number=5)
     if type_name == BLOCK:
         assert story.answers() == ["SUCCESS"]  # it stands
     else:
-        assert story.answers() == []
-        assert len(story.asked()) == 1
+        assert (story.answers(), len(story.asked())) == ([], 1)
 
 
 def test_one_policy_does_not_touch_the_other(alone):
     story = alone(kill_policy=Policy.REJECT).ask(KILL).ask(BLOCK, number=1)
-    assert story.answers() == ["REJECTED"]
-    assert story.asked() == [("FLIGHT_BLOCK", "33")]
-
-
-# -- what makes no sense ----------------------------------------------------------------------
+    assert (story.answers(), story.asked()) == (["REJECTED"], [BLOCKED])
 
 
 def test_bad_magic_number_is_rejected_and_counted(alone):
@@ -341,11 +269,8 @@ def test_flood_of_requests_is_bounded_and_answered(alone):
     assert story.answers() == [failed(story)] * (100 - MOST_PENDING)
     assert story.link.counts["requests refused: too many at once"] == 100 - MOST_PENDING
     assert len(story.asked()) == 100  # the supervisor hears of each all the same
-    story.link.kill_confirmed(story.now)
+    story.call("kill_confirmed")
     assert story.step().answers().count("SUCCESS") == MOST_PENDING
-
-
-# -- with the simulated controller ------------------------------------------------------------
 
 
 def test_controller_blocks_while_it_starts_and_releases_when_it_is_ready(bench):

@@ -8,19 +8,47 @@ from upf_link_bench import LAYOUTS, Bench, Layout, flying, landed, types_of
 from chute_ros.links.upf.protocol.definitions import VEHICLE_STATUS, Definitions
 from chute_ros.model import LandedState, LinkState, VehicleState
 
-KINDS = [
-    (LandedState.ON_GROUND, "ON_GROUND"),
-    (LandedState.IN_AIR, "IN_AIR"),
-    (LandedState.TAKING_OFF, "IN_AIR"),
-    (LandedState.LANDING, "IN_AIR"),
-    (LandedState.UNKNOWN, ""),
-]
+
+def test_landed_state_by_its_name(bench):
+    in_air = (LandedState.IN_AIR, LandedState.TAKING_OFF, LandedState.LANDING)
+    kinds = {LandedState.ON_GROUND: "ON_GROUND", LandedState.UNKNOWN: ""}
+    for state, name in {**kinds, **dict.fromkeys(in_air, "IN_AIR")}.items():
+        assert told(bench(""), flying(landed_state=state))["state"] == name
+
+
+def test_field_that_is_missing_or_old_is_told_as_not_known(bench):
+    nan, inf = math.nan, math.inf
+    for field, changes in {
+        "": [{}],
+        "state": [{"landed_state_age": age} for age in (1.1, nan)],
+        "height_of_home": [
+            *({"height_age": age} for age in (1.1, nan)),
+            *({"height": height} for height in (nan, inf, 70000.0)),
+        ],
+        "vz": [{"vertical_speed_age": 1.1}, {"vertical_speed": nan}],
+    }.items():
+        for change in changes:
+            values = told(bench(""), flying(**change))
+            known = {"state": "IN_AIR", "height_of_home": 50.0, "vz": -1.5}
+            if field:
+                del known[field]
+                unknown = values[field]
+                assert unknown == "" if field == "state" else math.isnan(unknown), change
+            assert {name: values[name] for name in known} == known, change
+
+
+def test_vehicle_that_is_not_known_or_lost_has_no_values(bench):
+    for state in (None, VehicleState(), flying(link_state=LinkState.LOST)):
+        values = told(bench(""), state)
+        assert values["state"] == ""
+        assert math.isnan(values["height_of_home"])
+        assert math.isnan(values["vz"])
 
 
 def told(story, state=None, passed=0.0):
     """The VehicleStatus that follows; state as its name, empty: not known."""
     if state is not None:
-        story.link.vehicle(state, story.now)
+        story.call("vehicle", state)
     story.after(passed).clear().after(0.11)
     values = story.messages(VEHICLE_STATUS)[-1]
     name = story.definitions.state_name(VEHICLE_STATUS, values)
@@ -28,8 +56,7 @@ def told(story, state=None, passed=0.0):
 
 
 def test_it_is_sent_ten_times_a_second(bench):
-    story = bench("").step()
-    story.link.vehicle(flying(), story.now)
+    story = bench("").step().call("vehicle", flying())
     assert 99 <= len(story.clear().at(10.0).messages(VEHICLE_STATUS)) <= 101
 
 
@@ -40,49 +67,6 @@ def test_it_stops_when_the_owner_hangs_and_goes_on_when_it_is_back(bench):
     assert story.messages(VEHICLE_STATUS) == []
     story.owner_lives = True
     assert len(story.at(6.0).messages(VEHICLE_STATUS)) >= 9
-
-
-@pytest.mark.parametrize(("state", "name"), KINDS)
-def test_landed_state_by_its_name(bench, state, name):
-    assert told(bench(""), flying(landed_state=state))["state"] == name
-
-
-def test_measured_values_are_told_while_they_are_fresh(bench):
-    values = told(bench(""), flying())
-    assert values["height_of_home"] == 50.0
-    assert values["vz"] == -1.5
-
-
-@pytest.mark.parametrize(
-    ("change", "field", "unknown"),
-    [
-        ({"landed_state_age": 1.1}, "state", ""),
-        ({"landed_state_age": math.nan}, "state", ""),
-        ({"height_age": 1.1}, "height_of_home", math.nan),
-        ({"height_age": math.nan}, "height_of_home", math.nan),
-        ({"height": math.nan}, "height_of_home", math.nan),
-        ({"height": math.inf}, "height_of_home", math.nan),
-        ({"height": 70000.0}, "height_of_home", math.nan),
-        ({"vertical_speed_age": 1.1}, "vz", math.nan),
-        ({"vertical_speed": math.nan}, "vz", math.nan),
-    ],
-)
-def test_field_that_is_missing_or_old_is_told_as_not_known(bench, change, field, unknown):
-    values = told(bench(""), flying(**change))
-    if unknown == "":
-        assert values[field] == ""
-    else:
-        assert math.isnan(values[field])
-    others = {"state": "IN_AIR", "height_of_home": 50.0, "vz": -1.5}
-    assert all(values[name] == value for name, value in others.items() if name != field)
-
-
-@pytest.mark.parametrize("state", [None, VehicleState(), flying(link_state=LinkState.LOST)])
-def test_vehicle_that_is_not_known_or_lost_has_no_values(bench, state):
-    values = told(bench(""), state)
-    assert values["state"] == ""
-    assert math.isnan(values["height_of_home"])
-    assert math.isnan(values["vz"])
 
 
 def test_values_grow_old_when_nothing_comes_any_more(bench):
@@ -107,9 +91,6 @@ def test_controller_sees_the_vehicle(bench):
     story.loses = lambda from_link, data: from_link
     story.after(2.0)
     assert "the controller does not receive our VehicleStatus" in story.picture().faults
-
-
-# -- types that cannot say "not known" --------------------------------------------------------
 
 
 @pytest.fixture
@@ -147,8 +128,7 @@ def test_nothing_is_said_while_a_whole_number_cannot_hold_what_is_not_known(chan
 
 
 def test_types_without_a_state_still_tell_the_rest(changed):
-    story = changed(("uint3 state ", "uint3 other_state "))
-    story.link.vehicle(flying(), story.now)
+    story = changed(("uint3 state ", "uint3 other_state ")).call("vehicle", flying())
     (values,) = story.step().messages(VEHICLE_STATUS)[-1:]
     assert "state" not in values
     assert values["height_of_home"] == 50.0

@@ -200,6 +200,14 @@ class Bench:
             self._collect()
         return self
 
+    def call(self, what: str, *arguments: Any, **more: Any) -> Bench:
+        """Call this method of the link now; what it sends at once comes."""
+        if what == "deploy":
+            self.link.deploy(*arguments, self.now, **more)
+        else:
+            getattr(self.link, what)(*arguments, self.now)
+        return self.step()
+
     # -- devices that are made up -----------------------------------------------------------------
 
     def puppet(self, node_id: int) -> Endpoint:

@@ -69,49 +69,37 @@ def test_node_ids_and_errors_can_be_chosen(bus, start):  # noqa: F811
     assert status.values["error_flags"] & constants["ERROR_LOW_POWER"]
 
 
-@pytest.mark.parametrize(
-    ("wrong", "told"),
-    [
-        (("--parameter", "Enable Lite=false"), "Enable Light"),
-        (
-            ("--parameter", "Enable Light=perhaps"),
-            "--parameter 'Enable Light=perhaps': Enable Light cannot be 'perhaps': need true or",
-        ),
-        (("--parameter", "Static Node ID=many"), "need a number"),
-        (
-            ("--parameter", "Static Node ID=999"),
-            "--parameter 'Static Node ID=999': Static Node ID cannot be 999: need 0 to 125",
-        ),
-        (("--parameter", "Static Node ID=-1"), "cannot be -1: need 0 to 125"),
-        (("--parameter", "Parachute Status Interval(ms)=0"), "cannot be 0: need 2 to 60000"),
-        (("--parameter", "Parachute Status Interval(ms)=-5"), "cannot be -5: need 2 to 60000"),
-        (("--parameter", "Node Status Interval(ms)=0"), "cannot be 0: need 2 to 1000"),
-        (("--error", "NOTHING"), "LOW_POWER"),
-        (("--no-controller", "--no-trigger"), "nothing to simulate"),
-        (("--at", "1:explode"), "need one of"),
-        (("--at", "1:error=TIRED"), "is no argument of error: need error=one of "),
-        (("--minimum-height", "nan"), "--minimum-height: m 'nan': need 0 to 10000"),
-        (("--minimum-height", "-1"), "--minimum-height: m '-1': need 0 to 10000"),
-        (("--half", "2"), "need 0 to 1"),
-        (("--connection", "can0"), "INTERFACE:CHANNEL"),
-        (("--dsdl-path", "/nowhere"), "/nowhere"),
-    ],
-)
-def test_a_mistake_is_told_in_one_line(wrong, told):
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            MODULE,
-            "--dsdl-path",
-            FOLDER,
-            *wrong,
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60.0,
-    )
+MISTAKES = [
+    ("--parameter", "Enable Lite=false", "Enable Light"),
+    (
+        *("--parameter", "Enable Light=perhaps"),
+        "--parameter 'Enable Light=perhaps': Enable Light cannot be 'perhaps': need true or",
+    ),
+    ("--parameter", "Static Node ID=many", "need a number"),
+    (
+        *("--parameter", "Static Node ID=999"),
+        "--parameter 'Static Node ID=999': Static Node ID cannot be 999: need 0 to 125",
+    ),
+    ("--parameter", "Static Node ID=-1", "cannot be -1: need 0 to 125"),
+    ("--parameter", "Parachute Status Interval(ms)=0", "cannot be 0: need 2 to 60000"),
+    ("--parameter", "Parachute Status Interval(ms)=-5", "cannot be -5: need 2 to 60000"),
+    ("--parameter", "Node Status Interval(ms)=0", "cannot be 0: need 2 to 1000"),
+    ("--error", "NOTHING", "LOW_POWER"),
+    ("--no-controller", "--no-trigger", "nothing to simulate"),
+    ("--at", "1:explode", "need one of"),
+    ("--at", "1:error=TIRED", "is no argument of error: need error=one of "),
+    ("--minimum-height", "nan", "--minimum-height: m 'nan': need 0 to 10000"),
+    ("--minimum-height", "-1", "--minimum-height: m '-1': need 0 to 10000"),
+    ("--half", "2", "need 0 to 1"),
+    ("--connection", "can0", "INTERFACE:CHANNEL"),
+    ("--dsdl-path", "/nowhere", "/nowhere"),
+]
+
+
+@pytest.mark.parametrize(("option", "value", "told"), MISTAKES)
+def test_a_mistake_is_told_in_one_line(option, value, told):
+    command = [sys.executable, "-m", MODULE, "--dsdl-path", FOLDER, option, value]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60.0)
     assert done.returncode == 2, done.stderr
     assert told in done.stderr
     assert "Traceback" not in done.stderr

@@ -10,6 +10,7 @@ from upf_device_bench import (
     BY_REQUEST,
     CONTROLLER,
     KILL,
+    LAYOUTS,
     NODE_STATUS,
     RELEASE,
     TRIGGER,
@@ -49,40 +50,28 @@ def test_a_failed_self_test_is_abnormal_and_blocks_the_flight(layout):
 
 
 def test_a_fault_during_the_self_test_fails_it():
-    story = Story(script=[(0.2, "error=BAROMETER")]).run(2.0)
+    story = Story(values={p.NODE_STATUS_INTERVAL: 100}, script=[(0.2, "error=BAROMETER")]).run(2.0)
     assert story.states() == [S.NOT_READY, S.ABNORMAL]
     assert story.faults() == ["BAROMETER"]
-
-
-def test_its_node_says_that_it_initializes_until_then():
-    story = Story(values={p.NODE_STATUS_INTERVAL: 100}).run(2.0)
     modes = [message.values["mode"] for message in story.heard(NODE_STATUS)]
-    assert modes[0] == 1
-    assert modes[-1] == 0
+    assert (modes[0], modes[-1]) == (1, 0), "its node says that it initializes until then"
 
 
-def test_a_vehicle_that_comes_later_is_asked_when_it_comes():
+def test_a_vehicle_that_comes_later_or_comes_back_is_asked_when_it_comes():
     story = Story()
     story.vehicle.speaks = False
     story.run(3.0)
-    assert story.state is S.READY
-    assert story.asked() == []
+    assert (story.state, story.asked()) == (S.READY, [])
     assert not story.status["is_vehicle_connected"]
     story.vehicle.speaks = True
-    story.run(0.3)
-    assert story.asked() == [RELEASE]
+    assert story.run(0.3).asked() == [RELEASE]
     assert story.status["is_vehicle_connected"]
-
-
-def test_a_vehicle_that_comes_back_is_asked_again():
     story = Story(errors=frozenset({"IMU"})).run(2.0)
     story.vehicle.speaks = False
     story.forget()
-    story.run(1.2)
-    assert "VEHICLE_CONNECTION" in story.faults()
+    assert "VEHICLE_CONNECTION" in story.run(1.2).faults()
     story.vehicle.speaks = True
-    story.run(0.3)
-    assert story.asked() == [BLOCK]
+    assert story.run(0.3).asked() == [BLOCK]
     assert story.faults() == ["IMU"]
 
 
@@ -131,36 +120,32 @@ def test_a_whole_flight_by_request(layout):
     assert story.asked() == [BLOCK, RELEASE, RELEASE], "READY again releases again"
 
 
-@pytest.mark.parametrize("request_name", ["TAKEOFF", "ARM", "DISARM", "LAND"])
-@BOTH_LAYOUTS
-def test_a_request_is_rejected_while_its_automatic_function_is_on(layout, request_name):
-    story = Story(layout).run(1.0)
-    assert story.ask(request_name) == "REJECTED"
-    assert story.state is S.READY
+REQUESTS = ("TAKEOFF", "ARM", "DISARM", "LAND")
 
 
-@pytest.mark.parametrize("request_name", ["TAKEOFF", "ARM", "DISARM", "LAND"])
-def test_only_its_own_automatic_function_excludes_a_request(request_name):
-    """Given the others on and its own off: whatever comes of it, it is not rejected."""
-    story = Story(values={p.EXCLUDES[f"TYPE_{request_name}"]: False}).run(1.0)
-    assert story.ask(request_name) in ("SUCCESS", "FAILED")
+def test_a_request_is_rejected_while_its_own_automatic_function_is_on():
+    for name in REQUESTS:
+        for layout in LAYOUTS:
+            story = Story(layout).run(1.0)
+            assert story.ask(name) == "REJECTED", name
+            assert story.state is S.READY
+        # Given the others on and its own off: whatever comes of it, it is not rejected.
+        story = Story(values={p.EXCLUDES[f"TYPE_{name}"]: False}).run(1.0)
+        assert story.ask(name) in ("SUCCESS", "FAILED"), name
 
 
-@pytest.mark.parametrize(
-    ("steps", "impossible"),
-    [
-        ([], ["ARM", "DISARM"]),
-        (["TAKEOFF", "ARM"], ["TAKEOFF", "LAND"]),
-    ],
-)
-def test_what_the_state_does_not_allow_fails_and_changes_nothing(steps, impossible):
-    story = ready()
-    for step in steps:
-        story.ask(step)
-    before = story.state
-    for name in impossible:
-        assert story.ask(name) == "FAILED"
-        assert story.run(0.2).state is before
+def test_what_the_state_does_not_allow_fails_and_changes_nothing():
+    for steps, impossible in (([], ["ARM", "DISARM"]), (["TAKEOFF", "ARM"], ["TAKEOFF", "LAND"])):
+        story = ready()
+        for step in steps:
+            story.ask(step)
+        before = story.state
+        for name in impossible:
+            assert story.ask(name) == "FAILED"
+            assert story.run(0.2).state is before, name
+    for name in REQUESTS:
+        story = Story(values=BY_REQUEST).run(0.2)
+        assert story.ask(name) == "FAILED", "before its self test has passed"
 
 
 def test_asking_once_more_for_what_is_so_succeeds():
@@ -171,27 +156,15 @@ def test_asking_once_more_for_what_is_so_succeeds():
     assert story.states() == [S.NOT_READY, S.READY, S.TAKEOFF, S.ARMED]
 
 
-@pytest.mark.parametrize("request_name", ["TAKEOFF", "ARM", "DISARM", "LAND"])
-def test_before_its_self_test_has_passed_it_does_not_fly(request_name):
-    story = Story(values=BY_REQUEST).run(0.2)
-    assert story.ask(request_name) == "FAILED"
-
-
-@BOTH_LAYOUTS
-def test_a_bad_magic_number_does_nothing(layout):
-    story = ready(layout)
-    values = story.definitions.request(names.PARACHUTE_SERVICE, "TYPE_TAKEOFF")
-    values["magic_number"] += 1
-    bad = "BAD_MAGIC_NUMBER" if layout == "ours" else "REJECTED"
-    assert story.result(names.PARACHUTE_SERVICE, values) == bad
-    assert story.run(0.2).state is S.READY
-    assert story.controller.requests_heard == []
-
-
-def test_a_type_without_a_name_is_rejected():
-    story = ready()
-    values = story.definitions.request(names.PARACHUTE_SERVICE, "TYPE_TAKEOFF") | {"type": 99}
-    assert story.result(names.PARACHUTE_SERVICE, values) == "REJECTED"
+def test_a_bad_magic_number_or_a_type_without_a_name_does_nothing():
+    for layout, bad in (("ours", "BAD_MAGIC_NUMBER"), ("other", "REJECTED")):
+        story = ready(layout)
+        values = story.definitions.request(names.PARACHUTE_SERVICE, "TYPE_TAKEOFF")
+        bad_magic = values | {"magic_number": values["magic_number"] + 1}
+        assert story.result(names.PARACHUTE_SERVICE, bad_magic) == bad
+        assert story.controller.requests_heard == []
+        assert story.result(names.PARACHUTE_SERVICE, values | {"type": 99}) == "REJECTED"
+        assert story.run(0.2).state is S.READY
 
 
 # Take-off, arm, disarm, land: automatic
@@ -207,38 +180,24 @@ def test_a_whole_flight_by_itself(layout):
     assert story.states() == expected
 
 
-def test_without_auto_takeoff_it_stays_ready_and_does_not_deploy_by_itself():
-    story = Story(values={p.AUTO_TAKEOFF: False}).run(1.0)
-    story.at(50.0).fall(50.0).run(5.0)
-    assert story.state is S.READY
-    assert not story.trigger.fired
-
-
-def test_without_auto_arm_it_stays_in_takeoff_and_does_not_deploy_by_itself():
-    story = Story(values={p.AUTO_ARM: False}).run(1.0)
-    story.at(50.0).fall(50.0).run(5.0)
-    assert story.state is S.TAKEOFF
-    assert not story.trigger.fired
+def test_without_auto_takeoff_or_auto_arm_it_stays_and_does_not_deploy_by_itself():
+    for switch, state in ((p.AUTO_TAKEOFF, S.READY), (p.AUTO_ARM, S.TAKEOFF)):
+        story = Story(values={switch: False}).run(1.0).at(50.0).fall(50.0).run(5.0)
+        assert story.state is state
+        assert not story.trigger.fired
     assert story.ask("ARM") == "SUCCESS"
-    story.run(1.0)
-    assert story.trigger.fired
+    assert story.run(1.0).trigger.fired
 
 
-def test_without_auto_disarm_it_stays_armed_on_the_ground_until_it_is_told():
-    story = Story(values={p.AUTO_DISARM: False}).run(1.0)
-    story.at(50.0).at(5.0).at(0.0).run(10.0)
-    assert story.state is S.ARMED
-    assert story.ask("DISARM") == "SUCCESS"
-    story.run(3.0)
-    assert story.state is S.READY
-
-
-def test_without_auto_land_it_does_not_return_to_ready_until_it_is_told():
-    story = Story(values={p.AUTO_LAND: False}).run(1.0)
-    story.at(50.0).at(5.0).at(0.0).run(10.0)
-    assert story.state is S.TAKEOFF
-    assert story.ask("LAND") == "SUCCESS"
-    assert story.state is S.READY
+def test_without_auto_disarm_or_auto_land_it_stays_until_it_is_told():
+    for switch, state, request in (
+        (p.AUTO_DISARM, S.ARMED, "DISARM"),
+        (p.AUTO_LAND, S.TAKEOFF, "LAND"),
+    ):
+        story = Story(values={switch: False}).run(1.0).at(50.0).at(5.0).at(0.0).run(10.0)
+        assert story.state is state
+        assert story.ask(request) == "SUCCESS"
+        assert story.run(3.0).state is S.READY
 
 
 def test_what_was_requested_on_the_ground_does_not_end_by_itself_there():
@@ -281,17 +240,22 @@ def test_an_accident_asks_for_the_kill_switch_first_and_launches_after_the_answe
     assert killed < fired
 
 
-@pytest.mark.parametrize("result", ["REJECTED", "FAILED"])
-def test_a_vehicle_that_does_not_want_to_stop_does_not_stop_the_launch(result):
-    story = armed()
-    story.vehicle.results[KILL] = result
-    story.fall(50.0).run(1.0)
-    assert story.trigger.fired
+def unanswered(**settings):
+    """An armed one whose kill switch nobody answers."""
+    story = armed(**settings)
+    story.vehicle.results[KILL] = None
+    return story
+
+
+def test_a_vehicle_that_does_not_want_to_stop_does_not_stop_the_launch():
+    for result in ("REJECTED", "FAILED"):
+        story = armed()
+        story.vehicle.results[KILL] = result
+        assert story.fall(50.0).run(1.0).trigger.fired, result
 
 
 def test_a_kill_switch_without_an_answer_is_waited_for_only_so_long():
-    story = armed(kill_wait=0.5)
-    story.vehicle.results[KILL] = None
+    story = unanswered(kill_wait=0.5)
     story.fall(50.0).until(story.asked)
     seconds = story.until(lambda: story.trigger.fired, 2.0)
     assert seconds == pytest.approx(0.5, abs=0.05)
@@ -308,38 +272,32 @@ def test_without_a_vehicle_nothing_is_waited_for():
     assert story.trigger.fired
 
 
-def test_it_is_launched_only_when_the_trigger_says_so():
+def stuck():
+    """An armed one whose trigger says yes, and nothing comes out."""
     story = armed()
     story.trigger.act("trigger-stuck")
-    story.fall(50.0).run(3.0)
+    return story
+
+
+def test_it_is_launched_only_when_the_trigger_says_so_and_tells_it_again_in_its_time():
+    story = stuck().fall(50.0).run(4.5)
     assert story.asked()
-    assert story.heard(names.TRIGGER_LAUNCH)
     assert story.state is S.ARMED
-
-
-def test_a_trigger_that_does_not_fire_is_told_again_in_its_time():
-    story = armed()
-    story.trigger.act("trigger-stuck")
-    story.fall(50.0).run(4.5)
     launches = [message.at for message in story.heard(names.TRIGGER_LAUNCH)]
     assert len(launches) in (4, 5)
     assert all(b - a >= 1.0 for a, b in pairwise(launches))
     story.trigger.stuck = False
-    story.run(1.5)
-    assert story.state is S.LAUNCHED
+    assert story.run(1.5).state is S.LAUNCHED
 
 
 def test_a_request_tells_a_trigger_that_has_not_fired_at_once_again():
-    story = armed()
-    story.trigger.act("trigger-stuck")
+    story = stuck()
     assert story.ask("DEPLOY") == "SUCCESS"
     story.run(0.2)
     story.trigger.stuck = False
     assert story.ask("DEPLOY") == "SUCCESS"
     assert story.run(0.1).state is S.LAUNCHED
-
-
-def test_a_trigger_that_somebody_else_fires_launches_it_as_well():
+    # One that somebody else fires launches it as well.
     story = armed()
     values = story.definitions.request(names.TRIGGER_SERVICE, "TYPE_LAUNCH")
     assert story.result(names.TRIGGER_SERVICE, values, TRIGGER) == "SUCCESS"
@@ -362,24 +320,17 @@ def test_touchdown_after_five_seconds_of_rest(layout):
 # TYPE_DEPLOY and TYPE_DEPLOY_FORCE
 
 
-@pytest.mark.parametrize(
-    ("state", "deploy", "force"),
-    [
-        (S.NOT_READY, "FAILED", "SUCCESS"),
-        (S.READY, "FAILED", "SUCCESS"),
-        (S.TAKEOFF, "SUCCESS", "SUCCESS"),
-        (S.ARMED, "SUCCESS", "SUCCESS"),
-        (S.ABNORMAL, "FAILED", "SUCCESS"),
-    ],
-)
-def test_deploy_needs_flight_and_force_does_not(state, deploy, force):
-    for name, expected in (("DEPLOY", deploy), ("DEPLOY_FORCE", force)):
-        story = in_state(state)
-        assert story.ask(name) == expected
-        story.run(0.2)
-        assert story.trigger.fired is (expected == "SUCCESS")
-        assert (story.state is S.LAUNCHED) is (expected == "SUCCESS")
-        assert (KILL in story.asked()) is (expected == "SUCCESS")
+def test_deploy_needs_flight_and_force_does_not():
+    flying = (S.TAKEOFF, S.ARMED)
+    for state in (S.NOT_READY, S.READY, S.ABNORMAL, *flying):
+        for name in ("DEPLOY", "DEPLOY_FORCE"):
+            goes = state in flying or name == "DEPLOY_FORCE"
+            story = in_state(state)
+            assert story.ask(name) == ("SUCCESS" if goes else "FAILED"), (state, name)
+            story.run(0.2)
+            assert story.trigger.fired is goes, (state, name)
+            assert (story.state is S.LAUNCHED) is goes
+            assert (KILL in story.asked()) is goes
 
 
 def in_state(state):
@@ -420,38 +371,33 @@ def test_a_person_at_the_device_deploys_as_well():
 # Enable Parachute, Enable APS
 
 
-@pytest.mark.parametrize("way", ["DEPLOY", "DEPLOY_FORCE", "APS", "person"])
 @BOTH_LAYOUTS
-def test_without_enable_parachute_nothing_deploys(layout, way):
-    story = armed(layout, {p.ENABLE_PARACHUTE: False})
-    if way == "APS":
-        story.fall(50.0)
-    elif way == "person":
-        story.bus.act("deploy")
-    else:
-        assert story.ask(way) == "REJECTED"
-    story.run(3.0)
-    assert not story.trigger.fired
-    assert story.state is S.ARMED
-    assert story.asked() == [], "nor are the motors stopped"
+def test_without_enable_parachute_nothing_deploys(layout):
+    for way in ("DEPLOY", "DEPLOY_FORCE", "APS", "person"):
+        story = armed(layout, {p.ENABLE_PARACHUTE: False})
+        if way == "APS":
+            story.fall(50.0)
+        elif way == "person":
+            story.bus.act("deploy")
+        else:
+            assert story.ask(way) == "REJECTED"
+        story.run(3.0)
+        assert not story.trigger.fired, way
+        assert story.state is S.ARMED
+        assert story.asked() == [], "nor are the motors stopped"
 
 
-def test_that_it_may_not_deploy_is_told():
+def test_that_it_may_not_deploy_is_told_and_calls_off_a_launch_that_waits():
     story = ready()
     assert story.faults() == []
     story.set(p.ENABLE_PARACHUTE, False)
     assert story.faults() == ["PARACHUTE_DISABLED"]
     assert story.run(1.0).state is S.READY
-
-
-def test_enable_parachute_switched_off_calls_off_a_launch_that_waits():
-    story = armed()
-    story.vehicle.results[KILL] = None
+    story = unanswered()
     story.ask("DEPLOY_FORCE")
     story.run(0.2)
     story.set(p.ENABLE_PARACHUTE, False)
-    story.run(3.0)
-    assert not story.trigger.fired
+    assert not story.run(3.0).trigger.fired
     assert story.asked() == [KILL], "what it was asked for is not asked again"
 
 
@@ -466,22 +412,18 @@ def test_without_enable_aps_it_deploys_only_when_told_to(layout):
 
 
 def test_enable_aps_switched_off_calls_off_an_automatic_launch_but_no_other():
-    story = armed()
-    story.vehicle.results[KILL] = None
+    for requested in (False, True):
+        story = unanswered()
+        story.fall(50.0).until(story.asked)
+        if requested:
+            story.ask("DEPLOY")
+        story.set(p.ENABLE_APS, False)
+        assert story.run(2.0).trigger.fired is requested
+    story = unanswered()
     story.fall(50.0).until(story.asked)
     story.set(p.ENABLE_APS, False)
-    assert not story.run(2.0).trigger.fired
-    story.ask("DEPLOY")
+    story.run(2.0).ask("DEPLOY")
     story.run(0.2)
-    story.set(p.ENABLE_APS, False)
-    assert story.run(1.0).trigger.fired
-
-
-def test_an_automatic_launch_that_is_requested_as_well_is_not_called_off_with_the_aps():
-    story = armed()
-    story.vehicle.results[KILL] = None
-    story.fall(50.0).until(story.asked)
-    story.ask("DEPLOY")
     story.set(p.ENABLE_APS, False)
     assert story.run(1.0).trigger.fired
 
@@ -489,37 +431,26 @@ def test_an_automatic_launch_that_is_requested_as_well_is_not_called_off_with_th
 # Faults and restarts
 
 
-@pytest.mark.parametrize("steps", [[], ["TAKEOFF"], ["TAKEOFF", "ARM"]])
-def test_a_fault_makes_it_abnormal_and_blocks_the_flight(steps):
-    story = ready()
-    for step in steps:
-        story.ask(step)
-    story.forget()
-    story.bus.act("error=LOW_POWER")
-    story.run(0.1)
-    assert story.state is S.ABNORMAL
-    assert story.asked() == [BLOCK]
-    assert story.faults() == ["LOW_POWER"]
-
-
-def test_when_the_fault_is_gone_it_is_ready_and_releases_the_flight():
-    story = ready()
-    story.bus.act("error=IMU")
-    story.run(0.2)
-    story.forget()
-    story.bus.act("clear-errors")
-    story.run(0.1)
-    assert story.state is S.READY
-    assert story.asked() == [RELEASE]
-    assert story.faults() == []
-
-
-def test_a_faulty_one_does_not_deploy_by_itself():
+def test_a_fault_makes_it_abnormal_and_blocks_the_flight():
+    for steps in ([], ["TAKEOFF"], ["TAKEOFF", "ARM"]):
+        story = ready()
+        for step in steps:
+            story.ask(step)
+        story.forget()
+        story.bus.act("error=LOW_POWER")
+        story.run(0.1)
+        assert (story.state, story.asked()) == (S.ABNORMAL, [BLOCK]), steps
+        assert story.faults() == ["LOW_POWER"]
+        story.forget()
+        story.bus.act("clear-errors")
+        story.run(0.1)
+        assert (story.state, story.asked()) == (S.READY, [RELEASE]), steps
+        assert story.faults() == []
     story = armed()
     story.bus.act("error=IMU")
     story.fall(50.0).run(3.0)
     assert story.state is S.ABNORMAL
-    assert not story.trigger.fired
+    assert not story.trigger.fired, "a faulty one does not deploy by itself"
 
 
 def test_a_launched_one_stays_launched_whatever_breaks():
@@ -583,8 +514,7 @@ def test_a_launched_one_that_restarts_is_launched_as_soon_as_it_hears_the_trigge
 
 
 def test_a_restart_forgets_a_launch_that_waits():
-    story = armed()
-    story.vehicle.results[KILL] = None
+    story = unanswered()
     story.ask("DEPLOY")
     story.run(0.1)
     story.restart()

@@ -26,6 +26,12 @@ SWITCHES = [one.name for one in p.PARAMETERS if one.kind is bool]
 NUMBERS = [one.name for one in p.PARAMETERS if one.kind is int]
 STATUS = names.PARACHUTE_STATUS
 
+
+def value(story, name, server=CONTROLLER):
+    """The value of a parameter, as it is read."""
+    return p.value_of(story.get(name, server)["value"])
+
+
 # GetSet
 
 
@@ -43,72 +49,59 @@ def test_it_has_the_twelve_parameters_of_the_document():
     assert p.kind_of(beyond["value"]) == ""
 
 
-@pytest.mark.parametrize("name", [one.name for one in p.PARAMETERS])
-def test_each_is_read_by_name_with_its_kind_range_and_default(name):
-    answer = ready().get(name)
-    documented = p.BY_NAME[name]
-    assert answer["name"].decode() == name
-    assert p.kind_of(answer["value"]) == ("boolean" if documented.kind is bool else "integer")
-    assert p.kind_of(answer["default_value"]) == p.kind_of(answer["value"])
-    if documented.kind is int:
-        assert p.value_of(answer["min_value"]) == documented.minimum
-        assert p.value_of(answer["max_value"]) == documented.maximum
-    else:
-        assert p.value_of(answer["min_value"]) is None
-
-
-@pytest.mark.parametrize("name", SWITCHES)
-def test_a_switch_is_switched_and_read_back(name):
+def test_each_is_read_by_name_with_its_kind_range_and_default():
     story = ready()
-    before = p.value_of(story.get(name)["value"])
-    assert story.set(name, not before) is not before
-    assert p.value_of(story.get(name)["value"]) is not before
+    for name, documented in p.BY_NAME.items():
+        answer = story.get(name)
+        assert answer["name"].decode() == name
+        kind = "boolean" if documented.kind is bool else "integer"
+        assert p.kind_of(answer["value"]) == p.kind_of(answer["default_value"]) == kind, name
+        limits = (p.value_of(answer["min_value"]), p.value_of(answer["max_value"]))
+        if documented.kind is int:
+            assert limits == (documented.minimum, documented.maximum), name
+        else:
+            assert limits[0] is None, name
 
 
-@pytest.mark.parametrize("name", NUMBERS)
-def test_a_number_is_taken_up_to_its_limits_and_not_beyond(name):
-    story, documented = ready(), p.BY_NAME[name]
-    for value in (documented.minimum, documented.maximum):
-        assert story.set(name, value) == value
-    for value in (documented.minimum - 1, documented.maximum + 1, 2**40):
-        assert story.set(name, value) == documented.maximum
+def test_a_switch_is_switched_and_read_back():
+    for name in SWITCHES:
+        story = ready()
+        before = value(story, name)
+        assert story.set(name, not before) is not before
+        assert value(story, name) is not before, name
 
 
-@pytest.mark.parametrize("value", ["text", True, 250.5, math.nan, 1e30, -1e30])
-def test_a_number_of_the_wrong_kind_is_not_taken(value):
-    story = ready()
-    before = p.value_of(story.get(p.NODE_STATUS_INTERVAL)["value"])
-    assert story.set(p.NODE_STATUS_INTERVAL, value) == before
+def test_a_number_is_taken_up_to_its_limits_and_not_beyond():
+    for name in NUMBERS:
+        story, documented = ready(), p.BY_NAME[name]
+        for limit in (documented.minimum, documented.maximum):
+            assert story.set(name, limit) == limit
+        for beyond in (documented.minimum - 1, documented.maximum + 1, 2**40):
+            assert story.set(name, beyond) == documented.maximum, name
 
 
-@pytest.mark.parametrize("value", ["false", 2, -1, 0.5, math.nan])
-def test_a_switch_of_the_wrong_kind_is_not_taken(value):
-    story = ready()
-    assert story.set(p.ENABLE_APS, value) is True
-    assert story.controller.switch(p.ENABLE_APS)
+def test_what_is_of_the_wrong_kind_is_not_taken():
+    for wrong in ("text", True, 250.5, math.nan, 1e30, -1e30):
+        story = ready()
+        before = value(story, p.NODE_STATUS_INTERVAL)
+        assert story.set(p.NODE_STATUS_INTERVAL, wrong) == before, wrong
+    assert story.set(p.NODE_STATUS_INTERVAL, 500.0) == 500, "a whole number as a real"
+    for wrong in ("false", 2, -1, 0.5, math.nan):
+        story = ready()
+        assert story.set(p.ENABLE_APS, wrong) is True, wrong
+        assert story.controller.switch(p.ENABLE_APS)
+    for number, taken in ((0, False), (1, True), (0.0, False)):
+        assert ready().set(p.ENABLE_APS, number) is taken, "a switch as a number"
 
 
-@pytest.mark.parametrize(("value", "taken"), [(0, False), (1, True), (0.0, False)])
-def test_a_switch_as_a_number_is_taken(value, taken):
-    assert ready().set(p.ENABLE_APS, value) is taken
-
-
-def test_a_whole_number_as_a_real_is_taken():
-    assert ready().set(p.NODE_STATUS_INTERVAL, 500.0) == 500
-
-
-@pytest.mark.parametrize("name", ["No Such Parameter", "enable aps", "\N{PARACHUTE}"])
-def test_an_unknown_name_is_answered_with_nothing(name):
-    story = ready()
-    answer = story.get(name)
-    assert answer["name"] == b""
-    assert p.kind_of(answer["value"]) == ""
-    assert story.set(name, True) is None
-
-
-def test_bytes_that_are_no_text_are_no_name():
-    answer = ready().call(errands.GET_SET, {"name": b"\xff\xfe"})
-    assert answer["name"] == b""
+def test_an_unknown_name_is_answered_with_nothing():
+    for name in ("No Such Parameter", "enable aps", "\N{PARACHUTE}"):
+        story = ready()
+        answer = story.get(name)
+        assert answer["name"] == b"", name
+        assert p.kind_of(answer["value"]) == ""
+        assert story.set(name, True) is None
+    assert ready().call(errands.GET_SET, {"name": b"\xff\xfe"})["name"] == b""
 
 
 def test_a_name_counts_more_than_an_index():
@@ -154,73 +147,52 @@ def test_static_node_id_0_asks_for_one_from_the_next_start():
     assert story.heard("uavcan.protocol.dynamic_node_id.Allocation", 0)
 
 
-@pytest.mark.parametrize(
-    ("name", "message", "interval"),
-    [
+def test_an_interval_counts_at_once():
+    for name, message, interval in (
         (p.NODE_STATUS_INTERVAL, NODE_STATUS, 0.2),
         (p.PARACHUTE_STATUS_INTERVAL, STATUS, 0.5),
-    ],
-)
-def test_an_interval_counts_at_once(name, message, interval):
-    story = ready()
-    story.set(name, round(interval * 1000))
-    story.forget()
-    story.run(10.0)
-    assert len(story.heard(message)) == pytest.approx(10.0 / interval, abs=2)
-
-
-def test_a_shorter_interval_does_not_wait_for_the_longer_one_to_end():
+    ):
+        story = ready()
+        story.set(name, round(interval * 1000))
+        story.forget()
+        story.run(10.0)
+        assert len(story.heard(message)) == pytest.approx(10.0 / interval, abs=2), name
+    # A shorter one does not wait for the longer one to end.
     story = ready(values={p.PARACHUTE_STATUS_INTERVAL: 60000})
     story.set(p.PARACHUTE_STATUS_INTERVAL, 100)
     story.forget()
-    story.run(1.0)
-    assert len(story.heard(STATUS)) >= 9
+    assert len(story.run(1.0).heard(STATUS)) >= 9
 
 
-@pytest.mark.parametrize("name", [p.CANBUS_RESISTER, p.LIGHT])
-def test_resistor_and_light_change_nothing_on_the_bus(name):
-    story = ready()
-    before = dict(story.status)
-    story.set(name, not story.controller.switch(name))
-    story.run(1.0)
-    assert story.status == before
+def test_resistor_and_light_change_nothing_on_the_bus():
+    for name in (p.CANBUS_RESISTER, p.LIGHT):
+        story = ready()
+        before = dict(story.status)
+        story.set(name, not story.controller.switch(name))
+        assert story.run(1.0).status == before, name
 
 
 # Memory
 
 
-def test_with_auto_save_a_change_survives_a_restart():
-    story = ready()
-    story.set(p.ENABLE_APS, False)
-    story.restart()
-    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
-
-
-def test_without_auto_save_a_change_is_lost_at_a_restart():
-    story = ready()
-    story.set(p.AUTO_SAVE, False)
-    story.set(p.ENABLE_APS, False)
-    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
-    story.restart()
-    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is True
-    assert p.value_of(story.get(p.AUTO_SAVE)["value"]) is False, "which itself is kept"
-
-
-def test_without_auto_save_the_opcode_keeps_a_change():
-    story = ready()
-    story.set(p.AUTO_SAVE, False)
-    story.set(p.ENABLE_APS, False)
-    assert story.opcode(errands.OPCODE_SAVE)
-    story.restart()
-    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
-
-
-def test_auto_save_switched_on_keeps_what_was_changed_before():
-    story = ready(values={p.AUTO_SAVE: False})
-    story.set(p.ENABLE_APS, False)
-    story.set(p.AUTO_SAVE, True)
-    story.restart()
-    assert p.value_of(story.get(p.ENABLE_APS)["value"]) is False
+def test_a_change_survives_a_restart_with_auto_save_or_once_it_is_saved():
+    for auto_save, opcode, later, kept in (
+        (True, None, None, True),
+        (False, None, None, False),
+        (False, errands.OPCODE_SAVE, None, True),
+        (False, None, True, True),
+    ):
+        story = ready()
+        story.set(p.AUTO_SAVE, auto_save)
+        story.set(p.ENABLE_APS, False)
+        assert value(story, p.ENABLE_APS) is False
+        assert opcode is None or story.opcode(opcode)
+        if later is not None:
+            story.set(p.AUTO_SAVE, later)
+        story.restart()
+        assert value(story, p.ENABLE_APS) is not kept, (auto_save, opcode, later)
+        assert value(story, p.AUTO_SAVE) is (auto_save or later or False), "which itself is kept"
+    assert ready().opcode(7) is False
 
 
 def test_erase_brings_back_what_was_delivered():
@@ -237,32 +209,20 @@ def test_erase_brings_back_what_was_delivered():
     assert p.value_of(story.get(p.STATIC_NODE_ID)["value"]) == CONTROLLER
 
 
-def test_an_opcode_that_is_none_is_not_done():
-    assert ready().opcode(7) is False
-
-
 # Who it is, and how it is
 
 
-@pytest.mark.parametrize(
-    ("server", "name"), [(CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")]
-)
-def test_it_says_who_it_is(server, name):
-    story = ready()
-    answer = story.call(errands.GET_NODE_INFO, {}, server)
-    assert answer["name"] == name
-    assert len(answer["hardware_version"]["unique_id"]) == 16
-    assert any(answer["hardware_version"]["unique_id"])
-    assert answer["status"]["uptime_sec"] == int(story.now - story.began)
-
-
-def test_controller_and_trigger_are_two_units():
-    story = ready()
-    units = [
-        story.call(errands.GET_NODE_INFO, {}, server)["hardware_version"]["unique_id"]
-        for server in (CONTROLLER, TRIGGER)
-    ]
-    assert units[0] != units[1]
+def test_it_says_who_it_is():
+    story, units = ready(), set()
+    for server, name in ((CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")):
+        answer = story.call(errands.GET_NODE_INFO, {}, server)
+        assert answer["name"] == name
+        unit = bytes(answer["hardware_version"]["unique_id"])
+        assert len(unit) == 16
+        assert any(unit)
+        units.add(unit)
+        assert answer["status"]["uptime_sec"] == int(story.now - story.began)
+    assert len(units) == 2
 
 
 def test_node_status_comes_at_its_interval_with_uptime_and_health():
@@ -291,22 +251,18 @@ def test_transport_stats_count_transfers_and_errors():
 # Restarts
 
 
-@pytest.mark.parametrize("server", [CONTROLLER, TRIGGER])
-def test_a_restart_is_answered_and_then_done(server):
-    story = ready()
-    story.restart(server)
-    story.run(0.5)
-    answer = story.call(errands.GET_NODE_INFO, {}, server)
-    assert answer["status"]["uptime_sec"] == 0
-    assert answer["name"] in (b"upf.controller", b"upf.trigger")
-
-
-@pytest.mark.parametrize("magic", [0, errands.RESTART_MAGIC - 1, 2**40 - 1])
-def test_a_restart_with_another_magic_number_is_refused(magic):
-    story = ready()
-    assert story.call(errands.RESTART_NODE, {"magic_number": magic}) == {"ok": False}
-    story.run(0.5)
-    assert story.call(errands.GET_NODE_INFO, {})["status"]["uptime_sec"] == 1
+def test_a_restart_is_answered_and_then_done_unless_its_magic_number_is_another():
+    for server, name in ((CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")):
+        story = ready()
+        story.restart(server)
+        story.run(0.5)
+        answer = story.call(errands.GET_NODE_INFO, {}, server)
+        assert (answer["status"]["uptime_sec"], answer["name"]) == (0, name)
+    for magic in (0, errands.RESTART_MAGIC - 1, 2**40 - 1):
+        story = ready()
+        assert story.call(errands.RESTART_NODE, {"magic_number": magic}) == {"ok": False}
+        story.run(0.5)
+        assert story.call(errands.GET_NODE_INFO, {})["status"]["uptime_sec"] == 1, magic
 
 
 def test_services_that_it_does_not_have_are_not_answered():
