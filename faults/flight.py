@@ -13,7 +13,7 @@ from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
 from faults.network import Network
 
-_ACTED = re.compile(r"decision (\d+)\.(\d+) (KILL|DEPLOY) \(")
+_ACTED = re.compile(r"decision (\d+) of epoch (\d+), (KILL|DEPLOY) \(")
 
 
 class Flight:
@@ -62,7 +62,10 @@ class Flight:
 
     def acted(self) -> list[tuple[int, int, str]]:
         """The kills and deploys that the device node acted on, in their order."""
-        text = self.processes.log("mavlink").read_text(errors="replace")
-        lines = (line for line in text.splitlines() if "not acted on" not in line)
-        found = (_ACTED.search(line) for line in lines if "[WARN]" in line)
-        return [(int(one[1]), int(one[2]), one[3]) for one in found if one]
+        return acted_on(self.processes.log("mavlink").read_text(errors="replace"))
+
+
+def acted_on(log: str) -> list[tuple[int, int, str]]:
+    """The kills and deploys of a device node's log: epoch, number, which of both."""
+    found = (_ACTED.search(line) for line in log.splitlines() if "[WARN]" in line)
+    return [(int(one[2]), int(one[1]), one[3]) for one in found if one]

@@ -249,7 +249,7 @@ def test_an_exception_in_a_flight_is_counted_and_ends_nothing(monkeypatch) -> No
     def broken(*_: object) -> None:
         raise ValueError("the rig fell apart")
 
-    monkeypatch.setattr(campaign, "Flight", broken)
+    monkeypatch.setattr(campaign, "fly", broken)
     tally = campaign.run(FOLDER, range(2), 1, lambda _: None, campaign.Tally())
     assert tally.counts[Count.BROKEN] == 2
     assert tally.wrong[0].why == "ValueError: the rig fell apart"
