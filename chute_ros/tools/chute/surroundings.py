@@ -1,0 +1,45 @@
+"""The environment variables that decide whom a process receives, as the user set them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
+
+_OLD_RANGE = "ROS_LOCALHOST_ONLY"
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Before set_up_middleware, which changes them. others: what else leads to other hosts."""
+
+    domain: str
+    discovery_range: str
+    middleware: str
+    distribution: str
+    others: tuple[str, ...]
+
+    def text(self) -> str:
+        """In words."""
+        parts = [
+            f"ROS domain {self.domain}",
+            f"discovery range {self.discovery_range}",
+            self.middleware,
+            *self.others,
+        ]
+        return ", ".join(parts)
+
+
+def surroundings(environment: Mapping[str, str]) -> Surroundings:
+    """Of this environment."""
+    given = environment.get(RANGE) or "SUBNET (the default)"
+    if environment.get(_OLD_RANGE) == "1":
+        given = f"LOCALHOST ({_OLD_RANGE})"
+    return Surroundings(
+        environment.get("ROS_DOMAIN_ID") or "0",
+        given,
+        environment.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp",
+        environment.get("ROS_DISTRO") or "",
+        tuple(f"{name}={environment[name]}" for name in LEADS_ELSEWHERE if environment.get(name)),
+    )
