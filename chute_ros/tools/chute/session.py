@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import set_up_middleware
-from chute_ros.tools.chute.errors import CommandError
+from chute_ros.tools.chute.errors import CommandError, MistakeError
 from chute_ros.tools.chute.surroundings import Surroundings, surroundings
 
 #: The longest wait for a message before the time is looked at again, s.
@@ -105,6 +105,8 @@ class Session:
 def opened(namespace: str) -> Iterator[Session]:
     """A session in ROS. CommandError where ROS does not let it start."""
     around = surroundings(os.environ)
+    if mistake := around.mistake():
+        raise MistakeError(mistake)
     set_up_middleware()
     session = None
     try:

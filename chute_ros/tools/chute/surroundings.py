@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
 
+#: Fast DDS has no ports for a higher domain.
+_HIGHEST_DOMAIN = 232
 _OLD_RANGE = "ROS_LOCALHOST_ONLY"
 
 
@@ -19,6 +21,13 @@ class Surroundings:
     middleware: str
     distribution: str
     others: tuple[str, ...]
+
+    def mistake(self) -> str:
+        """Why no process can start in it; empty: one can."""
+        domain = self.domain
+        if domain.isascii() and domain.isdigit() and int(domain[:9]) <= _HIGHEST_DOMAIN:
+            return ""
+        return f"ROS_DOMAIN_ID is {domain[:40]!r}: need a whole number from 0 to {_HIGHEST_DOMAIN}"
 
     def text(self) -> str:
         """In words."""

@@ -197,6 +197,10 @@ def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
     def age(of: float) -> float:
         return of + (now - heard.received) if of >= 0.0 else math.nan
 
+    def number(value: float, of: float) -> float:
+        # What was not filled in is 0, which is a height.
+        return value if of >= 0.0 else math.nan
+
     return VehicleView(
         source=message.source,
         link_state=name_of(LinkState, message.link_state),
@@ -204,12 +208,12 @@ def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
         armed_age=age(message.armed_age),
         landed_state=name_of(LandedState, message.landed_state),
         landed_state_age=age(message.landed_state_age),
-        height=message.height,
+        height=number(message.height, message.height_age),
         height_age=age(message.height_age),
-        vertical_speed=message.vertical_speed,
+        vertical_speed=number(message.vertical_speed, message.vertical_speed_age),
         vertical_speed_age=age(message.vertical_speed_age),
-        battery_voltage=message.battery_voltage,
-        battery_remaining=message.battery_remaining,
+        battery_voltage=number(message.battery_voltage, message.battery_age),
+        battery_remaining=number(message.battery_remaining, message.battery_age),
         battery_age=age(message.battery_age),
         faults=tuple(message.faults),
     )

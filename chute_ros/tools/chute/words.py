@@ -41,4 +41,5 @@ def span_text(seconds: float) -> str:
 
 def value_text(value: float, unit: str, digits: int = 1) -> str:
     """A measurement with its unit; NaN is not known."""
-    return "not known" if math.isnan(value) else f"{value + 0.0:.{digits}f} {unit}"
+    # Without the sign of what rounds to zero.
+    return "not known" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f} {unit}"
