@@ -555,3 +555,49 @@ def test_without_chute_msgs_it_says_what_to_build(tmp_path):
     )
     assert done.returncode == 1
     assert done.stderr.startswith("chute: chute_msgs cannot be imported: build both packages")
+
+
+# doctor
+
+
+def test_the_doctor_finds_nothing_wrong_with_a_sound_vehicle(ready):
+    code, out, err = run(ready.bench, "doctor")
+    lines = out.splitlines()
+    assert (code, err, [line for line in lines if line.startswith("WRONG")]) == (0, "", []), out
+    assert f"OK     supervisor of {ready.bench.namespace}: safety_supervisor" in lines
+    assert any(line.startswith("OK     versions: chute_ros ") for line in lines)
+
+
+def test_the_doctor_finds_a_port_that_is_not_there(ready):
+    ready.link.declare_parameter("connection", "serial:/dev/nothing:57600")
+    code, out, _ = run(ready.bench, "doctor", "--json")
+    told = json.loads(out)
+    assert (code, told["well"]) == (1, False)
+    wrong = [one["what"] for one in told["findings"] if one["level"] == "WRONG"]
+    name = "connection serial:/dev/nothing:57600 of mavlink_parachute"
+    assert len(wrong) == 1
+    assert wrong[0].startswith(f"{name}: /dev/nothing: no such port")
+
+
+def test_the_doctor_where_nothing_is_received(bench):  # noqa: F811
+    code, out, _ = run(bench, "doctor", "--timeout", "1")
+    first = out.splitlines()[0]
+    assert code == 1
+    assert first.startswith(f"WRONG  no node is received in {bench.namespace} within 1 s (ROS ")
+    assert " -> start the vehicle with the same ROS_DOMAIN_ID" in first
+
+
+def test_the_doctor_without_chute_msgs_and_in_a_domain_that_cannot_be(tmp_path, monkeypatch):
+    (tmp_path / "chute_msgs.py").write_text("raise ImportError('gone', name='chute_msgs')\n")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['chute', 'doctor']\n"
+    code += "from chute_ros.tools.chute.__main__ import main; main()"
+    for domain, told in (
+        ("1", "WRONG  cannot be imported: gone -> "),
+        ("one", "WRONG  ROS_DOMAIN_ID is 'one'"),
+    ):
+        monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+        )
+        assert (done.returncode, done.stderr) == (1, "")
+        assert done.stdout.startswith(told)
