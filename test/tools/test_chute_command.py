@@ -546,6 +546,16 @@ def test_a_domain_that_cannot_be_is_a_mistake(monkeypatch, domain):
     assert done.stderr == told
 
 
+def test_a_middleware_that_is_not_installed_is_a_mistake(monkeypatch):
+    """ROS itself would end the process."""
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nothing")
+    done = subprocess.run(
+        [*COMMAND, "status"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("chute: RMW_IMPLEMENTATION is 'rmw_nothing': need one ")
+
+
 def test_without_chute_msgs_it_says_what_to_build(tmp_path):
     (tmp_path / "chute_msgs.py").write_text("raise ImportError('gone', name='chute_msgs')\n")
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['chute', 'status']\n"

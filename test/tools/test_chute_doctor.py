@@ -27,7 +27,7 @@ from chute_ros.tools.chute.finding import (
 )
 from chute_ros.tools.chute.surroundings import surroundings
 
-
+INSTALLED = ("rmw_fastrtps_cpp", "rmw_x")
 ONLY_HERE = "ROS domain 0, discovery range LOCALHOST (ROS_LOCALHOST_ONLY)"
 
 
@@ -62,7 +62,7 @@ def test_the_worst_comes_first_each_on_one_line_with_its_remedy():
     ],
 )
 def test_the_environment_is_told_as_the_user_set_it(environment, text):
-    around = surroundings(environment)
+    around = surroundings(environment, INSTALLED)
     assert around.text() == text
     assert computer.environment_findings(around) == [Finding(OK, f"environment: {text}")]
 
@@ -71,12 +71,13 @@ def test_the_environment_is_told_as_the_user_set_it(environment, text):
     ("environment", "levels", "told"),
     [
         ({"ROS_DOMAIN_ID": "300"}, [WRONG], "ROS_DOMAIN_ID is '300'"),
+        ({"RMW_IMPLEMENTATION": "rmw_y"}, [WRONG], "installed: rmw_fastrtps_cpp, rmw_x"),
         ({"ROS_DOMAIN_ID": "150"}, [OK, NOTE], "may be taken by other programs"),
         ({"RMW_IMPLEMENTATION": "rmw_x"}, [OK, NOTE], "RMW_IMPLEMENTATION is rmw_x"),
     ],
 )
 def test_what_is_odd_in_the_environment(environment, levels, told):
-    found = computer.environment_findings(surroundings(environment))
+    found = computer.environment_findings(surroundings(environment, INSTALLED))
     assert [one.level for one in found] == levels
     assert told in found[-1].what
     assert found[-1].remedy
@@ -107,7 +108,7 @@ def test_a_disk_without_room_for_the_black_box(tmp_path, monkeypatch):
 
 
 def test_the_versions_of_a_report_of_a_fault():
-    found = computer.version_finding(surroundings({"ROS_DISTRO": "jazzy"}), (2, 14, 5))
+    found = computer.version_finding(surroundings({"ROS_DISTRO": "jazzy"}, INSTALLED), (2, 14, 5))
     assert found.what.startswith("versions: chute_ros ")
     assert "ROS jazzy, Python 3." in found.what
     assert found.what.endswith(", Fast DDS 2.14.5")

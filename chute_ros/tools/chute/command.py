@@ -11,11 +11,14 @@ from chute_ros.plain_text import plain
 from chute_ros.tools.chute.errors import CommandError, MistakeError
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.options import MISTAKE, NOT_WELL, Chosen, parse
+from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 
 #: Command -> its module here.
 _PLACES = {
     **dict.fromkeys(("arm", "disarm", "deploy", "kill", "reset", "mode"), "orders"),
 }
+#: It tells that mistake among its findings.
+_DOCTOR = "doctor"
 _NOT_BUILT = (
     "chute_msgs cannot be imported: build both packages (`make build`, or `colcon build`) and "
     "source the result"
@@ -40,6 +43,10 @@ def main() -> None:
 
 def _run(chosen: Chosen) -> int:
     try:
+        around = surroundings(os.environ, installed_middlewares())
+        if chosen.command != _DOCTOR and (mistake := around.mistake()):
+            # ROS would end the process as soon as it is imported.
+            raise MistakeError(mistake)
         # Here: a mistake in the command line is told without ROS, and doctor runs without it.
         place = _PLACES.get(chosen.command, chosen.command)
         module = importlib.import_module(f"chute_ros.tools.chute.{place}")

@@ -18,12 +18,12 @@ from chute_ros.tools.chute.errors import CommandError
 from chute_ros.tools.chute.finding import WRONG, Finding, finding_lines, worst_first
 from chute_ros.tools.chute.json_text import json_text
 from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
-from chute_ros.tools.chute.surroundings import surroundings
+from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 
 
 def main(chosen: Chosen) -> int:
     """Exit code 0: nothing is wrong; 1: something is."""
-    around = surroundings(os.environ)
+    around = surroundings(os.environ, installed_middlewares())
     found = [*environment_findings(around), shared_memory_finding(), *port_findings()]
     folder = None
     if not around.mistake():

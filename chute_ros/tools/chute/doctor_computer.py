@@ -21,7 +21,8 @@ LEAST_SHARED, LEAST_DISK = 32_000_000, 1_000_000_000
 def environment_findings(around: Surroundings) -> list[Finding]:
     """The variables that decide whom a process receives."""
     if mistake := around.mistake():
-        return [Finding(WRONG, mistake, "export ROS_DOMAIN_ID=0, the same for all of one vehicle")]
+        remedy = "export what is allowed, the same for all nodes of a vehicle, or unset it"
+        return [Finding(WRONG, mistake, remedy)]
     found = [Finding(OK, f"environment: {around.text()}")]
     if int(around.domain) > _HIGHEST_QUIET_DOMAIN:
         text = f"ROS_DOMAIN_ID is {around.domain}: its ports may be taken by other programs"

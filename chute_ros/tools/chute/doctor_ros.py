@@ -30,9 +30,8 @@ def vehicle_findings(namespace: str, seconds: float) -> tuple[list[Finding], str
     with opened(namespace) as session:
         listening = Listening(session)
         if not session.until(lambda: listening.picture.heartbeats, seconds):
-            nothing = session.not_heard("no node is received", seconds)
-            text = str(nothing).partition("; `chute doctor`")[0]
-            return [Finding(WRONG, text, _START)], ""
+            nothing = session.looked_for("no node is received", seconds)
+            return [Finding(WRONG, nothing, _START)], ""
         tasks = gather(session, seconds)
         found = supervisor_findings(listening.picture, namespace)
         graph = session.node.get_node_names_and_namespaces()

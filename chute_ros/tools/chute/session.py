@@ -17,8 +17,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import set_up_middleware
-from chute_ros.tools.chute.errors import CommandError, MistakeError
-from chute_ros.tools.chute.surroundings import Surroundings, surroundings
+from chute_ros.tools.chute.errors import CommandError
+from chute_ros.tools.chute.surroundings import Surroundings, installed_middlewares, surroundings
 
 #: The longest wait for a message before the time is looked at again, s.
 _STEP = 0.05
@@ -51,14 +51,9 @@ class Session:
         return True
 
     def not_heard(self, what: str, seconds: float, hint: str = "") -> CommandError:
-        """The error for what was not received within seconds: where it was looked for, and what
-        there is instead. hint: what else can be done."""
+        """The error for what was not received within seconds. hint: what else can be done."""
         vehicles = self.vehicles()
-        there = self.links()
-        parts = [f"{what} in {self.namespace} within {seconds:g} s ({self.around.text()})"]
-        if there:
-            parts.append(f"nodes there: {', '.join(there)}")
-        parts.append(f"vehicles found: {', '.join(vehicles) or 'none'}")
+        parts = [self.looked_for(what, seconds)]
         if hint:
             parts.append(hint)
         elif vehicles and self.namespace not in vehicles:
@@ -68,10 +63,18 @@ class Session:
         details = {
             "namespace": self.namespace,
             "surroundings": self.around.text(),
-            "nodes": there,
+            "nodes": self.links(),
             "vehicles": vehicles,
         }
         return CommandError("; ".join(parts), details)
+
+    def looked_for(self, what: str, seconds: float) -> str:
+        """Where what was not received was looked for, and what there is instead."""
+        parts = [f"{what} in {self.namespace} within {seconds:g} s ({self.around.text()})"]
+        if there := self.links():
+            parts.append(f"nodes there: {', '.join(there)}")
+        parts.append(f"vehicles found: {', '.join(self.vehicles()) or 'none'}")
+        return "; ".join(parts)
 
     def links(self) -> list[str]:
         """The nodes of this vehicle that send heartbeats, supervisors as well."""
@@ -104,9 +107,7 @@ class Session:
 @contextmanager
 def opened(namespace: str) -> Iterator[Session]:
     """A session in ROS. CommandError where ROS does not let it start."""
-    around = surroundings(os.environ)
-    if mistake := around.mistake():
-        raise MistakeError(mistake)
+    around = surroundings(os.environ, installed_middlewares())
     set_up_middleware()
     session = None
     try:
@@ -115,6 +116,8 @@ def opened(namespace: str) -> Iterator[Session]:
         session = Session(namespace, around)
     except RuntimeError as error:
         text = " ".join(str(error).partition(", at /")[0].split())
+        if os.environ.get("ROS_SECURITY_ENABLE") == "true":
+            text += "; ROS_SECURITY_ENABLE is true, which needs what docs/guide/security.md lists"
         raise CommandError(f"ROS does not start: {text} ({around.text()})") from None
     finally:
         if session is None:
