@@ -332,10 +332,10 @@ def test_a_decision_is_shown_once_with_its_reasons_and_its_newest_outcome(heard)
     heard.hears(report(ActionReport.SENT), 0.1).hears(report(ActionReport.CONFIRMED), 0.2)
     assert [line.text for line in decision_lines(heard.view(0.2).decisions)] == [
         "decisions received here",
-        "  DEPLOY by rule 'free fall', <1 s ago",
+        "  DEPLOY by rule 'free fall', 0 s ago",
         "      acceleration 0.65 (below 2)",
         "      -> mavlink_parachute CONFIRMED: after 0.1 s",
-        "  KILL in SHADOW, not sent by rule 'by hand', <1 s ago",
+        "  KILL in SHADOW, not sent by rule 'by hand', 0 s ago",
         "      acceleration 0.65 (below 2)",
     ]
 

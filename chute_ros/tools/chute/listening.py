@@ -20,6 +20,7 @@ from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.tools.chute.hearing import Picture
 from chute_ros.tools.chute.session import Session
 from chute_ros.tools.chute.view import VehiclePicture, view
+from chute_ros.tools.chute.words import is_old
 
 #: A supervisor publishes its state at least each second, a parachute its status about as often:
 #: so long after the first word everything that lives was received once, s.
@@ -48,20 +49,28 @@ class Listening:
         """What is shown now."""
         return view(self.picture, self._session.namespace, time.monotonic())
 
-    def settle(self) -> VehiclePicture | None:
-        """After the first word: wait for the rest, for SETTLE at most."""
+    def settle(self, seconds: float) -> VehiclePicture | None:
+        """After the first word: wait for the rest. A link that lives is found within seconds, and
+        from then on within SETTLE what its node has to say."""
+        self._session.until(self._found, seconds)
         self._session.until(self._complete, SETTLE)
         return self.view()
 
-    def _complete(self) -> bool:
-        """The state is no old one, and every link of the vehicle that has a parachute was heard
-        of; a link without one is waited for in vain."""
-        now, picture = time.monotonic(), self.picture
-        heard = picture.state(now)
-        if heard is None or picture.vehicle is None or picture.state_age(heard, now) > 1.0:
+    def _found(self) -> bool:
+        """Each link that the supervisor receives is received here as well."""
+        picture = self.view()
+        if picture is None:
             return False
-        links = set(heard.message.links)
-        return links <= {link for link, _ in picture.parachutes} and links <= {*picture.heartbeats}
+        living = {one.name for one in picture.links if not is_old(one.age)}
+        return living <= self.picture.heartbeats.keys()
+
+    def _complete(self) -> bool:
+        """The state is no old one, and the vehicle and a parachute of each link were received; of
+        a link without a parachute that is waited for in vain."""
+        picture = self.view()
+        if picture is None or is_old(picture.age) or picture.vehicle is None:
+            return False
+        return {one.name for one in picture.links} <= {one.link for one in picture.parachutes}
 
 
 def _plainly(hear: Callable[[Any, float, float], None]) -> Callable[[Any], None]:

@@ -22,6 +22,9 @@ from chute_ros.tools.chute.order import (
 from chute_ros.tools.chute.session import Session, opened
 from chute_ros.tools.chute.status_text import order_lines
 
+#: A person who is asked does not wait longer for the state, nor for a node of it, s.
+_SHOWN_WITHIN = 2.0
+
 
 def main(chosen: Chosen) -> int:
     """Exit code 0: done, and the answer says so; 1: anything else; 2: nobody could be asked."""
@@ -53,8 +56,8 @@ def main(chosen: Chosen) -> int:
 
 def _ask(session: Session, listening: Listening, order: Order) -> None:
     """A vehicle that says nothing can be ordered all the same."""
-    session.until(listening.view, 1.0)
-    picture = listening.settle() if listening.view() else None
+    session.until(listening.view, _SHOWN_WITHIN)
+    picture = listening.settle(_SHOWN_WITHIN) if listening.view() else None
     ask(order.name, order.word, order_lines(session.namespace, picture, order.does))
 
 

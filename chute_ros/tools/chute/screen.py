@@ -30,6 +30,8 @@ _GREY = "#808080"
 _ANEW = 10.0
 #: Rows that one line may take.
 _MOST_ROWS = 3
+#: Columns by which the second row of a line, and those after it, are moved in.
+_HANGING = 8
 _BANNER_ROWS = 3
 _OPEN, _CLOSE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 
@@ -97,8 +99,7 @@ def _rows(page: Page, width: int, height: int) -> list[str]:
     rows = [Text(" " * width, style), _banner(page.banner.text, width, style)]
     rows.append(rows[0])
     for line in page.lines:
-        text = Text(line.text, _style(line, page.grey))
-        rows += text.wrap(console, width)[:_MOST_ROWS]
+        rows += _wrapped(console, Text(line.text, _style(line, page.grey)), width)
     most = max(1, height - 1)
     if len(rows) > most:
         left_out = len(rows) - most + 1
@@ -106,6 +107,16 @@ def _rows(page: Page, width: int, height: int) -> list[str]:
     rows += [Text("")] * (most - len(rows))
     rows.append(Text(f"{KEYS}", _GREY))
     return [_ansi(console, row) for row in rows[:height]]
+
+
+def _wrapped(console: Console, text: Text, width: int) -> list[Text]:
+    """As it is if it fits, else in a few rows that show that they belong together."""
+    if text.cell_len <= width or width <= 2 * _HANGING:
+        return list(text.wrap(console, width))[:_MOST_ROWS]
+    rows = list(text.wrap(console, width - _HANGING))[:_MOST_ROWS]
+    for row in rows[1:]:
+        row.pad_left(_HANGING)
+    return rows
 
 
 def _banner(words: str, width: int, style: str) -> Text:

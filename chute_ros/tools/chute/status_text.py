@@ -66,7 +66,7 @@ def decision_lines(decisions: Sequence[DecisionView]) -> list[Line]:
     lines = [Line("decisions received here", "head")]
     for one in reversed(decisions):
         shadow = " in SHADOW, not sent" if one.shadow else ""
-        text = f"  {one.action}{shadow} by rule '{one.rule}', {age_text(one.age)}"
+        text = f"  {one.action}{shadow} by rule '{one.rule}', {span_text(one.age)} ago"
         lines.append(Line(text, _OF_ACTION.get(one.action, "plain")))
         lines += [Line(f"      {reason}") for reason in one.reasons]
         lines += [Line(f"      -> {outcome}") for outcome in one.outcomes]
