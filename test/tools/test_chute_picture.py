@@ -156,7 +156,7 @@ def test_a_vehicle_in_flight(heard):
         "  free fall: DEPLOY counting, 0.2 of 0.5 s",
         "      [x] acceleration 0.65 (below 2)",
         "      [ ] tilt_deg 13.34 (above 45)",
-        "  at 0 s: excess tilt",
+        "  not counting: excess tilt",
         "newest decision: FLIGHT_BLOCK_RELEASE by rule 'links' (number 3)",
     ]
     assert heard.view().well

@@ -61,7 +61,11 @@ def answer_text(order: Order, answer: Answer) -> str:
 
 def not_answered(order: Order, how: str) -> str:
     """The text for a call that nobody answered. how: the wait for the answer ended."""
-    again = " Giving the order again is safe: a parachute is released once." if order.word else ""
+    # Forced, it would release the next parachute of the ladder.
+    safe = order.service.startswith(f"{SUPERVISOR}/") and not order.fields.get("force")
+    again = ""
+    if order.word and safe:
+        again = " Giving the order again is safe: a parachute is released once."
     return (
         f"{order.name}: {order.service} did not answer {how}: it is NOT known whether it was "
         f"carried out. `chute status` shows what the vehicle reports.{again}"

@@ -170,7 +170,7 @@ def _rules(rules: Sequence[RuleView]) -> Iterator[Line]:
         if one.denied:
             yield Line(f"      not acted on: {one.denied}", "warn")
     if waiting := [one.name for one in rules if one.active and not one.counts]:
-        yield Line(f"  at 0 s: {', '.join(waiting)}")
+        yield Line(f"  not counting: {', '.join(waiting)}")
 
 
 def _newest(picture: VehiclePicture) -> Line:
