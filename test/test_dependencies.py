@@ -13,6 +13,7 @@ NAMES = {
     "serial": "python3-serial",
     "yaml": "python3-yaml",
     "orjson": "python3-orjson",
+    "rich": "python3-rich",
     "can": "python-can",
 }
 #: Imported only where a parameter asks for it, with what to install (ros/vehicle_sources.py).
@@ -55,7 +56,12 @@ def test_what_is_named_is_imported() -> None:
     used = {NAMES.get(one, one) for one in imported()}
     assert sorted(in_package_xml() - used) == []
     # Those with a rosdep key are named twice: for machines without ROS as well.
-    twice = {"pyserial": "python3-serial", "PyYAML": "python3-yaml", "orjson": "python3-orjson"}
+    twice = {
+        "pyserial": "python3-serial",
+        "PyYAML": "python3-yaml",
+        "orjson": "python3-orjson",
+        "rich": "python3-rich",
+    }
     told = {twice.get(one, one) for one in in_requirements()} - NOT_IMPORTED
     assert sorted(told - used) == []
 

@@ -41,9 +41,9 @@ class SerialWire:
             self._port = serial.Serial(path, self._baud, timeout=0, exclusive=True)
         except termios.error as error:
             # How a port that vanishes while it is set up shows itself; it is no OSError.
-            raise _explain(OSError(*error.args), path) from None
+            raise explain(OSError(*error.args), path) from None
         except OSError as error:  # SerialException is one
-            raise _explain(error, path) from None
+            raise explain(error, path) from None
         os.set_blocking(self._port.fileno(), False)
         self._path = path
         self._stream = (path, next(_stream_numbers))
@@ -108,7 +108,7 @@ def find_usb_port(vendor: int, product: int, serial_number: str) -> str:
     raise FileNotFoundError(f"no such USB device is plugged in{_ports()}")
 
 
-def _explain(error: OSError, path: str) -> OSError:
+def explain(error: OSError, path: str) -> OSError:
     """The same failure with what a person can do about it."""
     if error.errno == errno.ENOENT:
         return FileNotFoundError(f"no such port, is it plugged in?{_ports()}")

@@ -1,0 +1,42 @@
+"""Sends one order to its service, and waits for the answer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from chute_msgs.srv import Arm, Deploy, Kill, SetMode
+from std_srvs.srv import Trigger
+
+from chute_ros.ros.plain_border import with_plain_texts
+from chute_ros.tools.chute.errors import CommandError
+from chute_ros.tools.chute.order import Answer, Order, not_answered
+from chute_ros.tools.chute.session import Session
+
+_KINDS: dict[str, Any] = {
+    "Arm": Arm, "Deploy": Deploy, "Kill": Kill, "SetMode": SetMode, "Trigger": Trigger,
+}  # fmt: skip
+
+
+class Call:
+    """One order. Made first, so that its service is found while the vehicle is listened to."""
+
+    def __init__(self, session: Session, order: Order) -> None:
+        self._session, self._order = session, order
+        self._kind = _KINDS[order.kind]
+        self._client = session.node.create_client(self._kind, order.service)
+
+    def found(self) -> bool:
+        """Its service is there."""
+        return bool(self._client.service_is_ready())
+
+    def send(self, seconds: float) -> Answer:
+        """The answer; CommandError if the service is gone, or does not answer within seconds."""
+        if not self.found():
+            text = f"{self._order.name}: {self._order.service} is gone: nothing was sent"
+            raise CommandError(text, {"sent": False})
+        future = self._client.call_async(self._kind.Request(**self._order.fields))
+        if not self._session.until(future.done, seconds):
+            text = not_answered(self._order, f"within {seconds:g} s")
+            raise CommandError(text, {"sent": True, "answered": False})
+        message = with_plain_texts(future.result())
+        return Answer(message.success, message.message, getattr(message, "accepted", None))

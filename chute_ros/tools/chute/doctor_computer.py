@@ -1,0 +1,78 @@
+"""What can be wrong with this computer and its environment."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from chute_ros.ros.ros_home import ros_home
+from chute_ros.tools.chute.finding import NOTE, OK, WRONG, Finding
+from chute_ros.tools.chute.surroundings import Surroundings
+
+_FAST_DDS = "rmw_fastrtps_cpp"
+#: Above, the ports of ROS meet those that Linux gives to other programs.
+_HIGHEST_QUIET_DOMAIN = 101
+#: The shared memory of ROS nodes of a vehicle, and a black box for some hours, bytes.
+LEAST_SHARED, LEAST_DISK = 32_000_000, 1_000_000_000
+
+
+def environment_findings(around: Surroundings) -> list[Finding]:
+    """The variables that decide whom a process receives."""
+    if mistake := around.mistake():
+        remedy = "export what is allowed, the same for all nodes of a vehicle, or unset it"
+        return [Finding(WRONG, mistake, remedy)]
+    found = [Finding(OK, f"environment: {around.text()}")]
+    if int(around.domain) > _HIGHEST_QUIET_DOMAIN:
+        text = f"ROS_DOMAIN_ID is {around.domain}: its ports may be taken by other programs"
+        found.append(Finding(NOTE, text, f"use 0 to {_HIGHEST_QUIET_DOMAIN}"))
+    if around.middleware != _FAST_DDS:
+        text = f"RMW_IMPLEMENTATION is {around.middleware}: it receives no nodes of another one"
+        remedy = f"use the same for all; the settings of chute_ros are for {_FAST_DDS}"
+        found.append(Finding(NOTE, text, remedy))
+    return found
+
+
+def version_finding(around: Surroundings, fast_dds: tuple[int, int, int] | None) -> Finding:
+    """For a report of a fault. fast_dds: that this process has loaded."""
+    try:
+        own = version("chute_ros")
+    except PackageNotFoundError:
+        own = "not installed"
+    parts = [
+        f"chute_ros {own}",
+        f"ROS {around.distribution or 'of no known distribution'}",
+        f"Python {platform.python_version()}",
+    ]
+    if fast_dds is not None:
+        parts.append(f"Fast DDS {'.'.join(map(str, fast_dds))}")
+    return Finding(OK, f"versions: {', '.join(parts)}")
+
+
+def shared_memory_finding(folder: Path = Path("/dev/shm")) -> Finding:
+    """Where Fast DDS keeps what nodes on one computer share."""
+    remedy = "mount -t tmpfs tmpfs /dev/shm; a container needs --ipc=host or --shm-size=256m"
+    return _room(folder, "shared memory", LEAST_SHARED, remedy)
+
+
+def disk_finding(folder: Path | None) -> Finding:
+    """folder: of the black box, None: where it is by default."""
+    folder = folder or ros_home() / "black_box"
+    # One that is missing is made where the one above it may be written.
+    folder = next(one for one in (folder, *folder.parents) if one.exists())
+    remedy = "remove old files, or set black_box_folder to a folder on another disk"
+    return _room(folder, "black box", LEAST_DISK, remedy)
+
+
+def _room(folder: Path, name: str, least: int, remedy: str) -> Finding:
+    if not folder.is_dir():
+        return Finding(WRONG, f"{name}: {folder} is no folder", remedy)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return Finding(WRONG, f"{name}: {folder} may not be written by this user", remedy)
+    about = os.statvfs(folder)
+    free = about.f_bavail * about.f_frsize
+    text = f"{name}: {free / 1e9:.1f} GB free in {folder}"
+    if free < least:
+        return Finding(WRONG, f"{text}, need {least / 1e9:g} GB", remedy)
+    return Finding(OK, text)

@@ -1,0 +1,88 @@
+"""What can be wrong with a vehicle, by what was received of it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from chute_ros.tools.chute.diagnostic_tasks import Task
+from chute_ros.tools.chute.finding import NOTE, OK, WRONG, Finding
+from chute_ros.tools.chute.hearing import Picture
+
+#: Half of max_decision_age: what a decision may be late by its clock alone, s.
+CLOCKS_APART = 0.25
+#: With this computer, which decides nothing, s.
+HERE_APART = 1.0
+MOST_TASKS_SHOWN = 10
+
+
+def supervisor_findings(picture: Picture, namespace: str) -> list[Finding]:
+    """There is one that leads, and no more."""
+    beats = [one.message for one in picture.heartbeats.values() if one.message.supervisor]
+    leaders = sorted(one.link for one in beats if one.device_healthy)
+    others = sorted(one.link for one in beats if not one.device_healthy)
+    standby = f", standby: {', '.join(others)}" if others else ""
+    if len(leaders) == 1:
+        return [Finding(OK, f"supervisor of {namespace}: {leaders[0]}{standby}")]
+    if leaders:
+        text = f"{len(leaders)} supervisors lead in {namespace}: {', '.join(leaders)}"
+        remedy = "end all but one, or give each a rank of its own and hot_standby: true"
+        return [Finding(WRONG, text, remedy)]
+    remedy = "start safety_supervisor in this namespace, or name another: --namespace"
+    return [Finding(WRONG, f"no supervisor leads in {namespace}{standby}", remedy)]
+
+
+def namesake_findings(nodes: Iterable[tuple[str, str]], namespace: str) -> list[Finding]:
+    """Two nodes of one name. nodes: (name, namespace) of each in the graph."""
+    counted = Counter(name for name, where in nodes if where == namespace)
+    return [
+        Finding(
+            WRONG,
+            f"{count} nodes are called {namespace.rstrip('/')}/{name}",
+            "end all but one: they answer the same calls and publish the same topics",
+        )
+        for name, count in sorted(counted.items())
+        if count > 1
+    ]
+
+
+def clock_findings(picture: Picture) -> list[Finding]:
+    """The wall clocks of the computers of the vehicle, and of this one."""
+    ahead = {
+        name: -difference
+        for name in sorted(picture.heartbeats)
+        if not math.isnan(difference := picture.clock_difference(name))
+    }
+    if not ahead:
+        return []
+    least, most = min(ahead, key=lambda n: ahead[n]), max(ahead, key=lambda n: ahead[n])
+    remedy = "set the clocks of all computers by one NTP server (chrony)"
+    if (apart := ahead[most] - ahead[least]) > CLOCKS_APART:
+        text = f"clocks: that of {most} is {apart:.2f} s ahead of that of {least}"
+        return [Finding(WRONG, text, remedy)]
+    if abs(ahead[most]) > HERE_APART:
+        text = f"clocks: those of the vehicle are {ahead[most]:+.1f} s to that of this computer"
+        return [Finding(NOTE, text, remedy)]
+    return [Finding(OK, f"clocks: {apart:.2f} s apart in the vehicle")]
+
+
+def task_findings(tasks: Sequence[Task]) -> list[Finding]:
+    """What the nodes themselves report as wrong."""
+    bad = [one for one in tasks if one.level in ("ERROR", "STALE", "WARN")]
+    found = [
+        Finding(
+            NOTE if one.level == "WARN" else WRONG,
+            f"{one.node} reports {one.level}: {one.task}: {one.message}",
+            f"`chute diagnostics --all` shows its values{_page(one)}",
+        )
+        for one in bad[:MOST_TASKS_SHOWN]
+    ]
+    if len(bad) > MOST_TASKS_SHOWN:
+        left_out = len(bad) - MOST_TASKS_SHOWN
+        found.append(Finding(WRONG, f"{left_out} more", "`chute diagnostics` lists them"))
+    return found or [Finding(OK, f"diagnostics: {len(tasks)} tasks, none reports a fault")]
+
+
+def _page(task: Task) -> str:
+    return "; docs/guide/security.md" if task.task == "middleware" else ""

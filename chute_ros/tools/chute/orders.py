@@ -1,0 +1,86 @@
+"""`chute arm`, `disarm`, `deploy`, `kill`, `reset` and `mode`: one call of a service."""
+
+from __future__ import annotations
+
+import getpass
+import socket
+import sys
+
+from chute_ros.tools.chute.calling import Call
+from chute_ros.tools.chute.confirmation import ask, require_terminal
+from chute_ros.tools.chute.json_text import json_text
+from chute_ros.tools.chute.listening import Listening
+from chute_ros.tools.chute.options import ANSWER, Chosen
+from chute_ros.tools.chute.order import (
+    SUPERVISOR,
+    Answer,
+    Order,
+    answer_text,
+    not_answered,
+    order_of,
+)
+from chute_ros.tools.chute.session import Session, opened
+from chute_ros.tools.chute.status_text import order_lines
+
+#: A person who is asked does not wait longer for the state, nor for a node of it, s.
+_SHOWN_WITHIN = 2.0
+
+
+def main(chosen: Chosen) -> int:
+    """Exit code 0: done, and the answer says so; 1: anything else; 2: nobody could be asked."""
+    order = order_of(chosen, _who())
+    asks = bool(order.word) and not chosen.more.yes
+    if asks:
+        require_terminal(order.name)
+    with opened(chosen.namespace) as session:
+        call = Call(session, order)
+        listening = Listening(session) if asks else None
+        within = chosen.wait()
+        if not session.until(call.found, within):
+            what = f"{order.name}: {order.service} is not offered"
+            raise session.not_heard(what, within, _other_way(session, order))
+        if listening is not None:
+            _ask(session, listening, order)
+        try:
+            answer = call.send(chosen.wait(ANSWER))
+        except KeyboardInterrupt:
+            told = not_answered(order, "before it was interrupted")
+            print(f"\nchute: {told}", file=sys.stderr)
+            raise
+    if chosen.json:
+        print(json_text(_told(order, chosen.namespace, answer)))
+    else:
+        print(answer_text(order, answer))
+    return answer.code
+
+
+def _ask(session: Session, listening: Listening, order: Order) -> None:
+    """A vehicle that says nothing can be ordered all the same."""
+    session.until(listening.view, _SHOWN_WITHIN)
+    picture = listening.settle(_SHOWN_WITHIN) if listening.view() else None
+    ask(order.name, order.word, order_lines(session.namespace, picture, order.does))
+
+
+def _told(order: Order, namespace: str, answer: Answer) -> dict[str, object]:
+    """For --json."""
+    told: dict[str, object] = {"order": order.name, "namespace": namespace}
+    told |= {"service": order.service, "sent": True, "answered": True}
+    told |= {"success": answer.success, "message": answer.message}
+    return told if answer.accepted is None else {**told, "accepted": answer.accepted}
+
+
+def _other_way(session: Session, order: Order) -> str:
+    """A device node takes the order itself where no supervisor is there; empty: none does."""
+    prefix, _, service = order.service.partition("/")
+    offered = session.services() if prefix == SUPERVISOR else set()
+    takers = [node for node in session.links() if f"{node}/{service}" in offered]
+    return f"{takers[0]} takes the order itself: --link {takers[0]}" if takers else ""
+
+
+def _who() -> str:
+    """The person, for the record: user and computer."""
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):  # a container may have no name for its user
+        user = "somebody"
+    return f"{user}@{socket.gethostname()}"

@@ -1,0 +1,261 @@
+"""The picture of a vehicle at one moment, in names, units and ages: for text and for JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, ParachuteState
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.chute.hearing import Heard, Picture
+from chute_ros.tools.chute.words import is_old, name_of
+
+#: States in which nothing is wrong, if there is no alarm.
+WELL = ("READY", "ARMED", "IN_FLIGHT", "LANDED")
+#: chute_msgs/SafetyState.LINK_REGAINED, which only the supervisor's judgement has.
+_REGAINED = 4
+
+
+@dataclass(frozen=True)
+class LinkView:
+    """One link as the supervisor judges it. age: since its heartbeat, s, NaN: never received."""
+
+    name: str
+    state: str
+    age: float
+    device_healthy: bool
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ParachuteView:
+    """One parachute. age: since its node received it, s."""
+
+    link: str
+    device: str
+    link_state: str
+    state: str
+    armed: bool
+    deployed: bool
+    backup_voltage: float
+    faults: tuple[str, ...]
+    age: float
+
+
+@dataclass(frozen=True)
+class VehicleView:
+    """The vehicle; ages in s, NaN: never received. battery_remaining: 0 to 1."""
+
+    source: str
+    link_state: str
+    armed: str
+    armed_age: float
+    landed_state: str
+    landed_state_age: float
+    height: float
+    height_age: float
+    vertical_speed: float
+    vertical_speed_age: float
+    battery_voltage: float
+    battery_remaining: float
+    battery_age: float
+    faults: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RuleView:
+    """One rule of the profile: level and hold in s."""
+
+    name: str
+    action: str
+    active: bool
+    fulfilled: bool
+    acted_on: bool
+    level: float
+    hold: float
+    conditions: tuple[str, ...]
+    denied: str
+
+    @property
+    def counts(self) -> bool:
+        """Its counter has begun, or it was fulfilled, acted on or denied."""
+        return self.level > 0.0 or self.fulfilled or self.acted_on or bool(self.denied)
+
+
+@dataclass(frozen=True)
+class DecisionView:
+    """A decision received since the listener began. outcomes: link and outcome, with detail."""
+
+    epoch: int
+    id: int
+    action: str
+    rule: str
+    shadow: bool
+    reasons: tuple[str, ...]
+    outcomes: tuple[str, ...]
+    age: float
+
+
+@dataclass(frozen=True)
+class VehiclePicture:
+    """Everything. age: since the supervisor's last word, s. well: a state of WELL that is not old,
+    in mode ACTIVE, without an alarm."""
+
+    namespace: str
+    supervisor: str
+    epoch: int
+    state: str
+    state_text: str
+    mode: str
+    age: float
+    well: bool
+    flight_blocked: bool
+    block_reasons: tuple[str, ...]
+    device_blocks: tuple[str, ...]
+    alarms: tuple[str, ...]
+    unusable: tuple[str, ...]
+    links: tuple[LinkView, ...]
+    parachutes: tuple[ParachuteView, ...]
+    vehicle: VehicleView | None
+    rules: tuple[RuleView, ...]
+    newest_decision: str
+    decisions: tuple[DecisionView, ...]
+
+
+def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
+    """What picture shows at now (monotonic s); None: no supervisor was received."""
+    heard = picture.state(now)
+    if heard is None:
+        return None
+    message, age = heard.message, picture.state_age(heard, now)
+    state, mode = name_of(Stage, message.state), name_of(Mode, message.mode)
+    alarms = tuple(message.alarms)
+    return VehiclePicture(
+        namespace=namespace,
+        supervisor=message.supervisor,
+        epoch=message.epoch,
+        state=state,
+        state_text=message.state_text,
+        mode=mode,
+        age=age,
+        well=state in WELL and mode == Mode.ACTIVE.name and not alarms and not is_old(age),
+        flight_blocked=message.flight_blocked,
+        block_reasons=tuple(message.block_reasons),
+        device_blocks=tuple(message.device_blocks),
+        alarms=alarms,
+        unusable=tuple(message.unusable),
+        links=_links(picture, message, age),
+        parachutes=tuple(
+            _parachute(one.message, picture.parachute_age(one, now))
+            for _, one in sorted(picture.parachutes.items())
+        ),
+        vehicle=_vehicle(picture.vehicle, now),
+        rules=tuple(map(_rule, message.rules)),
+        newest_decision=_newest_decision(message),
+        decisions=tuple(_decision(picture, one, now) for one in picture.decisions),
+    )
+
+
+def _links(picture: Picture, message: Any, age: float) -> tuple[LinkView, ...]:
+    columns = (message.links, message.link_states, message.link_ages, message.devices_healthy)
+    found = []
+    for name, state, link_age, healthy in zip(*columns, strict=False):
+        heartbeat = picture.heartbeats.get(name)
+        found.append(
+            LinkView(
+                name=name,
+                state="REGAINED" if state == _REGAINED else name_of(LinkState, state),
+                age=link_age + age,
+                device_healthy=healthy,
+                reasons=tuple(heartbeat.message.reasons) if heartbeat and not healthy else (),
+            )
+        )
+    return tuple(found)
+
+
+def _parachute(message: Any, age: float) -> ParachuteView:
+    return ParachuteView(
+        link=message.link,
+        device=message.device,
+        link_state=name_of(LinkState, message.link_state),
+        state=name_of(ParachuteState, message.state),
+        armed=message.armed,
+        deployed=message.deployed,
+        backup_voltage=message.backup_voltage,
+        faults=tuple(message.faults),
+        age=age,
+    )
+
+
+def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
+    if heard is None:
+        return None
+    message = heard.message
+
+    def age(of: float) -> float:
+        return of + (now - heard.received) if of >= 0.0 else math.nan
+
+    def number(value: float, of: float) -> float:
+        # What was not filled in is 0, which is a height.
+        return value if of >= 0.0 else math.nan
+
+    return VehicleView(
+        source=message.source,
+        link_state=name_of(LinkState, message.link_state),
+        armed=name_of(Armed, message.armed),
+        armed_age=age(message.armed_age),
+        landed_state=name_of(LandedState, message.landed_state),
+        landed_state_age=age(message.landed_state_age),
+        height=number(message.height, message.height_age),
+        height_age=age(message.height_age),
+        vertical_speed=number(message.vertical_speed, message.vertical_speed_age),
+        vertical_speed_age=age(message.vertical_speed_age),
+        battery_voltage=number(message.battery_voltage, message.battery_age),
+        battery_remaining=number(message.battery_remaining, message.battery_age),
+        battery_age=age(message.battery_age),
+        faults=tuple(message.faults),
+    )
+
+
+def _rule(message: Any) -> RuleView:
+    return RuleView(
+        name=message.name,
+        action=name_of(Action, message.action),
+        active=message.alive,
+        fulfilled=message.fulfilled,
+        acted_on=message.latched,
+        level=message.level,
+        hold=message.hold,
+        conditions=tuple(message.conditions),
+        denied=message.denied,
+    )
+
+
+def _newest_decision(message: Any) -> str:
+    if not message.decision_id:
+        return ""
+    action = name_of(Action, message.decision_action)
+    return f"{action} by rule '{message.decision_rule}' (number {message.decision_id})"
+
+
+def _decision(picture: Picture, heard: Heard, now: float) -> DecisionView:
+    message = heard.message
+    reports = [
+        one.message
+        for (epoch, number, _), one in picture.reports.items()
+        if (epoch, number) == (message.epoch, message.id)
+    ]
+    return DecisionView(
+        epoch=message.epoch,
+        id=message.id,
+        action=name_of(Action, message.action),
+        rule=message.rule,
+        shadow=message.shadow,
+        reasons=tuple(message.reasons),
+        outcomes=tuple(
+            f"{one.link} {name_of(Outcome, one.outcome)}: {one.detail}" for one in reports
+        ),
+        age=now - heard.received,
+    )

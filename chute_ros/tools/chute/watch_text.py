@@ -1,0 +1,47 @@
+"""The full screen of a vehicle as lines that fit it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from chute_ros.tools.chute.status_text import Line, body_lines, decision_lines, headline
+from chute_ros.tools.chute.view import VehiclePicture
+from chute_ros.tools.chute.words import is_old, span_text
+
+KEYS = "q ends"
+
+
+@dataclass(frozen=True)
+class Page:
+    """banner: the state in large, in its tone; grey: what it shows is old."""
+
+    banner: Line
+    lines: tuple[Line, ...]
+    grey: bool = False
+
+
+def page_of(picture: VehiclePicture) -> Page:
+    """Everything, the most important first."""
+    old = is_old(picture.age)
+    if old:
+        text = f"LAST WORD {span_text(picture.age)} AGO (WAS {spaced(picture.state)})"
+    else:
+        text = spaced(picture.state)
+    lines = [*body_lines(picture), *decision_lines(picture.decisions)]
+    return Page(Line(text, headline(picture).tone), tuple(lines), grey=old)
+
+
+def empty_page(namespace: str, around: str, vehicles: Sequence[str], seconds: float) -> Page:
+    """Nothing was received yet, for so long (s)."""
+    lines = (
+        Line(f"  no supervisor is received in {namespace} for {span_text(seconds)}"),
+        Line(f"  looked for in: {around}"),
+        Line(f"  vehicles found: {', '.join(vehicles) or 'none'}"),
+    )
+    return Page(Line("NOTHING RECEIVED YET", "quiet"), lines, grey=True)
+
+
+def spaced(state: str) -> str:
+    """The name of a state in large."""
+    return " ".join(state.replace("_", " "))

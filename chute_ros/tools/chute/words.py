@@ -1,0 +1,45 @@
+"""Numbers, ages and names of enumerations as a person reads them."""
+
+from __future__ import annotations
+
+import enum
+import math
+
+#: What is older than this is not shown as if it were now, s.
+OLD_AFTER = 2.0
+NEVER = "never received"
+
+
+def name_of(kind: type[enum.IntEnum], number: int) -> str:
+    """The name of a member; a number that has none is shown as it is."""
+    member = kind._value2member_map_.get(number)
+    return str(member.name) if isinstance(member, enum.IntEnum) else f"number {number}"
+
+
+def is_old(age: float) -> bool:
+    """Older than OLD_AFTER, or never received."""
+    return not age <= OLD_AFTER
+
+
+def age_text(age: float) -> str:
+    """An age (s) in words; old ones say so."""
+    if math.isnan(age):
+        return NEVER
+    if age < 1.0:
+        return "<1 s ago"
+    return f"{'OLD: ' if is_old(age) else ''}{span_text(age)} ago"
+
+
+def span_text(seconds: float) -> str:
+    """A span of time in the unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.0f} s"
+    if seconds < 7200.0:
+        return f"{seconds / 60.0:.0f} min"
+    return f"{seconds / 3600.0:.0f} h" if seconds < 172800.0 else f"{seconds / 86400.0:.0f} days"
+
+
+def value_text(value: float, unit: str, digits: int = 1) -> str:
+    """A measurement with its unit; NaN is not known."""
+    # Without the sign of what rounds to zero.
+    return "not known" if math.isnan(value) else f"{round(value, digits) + 0.0:.{digits}f} {unit}"

@@ -1,0 +1,613 @@
+"""The command chute, as a process, against a real supervisor with a stub link."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+from chute_bench import COMMAND, CONTROL, ROOT, AtTerminal, Command, run
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState
+from chute_msgs.srv import Kill
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from node_bench import bench, stamped  # noqa: F401
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from supervisor_bench import Scene
+
+from chute_ros.model import Action, Outcome
+from chute_ros.ros import qos
+
+HOSTILE = "\x1b[2J\x1b]0;title\x07\u202eevil\r\n"
+
+
+@pytest.fixture
+def scene(bench):  # noqa: F811
+    return Scene(bench)
+
+
+@pytest.fixture
+def ready(scene):
+    scene.link.offer_arming()
+    scene.await_stage(SafetyState.READY)
+    return scene
+
+
+@pytest.fixture
+def flying(ready):
+    ready.link.flying = True
+    ready.await_stage(SafetyState.IN_FLIGHT)
+    return ready
+
+
+@pytest.fixture
+def terminal(bench):  # noqa: F811
+    """terminal(arguments): the command at a terminal."""
+    opened = []
+
+    def start(*arguments, **how):
+        opened.append(AtTerminal(bench, *arguments, **how))
+        return opened[-1]
+
+    yield start
+    for one in opened:
+        one.close()
+
+
+def ordered(scene):
+    """The decisions that stop motors or release a parachute."""
+    return [*scene.decided(Action.KILL), *scene.decided(Action.DEPLOY)]
+
+
+# status
+
+
+def test_a_ready_vehicle_is_well(ready):
+    code, out, err = run(ready.bench, "status")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "READY"
+    assert "  mavlink_parachute  OK, device healthy, <1 s ago" in lines
+    assert "  motors             DISARMED, <1 s ago" in lines
+    assert "  height             never received" in lines
+
+
+def test_a_blocked_vehicle_tells_why(ready):
+    ready.link.healthy = False
+    ready.await_stage(SafetyState.BLOCKED)
+    code, out, _ = run(ready.bench, "status")
+    assert code == 1
+    assert out.startswith("BLOCKED\n")
+    assert "  flight             BLOCKED\n" in out
+    assert "mavlink_parachute  OK, device NOT healthy" in out
+
+
+def test_its_json_is_one_object(ready):
+    code, out, _ = run(ready.bench, "status", "--json")
+    told = json.loads(out)
+    assert (code, out.count("\n")) == (0, 1)
+    assert (told["state"], told["well"]) == ("READY", True)
+    assert told["namespace"] == ready.bench.namespace
+    assert told["vehicle"]["height"] is None
+    assert [one["name"] for one in told["links"]] == ["mavlink_parachute"]
+
+
+def test_where_nothing_is_heard_it_says_where_it_looked_and_what_there_is(ready):
+    code, out, err = run(ready.bench, "status", "--timeout", "5", namespace="/nobody/here")
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith(
+        "chute: no supervisor is received in /nobody/here within 5 s (ROS domain "
+    )
+    assert "discovery range LOCALHOST, rmw_fastrtps_cpp" in err
+    assert f"vehicles found: {ready.bench.namespace}; name one" in err
+
+
+def test_the_same_as_json(ready):
+    code, out, _ = run(ready.bench, "status", "--json", namespace="/nobody/here")
+    told = json.loads(out)
+    assert (code, told["namespace"]) == (1, "/nobody/here")
+    assert told["vehicles"] == [ready.bench.namespace]
+    assert told["error"].startswith("no supervisor is received")
+
+
+def test_nodes_without_a_supervisor_are_named(bench):  # noqa: F811
+    scene = Scene(bench)
+    bench.remove(scene.supervisor)
+    code, _, err = run(bench, "status", "--timeout", "5")
+    assert code == 1
+    assert "; nodes there: mavlink_parachute; " in err
+
+
+# arm, disarm, mode, reset
+
+
+def test_arm_and_disarm_by_the_supervisor(ready):
+    code, out, _ = run(ready.bench, "arm")
+    assert (code, out) == (0, "arm: done: mavlink_parachute: as told\n")
+    code, out, _ = run(ready.bench, "disarm", "--json")
+    assert (code, json.loads(out)) == (
+        0,
+        {
+            "order": "disarm",
+            "namespace": ready.bench.namespace,
+            "service": "safety/arm",
+            "sent": True,
+            "answered": True,
+            "success": True,
+            "message": "mavlink_parachute: as told",
+        },
+    )
+    assert [arm for arm, _ in ready.link.arm_requests] == [True, False]
+
+
+def test_a_refusal_is_no_success(ready):
+    ready.link.arm_succeeds = False
+    code, out, _ = run(ready.bench, "arm")
+    assert code == 1
+    assert out.startswith("arm: NOT DONE: ")
+    assert "as told" in out
+
+
+def test_by_a_device_node_past_the_supervisor(ready):
+    ready.bench.remove(ready.supervisor)
+    code, out, err = run(ready.bench, "arm", "--timeout", "5")
+    assert (code, out) == (1, "")
+    assert err.endswith("; mavlink_parachute takes the order itself: --link mavlink_parachute\n")
+    code, out, _ = run(ready.bench, "arm", "--link", "mavlink_parachute")
+    assert (code, out) == (0, "arm: done: as told\n")
+    assert ready.link.arm_requests == [(True, 0)]
+
+
+def test_the_mode_is_set_and_seen(ready):
+    code, out, _ = run(ready.bench, "mode", "inhibited", "--reason", "maintenance")
+    assert (code, out) == (0, "mode: done: mode INHIBITED\n")
+    code, out, _ = run(ready.bench, "status")
+    assert (code, "  mode               INHIBITED" in out) == (1, True)
+
+
+def test_reset_after_a_kill(ready):
+    assert run(ready.bench, "kill", "--yes")[0] == 0
+    ready.await_decision(Action.KILL)
+    code, out, _ = run(ready.bench, "reset")
+    assert code == 0
+    assert out.startswith("reset: done: ")
+    ready.await_stage(SafetyState.READY)
+
+
+# deploy and kill
+
+
+def test_a_deploy_that_is_confirmed(flying):
+    code, out, _ = run(flying.bench, "deploy", "--yes", "--reason", "it falls")
+    assert code == 0
+    assert out.startswith("deploy: done: ")
+    deploy = flying.await_decision(Action.DEPLOY)
+    assert any("it falls" in reason for reason in deploy.reasons)
+
+
+def test_a_deploy_that_is_accepted_and_not_confirmed(flying):
+    flying.link.outcomes = [Outcome.SENT, Outcome.ACCEPTED]
+    code, out, _ = run(flying.bench, "deploy", "--yes")
+    assert code == 1
+    assert out.startswith("deploy: ACCEPTED, NOT CONFIRMED: ")
+
+
+def test_a_deploy_that_is_refused(ready):
+    code, out, _ = run(ready.bench, "deploy", "--yes", "--json")
+    told = json.loads(out)
+    assert (code, told["success"], told["accepted"]) == (1, False, False)
+    assert "not in flight" in told["message"]
+    assert ordered(ready) == []
+
+
+def test_a_kill_alone(flying):
+    code, out, _ = run(flying.bench, "kill", "--only", "--yes", "--reason", "smoke")
+    assert code == 0
+    assert out.startswith("kill: done: ")
+    kill = flying.await_decision(Action.KILL)
+    assert any("smoke" in reason for reason in kill.reasons)
+
+
+@pytest.mark.parametrize("order", ["deploy", "kill"])
+def test_without_a_terminal_and_without_yes_nothing_is_sent(flying, order):
+    code, out, err = run(flying.bench, order, "--reason", "anything")
+    assert (code, out) == (2, "")
+    assert err == (
+        f"chute: {order}: no terminal to ask at: nothing was sent; --yes does not ask\n"
+    )
+    assert ordered(flying) == []
+
+
+@pytest.mark.parametrize(
+    ("order", "typed"),
+    [("deploy", "yes\n"), ("deploy", "deploy\n"), ("deploy", "KILL\n"), ("kill", "\n")],
+)
+def test_another_word_sends_nothing(flying, terminal, order, typed):
+    asked = terminal(order)
+    asked.reads("anything else to leave it: ")
+    asked.types(typed)
+    assert asked.end() == 1
+    assert f"chute: {order}: not confirmed, nothing was sent" in asked.shown
+    assert ordered(flying) == []
+
+
+def test_the_word_is_asked_for_after_the_state_was_shown(flying, terminal):
+    asked = terminal("deploy", "--reason", "it falls")
+    asked.reads("type DEPLOY to deploy, anything else to leave it: ")
+    for told in (": IN_FLIGHT", "height", "this RELEASES the parachute of the vehicle"):
+        assert told in asked.shown
+    assert ordered(flying) == []
+    asked.types("DEPLOY\n")
+    assert asked.end() == 0
+    assert "deploy: done: " in asked.shown
+
+
+def test_what_was_typed_before_the_question_is_no_answer(flying, terminal):
+    asked = terminal("kill")
+    asked.types("KILL\n")
+    asked.reads("type KILL to kill")
+    asked.types("no\n")
+    assert asked.end() == 1
+    assert ordered(flying) == []
+
+
+@pytest.mark.parametrize("key", ["\x03", "\x04"])
+def test_ctrl_c_and_ctrl_d_at_the_question_send_nothing(flying, terminal, key):
+    asked = terminal("deploy")
+    asked.reads("leave it: ")
+    asked.types(key)
+    assert asked.end() == {"\x03": 130, "\x04": 1}[key]
+    assert ordered(flying) == []
+    assert "Traceback" not in asked.shown
+
+
+@pytest.fixture
+def silent(bench):  # noqa: F811
+    """A supervisor's kill that takes each call and answers none."""
+    calls = []
+
+    async def never(request, response):
+        calls.append(request)
+        return await Future()
+
+    group = ReentrantCallbackGroup()
+    bench.client.create_service(Kill, "safety/kill", never, callback_group=group)
+    return calls
+
+
+def test_without_an_answer_it_says_that_nobody_knows(bench, silent):  # noqa: F811
+    code, out, err = run(bench, "kill", "--yes", "--timeout", "5")
+    assert (code, out, len(silent)) == (1, "", 1)
+    assert err.startswith("chute: kill: safety/kill did not answer within 5 s: it is NOT known ")
+
+
+def test_the_same_as_json_and_by_ctrl_c(bench, silent):  # noqa: F811
+    _, out, _ = run(bench, "kill", "--yes", "--json", "--timeout", "5")
+    told = json.loads(out)
+    assert (told["sent"], told["answered"]) == (True, False)
+    command = Command("--namespace", bench.namespace, "kill", "--yes")
+    bench.until(lambda: len(silent) == 2, "the kill is received")
+    command.process.send_signal(signal.SIGINT)
+    bench.until(lambda: command.process.poll() is not None, "it ends")
+    code, _, err = command.ended()
+    assert code == 130
+    assert "did not answer before it was interrupted: it is NOT known" in err
+    assert err.endswith("chute: interrupted\n")
+
+
+# watch
+
+
+def test_watch_shows_the_state_in_large_until_q(ready, terminal):
+    watching = terminal("watch")
+    watching.reads("R E A D Y")
+    ready.link.flying = True
+    watching.reads("I N   F L I G H T")
+    watching.types("q")
+    assert watching.end() == 0
+    assert watching.is_as_before()
+
+
+def test_watch_turns_grey_when_the_supervisor_is_silent(ready, terminal):
+    watching = terminal("watch")
+    watching.reads("R E A D Y")
+    ready.bench.remove(ready.supervisor)
+    watching.reads("LAST WORD 2 s AGO (WAS R E A D Y)")
+    watching.types("\x03")
+    assert watching.end() == 130
+    assert watching.is_as_before()
+
+
+def test_watch_waits_for_a_vehicle_that_is_not_there_yet(bench, terminal):  # noqa: F811
+    watching = terminal("watch")
+    watching.reads("NOTHING RECEIVED YET")
+    Scene(bench)
+    watching.reads("R E A D Y")
+    watching.process.send_signal(signal.SIGTERM)
+    assert watching.end() == 128 + signal.SIGTERM
+    assert watching.is_as_before()
+
+
+def test_watch_gives_up_after_its_timeout(terminal):
+    watching = terminal("watch", "--timeout", "1")
+    assert watching.end() == 1
+    assert "chute: no supervisor is received in " in watching.shown
+    assert watching.is_as_before()
+
+
+def test_watch_needs_a_terminal_but_for_its_json(ready):
+    code, out, err = run(ready.bench, "watch")
+    assert (code, out) == (2, "")
+    assert err == "chute: watch: needs a terminal; `chute status` and --json do not\n"
+    command = Command("--namespace", ready.bench.namespace, "watch", "--json")
+    heard = Reader(command.process.stdout)
+    ready.bench.until(lambda: heard.has("READY"), "READY is told")
+    ready.link.flying = True
+    ready.bench.until(lambda: heard.has("IN_FLIGHT"), "IN_FLIGHT is told")
+    command.process.send_signal(signal.SIGINT)
+    ready.bench.until(lambda: command.process.poll() is not None, "it ends")
+    assert command.process.returncode == 130
+
+
+class Reader:
+    """The lines of JSON that a process has printed so far."""
+
+    def __init__(self, stream):
+        self._lines, self._stream = [], stream
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        for line in self._stream:
+            self._lines.append(json.loads(line))
+
+    def has(self, state):
+        return any(one["state"] == state for one in self._lines)
+
+
+# diagnostics, parameters, record
+
+
+def test_diagnostics_are_worst_first_and_of_this_vehicle_alone(ready):
+    levels = {"bad": b"\x02", "stale": b"\x03", "doubtful": b"\x01", "good": b"\x00"}
+    tasks = [
+        DiagnosticStatus(
+            level=level,
+            name=f"mine: {name}",
+            message="told",
+            values=[KeyValue(key="height (m)", value="3")],
+        )
+        for name, level in levels.items()
+    ]
+    ready.bench.client.create_timer(
+        0.2, publisher_of(ready, DiagnosticArray, "diagnostics", DiagnosticArray(status=tasks))
+    )
+    code, out, _ = run(ready.bench, "diagnostics", "--all")
+    mine = [line for line in out.splitlines() if "mine: " in line]
+    assert mine == [
+        "ERROR  mine: bad: told (<1 s ago)",
+        "STALE  mine: stale: told (<1 s ago)",
+        "WARN   mine: doubtful: told (<1 s ago)",
+        "OK     mine: good: told (<1 s ago)",
+    ]
+    assert code == 1
+    assert "           height (m): 3\n" in out
+    assert "safety_supervisor: decisions: READY" in out
+
+
+def publisher_of(scene, kind, topic, message, profile=qos.STATUS):
+    """What publishes message, stamped, whenever it is called."""
+    publisher = scene.bench.client.create_publisher(kind, topic, profile)
+    return lambda: publisher.publish(stamped(scene.bench.client, message))
+
+
+def test_healthy_diagnostics_are_well(ready):
+    code, out, _ = run(ready.bench, "diagnostics", "--json")
+    told = json.loads(out)
+    assert {one["level"] for one in told["tasks"]} <= {"OK", "WARN"}
+    assert code == 0
+
+
+def test_parameters_show_what_differs_from_the_default(ready):
+    code, out, _ = run(ready.bench, "parameters", "safety_supervisor")
+    lines = out.splitlines()
+    assert (code, lines[0]) == (0, "safety_supervisor")
+    assert [line.split() for line in lines if line.startswith("  *")] == [
+        ["*", "startup_grace", "0.3", "(default:", "10.0)"],
+        ["*", "deploy_timeout", "2.0", "(default:", "8.0)"],
+        ["*", "kill_timeout", "2.0", "(default:", "6.0)"],
+    ]
+    assert any(line.split() == ["profile", '"multirotor"'] for line in lines)
+
+
+def test_parameters_of_all_nodes_as_json(ready):
+    code, out, _ = run(ready.bench, "parameters", "--changed", "--json")
+    told = json.loads(out)
+    assert (code, told["silent"]) == (0, [])
+    assert told["nodes"]["mavlink_parachute"] == []
+    assert told["nodes"]["safety_supervisor"][0] == {
+        "name": "startup_grace",
+        "value": 0.3,
+        "default": 10.0,
+        "differs": True,
+    }
+
+
+def test_a_node_that_is_not_there(ready):
+    code, _, err = run(ready.bench, "parameters", "upf_can")
+    assert code == 1
+    assert err.startswith("chute: no node upf_can is found in ")
+    assert "nodes there: mavlink_parachute, safety_supervisor" in err
+
+
+def test_the_black_box_is_found_with_its_files(bench):  # noqa: F811
+    folder = bench.folder / "box"
+    scene = Scene(bench, black_box_folder=str(folder))
+    scene.await_stage(SafetyState.READY)
+    bench.until(lambda: [*folder.glob("*.mcap")], "a file begins")
+    code, out, _ = run(bench, "record")
+    assert code == 0
+    lines = out.splitlines()
+    assert lines[0] == "safety_supervisor: recording, <1 s ago"
+    assert lines[1] == f"  folder  {folder}"
+    assert lines[2].endswith(str(next(folder.glob("*.mcap"))))
+
+
+def test_without_a_black_box_it_says_so(bench):  # noqa: F811
+    Scene(bench, black_box=False).await_stage(SafetyState.READY)
+    code, out, err = run(bench, "record")
+    assert (code, out) == (1, "")
+    assert "its parameter black_box is false (nodes received: safety_supervisor)" in err
+
+
+# What others may send, and what a shell may do
+
+
+@pytest.mark.parametrize("command", ["status", "diagnostics", "parameters"])
+def test_no_control_character_reaches_the_terminal(ready, command):
+    client = ready.bench.client
+    client.declare_parameter("evil", HOSTILE)
+    senders = [
+        publisher_of(ready, kind, topic, message, profile)
+        for kind, topic, message, profile in (
+            (
+                SafetyState,
+                "safety/state",
+                SafetyState(
+                    supervisor=HOSTILE,
+                    epoch=2**32 - 1,
+                    state=4,
+                    state_text=HOSTILE,
+                    links=[HOSTILE],
+                    link_states=[1],
+                    link_ages=[0.0],
+                    devices_healthy=[False],
+                    alarms=[HOSTILE],
+                ),
+                qos.LATCHED,
+            ),
+            (
+                LinkHeartbeat,
+                "safety/heartbeat",
+                LinkHeartbeat(link=HOSTILE, reasons=[HOSTILE]),
+                qos.STATUS,
+            ),
+            (
+                ParachuteStatus,
+                "parachute/status",
+                ParachuteStatus(link=HOSTILE, device=HOSTILE, faults=[HOSTILE]),
+                qos.STATUS,
+            ),
+            (
+                DiagnosticArray,
+                "diagnostics",
+                DiagnosticArray(
+                    status=[DiagnosticStatus(name=HOSTILE, message=HOSTILE, level=b"\x07")]
+                ),
+                qos.STATUS,
+            ),
+        )
+    ]
+    client.create_timer(0.1, lambda: [send() for send in senders])
+    code, out, err = run(ready.bench, command)
+    assert "evil" in out, (code, out, err)
+    assert CONTROL.findall(out + err) == []
+
+
+def test_a_reader_that_has_seen_enough(ready):
+    command = Command("--namespace", ready.bench.namespace, "status")
+    command.process.stdout.close()
+    ready.bench.until(lambda: command.process.poll() is not None, "it ends")
+    assert command.process.stderr.read() == ""
+
+
+def test_a_mistake_is_told_without_ros():
+    done = subprocess.run(
+        [*COMMAND, "arm", "--link", "no name"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("domain", ["233", "999999999999", "one", "-1"])
+def test_a_domain_that_cannot_be_is_a_mistake(monkeypatch, domain):
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+    done = subprocess.run(
+        [*COMMAND, "status"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    told = f"chute: ROS_DOMAIN_ID is '{domain}': need a whole number from 0 to 232\n"
+    assert done.stderr == told
+
+
+def test_a_middleware_that_is_not_installed_is_a_mistake(monkeypatch):
+    """ROS itself would end the process."""
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_nothing")
+    done = subprocess.run(
+        [*COMMAND, "status"], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("chute: RMW_IMPLEMENTATION is 'rmw_nothing': need one ")
+
+
+def test_without_chute_msgs_it_says_what_to_build(tmp_path):
+    (tmp_path / "chute_msgs.py").write_text("raise ImportError('gone', name='chute_msgs')\n")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['chute', 'status']\n"
+    code += "from chute_ros.tools.chute.__main__ import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith("chute: chute_msgs cannot be imported: build both packages")
+
+
+# doctor
+
+
+def test_the_doctor_finds_nothing_wrong_with_a_sound_vehicle(ready):
+    code, out, err = run(ready.bench, "doctor")
+    lines = out.splitlines()
+    assert (code, err, [line for line in lines if line.startswith("WRONG")]) == (0, "", []), out
+    assert f"OK     supervisor of {ready.bench.namespace}: safety_supervisor" in lines
+    assert any(line.startswith("OK     versions: chute_ros ") for line in lines)
+
+
+def test_the_doctor_finds_a_port_that_is_not_there(ready):
+    ready.link.declare_parameter("connection", "serial:/dev/nothing:57600")
+    code, out, _ = run(ready.bench, "doctor", "--json")
+    told = json.loads(out)
+    assert (code, told["well"]) == (1, False)
+    wrong = [one["what"] for one in told["findings"] if one["level"] == "WRONG"]
+    name = "connection serial:/dev/nothing:57600 of mavlink_parachute"
+    assert len(wrong) == 1
+    assert wrong[0].startswith(f"{name}: /dev/nothing: no such port")
+
+
+def test_the_doctor_where_nothing_is_received(bench):  # noqa: F811
+    code, out, _ = run(bench, "doctor", "--timeout", "1")
+    first = out.splitlines()[0]
+    assert code == 1
+    assert first.startswith(f"WRONG  no node is received in {bench.namespace} within 1 s (ROS ")
+    assert " -> start the vehicle with the same ROS_DOMAIN_ID" in first
+
+
+def test_the_doctor_without_chute_msgs_and_in_a_domain_that_cannot_be(tmp_path, monkeypatch):
+    (tmp_path / "chute_msgs.py").write_text("raise ImportError('gone', name='chute_msgs')\n")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); sys.argv = ['chute', 'doctor']\n"
+    code += "from chute_ros.tools.chute.__main__ import main; main()"
+    for domain, told in (
+        ("1", "WRONG  cannot be imported: gone -> "),
+        ("one", "WRONG  ROS_DOMAIN_ID is 'one'"),
+    ):
+        monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+        )
+        assert (done.returncode, done.stderr) == (1, "")
+        assert done.stdout.startswith(told)

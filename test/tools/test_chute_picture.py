@@ -1,0 +1,379 @@
+"""What chute shows of the messages that it received: no text without its age."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+from builtin_interfaces.msg import Time
+from chute_msgs.msg import (
+    ActionReport,
+    LinkHeartbeat,
+    ParachuteStatus,
+    RuleState,
+    SafetyDecision,
+    SafetyState,
+    VehicleState,
+)
+
+from chute_ros.tools.chute.hearing import MOST_NAMES, Picture
+from chute_ros.tools.chute.json_text import json_text
+from chute_ros.tools.chute.status_text import decision_lines, order_lines, status_lines
+from chute_ros.tools.chute.view import view
+
+#: The listener's monotonic clock and wall clock, s.
+NOW, WALL = 1000.0, 1_780_000_000.0
+
+
+def stamped(message, at=0.0, clock=0.0):
+    """message, sent at t+at by a host whose wall clock is ahead by clock."""
+    moment = round((WALL + at + clock) * 1e9)
+    message.header.stamp = Time(sec=moment // 10**9, nanosec=moment % 10**9)
+    return message
+
+
+def state(**fields):
+    """A vehicle that flies with one link."""
+    return SafetyState(
+        **{
+            "supervisor": "safety_supervisor",
+            "epoch": 7,
+            "state": SafetyState.IN_FLIGHT,
+            "state_text": "IN_FLIGHT",
+            "links": ["mavlink_parachute"],
+            "link_states": [1],
+            "link_ages": [0.1],
+            "devices_healthy": [True],
+            **fields,
+        }
+    )
+
+
+def vehicle(**fields):
+    return VehicleState(
+        **{
+            "source": "1/1",
+            "link_state": 1,
+            "armed": VehicleState.ARMED,
+            "armed_age": 0.2,
+            "landed_state": VehicleState.IN_AIR,
+            "landed_state_age": 0.2,
+            "height": 61.25,
+            "height_age": 0.1,
+            "vertical_speed": -0.04,
+            "vertical_speed_age": 0.1,
+            "battery_voltage": 15.8,
+            "battery_remaining": 0.87,
+            "battery_age": 1.2,
+            **fields,
+        }
+    )
+
+
+def parachute(**fields):
+    return ParachuteStatus(
+        **{
+            "link": "mavlink_parachute",
+            "device": "1/161",
+            "link_state": 1,
+            "state": ParachuteStatus.ARMED,
+            "armed": True,
+            "backup_voltage": math.nan,
+            **fields,
+        }
+    )
+
+
+def heartbeat(link="mavlink_parachute", **fields):
+    return LinkHeartbeat(link=link, link_state=1, **fields)
+
+
+class Heard:
+    """A picture, and what it shows."""
+
+    def __init__(self):
+        self.picture = Picture()
+
+    def hears(self, message, at=0.0):
+        """A message is received at t+at."""
+        kinds = {
+            SafetyState: self.picture.hear_state,
+            LinkHeartbeat: self.picture.hear_heartbeat,
+            ParachuteStatus: self.picture.hear_parachute,
+            VehicleState: self.picture.hear_vehicle,
+            SafetyDecision: self.picture.hear_decision,
+            ActionReport: self.picture.hear_report,
+        }
+        kinds[type(message)](message, NOW + at, WALL + at)
+        return self
+
+    def view(self, at=0.0):
+        return view(self.picture, "/drone1", NOW + at)
+
+    def text(self, at=0.0):
+        return [line.text for line in status_lines(self.view(at))]
+
+
+@pytest.fixture
+def heard():
+    return Heard()
+
+
+def test_a_vehicle_in_flight(heard):
+    rules = [
+        RuleState(
+            name="free fall",
+            action=SafetyDecision.DEPLOY,
+            alive=True,
+            level=0.25,
+            hold=0.5,
+            conditions=["[x] acceleration 0.65 (below 2)", "[ ] tilt_deg 13.34 (above 45)"],
+        ),
+        RuleState(name="excess tilt", action=SafetyDecision.DEPLOY, alive=True, hold=0.25),
+        RuleState(name="on the ground alone", action=SafetyDecision.KILL, hold=0.25),
+    ]
+    told = {"decision_id": 3, "decision_action": 2, "decision_rule": "links"}
+    heard.hears(stamped(state(rules=rules, unusable=["tilt_deg: stuck"], **told)))
+    heard.hears(stamped(parachute())).hears(vehicle())
+    assert heard.text() == [
+        "IN_FLIGHT",
+        "  vehicle            /drone1, supervisor safety_supervisor, <1 s ago",
+        "  mode               ACTIVE",
+        "  flight             not blocked",
+        "  cannot be used     tilt_deg: stuck",
+        "links",
+        "  mavlink_parachute  OK, device healthy, <1 s ago",
+        "parachutes",
+        "  mavlink_parachute 1/161  ARMED, armed, not deployed, link OK, <1 s ago",
+        "vehicle 1/1, link OK",
+        "  motors             ARMED, <1 s ago",
+        "  landed state       IN_AIR, <1 s ago",
+        "  height             61.2 m, <1 s ago",
+        "  vertical speed     0.0 m/s, <1 s ago",
+        "  battery            15.8 V, 87 %, 1 s ago",
+        "rules: 2 of 3 active, 1 counting",
+        "  free fall: DEPLOY counting, 0.2 of 0.5 s",
+        "      [x] acceleration 0.65 (below 2)",
+        "      [ ] tilt_deg 13.34 (above 45)",
+        "  not counting: excess tilt",
+        "newest decision: FLIGHT_BLOCK_RELEASE by rule 'links' (number 3)",
+    ]
+    assert heard.view().well
+
+
+def test_a_vehicle_that_may_not_fly_tells_why(heard):
+    blocked = state(
+        state=SafetyState.BLOCKED,
+        state_text="BLOCKED: no fuel",
+        mode=SafetyState.SHADOW,
+        flight_blocked=True,
+        block_reasons=["no fuel"],
+        device_blocks=["upf_can 33"],
+        alarms=["the canopy was packed in 1999"],
+        devices_healthy=[False],
+        link_ages=[math.nan],
+        link_states=[0],
+    )
+    heard.hears(stamped(blocked)).hears(stamped(heartbeat(reasons=["voltage 2 (above 3)"])))
+    assert heard.text() == [
+        "BLOCKED",
+        "  vehicle            /drone1, supervisor safety_supervisor, <1 s ago",
+        "  mode               SHADOW",
+        "  why                BLOCKED: no fuel",
+        "  flight             BLOCKED",
+        "                     no fuel",
+        "                     blocked by device upf_can 33",
+        "  ALARM              the canopy was packed in 1999",
+        "links",
+        "  mavlink_parachute  NEVER_SEEN, device NOT healthy, never received: voltage 2 (above 3)",
+        "parachutes",
+        "  never received",
+        "vehicle",
+        "  never received",
+        "rules: 0 of 0 active, none counting",
+        "newest decision: none yet",
+    ]
+    assert not heard.view().well
+
+
+@pytest.mark.parametrize(
+    ("fields", "well"),
+    [
+        ({}, True),
+        ({"state": SafetyState.READY}, True),
+        ({"state": SafetyState.ARMED}, True),
+        ({"state": SafetyState.LANDED}, True),
+        ({"state": SafetyState.STARTUP}, False),
+        ({"state": SafetyState.BLOCKED}, False),
+        ({"state": SafetyState.KILLING}, False),
+        ({"state": SafetyState.DEPLOYING}, False),
+        ({"state": SafetyState.DEPLOYED}, False),
+        ({"state": SafetyState.FAULT}, False),
+        ({"state": 200}, False),
+        ({"mode": SafetyState.SHADOW}, False),
+        ({"mode": SafetyState.INHIBITED}, False),
+        ({"alarms": ["anything"]}, False),
+    ],
+)
+def test_a_script_takes_only_a_protected_vehicle_for_well(heard, fields, well):
+    heard.hears(stamped(state(**fields)))
+    assert heard.view().well is well
+
+
+def test_without_a_supervisor_there_is_nothing_to_show(heard):
+    heard.hears(vehicle())
+    assert heard.view() is None
+    assert order_lines("/drone1", None, "RELEASES it") == [
+        "/drone1: NOT KNOWN, no supervisor is received",
+        "this RELEASES it",
+    ]
+
+
+# Ages
+
+
+def test_what_is_old_is_not_shown_as_if_it_were_now(heard):
+    heard.hears(stamped(state(state=SafetyState.READY, state_text="READY")))
+    heard.hears(stamped(parachute())).hears(vehicle())
+    assert heard.text(at=2.0)[0] == "READY"
+    text = heard.text(at=14.0)
+    assert text[0] == "NOT KNOWN NOW (was READY, last word 14 s ago)"
+    assert "  mavlink_parachute  OK, device healthy, OLD: 14 s ago" in text
+    assert "  motors             ARMED, OLD: 14 s ago" in text
+    assert "  mavlink_parachute 1/161  ARMED, armed, not deployed, link OK, OLD: 14 s ago" in text
+    assert not heard.view(14.0).well
+
+
+def test_a_part_of_the_vehicle_that_was_never_received_says_so(heard):
+    heard.hears(stamped(state()))
+    heard.hears(vehicle(height_age=-1.0, armed_age=math.nan, vertical_speed=math.nan))
+    text = heard.text()
+    assert "  height             never received" in text
+    assert "  motors             never received" in text
+    assert "  vertical speed     not known, <1 s ago" in text
+
+
+def test_a_status_that_its_node_repeats_has_the_age_of_the_device(heard):
+    """The parachute fell silent at t+0; its node repeats the status, and its clock is wrong."""
+    heard.hears(stamped(state(), at=40.0), at=40.0)
+    heard.hears(stamped(heartbeat(), at=40.0, clock=-3600.0), at=40.0)
+    heard.hears(stamped(parachute(link_state=3), at=0.0, clock=-3600.0), at=40.0)
+    assert heard.view(40.0).parachutes[0].age == pytest.approx(40.0)
+
+
+def test_a_late_heartbeat_does_not_make_a_status_younger(heard):
+    heard.hears(stamped(heartbeat(), at=0.0), at=0.0)
+    heard.hears(stamped(heartbeat(), at=0.1), at=1.9)
+    heard.hears(stamped(parachute(), at=0.0), at=1.9)
+    heard.hears(stamped(state(), at=1.9), at=1.9)
+    assert heard.view(2.0).parachutes[0].age == pytest.approx(2.0)
+
+
+def test_the_first_state_may_have_waited_for_hours(heard):
+    """It is latched, and its supervisor is silent: its stamp is believed."""
+    heard.hears(stamped(state(), at=-7200.0))
+    assert heard.text()[0] == "NOT KNOWN NOW (was IN_FLIGHT, last word 2 h ago)"
+
+
+def test_a_host_with_another_clock_is_not_taken_for_silent(heard):
+    """Its second word comes as it is sent; and its heartbeats show its clock at once."""
+    heard.hears(stamped(state(), clock=-7200.0)).hears(
+        stamped(state(), at=0.5, clock=-7200.0), 0.5
+    )
+    assert heard.view(0.6).age == pytest.approx(0.1)
+    at_once = Heard().hears(stamped(state(), clock=-7200.0))
+    at_once.hears(stamped(heartbeat("safety_supervisor"), at=0.1, clock=-7200.0), at=0.1)
+    assert at_once.view(0.1).age == pytest.approx(0.1)
+    assert at_once.picture.clock_difference("safety_supervisor") == pytest.approx(7200.0)
+
+
+def test_the_supervisor_that_leads_is_believed_and_not_what_another_left(heard):
+    """a led, b took over; a's latched state is received after b's."""
+    heard.hears(stamped(state(supervisor="b", epoch=9, state=SafetyState.DEPLOYED)))
+    heard.hears(stamped(state(supervisor="a", epoch=8), at=-30.0))
+    assert (heard.view().supervisor, heard.view().state) == ("b", "DEPLOYED")
+    # b is silent, and a has started again under a lower epoch, as after a lost clock.
+    heard.hears(stamped(state(supervisor="a", epoch=3), at=5.0), at=5.0)
+    assert heard.view(5.0).supervisor == "a"
+
+
+# Decisions
+
+
+def decision(**fields):
+    return SafetyDecision(
+        **{
+            "epoch": 7,
+            "id": 4,
+            "action": SafetyDecision.DEPLOY,
+            "rule": "free fall",
+            "reasons": ["acceleration 0.65 (below 2)"],
+            **fields,
+        }
+    )
+
+
+def report(outcome):
+    return ActionReport(
+        epoch=7,
+        id=4,
+        action=SafetyDecision.DEPLOY,
+        link="mavlink_parachute",
+        outcome=outcome,
+        detail="after 0.1 s",
+    )
+
+
+def test_a_decision_is_shown_once_with_its_reasons_and_its_newest_outcome(heard):
+    heard.hears(stamped(state()))
+    heard.hears(decision(id=3, action=SafetyDecision.KILL, rule="by hand", shadow=True))
+    heard.hears(decision()).hears(decision(), at=0.1)
+    heard.hears(report(ActionReport.SENT), 0.1).hears(report(ActionReport.CONFIRMED), 0.2)
+    assert [line.text for line in decision_lines(heard.view(0.2).decisions)] == [
+        "decisions received here",
+        "  DEPLOY by rule 'free fall', 0 s ago",
+        "      acceleration 0.65 (below 2)",
+        "      -> mavlink_parachute CONFIRMED: after 0.1 s",
+        "  KILL in SHADOW, not sent by rule 'by hand', 0 s ago",
+        "      acceleration 0.65 (below 2)",
+    ]
+
+
+# What a stranger may send
+
+
+def test_names_that_a_stranger_invents_do_not_fill_the_memory(heard):
+    heard.hears(stamped(state()), at=1.0)
+    for number in range(10 * MOST_NAMES):
+        heard.hears(stamped(heartbeat(f"link{number}")), at=0.001 * number)
+        heard.hears(stamped(parachute(device=str(number))), at=0.001 * number)
+    assert len(heard.picture.heartbeats) == MOST_NAMES
+    assert len(heard.picture.parachutes) == MOST_NAMES
+    assert heard.view(1.0).parachutes[-1].device in {str(n) for n in range(10 * MOST_NAMES)}
+
+
+def test_arrays_of_different_lengths_and_numbers_without_a_name_are_shown(heard):
+    odd = state(links=["a", "b"], link_states=[77], link_ages=[math.inf, 1.0], mode=99)
+    heard.hears(stamped(odd)).hears(stamped(parachute(state=88, link_state=66)))
+    heard.hears(vehicle(armed=55, height=math.inf, battery_voltage=-math.inf))
+    text = "\n".join(heard.text())
+    for number in (77, 99, 88, 66, 55):
+        assert f"number {number}" in text
+
+
+def test_json_has_null_for_what_is_no_number(heard):
+    heard.hears(stamped(state(link_ages=[math.nan]))).hears(vehicle(height=math.inf))
+    told = json.loads(json_text(heard.view()))
+    assert told["state"] == "IN_FLIGHT"
+    assert told["links"] == [
+        {
+            "name": "mavlink_parachute",
+            "state": "OK",
+            "age": None,
+            "device_healthy": True,
+            "reasons": [],
+        }
+    ]
+    assert told["vehicle"]["height"] is None
+    assert told["well"] is True
