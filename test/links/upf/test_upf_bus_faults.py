@@ -1,7 +1,5 @@
 """upf_can on a bus that loses, doubles, spoils and floods."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

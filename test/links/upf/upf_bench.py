@@ -1,7 +1,5 @@
 """What the tests of upf_can share: quick parameters, a bus of its own, and its devices."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

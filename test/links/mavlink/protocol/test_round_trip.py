@@ -1,7 +1,5 @@
 """A line that is full brings everything, late: the time until the autopilot answers tells."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 
