@@ -6,16 +6,7 @@ import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, TriggerStatus
 from chute_msgs.srv import Deploy, GetNodeInfo
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from upf_bench import (
-    OTHER_LAYOUT,
-    PATIENT,
-    Devices,
-    Network,
-    fly,
-    tasks,
-    values,
-    vehicle_state,
-)
+from upf_bench import OTHER_LAYOUT, PATIENT, Devices, Network, fly, tasks, values, vehicle_state
 
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, VEHICLE_STATUS

@@ -175,10 +175,7 @@ def test_a_node_says_who_it_is(bench, devices):
         one = devices.trigger if node_id == 34 else devices.controller
         answer = call(bench, GetNodeInfo, "get_node_info", node_id=node_id)
         assert answer.success, answer.message
-        assert (answer.name, answer.unique_id) == (
-            one.settings.name,
-            one.settings.unique_id.hex(),
-        )
+        assert (answer.name, answer.unique_id) == (one.settings.name, one.settings.unique_id.hex())
         assert (answer.software_version, answer.hardware_version) == ("3.0", "3.0")
         assert answer.uptime < 60
         assert answer.health == 0

@@ -227,11 +227,7 @@ def test_trouble_bus_off_and_back():
 
 STEPS = st.lists(
     st.one_of(
-        st.tuples(
-            st.just("status"),
-            st.sampled_from([5, OWN, 33, 40]),
-            st.integers(0, 20),
-        ),
+        st.tuples(st.just("status"), st.sampled_from([5, OWN, 33, 40]), st.integers(0, 20)),
         st.tuples(st.just("time"), st.sampled_from([5, OWN, 33])),
         st.tuples(st.just("allocation"), st.sampled_from([0, 5]), st.booleans()),
         st.tuples(st.just("alive"), st.floats(-1, 2)),

@@ -4,17 +4,7 @@ import math
 
 import pytest
 from umbilical_lines import BY_NAME, COUNTS, STATE, as_f32
-from umbilical_link_bench import (
-    ASCENT,
-    COAST,
-    DROGUE,
-    FAULT,
-    MAIN,
-    STANDBY,
-    STARTUP,
-    Bench,
-    ready,
-)
+from umbilical_link_bench import ASCENT, COAST, DROGUE, FAULT, MAIN, STANDBY, STARTUP, Bench, ready
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.protocol import commands

@@ -1,16 +1,7 @@
 """One damaged record proves nothing: $TELEM is text without a checksum."""
 
 import pytest
-from umbilical_link_bench import (
-    ASCENT,
-    COAST,
-    FAULT,
-    STANDBY,
-    STARTUP,
-    Bench,
-    in_situation,
-    ready,
-)
+from umbilical_link_bench import ASCENT, COAST, FAULT, STANDBY, STARTUP, Bench, in_situation, ready
 from umbilical_rocket import flown, vehicle
 
 from chute_ros.links.umbilical.protocol.config import DeployStage

@@ -114,10 +114,7 @@ def test_the_parameter_wins_over_the_layout_and_the_layout_is_asked_by_auto():
     }
     assert not layout_from(content, "here").heartbeat_in_flight
     own = layout_from({**content, "heartbeat_in_flight": True}, "here")
-    wants = {
-        HeartbeatInFlight.AUTO: Mode.Fault,
-        HeartbeatInFlight.NO: Mode.Coast,
-    }
+    wants = {HeartbeatInFlight.AUTO: Mode.Fault, HeartbeatInFlight.NO: Mode.Coast}
     for setting, ends in wants.items():
         flight = Flight(setting, layouts=[own]).launched()
         flight.until(lambda flight=flight: flight.computer.mode in (Mode.Coast, Mode.Fault))

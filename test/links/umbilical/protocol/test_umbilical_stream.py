@@ -73,7 +73,11 @@ def whole_dump(data, format_=DumpFormat.BINARY, complete=True):
 def test_lines_come_out_whole_whatever_their_pieces(size):
     ear = Ear()
     assert ear.hear(PAD + b"\n[INFO] a\r\n\r\n" + PAD, size) == [
-        *(Line(WHOLE), Line(b""), Line(b"[INFO] a"), Line(b""), Line(WHOLE)),
+        Line(WHOLE),
+        Line(b""),
+        Line(b"[INFO] a"),
+        Line(b""),
+        Line(WHOLE),
     ]
     assert ear.counts == {}
 

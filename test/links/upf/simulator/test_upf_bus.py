@@ -3,15 +3,7 @@
 import math
 
 import pytest
-from upf_device_bench import (
-    CONTROLLER,
-    NODE_STATUS,
-    TRIGGER,
-    Story,
-    Vehicle,
-    definitions,
-    ready,
-)
+from upf_device_bench import CONTROLLER, NODE_STATUS, TRIGGER, Story, Vehicle, definitions, ready
 
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.simulator.bus import UpfBus
