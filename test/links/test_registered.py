@@ -1,7 +1,5 @@
 """A link is found by its entry: ours, and one of somebody's own package."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import json

@@ -105,27 +105,24 @@ def test_the_effect_of_a_second_try_counts():
     assert bench.at(20.0).sent == [0.0, 1.5]
 
 
-def test_what_is_sent_once_is_never_sent_again():
+def test_what_is_sent_once_is_never_sent_again_though_its_effect_may_come_late():
     bench = Bench(once=True).at(4.9)
     assert bench.sent == [0.0]
     assert not bench.loop.ended
     assert "sent once, but" in bench.at(5.0).end.message
     assert bench.at(50.0).sent == [0.0]
-
-
-def test_the_effect_of_what_is_sent_once_may_come_late():
+    # The effect of what is sent once may come late.
     assert Bench(once=True).at(4.5).shows().end.success
 
 
-def test_the_time_to_the_effect_runs_from_when_it_left():
+def test_the_effect_counts_and_its_time_runs_from_when_it_left():
+    # The time to the effect runs from when it left.
     bench = Bench(sends_at_once=False).at(1.0).send().at(2.4)
     assert (bench.sent, bench.waiting) == ([1.0], 0)
     bench.at(2.5)
     assert bench.waiting == 1
     assert bench.send().sent == [1.0, 2.5]
-
-
-def test_the_effect_does_not_count_before_it_left():
+    # The effect does not count before it left.
     bench = Bench(sends_at_once=False, even_if_shown=True).at(0.5).shows()
     assert not bench.loop.ended
     bench.send()

@@ -9,12 +9,7 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import LinkState
-from chute_ros.protocol.liveness import (
-    TRANSITIONS,
-    Liveness,
-    LivenessLimits,
-    Stimulus,
-)
+from chute_ros.protocol.liveness import TRANSITIONS, Liveness, LivenessLimits, Stimulus
 from chute_ros.transitions import after
 
 LIMITS = LivenessLimits(stale_after=2.5, lost_after=5.0)

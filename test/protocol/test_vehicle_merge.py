@@ -220,11 +220,7 @@ def test_the_autopilot_is_lost_only_when_nobody_hears_it():
             {"vehicle/state": (10.0, (stale, 4)), "mavros": (1.0, (ok, 5))},
             (stale, 4),
         ),
-        (
-            state_and_mavros[::-1],
-            {"vehicle/state": (10.0, OK), "mavros": (9.9, (ok, 5))},
-            (ok, 5),
-        ),
+        (state_and_mavros[::-1], {"vehicle/state": (10.0, OK), "mavros": (9.9, (ok, 5))}, (ok, 5)),
     ):
         one = merge(*sources)
         for source, (at, word) in told.items():
@@ -270,10 +266,7 @@ def test_two_that_tell_otherwise_dispute_it_also_when_one_is_left(part, right, n
 def test_a_last_word_before_the_power_went_disputes_nothing():
     """The autopilot dies with its motors, and what it said last was of before."""
     one, now = hear_both(
-        merge(),
-        1.0,
-        {"acceleration": (9.8,), "vertical_speed": (0.0,)},
-        {"acceleration": (9.8,)},
+        merge(), 1.0, {"acceleration": (9.8,), "vertical_speed": (0.0,)}, {"acceleration": (9.8,)}
     )
     for hundredth in range(2, 60, 2):
         falls = {"acceleration": (0.1,)}

@@ -118,9 +118,7 @@ def test_imu_tells_attitude_and_the_length_of_the_specific_force():
     assert parts["acceleration"] == 7.0
     assert parts["pitch"] == pytest.approx(math.radians(30))
     assert by_name(readings.imu(imu(acceleration=(0.0, 0.0, 0.0))))["acceleration"] == 0.0
-
-
-def test_imu_says_with_a_covariance_of_minus_1_what_it_does_not_estimate():
+    # Imu says with a covariance of minus 1 what it does not estimate.
     message = imu()
     message.orientation_covariance[0] = -1.0
     assert readings.imu(message) == {"attitude": None, "acceleration": (9.81,)}

@@ -1,7 +1,5 @@
 """What the tests of mavlink_parachute share: quick parameters, and devices that remember."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

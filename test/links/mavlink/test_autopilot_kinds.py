@@ -1,7 +1,5 @@
 """mavlink_parachute with each kind of autopilot, on real UDP: kill, block, what is said of it."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """mavlink_parachute passes the stories of all device nodes, over real UDP."""
 
-from __future__ import annotations
-
 from device_suite import DeviceSuite
 from mavlink_bench import Module, quick
 from node_bench import LOCAL, port_of

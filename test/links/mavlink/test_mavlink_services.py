@@ -1,7 +1,5 @@
 """The services of mavlink_parachute, over real UDP."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

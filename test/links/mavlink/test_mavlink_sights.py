@@ -1,7 +1,5 @@
 """mavlink_parachute on a real network: what it sees of the vehicle, and what it does not."""
 
-from __future__ import annotations
-
 import math
 import time
 

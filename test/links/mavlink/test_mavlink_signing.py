@@ -1,7 +1,5 @@
 """A signing key: refused if it is not safe, and then used in both directions."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

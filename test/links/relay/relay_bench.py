@@ -1,7 +1,5 @@
 """The node relay and a simulated relay board on a real pty."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable
 from typing import Any
 

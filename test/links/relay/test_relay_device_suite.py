@@ -1,7 +1,5 @@
 """relay passes the stories of all device nodes, over a real pty, as far as nothing comes back."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from chute_msgs.msg import ActionReport

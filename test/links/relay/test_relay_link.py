@@ -1,7 +1,5 @@
 """An output that fires and never answers: stories, golden bytes and what must always hold."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

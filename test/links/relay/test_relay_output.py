@@ -1,7 +1,5 @@
 """The output as a file or a serial port, and the parameters that name it."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Supervisor, mavlink_parachute, relay and the simulators: from the autopilot to the channel."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """The cable of the umbilical: pulled, plugged in, full of garbage; a port that is not there."""
 
-from __future__ import annotations
-
 import os
 import random
 import threading

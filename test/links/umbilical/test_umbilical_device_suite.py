@@ -1,7 +1,5 @@
 """umbilical passes the stories of all device nodes, over a real pty."""
 
-from __future__ import annotations
-
 import math
 
 from device_suite import DeviceSuite

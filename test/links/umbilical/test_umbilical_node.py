@@ -1,7 +1,5 @@
 """The node umbilical: what it publishes of a flight computer at the other end of a real pty."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """What the tests of umbilical share: quick parameters, and a flight computer on a pty."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The table of node ids on the disk: whatever happens to it, it is whole or the start ends."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import json

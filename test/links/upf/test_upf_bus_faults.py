@@ -1,7 +1,5 @@
 """upf_can on a bus that loses, doubles, spoils and floods."""
 
-from __future__ import annotations
-
 import random
 
 import pytest
@@ -14,12 +12,7 @@ from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, TRIGGER_STATUS
 from chute_ros.model import LinkState
 from chute_ros.protocol.dronecan.bus_node import NODE_STATUS
-from chute_ros.protocol.dronecan.can_frame import (
-    ERROR_BUS_OFF,
-    ERROR_RESTARTED,
-    CanFrame,
-    pack,
-)
+from chute_ros.protocol.dronecan.can_frame import ERROR_BUS_OFF, ERROR_RESTARTED, CanFrame, pack
 from chute_ros.sim.can_faults import CanFaultKnobs
 
 #: A bus that loses much needs limits to match.

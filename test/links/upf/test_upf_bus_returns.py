@@ -1,7 +1,5 @@
 """upf_can outlives its bus: a serial CAN adapter that goes away and comes back."""
 
-from __future__ import annotations
-
 import os
 import select
 import threading

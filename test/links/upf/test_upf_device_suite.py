@@ -1,7 +1,5 @@
 """upf_can passes the stories of all device nodes, over real CAN frames, with either data types."""
 
-from __future__ import annotations
-
 from device_suite import DeviceSuite
 from simulated_device import SimulatedDevice
 from upf_bench import OTHER_LAYOUT, Network

@@ -1,7 +1,5 @@
 """What upf_can says on /diagnostics, and in its log at the start."""
 
-from __future__ import annotations
-
 import pytest
 from chute_msgs.msg import TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

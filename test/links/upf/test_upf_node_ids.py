@@ -1,7 +1,5 @@
 """Node ids that upf_can gives out: kept on the disk before they leave, and the same ever after."""
 
-from __future__ import annotations
-
 import threading
 
 import pytest

@@ -1,7 +1,5 @@
 """Parameters of upf_can: a bad value stops the start, and is named with what is allowed."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """upf_can and its simulated devices, as the dronecan library with its own driver sees them."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

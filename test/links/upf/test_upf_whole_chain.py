@@ -1,7 +1,5 @@
 """Supervisor, mavlink_parachute, upf_can and all simulators: from one wire to the other."""
 
-from __future__ import annotations
-
 import pytest
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy

@@ -1,7 +1,5 @@
 """What the tests of upf_can share: quick parameters, a bus of its own, and its devices."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -153,12 +151,7 @@ class Devices:
     """A controller and a trigger on the network, heard and well, the controller's parameters
     known."""
 
-    def __init__(
-        self,
-        network: Network,
-        self_test: float = 0.0,
-        **values: p.Value,
-    ) -> None:
+    def __init__(self, network: Network, self_test: float = 0.0, **values: p.Value) -> None:
         self.network, self.bench = network, network.bench
         self.controller, self.trigger = network.controller(self_test, **values), network.trigger()
         self.beats = self.bench.follow(LinkHeartbeat, "safety/heartbeat")

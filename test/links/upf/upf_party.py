@@ -1,7 +1,5 @@
 """A node of the test's own on the bus, for the tests of upf_can."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 Each story writes what it has seen to the standard output, one JSON object a line.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

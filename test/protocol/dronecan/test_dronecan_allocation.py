@@ -271,8 +271,8 @@ def test_requests_that_nobody_else_answers_are_ours_after_two_seconds():
     assert desk.ask(UID) == 124, "at once from then on"
 
 
-def test_an_allocator_that_answers_is_left_to_it_for_good():
-    """Given an autopilot that answers, an hour passes, and it answers again."""
+def test_an_allocator_that_answers_is_left_to_it_for_good_also_one_that_appears_later():
+    # Given an autopilot that answers, an hour passes, and it answers again.
     desk = yielding()
     assert asks_until(desk, 60.0, answered_by=10) is None
     assert desk.allocator.left_to == 10
@@ -280,9 +280,7 @@ def test_an_allocator_that_answers_is_left_to_it_for_good():
     assert asks_until(desk, desk.now + 60.0, answered_by=10) is None
     assert desk.allocator.left_to == 10
     assert desk.kept == []
-
-
-def test_an_allocator_that_appears_later_is_left_to_it():
+    # An allocator that appears later is left to it.
     desk = yielding()
     assert asks_until(desk, 5.0) == 125
     desk.part(UID[:6], source=10)

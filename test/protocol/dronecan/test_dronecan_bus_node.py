@@ -118,10 +118,15 @@ def test_the_answer_goes_to_who_asked_under_the_same_transfer_id():
     assert [frame[:8] for frame in shown(bench.frames)] == ["100b218a"]
 
 
-def test_what_it_does_not_serve_is_counted():
+def test_what_it_does_not_serve_and_a_status_of_nobody_are_nobodys():
+    # What it does not serve is counted.
     bench = Bench().clear().asked(33, "uavcan.protocol.AccessCommandShell")
     assert bench.frames == []
     assert bench.node.counts == {"requests that this node does not serve": 1}
+    # A status of nobody is nobodys.
+    # Data type id 341 needs more than the two bits of an anonymous message.
+    bench = Bench().feed(raw(0x10000100, "00c0"))
+    assert bench.node.nodes.all() == []
 
 
 def test_what_is_not_standard_is_handed_on():
@@ -158,12 +163,6 @@ def test_a_node_that_does_not_answer_is_taken_as_it_is():
     assert len(bench.requests(GET_NODE_INFO)) == 15
     assert bench.node.nodes.all_discovered(bench.now)
     assert bench.node.counts["calls without an answer"] == 5
-
-
-def test_a_status_of_nobody_is_nobodys():
-    # Data type id 341 needs more than the two bits of an anonymous message.
-    bench = Bench().feed(raw(0x10000100, "00c0"))
-    assert bench.node.nodes.all() == []
 
 
 def errand(*calls):
@@ -228,11 +227,7 @@ def test_trouble_bus_off_and_back():
 
 STEPS = st.lists(
     st.one_of(
-        st.tuples(
-            st.just("status"),
-            st.sampled_from([5, OWN, 33, 40]),
-            st.integers(0, 20),
-        ),
+        st.tuples(st.just("status"), st.sampled_from([5, OWN, 33, 40]), st.integers(0, 20)),
         st.tuples(st.just("time"), st.sampled_from([5, OWN, 33])),
         st.tuples(st.just("allocation"), st.sampled_from([0, 5]), st.booleans()),
         st.tuples(st.just("alive"), st.floats(-1, 2)),

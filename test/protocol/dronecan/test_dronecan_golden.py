@@ -279,12 +279,7 @@ def _parsed(folder, **files):
 def test_arrays_of_any_kind(tmp_path):
     text = "int8[<=2] small\nuint12[3] fixed\nbool[2] flags\nfloat16[<=2] f\n"
     kind = DataTypes(_parsed(tmp_path, **{"20000_Odd": text})).message("flyfire.Odd")
-    values = {
-        "small": [-128, 127],
-        "fixed": [0, 4095, 1],
-        "flags": [True, False],
-        "f": [0.5],
-    }
+    values = {"small": [-128, 127], "fixed": [0, 4095, 1], "flags": [True, False], "f": [0.5]}
     assert kind.decode(kind.encode(values)) == values
     for name, one in (
         ("small", [128]),

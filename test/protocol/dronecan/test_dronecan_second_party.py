@@ -55,18 +55,15 @@ def test_it_hears_the_time_of_the_bus(came):
     assert third - second == pytest.approx(1e6, abs=2e4)
 
 
-def test_a_device_made_of_the_library_gets_a_node_id_of_ours(came):
+def test_node_ids_are_given_by_either_allocator_to_either_device(came):
+    # A device made of the library gets a node id of ours.
     story = came["our allocator"]
     assert story["sent"] == [0, 6, 12]
     # It wants 33, which is the controller's as delivered, as 34 is the trigger's.
     assert story["given"] == [[10, 35]]
     assert story["table"] == [[OTHER, 35]]
-
-
-def test_a_device_made_of_ours_gets_a_node_id_of_the_librarys_allocator(came):
+    # A device made of ours gets a node id of the librarys allocator.
     assert came["their allocator"] == [[bytes(range(200, 216)).hex(), 125]]
-
-
-def test_the_librarys_allocator_is_another_one(came):
+    # The librarys allocator is another one.
     (notice,) = came["two allocators"]
     assert notice.startswith("node 50 gives out node ids as well")

@@ -209,15 +209,8 @@ def test_a_lost_frame_loses_its_transfer_and_not_the_next():
         assert sum(ear.counts.values()) > 0
 
 
-def test_a_transfer_of_one_frame_cuts_short_as_well():
-    ear = Ear()
-    _, frames = status(transfer_id=0)
-    (after,) = ear.hear([frames[0], raw(0x10067F21, "0000c1"), frames[1]])
-    assert (after.transfer_id, after.payload) == (1, b"\0\0")
-    assert ear.counts == {"transfers cut short": 1, "frames without their beginning": 1}
-
-
-def test_a_transfer_that_pauses_too_long_is_given_up():
+def test_a_pause_between_two_frames_that_is_too_long_ends_a_transfer():
+    # A transfer that pauses too long is given up.
     ear = Ear()
     _, frames = status()
     assert ear.hear(frames[:1], 0.0) == []
@@ -226,20 +219,25 @@ def test_a_transfer_that_pauses_too_long_is_given_up():
     # The same id again is a new transfer, and the old one was cut short.
     assert len(ear.hear(frames, 2.5)) == 1
     assert ear.counts["transfers cut short"] == 1
-
-
-def test_the_pause_is_between_two_frames_however_long_it_all_takes():
+    # The pause is between two frames however long it all takes.
     ear = Ear()
     transfer, frames = information()
     came = [ear.hear([frame], index * 1.9) for index, frame in enumerate(frames)]
     assert came == [[]] * 7 + [[transfer]]
 
 
-def test_a_first_frame_that_is_not_full():
+def test_a_first_frame_that_is_not_full_and_a_transfer_of_one_frame():
+    # A first frame that is not full.
     ear = Ear()
     _, frames = status()
     assert ear.hear([frames[0], raw(0x10067F21, "1bbb81"), frames[1]]) != []
     assert ear.counts == {"first frame too short": 1}
+    # A transfer of one frame cuts short as well.
+    ear = Ear()
+    _, frames = status(transfer_id=0)
+    (after,) = ear.hear([frames[0], raw(0x10067F21, "0000c1"), frames[1]])
+    assert (after.transfer_id, after.payload) == (1, b"\0\0")
+    assert ear.counts == {"transfers cut short": 1, "frames without their beginning": 1}
 
 
 def test_a_wrong_crc_is_damage_or_another_definition_of_the_type():

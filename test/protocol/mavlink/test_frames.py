@@ -198,15 +198,14 @@ def test_no_true_frame_is_held_back_for_longer_than_the_longest_frame_takes(piec
         assert all(now < put + frames.LONGEST_FRAME_TIME for put in held.values())
 
 
-def test_a_version_1_frame_longer_than_its_message_is_none():
+def test_a_frame_longer_than_its_message_is_read_only_of_version_2():
+    # A version 1 frame longer than its message is none.
     body = struct.pack("<BBBBB", 10, 0, 1, 161, 0) + bytes(10)
     raw = b"\xfe" + body + struct.pack("<H", crc(body + b"\x32"))
     decoder = FrameDecoder()
     assert decoder.feed_datagram(raw, 0.0) == []
     assert decoder.counts == {frames.NOISE: len(raw)}
-
-
-def test_a_version_2_frame_longer_than_its_message_is_read_without_the_newer_fields():
+    # A version 2 frame longer than its message is read without the newer fields.
     payload = struct.pack("<IBBBBB", 0, 37, 8, 0, 3, 3) + b"newer"
     body = struct.pack("<BBBBBB", len(payload), 0, 0, 0, 1, 161) + b"\0\0\0" + payload
     raw = b"\xfd" + body + struct.pack("<H", crc(body + b"\x32"))

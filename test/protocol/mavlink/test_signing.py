@@ -42,9 +42,7 @@ def test_a_signature_is_what_the_guide_prescribes():
     assert int.from_bytes(stamp, "little") == expected
     digest = hashlib.sha256(KEY + frame + bytes([link]) + stamp).digest()
     assert signature == digest[:6]
-
-
-def test_a_rightly_signed_frame_is_read_and_marked():
+    # A rightly signed frame is read and marked.
     (frame,) = reader().feed_datagram(signed(), NOW)
     assert frame.signed
 

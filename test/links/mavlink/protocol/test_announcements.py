@@ -27,14 +27,13 @@ def block(bench, reason):
 
 
 def test_the_whole_reason_comes_first_in_as_many_chunks_as_it_takes():
+    # The whole reason comes first in as many chunks as it takes.
     bench = block(flying(), LONG)
     assert bench.texts() == [f"{LONG}: flight blocked"]
     first, *_ = [m for _, m in bench.sent if m.get_type() == "STATUSTEXT"]
     assert first.text == LONG[:50]
     assert first.id != 0
-
-
-def test_two_long_texts_have_different_ids():
+    # Two long texts have different ids.
     bench = block(block(flying(), LONG).at(3.0), LONG[::-1])
     ids = [m.id for _, m in bench.sent if m.get_type() == "STATUSTEXT"]
     assert len(set(ids)) == 2
@@ -51,16 +50,15 @@ def test_a_reason_that_changes_is_said_anew_at_a_pace_and_the_newest_wins():
     assert len(bench.texts()) == 2
 
 
-def test_a_reason_that_is_told_again_is_not_said_again():
+def test_a_reason_is_said_again_only_if_it_changes_and_stays():
+    # A reason that is told again is not said again.
     bench = block(flying(), "x")
     for second in range(1, 20):
         block(bench.at(second), "x")
     assert bench.texts() == ["x: flight blocked"]
     block(bench.at(30.0), "")
     assert bench.texts() == ["x: flight blocked", "flight block released"]
-
-
-def test_one_that_comes_and_goes_within_the_pace_says_nothing():
+    # One that comes and goes within the pace says nothing.
     bench = block(flying(), "x")
     block(bench.at(0.5), "y")
     block(bench.at(1.0), "x")

@@ -72,14 +72,13 @@ def test_it_is_sent_at_once_and_done_at_its_acknowledgement():
 
 
 def test_it_is_sent_again_with_a_rising_confirmation_and_given_up_in_words():
+    # It is sent again with a rising confirmation and given up in words.
     bench = Bench(ack_timeout=0.5, tries=3).start(7, RELEASE).at(10.0)
     assert [(when, one.confirmation) for when, one in bench.sent] == [(0.0, 0), (0.5, 1), (1.0, 2)]
     (end,) = bench.ends()
     assert end.result == results.NO_ACKNOWLEDGEMENT
     assert end.text() == "no acknowledgement after 3 sends in 1.50 s"
-
-
-def test_the_confirmation_is_a_byte_and_stays_at_its_highest():
+    # The confirmation is a byte and stays at its highest.
     bench = Bench(tries=100, ack_timeout=0.1, late_ack_window=0.1)
     for number in (1, 2, 3, 4):  # each joins the one before, and begins its tries again
         bench.start(number, RELEASE, urgent=True).at(number * 8.5)
@@ -130,24 +129,18 @@ def test_a_late_answer_to_an_earlier_command_does_not_confirm_a_later_one():
     # Its own answer comes too, and two answers cannot both be to the one earlier send.
     (end,) = bench.at(1.2).ack(RELEASE).ends()
     assert (end.token, end.accepted) == (2, True)
-
-
-def test_answers_that_never_come_do_not_hold_a_later_command_up_for_ever():
+    # Answers that never come do not hold a later command up for ever.
     bench = Bench(tries=1, ack_timeout=0.5, late_ack_window=5.0).start(1, DISABLE).at(1.0)
     bench.ends()
     bench.at(6.0).start(2, RELEASE).at(6.1).ack(RELEASE)
     assert bench.ends()[0].accepted
-
-
-def test_a_late_final_answer_after_in_progress_does_not_confirm_a_later_command():
+    # A late final answer after in progress does not confirm a later command.
     bench = Bench(tries=1, in_progress_timeout=1.0, late_ack_window=2.0).start(1, DISABLE)
     bench.at(0.1).ack(DISABLE, results.IN_PROGRESS).at(1.5)
     assert bench.ends()[0].result == results.NO_ACKNOWLEDGEMENT
     bench.at(2.5).start(2, RELEASE).at(2.6).ack(DISABLE)
     assert bench.ends() == []
-
-
-def test_what_was_sent_once_without_waiting_confirms_nothing_either():
+    # What was sent once without waiting confirms nothing either.
     bench = Bench()
     bench.commands.send_once(DISABLE, 0.0)
     bench.start(2, RELEASE).at(0.1).ack(DISABLE)
@@ -173,15 +166,13 @@ def test_a_second_command_of_the_same_number_waits_for_its_turn():
     assert [end.token for end in bench.ends()] == [1, 2]
 
 
-def test_an_urgent_one_takes_the_place_of_another_and_of_what_waits():
+def test_an_urgent_one_takes_the_place_of_another_or_joins_the_very_same():
     bench = Bench().start(1, DISABLE).start(2, DISABLE).start(3, RELEASE, urgent=True)
     assert bench.sent[-1][1].command == RELEASE
     ends = bench.ends()
     assert {end.token: end.superseded for end in ends} == {1: True, 2: True}
     assert "for a newer command of the same number" in ends[0].text()
-
-
-def test_an_urgent_one_joins_one_that_asks_for_the_very_same():
+    # An urgent one joins one that asks for the very same.
     bench = Bench().start(1, RELEASE, urgent=True).at(0.1).start(2, RELEASE, urgent=True)
     assert len(bench.sent) == 2
     bench.at(0.2).ack(RELEASE)

@@ -92,13 +92,12 @@ def test_acknowledged_and_then_shown():
     assert bench.reports == [Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED]
 
 
-def test_shown_without_an_acknowledgement_is_done_and_says_so():
+def test_shown_or_not_acknowledged_or_not_says_which_did_not_come():
+    # Shown without an acknowledgement is done and says so.
     bench = Bench().at(0.3).shows()
     assert (bench.end.success, bench.end.accepted) == (True, False)
     assert "not acknowledged" in bench.end.message
-
-
-def test_acknowledged_but_never_shown_says_which_did_not_come_and_when_it_gave_up():
+    # Acknowledged but never shown says which did not come and when it gave up.
     bench = Bench().at(0.1).answer()
     while not bench.loop.ended:
         bench.at(bench.loop.next_deadline())
@@ -108,9 +107,7 @@ def test_acknowledged_but_never_shown_says_which_did_not_come_and_when_it_gave_u
     assert "given up after 5.0 s" in bench.end.message
     assert "acknowledged after 0.10 s" in bench.end.message
     assert "never showed that PARACHUTE_STATUS reports deployed" in bench.end.message
-
-
-def test_neither_says_both():
+    # Neither says both.
     bench = Bench().at(1.5).answer(results.NO_ACKNOWLEDGEMENT, sends=3).at(10.0)
     assert (bench.end.success, bench.end.accepted) == (False, False)
     assert bench.end.result == results.NO_ACKNOWLEDGEMENT
@@ -156,15 +153,14 @@ def test_any_other_refusal_is_final_and_in_words_unless_somebody_insists():
     assert bench.end.message.endswith("; armed triggers: none")
 
 
-def test_an_effect_that_is_there_already_is_not_ordered_again():
+def test_nothing_is_ordered_of_what_is_shown_already():
+    # An effect that is there already is not ordered again.
     bench = Bench(already=True)
     assert bench.sent == []
     assert bench.end.success
     assert "nothing was sent" in bench.end.message
     assert bench.reports == [Outcome.CONFIRMED]
-
-
-def test_nothing_more_is_sent_once_it_is_shown():
+    # Nothing more is sent once it is shown.
     bench = Bench().at(0.1).answer().shows()
     before = (list(bench.sent), list(bench.asked))
     bench.at(100.0).answer()
@@ -199,9 +195,7 @@ def test_a_refusal_after_an_acceptance_is_the_answer_that_is_reported():
     bench = Bench().at(0.1).answer().at(1.7).answer(results.DENIED)
     assert (bench.end.success, bench.end.accepted, bench.end.result) == (False, True, 2)
     assert "denied" in bench.end.message
-
-
-def test_time_that_is_up_names_the_newest_answer_too():
+    # Time that is up names the newest answer too.
     bench = Bench().at(0.1).answer().at(1.7)
     while not bench.loop.ended:
         bench.answer(results.TEMPORARILY_REJECTED).at(bench.now + 0.3)

@@ -67,17 +67,13 @@ def test_above_takeoff_height_nothing_is_disarmed_any_more():
     assert disarms(bench) == [], "down again, but it does not say that it stands"
     bench.at(bench.t + 0.1).hear(PILOT, at_height(0.5), landed())
     assert disarms(bench)[:1] == [0]
-
-
-def test_one_height_above_it_is_no_take_off():
+    # One height above it is no take off.
     bench = on_the_ground()
     climb(bench, quadplane, [0.1, 5.0, 0.1, 0.2])
     bench.clear()
     climb(bench, quadplane, [0.2] * 20)
     assert FORCE in disarms(bench)
-
-
-def test_home_that_is_set_as_it_arms_is_no_climb():
+    # Home that is set as it arms is no climb.
     bench = Bench().hear(PILOT, quadplane(), landed(), at_height(30.0))
     bench.call("flight_block", "x").at(0.5).hear(PILOT, at_height(30.0), quadplane(True))
     climb(bench, quadplane, [0.0, 0.0])

@@ -120,7 +120,8 @@ def test_a_refused_way_is_followed_by_the_other_at_once(result):
     assert outcomes(bench, 1)[-1] == "CONFIRMED"
 
 
-def test_a_way_without_an_answer_is_followed_by_the_other_and_not_given_up():
+def test_a_way_that_is_not_answered_or_has_no_effect_is_followed_by_the_other():
+    # A way without an answer is followed by the other and not given up.
     bench = flying(ardupilot, setting("AFS_ENABLE", 0))
     kill(bench)
     bench.at(1.5)
@@ -129,9 +130,7 @@ def test_a_way_without_an_answer_is_followed_by_the_other_and_not_given_up():
     bench.hear(PILOT, ack(DISARM), ardupilot(False))
     assert bench.end(1).finished.success
     assert "kill (flight_termination): not answered" in bench.end(1).finished.message
-
-
-def test_an_accepted_way_without_effect_is_followed_by_the_other():
+    # An accepted way without effect is followed by the other.
     bench = flying(ardupilot, setting("AFS_ENABLE", 0))
     kill(bench)
     bench.at(1.02).hear(PILOT, ack(DISARM)).stream(3.0, 0.1, PILOT, lambda: ardupilot(True))

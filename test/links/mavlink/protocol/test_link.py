@@ -183,16 +183,15 @@ def test_vehicle_is_the_chosen_autopilots_alone():
     assert bench.events[-1].state.armed is Armed.ARMED
 
 
-def test_link_comes_up_falls_silent_and_comes_back():
+def test_link_comes_up_falls_silent_and_comes_back_and_restarts_are_told():
+    # Link comes up falls silent and comes back.
     bench = Bench().hear(CHUTE, heartbeat()).at(6.0).hear(CHUTE, heartbeat())
     changes = [e for e in bench.events if isinstance(e, DeviceLinkChanged)]
     assert {e.name for e in changes} == {"parachute 1/161"}
     states = [e.change.after for e in changes]
     assert states == [LinkState.OK, LinkState.STALE, LinkState.LOST, LinkState.OK]
     assert changes[-1].change.regained
-
-
-def test_restarts_are_told():
+    # Restarts are told.
     bench = Bench().hear(CHUTE, heartbeat(), *[status(boot_ms=t) for t in (9000, 100, 200)])
     times = [d.MAVLink_system_time_message(0, t) for t in (9000, 100, 200)]
     bench.hear(PILOT, copter(armed=True), *times)
@@ -371,16 +370,14 @@ def test_one_that_streams_or_is_silent_is_not_asked():
 
 
 def test_the_first_status_after_a_restart_is_followed_by_a_question():
-    """It may be one from before that was delayed; the next one tells, and may say "deployed"."""
+    # It may be one from before that was delayed; the next one tells, and may say "deployed".
     bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=500_000))
     bench.at(0.5).hear(CHUTE, status(boot_ms=100, deployed=2))
     assert asked_for_status(bench) == [0.5]
     assert not bench.last_status().deployed
     bench.at(0.52).hear(CHUTE, status(boot_ms=120, deployed=2))
     assert bench.last_status().deployed
-
-
-def test_a_flood_of_doubtful_statuses_is_not_answered_one_by_one():
+    # A flood of doubtful statuses is not answered one by one.
     bench = Bench().hear(CHUTE, heartbeat(), status(boot_ms=500_000))
     for step in range(1, 100):
         bench.at(0.5 + step * 0.01).hear(CHUTE, status(boot_ms=1000 - 10 * step))

@@ -83,13 +83,12 @@ def test_acknowledgement_by_or_to_another_component_is_not_ours():
     assert steps(bench, 1) == ["SENT", "ACCEPTED"]
 
 
-def test_deployed_parachute_is_not_released_again():
+def test_deployed_parachute_is_not_released_again_by_its_old_word():
+    # Deployed parachute is not released again.
     bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2)).call("deploy", 1, False)
     assert bench.end(1).finished.success
     assert bench.commands() == []
-
-
-def test_old_word_of_having_deployed_does_not_hold_back_a_release():
+    # Old word of having deployed does not hold back a release.
     bench = ready().hear(CHUTE, status(boot_ms=5200, deployed=2))
     bench.stream(6.0, 1.0, CHUTE, heartbeat).call("deploy", 1, False)
     assert len(bench.commands(RELEASE)) == 1
@@ -114,9 +113,7 @@ def test_nothing_makes_a_parachute_less_ready_while_it_is_being_released():
     for token in (2, 3):
         assert "a release is under way" in bench.end(token).finished.message
     assert [order.command for order in bench.commands()] == [RELEASE]
-
-
-def test_disarm_under_way_gives_way_to_a_release():
+    # Disarm under way gives way to a release.
     bench = ready().call("arm", 1, False, 0).call("deploy", 2, False)
     bench.stream(6.0, 0.5, CHUTE, heartbeat)
     assert not bench.end(1).finished.success

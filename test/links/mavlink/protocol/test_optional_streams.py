@@ -1,7 +1,5 @@
 """Messages that are asked for besides the needed ones: a few times, given up on a slow line."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

@@ -74,14 +74,13 @@ def test_silent_heartbeat_is_a_fault_in_words():
     assert not told.at(5.0).healthy
 
 
-def test_restart_is_seen_in_time_boot_ms():
+def test_restart_is_seen_in_time_boot_ms_and_nothing_else_is_one():
+    # Restart is seen in time boot ms.
     told = Told().heartbeat().status(0.0, boot_ms=60_000)
     told.status(1.0, boot_ms=61_000).status(2.0, boot_ms=400).status(3.0, boot_ms=1400)
     assert told.tracker.reboot_count == 1
     assert told.at(3.0).uptime == 1.4
-
-
-def test_delayed_status_is_no_restart_and_undoes_nothing():
+    # Delayed status is no restart and undoes nothing.
     told = Told().heartbeat().status(0.0, boot_ms=60_500, deployed=4)
     told.status(0.1, boot_ms=60_000)
     assert told.tracker.deployed
@@ -89,16 +88,12 @@ def test_delayed_status_is_no_restart_and_undoes_nothing():
     assert told.tracker.deployed
     told.status(0.3, boot_ms=60_800, deployed=4)
     assert told.tracker.reboot_count == 0
-
-
-def test_clock_that_wraps_after_49_days_is_no_restart():
+    # Clock that wraps after 49 days is no restart.
     told = Told().heartbeat().status(0.0, boot_ms=2**32 - 500).status(1.0, boot_ms=500)
     told.status(2.0, boot_ms=1500)
     assert told.tracker.reboot_count == 0
     assert told.at(2.0).uptime == 1.5
-
-
-def test_device_without_a_clock_is_followed():
+    # Device without a clock is followed.
     told = Told().heartbeat().status(0.0, boot_ms=0).status(1.0, boot_ms=0, deployed=3)
     assert told.tracker.deployed
     assert told.tracker.status_interval == 1.0

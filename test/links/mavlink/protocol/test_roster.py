@@ -50,13 +50,16 @@ def test_other_component_than_the_named_one_is_neither_ours_nor_makes_doubt():
     assert not heard(roster, 1, 2)
     assert not heard(roster, 9, 154)
     assert roster.doubt() == ""
-
-
-def test_component_0_is_a_sender_like_any_other():
+    # Component 0 is a sender like any other.
     # The protocol's public emulator speaks as 255/0.
     roster = Roster("parachute", 0, 0)
     assert heard(roster, 255, 0)
     assert roster.named("255/0") is roster.get(255, 0)
+    # Device by its name.
+    roster = Roster("parachute", 0, 0)
+    heard(roster, 1, 161)
+    assert roster.named("1/161").device == "1/161"
+    assert roster.named("1/16") is None
 
 
 @pytest.mark.parametrize("named", [0, 1])
@@ -79,10 +82,3 @@ def test_flood_of_made_up_ids_is_bounded_and_keeps_those_who_were_first():
         heard(roster, system, 1)
     assert len(roster.all()) == MOST_DEVICES
     assert roster.doubt().count(",") <= MOST_DEVICES + 1
-
-
-def test_device_by_its_name():
-    roster = Roster("parachute", 0, 0)
-    heard(roster, 1, 161)
-    assert roster.named("1/161").device == "1/161"
-    assert roster.named("1/16") is None

@@ -1,7 +1,5 @@
 """A line that is full brings everything, late: the time until the autopilot answers tells."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 
@@ -44,14 +42,13 @@ def test_it_is_asked_each_second_and_two_answers_tell():
     assert "raise its baud rate" in fault
 
 
-def test_one_late_answer_is_none_yet():
+def test_what_tells_nothing_of_the_time():
+    # One late answer is none yet.
     trip = RoundTrip()
     for second, took in enumerate((0.02, 0.9, 0.02)):
         trip.heard(answer(asked(trip, float(second))), second + took)
         assert not trip.late(second + took)
-
-
-def test_answers_to_others_its_own_questions_and_copies_count_nothing():
+    # Answers to others its own questions and copies count nothing.
     trip = RoundTrip()
     sent = asked(trip, 10.0)
     trip.heard(answer(sent, tc1=0), 10.1)
@@ -60,9 +57,7 @@ def test_answers_to_others_its_own_questions_and_copies_count_nothing():
     for again in (10.7, 10.8, 10.9):
         trip.heard(answer(sent), again)
     assert math.isnan(trip.seconds(11.0))
-
-
-def test_what_was_measured_long_ago_says_nothing():
+    # What was measured long ago says nothing.
     trip = RoundTrip()
     for second in (0.0, 1.0):
         trip.heard(answer(asked(trip, second)), second + 0.9)

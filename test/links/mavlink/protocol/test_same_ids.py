@@ -26,10 +26,21 @@ def restarts(bench):
     return [text for text in bench.notices() if "restarted" in text]
 
 
-def test_one_autopilot_is_in_no_doubt():
+def test_one_alone_is_in_no_doubt_nor_is_a_restart_or_one_that_was_switched_off():
+    # One autopilot is in no doubt.
     bench = autopilots(Bench(**ASLEEP).hear(PILOT, copter()), 20.0, 100.0)
     assert bench.link.doubts(bench.now) == []
     assert restarts(bench) == []
+    # It is over when the other one is switched off.
+    bench = autopilots(Bench(**ASLEEP).hear(PILOT, copter()), 10.0, 100.0, 5.0)
+    autopilots(bench, 20.0, 100.0)
+    assert bench.link.doubts(bench.now) == []
+    assert bench.link.vehicle_state(bench.now).armed is Armed.DISARMED
+    # A restart is still one.
+    bench = autopilots(Bench(**ASLEEP).hear(PILOT, copter()), 10.0, 100.0)
+    autopilots(bench, 10.0, -bench.t)
+    assert restarts(bench) == ["autopilot 1/1 restarted on the ground"]
+    assert bench.link.doubts(bench.now) == []
 
 
 @pytest.mark.parametrize("other", [5.0, 97.033, 4000.0])
@@ -57,20 +68,6 @@ def test_their_heights_are_not_mixed_and_what_cannot_be_told_apart_ages():
     assert state.height_age < 0.3
     assert state.armed_age > 4.0
     assert state.landed_state_age > 4.0
-
-
-def test_it_is_over_when_the_other_one_is_switched_off():
-    bench = autopilots(Bench(**ASLEEP).hear(PILOT, copter()), 10.0, 100.0, 5.0)
-    autopilots(bench, 20.0, 100.0)
-    assert bench.link.doubts(bench.now) == []
-    assert bench.link.vehicle_state(bench.now).armed is Armed.DISARMED
-
-
-def test_a_restart_is_still_one():
-    bench = autopilots(Bench(**ASLEEP).hear(PILOT, copter()), 10.0, 100.0)
-    autopilots(bench, 10.0, -bench.t)
-    assert restarts(bench) == ["autopilot 1/1 restarted on the ground"]
-    assert bench.link.doubts(bench.now) == []
 
 
 def test_two_parachutes_with_the_same_ids_are_one_clear_error():

@@ -22,13 +22,9 @@ def test_connection_identified_by_type_MAV_TYPE_PARACHUTE():  # noqa: N802
         assert bench.last_status().state is ParachuteState.READY
 
 
-def test_connection_MAV_COMP_ID_PARACHUTE_without_the_type_is_no_parachute():  # noqa: N802
-    bench = Bench().hear(PARACHUTE, heartbeat(kind=d.MAV_TYPE_GIMBAL), status())
-    assert bench.link.chosen_parachute() is None
-    assert bench.events == []
-
-
-def test_connection_type_counts_whatever_the_field_autopilot_says():
+def test_connection_counts_by_the_type_alone():
+    # Connection MAV COMP ID PARACHUTE without the type is no parachute.
+    # Connection type counts whatever the field autopilot says.
     bench = Bench().hear(PARACHUTE, heartbeat(autopilot=d.MAV_AUTOPILOT_GENERIC), status())
     assert bench.link.chosen_parachute().device == "1/161"
     assert bench.link.autopilots.all() == []

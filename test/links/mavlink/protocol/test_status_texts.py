@@ -45,9 +45,12 @@ def test_golden_chunks():
     ]
 
 
-def test_short_text_is_one_message_without_an_id():
+def test_short_text_is_one_message_and_letters_beyond_ascii_do_not_shift_the_cuts():
+    # Short text is one message without an id.
     (only,) = chunked("x" * CHUNK, 2, 9)
     assert (only.id, only.chunk_seq, only.severity, len(only.text)) == (0, 0, 2, CHUNK)
+    # Letters beyond ascii do not shift the cuts.
+    assert [len(one.text) for one in chunked("ä" * 120, 3, 7)] == [50, 50, 20]
 
 
 @given(st.text(st.characters(codec="ascii", exclude_characters="\0"), max_size=600))
@@ -59,10 +62,6 @@ def test_what_is_cut_up_is_put_together(text):
     most = MOST_SENT * CHUNK - 1
     assert whole.text == (text if len(text) <= most else text[: most - 3] + "...")
     assert len(sent) <= MOST_SENT
-
-
-def test_letters_beyond_ascii_do_not_shift_the_cuts():
-    assert [len(one.text) for one in chunked("ä" * 120, 3, 7)] == [50, 50, 20]
 
 
 def test_chunks_in_any_order_and_of_two_texts_at_once():

@@ -1,7 +1,5 @@
 """Which messages are asked for: given what comes and how often, at t+..., then."""
 
-from __future__ import annotations
-
 import itertools
 import random
 

@@ -1,7 +1,5 @@
 """Two devices with the same ids: found by their clocks; one that restarts, or is late, is one."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

@@ -48,11 +48,16 @@ def test_it_is_told_by_its_heartbeat_once_a_second():
     assert beat.system_status == 5
 
 
-def test_time_boot_ms_counts_from_its_start():
+def test_time_boot_ms_counts_from_its_start_and_the_rest_is_as_set():
+    # Time boot ms counts from its start.
     station = module()
     assert station.newest("PARACHUTE_STATUS").time_boot_ms == 0
     station.run(5.0)
     assert station.newest("PARACHUTE_STATUS").time_boot_ms == pytest.approx(5000, abs=20)
+    # The rest of the status is as set.
+    got = status(module(ats_arm_altitude=30, packed_date="2024-09-12"))
+    assert got.ats_arm_altitude == 30
+    assert got.parachute_packed_date == "2024-09-12"
 
 
 def test_error_status_shows_each_error():
@@ -98,12 +103,6 @@ def test_safety_status_follows_the_settings_and_the_height():
     station = module()
     station.send(position(0.0), sender=(1, 50))
     assert status(station).safety_status == cleared, "another component's is not its vehicle's"
-
-
-def test_the_rest_of_the_status_is_as_set():
-    got = status(module(ats_arm_altitude=30, packed_date="2024-09-12"))
-    assert got.ats_arm_altitude == 30
-    assert got.parachute_packed_date == "2024-09-12"
 
 
 # MAV_CMD_SET_PARACHUTE_ARM and MAV_CMD_DO_PARACHUTE
@@ -154,16 +153,15 @@ def test_a_release_is_acknowledged_and_then_told_at_once():
         assert f"RELEASED by {by.name}" in station.log
 
 
-def test_a_second_release_is_accepted_and_changes_nothing():
+def test_a_second_release_changes_nothing_and_enable_switches_the_automatic_trigger():
+    # A second release is accepted and changes nothing.
     station = module(armed_triggers=int(FC), ground_cleared="yes")
     station.command(DO_PARACHUTE, RELEASE)
     station.command(SET_ARM, 0, FC)
     assert station.command(DO_PARACHUTE, RELEASE) == [ACCEPTED]
     assert status(station).deployment_status == DeploymentTrigger.DRONE
     assert sum("RELEASED" in line for line in station.log) == 1
-
-
-def test_enable_and_disable_switch_the_automatic_trigger():
+    # Enable and disable switch the automatic trigger.
     station = module(armed_triggers=int(FC))
     assert station.command(DO_PARACHUTE, ENABLE) == [ACCEPTED]
     assert status(station).arm_status == FC | ATS
@@ -186,13 +184,12 @@ def fall(station, height, seconds, sink=15.0):
         station.run(0.1)
 
 
-def test_a_fall_with_the_automatic_trigger_armed_releases():
+def test_a_fall_with_the_automatic_trigger_armed_releases_and_tells_it_at_once():
+    # A fall with the automatic trigger armed releases.
     station = module(armed_triggers=int(ATS))
     fall(station, 60.0, 1.0)
     assert station.newest("PARACHUTE_STATUS").deployment_status == DeploymentTrigger.ATS
-
-
-def test_a_release_by_itself_is_told_at_once_with_the_right_time():
+    # A release by itself is told at once with the right time.
     station = module(armed_triggers=int(ATS))
     station.run(0.4)
     fall(station, 60.0, 0.5)

@@ -4,17 +4,7 @@ import math
 
 import pytest
 from umbilical_lines import BY_NAME, COUNTS, STATE, as_f32
-from umbilical_link_bench import (
-    ASCENT,
-    COAST,
-    DROGUE,
-    FAULT,
-    MAIN,
-    STANDBY,
-    STARTUP,
-    Bench,
-    ready,
-)
+from umbilical_link_bench import ASCENT, COAST, DROGUE, FAULT, MAIN, STANDBY, STARTUP, Bench, ready
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.umbilical.protocol import commands
@@ -140,16 +130,15 @@ def test_what_telemetry_cannot_show_is_sent_and_says_so():
         assert bench.tokens == [token]
 
 
-def test_flash_info_is_confirmed_by_its_answer():
+def test_an_answer_or_its_clock_confirms_what_telemetry_has_no_field_for():
+    # Flash info is confirmed by its answer.
     bench = ready().hear("Flash: 1/8192 KB used (0.0%)").after(0.1)
     number = bench.order("flash_info")
     assert bench.after(0.3).ends(number) == []  # the answer of before does not count
     bench.hear("Flash: 12/8192 KB used (0.1%)")
     assert bench.end(number).success
     assert "flash: 12 of 8192 KB used" in bench.notices()
-
-
-def test_a_reboot_is_confirmed_by_its_clock():
+    # A reboot is confirmed by its clock.
     bench = ready()
     number = bench.order("reboot")
     assert bench.after(0.5).ends(number) == []

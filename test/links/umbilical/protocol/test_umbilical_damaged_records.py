@@ -1,16 +1,7 @@
 """One damaged record proves nothing: $TELEM is text without a checksum."""
 
 import pytest
-from umbilical_link_bench import (
-    ASCENT,
-    COAST,
-    FAULT,
-    STANDBY,
-    STARTUP,
-    Bench,
-    in_situation,
-    ready,
-)
+from umbilical_link_bench import ASCENT, COAST, FAULT, STANDBY, STARTUP, Bench, in_situation, ready
 from umbilical_rocket import flown, vehicle
 
 from chute_ros.links.umbilical.protocol.config import DeployStage
@@ -116,7 +107,8 @@ def refused(bench: Bench) -> Bench:
     return bench
 
 
-def test_a_drogue_that_was_not_written_was_not_fired():
+def test_what_was_not_written_has_failed_and_a_heartbeat_is_only_counted():
+    # A drogue that was not written was not fired.
     bench = ready(COAST, altitude=2900.0, deploy=DeployStage.NEXT)
     bench.link.deploy(1, True, bench.now)
     refused(bench)
@@ -125,17 +117,13 @@ def test_a_drogue_that_was_not_written_was_not_fired():
     ]
     bench.link.deploy(2, True, bench.now)
     assert set(bench.collect().after(1.0).tokens) == {"<D>"}
-
-
-def test_what_is_sent_once_and_was_not_written_has_failed():
+    # What is sent once and was not written has failed.
     bench = ready(STARTUP)
     bench.link.command(1, "reset_fram", True, bench.now)
     end = refused(bench).end(1)
     assert (end.success, end.sent) == (False, False)
     assert end.message.startswith("reset_fram was not written: the port takes no more data")
-
-
-def test_a_heartbeat_that_was_not_written_is_only_counted():
+    # A heartbeat that was not written is only counted.
     bench = ready(STANDBY)
     bench.link.owner_alive(float("inf"))
     bench.link.update(bench.now + 1.0)

@@ -94,14 +94,12 @@ def test_field_32_tells_two_layouts_apart_and_what_either_could_have_is_the_refe
         assert Ear(*[body(airbrake_state=text)] * 3).layout == name, text
 
 
-def test_a_fraction_in_field_32_corrects_what_was_believed_before():
+def test_a_fraction_or_a_2_in_field_32_corrects_what_was_believed_before():
     ear = knowing(STATE, airbrake_state="0")
     assert ear.hear(*[FRACTION] * 4) == [DEPLOYMENT] * 2
     assert ear.counts == {f"fits {DEPLOYMENT}, not {STATE}": 2}
     assert ear.told() == [f"telemetry has layout {DEPLOYMENT} (57 fields), no longer {STATE}"]
-
-
-def test_so_does_a_2():
+    # So does a 2.
     ear = knowing(DEPLOYMENT)
     assert ear.hear(*[body(airbrake_state="2")] * 4) == [STATE] * 2
 
@@ -135,11 +133,10 @@ def test_a_cut_line_that_has_the_count_of_another_layout_is_never_a_record(count
     assert ear.counts == {NOT_YET: 7}
 
 
-def test_cut_lines_of_two_counts_do_not_add_up():
+def test_cut_lines_of_two_counts_and_a_broken_one_between_make_no_row():
+    # Cut lines of two counts do not add up.
     assert Ear(*map(cut_to, (50, 52, 50, 54, 52, 50))).layout is None
-
-
-def test_a_broken_line_between_breaks_the_row():
+    # A broken line between breaks the row.
     text = body(BY_NAME["telem50"])
     ear = knowing(STATE)
     assert ear.hear(text, text, "1,2,3", text, text, GOOD, text, text) == [STATE]

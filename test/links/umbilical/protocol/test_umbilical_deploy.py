@@ -1,17 +1,7 @@
 """Deploy: fires until telemetry shows it, and never what is out already."""
 
 import pytest
-from umbilical_link_bench import (
-    ASCENT,
-    COAST,
-    DROGUE,
-    FAULT,
-    MAIN,
-    STANDBY,
-    STARTUP,
-    Bench,
-    ready,
-)
+from umbilical_link_bench import ASCENT, COAST, DROGUE, FAULT, MAIN, STANDBY, STARTUP, Bench, ready
 
 from chute_ros.links.umbilical.protocol.config import DeployStage, UmbilicalConfig
 from chute_ros.links.umbilical.protocol.events import DumpStarted

@@ -210,7 +210,8 @@ def test_launch_and_the_main_valve_are_refused_while_flight_is_blocked():
     assert bench.notices() == ["flight blocked: parachute lost", "flight block released"]
 
 
-def test_a_flight_block_takes_back_a_launch_that_waits():
+def test_a_flight_block_or_another_mode_takes_back_a_launch_that_waits():
+    # A flight block takes back a launch that waits.
     bench = ready()
     bench.order("payload_n1")
     number = bench.order("launch", force=True)
@@ -218,6 +219,13 @@ def test_a_flight_block_takes_back_a_launch_that_waits():
     bench.after(9.0)
     assert bench.tokens == ["<1>"]
     assert bench.end(number).message == "launch given up: flight is blocked: parachute lost"
+    # A launch that waits when the mode changes does not leave.
+    bench = ready(scheduler=SchedulerLimits(0.5, 1.0, 0.5))
+    bench.order("flash_info")
+    number = bench.order("launch", force=True)
+    bench.talk(flight_mode=STARTUP).after(2.0)
+    assert bench.tokens == ["<I>"]
+    assert not bench.end(number).sent
 
 
 def test_launch_is_refused_after_the_key_was_disarmed_from_here_until_it_is_armed_from_here():
@@ -252,12 +260,3 @@ def test_what_is_unsafe_is_refused_while_the_vehicle_is_made_safe():
         )
         bench.talk(mav_open=0).after(0.2).order(name, force=True)
         assert len(bench.after(0.3).tokens) == 2, name
-
-
-def test_a_launch_that_waits_when_the_mode_changes_does_not_leave():
-    bench = ready(scheduler=SchedulerLimits(0.5, 1.0, 0.5))
-    bench.order("flash_info")
-    number = bench.order("launch", force=True)
-    bench.talk(flight_mode=STARTUP).after(2.0)
-    assert bench.tokens == ["<I>"]
-    assert not bench.end(number).sent

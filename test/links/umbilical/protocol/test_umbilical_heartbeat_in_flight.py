@@ -89,19 +89,16 @@ def test_heartbeats_end_at_the_second_record_in_flight_and_begin_again_after_the
     assert beats(story, 35.0, 40.0) >= 4
 
 
-def test_one_damaged_record_does_not_end_the_heartbeats_on_the_ground():
+def test_neither_silence_nor_one_damaged_record_changes_them():
+    # One damaged record does not end the heartbeats on the ground.
     story = Bench(always_alive=True).talk(flight_mode=STANDBY).at(5.0)
     story.talk(flight_mode=ASCENT).at(5.05).talk(flight_mode=STANDBY).at(20.0)
     assert beats(story, 5.0, 20.0) >= 14
-
-
-def test_silence_in_flight_does_not_begin_them_again():
+    # Silence in flight does not begin them again.
     story = Bench(always_alive=True).talk(flight_mode=ASCENT, altitude=500.0).at(5.0)
     story.silent().at(60.0)
     assert beats(story, 2.0, 60.0) == 0
-
-
-def test_before_anything_was_heard_they_are_sent():
+    # Before anything was heard they are sent.
     assert beats(Bench(always_alive=True).at(5.0), 0.0, 5.0) >= 4
 
 
@@ -117,10 +114,7 @@ def test_the_parameter_wins_over_the_layout_and_the_layout_is_asked_by_auto():
     }
     assert not layout_from(content, "here").heartbeat_in_flight
     own = layout_from({**content, "heartbeat_in_flight": True}, "here")
-    wants = {
-        HeartbeatInFlight.AUTO: Mode.Fault,
-        HeartbeatInFlight.NO: Mode.Coast,
-    }
+    wants = {HeartbeatInFlight.AUTO: Mode.Fault, HeartbeatInFlight.NO: Mode.Coast}
     for setting, ends in wants.items():
         flight = Flight(setting, layouts=[own]).launched()
         flight.until(lambda flight=flight: flight.computer.mode in (Mode.Coast, Mode.Fault))

@@ -185,8 +185,14 @@ def test_a_mistake_in_a_file_is_told_with_the_name_of_the_file(story):
     assert told in str(caught.value)
 
 
-def test_a_file_without_a_mistake_is_taken():
+def test_a_file_without_a_mistake_is_taken_and_the_references_comes_first(tmp_path):
+    # A file without a mistake is taken.
     assert layout_from(content(), "here").fields == LAYOUT.fields
+    # The references layout comes first and the others by file.
+    for name in ("telem54", STATE, "telem50"):
+        (tmp_path / f"{name}.yaml").write_text((FOLDER / f"{name}.yaml").read_text())
+    names = [layout.name for layout in load_layouts(str(tmp_path), "layouts")]
+    assert names == [STATE, "telem50", "telem54"]
 
 
 def test_a_folder_without_layouts_or_with_two_of_one_name(tmp_path):
@@ -198,13 +204,6 @@ def test_a_folder_without_layouts_or_with_two_of_one_name(tmp_path):
         (tmp_path / f"{name}.yaml").write_text((FOLDER / "telem50.yaml").read_text())
     with pytest.raises(ParameterError, match="two layouts have one name"):
         load_layouts(str(tmp_path), "layouts")
-
-
-def test_the_references_layout_comes_first_and_the_others_by_file(tmp_path):
-    for name in ("telem54", STATE, "telem50"):
-        (tmp_path / f"{name}.yaml").write_text((FOLDER / f"{name}.yaml").read_text())
-    names = [layout.name for layout in load_layouts(str(tmp_path), "layouts")]
-    assert names == [STATE, "telem50", "telem54"]
 
 
 @pytest.mark.parametrize(

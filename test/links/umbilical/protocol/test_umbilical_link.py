@@ -3,26 +3,13 @@
 import itertools
 
 import pytest
-from umbilical_link_bench import (
-    ASCENT,
-    COAST,
-    DROGUE,
-    STANDBY,
-    STARTUP,
-    Bench,
-    ready,
-)
+from umbilical_link_bench import ASCENT, COAST, DROGUE, STANDBY, STARTUP, Bench, ready
 
 from chute_ros.links.umbilical.protocol.events import TelemetryReceived
 from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.links.umbilical.protocol.link import DOUBTED
 from chute_ros.model import LinkState, ParachuteState
-from chute_ros.protocol.events import (
-    DeviceLinkChanged,
-    ParachuteChanged,
-    Severity,
-    VehicleChanged,
-)
+from chute_ros.protocol.events import DeviceLinkChanged, ParachuteChanged, Severity, VehicleChanged
 from chute_ros.protocol.liveness import LivenessLimits
 
 BEGIN, END = "--- BEGIN FLASH CSV DUMP ---", "--- END FLASH CSV DUMP ---"

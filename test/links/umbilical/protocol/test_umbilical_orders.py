@@ -1,12 +1,7 @@
 """Orders on their way: what is told of them, and what ends them."""
 
 import pytest
-from umbilical_link_bench import (
-    ASCENT,
-    STANDBY,
-    STARTUP,
-    ready,
-)
+from umbilical_link_bench import ASCENT, STANDBY, STARTUP, ready
 
 from chute_ros.links.umbilical.protocol.config import EffectLimits
 from chute_ros.links.umbilical.protocol.scheduler import SchedulerLimits

@@ -72,9 +72,8 @@ def whole_dump(data, format_=DumpFormat.BINARY, complete=True):
 @pytest.mark.parametrize("size", [1, 7, 64, 0])
 def test_lines_come_out_whole_whatever_their_pieces(size):
     ear = Ear()
-    assert ear.hear(PAD + b"\n[INFO] a\r\n\r\n" + PAD, size) == [
-        *(Line(WHOLE), Line(b""), Line(b"[INFO] a"), Line(b""), Line(WHOLE)),
-    ]
+    heard = ear.hear(PAD + b"\n[INFO] a\r\n\r\n" + PAD, size)
+    assert heard == [Line(text) for text in (WHOLE, b"", b"[INFO] a", b"", WHOLE)]
     assert ear.counts == {}
 
 

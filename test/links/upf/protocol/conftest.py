@@ -1,7 +1,5 @@
 """Every story of the UPF is told with both layouts of its data types."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -89,13 +89,12 @@ def test_value_that_does_not_fit_is_refused_before_it_is_sent(bench):
         assert story.controller.values == before
 
 
-def test_limits_of_the_document_count_where_the_device_has_none(bench):
+def test_limits_are_the_devices_or_those_of_the_document(bench):
+    # Limits of the document count where the device has none.
     story = setting(bench, p.STATIC_NODE_ID, "126")
     answer(story, p.STATIC_NODE_ID, {"integer_value": 33})
     assert "need 0 to 125" in story.errand(1).message
-
-
-def test_number_of_a_device_with_its_own_range(bench):
+    # Number of a device with its own range.
     limits = {"min_value": {"real_value": 0.0}, "max_value": {"real_value": 2.0}}
     story = answer(setting(bench, "Gain", "2.5"), "Gain", {"real_value": 1.0}, **limits)
     assert "need 0.0 to 2.0" in story.errand(1).message
@@ -165,14 +164,13 @@ def test_value_is_kept_where_auto_save_is_on_or_once_it_is_saved(bench):
         assert story.controller.values[p.LIGHT] is not saved
 
 
-def test_nothing_is_said_of_what_is_kept_where_auto_save_is_not_known(bench):
+def test_what_is_kept_is_told_where_it_is_known(bench):
+    # Nothing is said of what is kept where auto save is not known.
     story = bench().ready()
     done = set_it(story, p.LIGHT, "false", node_id=34).errand(1)
     assert done.message == "Enable Light is false"
     assert done.node_id == 34
-
-
-def test_auto_save_tells_of_itself(bench):
+    # Auto save tells of itself.
     story = bench().ready()
     assert "lost at a restart" in set_it(story, p.AUTO_SAVE, "false").errand(1).message
     done = set_it(story, p.AUTO_SAVE, "true", token=2).errand(2)
@@ -196,14 +194,13 @@ def test_node_id_0_makes_it_ask_for_one_at_each_start(bench):
     assert 1 <= given <= 125
 
 
-def test_list_has_all_twelve(bench):
+def test_list_has_all_twelve_and_is_read_from_a_new_controller_unasked(bench):
+    # List has all twelve.
     story = bench().ready().call("errand", 1, 0, errands.list_parameters)
     done = story.after(0.5).errand(1)
     assert (done.success, done.message) == (True, "12 parameters")
     assert [one.name for one in done.parameters] == list(p.BY_NAME)
-
-
-def test_list_is_read_from_a_new_controller_unasked(bench):
+    # List is read from a new controller unasked.
     story = bench().ready()
     known = story.link.devices.controllers[33].parameters
     assert known == story.controller.values
@@ -226,16 +223,15 @@ def test_list_of_a_device_that_falls_silent_or_never_ends_tells_how_far_it_came(
         assert [one.name for one in done.parameters] == [p.LIGHT] * answered
 
 
-def test_controller_that_did_not_tell_its_parameters_is_asked_again(bench):
+def test_controller_that_did_not_tell_its_parameters_or_was_lost_is_asked_again(bench):
+    # Controller that did not tell its parameters is asked again.
     story = bench()
     story.loses = lambda from_link, data: from_link
     story.at(5.0)
     assert not story.link.devices.controllers[33].parameters
     story.loses = lambda from_link, data: False
     assert story.at(20.0).link.devices.controllers[33].parameters == story.controller.values
-
-
-def test_controller_that_is_lost_is_not_asked_again_until_it_is_back(bench):
+    # Controller that is lost is not asked again until it is back.
     story = bench("").status("READY").at(30.0)
     assert story.link._desk.next_deadline() == float("inf")
     count = len(story.requests(GET_SET))
@@ -295,15 +291,14 @@ def test_device_that_does_not_answer_ends_the_errand(bench):
         assert done.message.startswith(f"{what}: no acknowledgement after 3 sends")
 
 
-def test_node_information_and_statistics(bench):
+def test_node_information_and_statistics_also_of_the_trigger(bench):
+    # Node information and statistics.
     story = bench().ready().call("errand", 1, 0, errands.node_info)
     story.call("errand", 2, 34, errands.transport_stats).after(0.5)
     assert bytes(story.errand(1).values["name"]) == b"upf.controller"
     assert story.errand(2).values["transfers_tx"] > 0
     assert story.errand(2).node_id == 34
-
-
-def test_errand_goes_to_the_trigger_where_there_is_no_controller(bench):
+    # Errand goes to the trigger where there is no controller.
     story = bench("trigger").ready().call("errand", 1, 0, errands.node_info)
     assert bytes(story.after(0.5).errand(1).values["name"]) == b"upf.trigger"
 
@@ -341,10 +336,12 @@ def test_protection_is_switched_off_in_the_air_only_by_force_which_is_said_loudl
 )
 def test_device_is_not_taken_away_in_the_air_unless_forced(bench, make):
     story = bench("").status("ARMED").clear().call("disturb", 1, 0, False, make)
-    assert "refused while the vehicle is in the air" in story.step().errand(1).message
+    assert "refused while the vehicle is in the air" in story.errand(1).message
     assert not story.requests(OPCODE) + story.requests(errands.RESTART_NODE)
     story.call("disturb", 2, 0, True, make)
-    assert story.step().requests(OPCODE) + story.requests(errands.RESTART_NODE)
+    assert story.requests(OPCODE) + story.requests(errands.RESTART_NODE)
+    lit = set_it(bench().in_flight(), p.LIGHT, "false").errand(1)
+    assert lit.success, "what does not protect may be changed"
 
 
 def test_vehicle_is_in_the_air_by_its_own_word_or_the_controllers(bench):

@@ -26,13 +26,12 @@ DOCUMENTED = {
 }
 
 
-def test_the_twelve_names_are_those_of_the_document_in_its_order():
+def test_names_defaults_and_ranges_are_those_of_the_document():
+    # The twelve names are those of the document in its order.
     assert {one.name: one.kind for one in p.PARAMETERS} == DOCUMENTED
     assert [one.name for one in p.PARAMETERS] == list(DOCUMENTED)
     assert len(p.BY_NAME) == 12
-
-
-def test_only_the_defaults_that_the_document_gives_are_known():
+    # Only the defaults that the document gives are known.
     assert {one.name: one.default for one in p.PARAMETERS if one.default is not None} == {
         "Enable CANBUS resister": False
     }
@@ -40,18 +39,14 @@ def test_only_the_defaults_that_the_document_gives_are_known():
     assert CONTROLLER_PARAMETERS[p.STATIC_NODE_ID] == 33
     assert TRIGGER_PARAMETERS[p.STATIC_NODE_ID] == 34
     assert CONTROLLER_PARAMETERS[p.CANBUS_RESISTER] is False
-
-
-def test_ranges_are_those_that_the_meanings_allow():
+    # Ranges are those that the meanings allow.
     limits = {one.name: (one.minimum, one.maximum) for one in p.PARAMETERS if one.kind is int}
     assert limits == {
         "Static Node ID": (0, 125),
         "Node Status Interval(ms)": (2, 1000),
         "Parachute Status Interval(ms)": (2, 60000),
     }
-
-
-def test_each_request_is_excluded_by_its_automatic_counterpart():
+    # Each request is excluded by its automatic counterpart.
     assert p.EXCLUDES == {
         "TYPE_TAKEOFF": "Enable Auto-Takeoff",
         "TYPE_ARM": "Enable Auto-Arm",
@@ -131,13 +126,11 @@ def test_any_text_is_a_value_or_a_parameter_error(text, kind):
         assert p.kind_of(p.union_of(value)) == kind
 
 
-def test_empty_union_has_no_value_and_no_kind():
+def test_values_of_a_union_in_words_and_as_a_switch():
+    # Empty union has no value and no kind.
     assert p.value_of({"empty": {}}) is None
     assert p.kind_of({"empty": {}}) == ""
     assert p.kind_of({}) == ""
-
-
-def test_values_in_words_and_as_a_switch():
     words = {None: "", True: "true", False: "false", 3: "3", 2.5: "2.5", "text": "text"}
     assert {value: p.words(value) for value in words} == words
     switches = [p.as_switch(value) for value in (True, 0, 1.0, "on", None)]

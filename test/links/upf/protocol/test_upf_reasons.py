@@ -11,8 +11,25 @@ def reasons(story, *troubles):
     return reasons_of(link.config, link.devices, picture, troubles, story.now)
 
 
-def test_nothing_is_wrong_with_healthy_devices(bench):
+def test_each_reason_is_told_with_its_value(bench):
+    # Nothing is wrong with healthy devices.
     assert reasons(bench().ready()) == ()
+    # A state is told with those that are needed.
+    story = bench("").status("NOT_READY")
+    assert reasons(story) == ("controller 33: state NOT_READY, need READY, TAKEOFF or ARMED",)
+    story = bench("").status("LAUNCHED")
+    assert reasons(story)[-1] == (
+        "controller 33: state LAUNCHED, the parachute is out, need READY, TAKEOFF or ARMED"
+    )
+    # A lost controller is told with its silence.
+    story = bench("").status("READY").node_status().at(10.0)
+    assert "controller 33 LOST: 10.0 s" in reasons(story)
+    # A trigger in trouble is told with its supply.
+    story = bench("").status("READY").trigger_status("NOT_READY", supply_voltage=3.125)
+    assert reasons(story) == ("trigger 34: state NOT_READY, supply 3.1 V, need READY",)
+    # Troubles of the bus are reasons.
+    story = bench("").status("READY")
+    assert reasons(story, "two nodes use node id 40") == ("two nodes use node id 40",)
 
 
 @pytest.mark.parametrize(
@@ -29,27 +46,3 @@ def test_nothing_is_wrong_with_healthy_devices(bench):
 def test_never_heard(bench, config, text):
     (reason,) = reasons(bench("", **config))
     assert reason.startswith(text)
-
-
-def test_a_state_is_told_with_those_that_are_needed(bench):
-    story = bench("").status("NOT_READY")
-    assert reasons(story) == ("controller 33: state NOT_READY, need READY, TAKEOFF or ARMED",)
-    story = bench("").status("LAUNCHED")
-    assert reasons(story)[-1] == (
-        "controller 33: state LAUNCHED, the parachute is out, need READY, TAKEOFF or ARMED"
-    )
-
-
-def test_a_lost_controller_is_told_with_its_silence(bench):
-    story = bench("").status("READY").node_status().at(10.0)
-    assert "controller 33 LOST: 10.0 s" in reasons(story)
-
-
-def test_a_trigger_in_trouble_is_told_with_its_supply(bench):
-    story = bench("").status("READY").trigger_status("NOT_READY", supply_voltage=3.125)
-    assert reasons(story) == ("trigger 34: state NOT_READY, supply 3.1 V, need READY",)
-
-
-def test_troubles_of_the_bus_are_reasons(bench):
-    story = bench("").status("READY")
-    assert reasons(story, "two nodes use node id 40") == ("two nodes use node id 40",)

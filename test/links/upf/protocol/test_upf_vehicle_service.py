@@ -60,13 +60,12 @@ def test_one_that_was_confirmed_all_the_same_has_happened(alone):
     assert story.ask(KILL, number=1).step().answers() == ["SUCCESS"] * 2
 
 
-def test_a_kill_long_after_the_deploy_is_another_one(alone):
+def test_a_kill_is_waited_for_again_long_after_the_deploy_and_a_block_always(alone):
+    # A kill long after the deploy is another one.
     story = alone().call("kill_waited_for").at(5.1).ask(KILL).step()
     assert story.answers() == []
     assert story.at(6.0).answers() == [failed(story)]
-
-
-def test_a_flight_block_is_waited_for_also_after_a_deploy(alone):
+    # A flight block is waited for also after a deploy.
     story = alone().call("kill_waited_for")
     assert story.ask(BLOCK).step().answers() == []
 
@@ -103,14 +102,12 @@ def test_vehicle_that_is_armed_again_has_forgotten_the_kill(alone):
     assert story.ask(KILL, number=3).at(3.0).answers() == ["SUCCESS", "SUCCESS", failed(story)]
 
 
-def test_every_repetition_of_a_kill_is_answered(alone):
+def test_every_kill_is_answered_and_asked_for_until_it_is(alone):
+    # Every repetition of a kill is answered.
     story = alone().ask(KILL, number=0).at(0.3).ask(KILL, number=1).call("kill_confirmed")
     assert story.step().answers() == ["SUCCESS"] * 2
     assert set(story.asked()) == {("KILL", "33")}
-
-
-def test_kill_that_waits_is_asked_for_again_until_it_is_answered(alone):
-    """A supervisor that has just started has not heard the first."""
+    # A supervisor that has just started has not heard the first.
     story = alone().ask(KILL).at(0.5)
     assert len(story.asked()) == 3
     story.call("kill_confirmed").at(3.0)
@@ -208,13 +205,12 @@ def test_late_repetition_of_a_block_does_not_stay_when_the_state_is_ready(alone)
     assert 1.5 <= t <= 1.7
 
 
-def test_request_that_the_state_has_said_before_is_not_passed_on_twice(alone):
+def test_request_of_the_state_or_of_another_is_passed_on_once(alone):
+    # Request that the state has said before is not passed on twice.
     story = alone().status("NOT_READY").ask(BLOCK)
     assert story.asked() == [BLOCKED]
     assert story.call("supervisor_said", True, {"33"}).answers() == ["SUCCESS"]
-
-
-def test_two_controllers_block_each_for_itself(alone):
+    # Two controllers block each for itself.
     story = alone().status("ABNORMAL").status("ABNORMAL", 35).at(1.0).status("READY")
     assert story.asked() == [BLOCKED, ("FLIGHT_BLOCK", "35"), RELEASED]
 

@@ -3,15 +3,7 @@
 import math
 
 import pytest
-from upf_device_bench import (
-    CONTROLLER,
-    NODE_STATUS,
-    TRIGGER,
-    Story,
-    Vehicle,
-    definitions,
-    ready,
-)
+from upf_device_bench import CONTROLLER, NODE_STATUS, TRIGGER, Story, Vehicle, definitions, ready
 
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.simulator.bus import UpfBus
@@ -37,7 +29,8 @@ def test_what_comes_from_the_wire_all_hear():
     assert story.result(names.TRIGGER_SERVICE, values, TRIGGER) == "SUCCESS"
 
 
-def test_each_frame_goes_out_once():
+def test_each_frame_goes_out_once_and_a_node_does_not_hear_itself():
+    # Each frame goes out once.
     bus = UpfBus([UpfController(definitions()), UpfTrigger(definitions())])
     bus.update(10.0)
     frames = bus.take_output()
@@ -46,15 +39,14 @@ def test_each_frame_goes_out_once():
     assert bus.take_output() == []
     bus.update(10.0)
     assert bus.take_output() == []
-
-
-def test_a_node_does_not_hear_itself():
+    # A node does not hear itself.
     story = Story().run(5.0)
     for node in story.bus.nodes:
         assert node.endpoint.own_id_count == 0
 
 
-def test_a_script_acts_in_its_time():
+def test_a_script_acts_in_its_time_which_is_a_deadline():
+    # A script acts in its time.
     story = Story(script=[(2.0, "silent"), (1.0, "error=IMU"), (3.0, "speak")])
     story.run(1.5)
     assert story.faults() == ["IMU"]
@@ -62,9 +54,7 @@ def test_a_script_acts_in_its_time():
     story.forget()
     assert not story.run(0.8).vehicle.messages
     assert story.run(0.3).heard(names.PARACHUTE_STATUS)
-
-
-def test_a_script_is_a_deadline():
+    # A script is a deadline.
     story = Story(script=[(2.005, "error=IMU")]).run(2.0)
     assert story.bus.next_deadline() <= story.began + 2.005 + story.STEP
 

@@ -354,15 +354,14 @@ def test_a_second_deploy_succeeds_and_does_nothing():
     assert len([event for _, event in story.log if "LAUNCH by" in event]) == 1
 
 
-def test_too_low_is_not_now_but_force_deploys():
+def test_too_low_is_not_now_but_force_or_a_person_deploys():
+    # Too low is not now but force deploys.
     story = armed(minimum_height=20.0).at(15.0)
     assert story.ask("DEPLOY") == "TEMPORARILY_REJECTED"
     assert not story.run(1.0).trigger.fired
     assert story.ask("DEPLOY_FORCE") == "SUCCESS"
     assert story.run(0.2).trigger.fired
-
-
-def test_a_person_at_the_device_deploys_as_well():
+    # A person at the device deploys as well.
     story = armed()
     story.bus.act("deploy")
     assert story.run(0.2).state is S.LAUNCHED
@@ -524,15 +523,14 @@ def test_a_restart_forgets_a_launch_that_waits():
 # What it tells
 
 
-def test_the_status_tells_what_it_feels():
+def test_the_status_tells_what_it_feels_and_what_is_not_known_stops_nothing():
+    # The status tells what it feels.
     story = ready().at(12.5, vertical_speed=-1.5).run(0.2)
     assert story.status["height_of_home"] == pytest.approx(12.5)
     assert story.status["vz"] == pytest.approx(-1.5)
     assert story.status["is_enable_auto_launch"]
     assert story.status["backup_power_voltage"] > 5.0
-
-
-def test_what_is_not_known_stops_nothing():
+    # What is not known stops nothing.
     story = ready()
     story.controller.motion = Motion(math.nan, math.nan, math.nan, math.nan)
     story.run(1.0)

@@ -5,14 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from upf_device_bench import (
-    CONTROLLER,
-    NODE_STATUS,
-    TRIGGER,
-    Story,
-    Vehicle,
-    ready,
-)
+from upf_device_bench import CONTROLLER, NODE_STATUS, TRIGGER, Story, Vehicle, ready
 
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import errands

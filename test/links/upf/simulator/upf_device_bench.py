@@ -32,10 +32,7 @@ from chute_ros.transport.data_types import load_data_types
 
 VEHICLE = 10
 CONTROLLER, TRIGGER = 33, 34
-LAYOUTS = {
-    "ours": "",
-    "other": str(Path(__file__).parents[3] / "dsdl_other" / "flyfire"),
-}
+LAYOUTS = {"ours": "", "other": str(Path(__file__).parents[3] / "dsdl_other" / "flyfire")}
 BOTH_LAYOUTS = pytest.mark.parametrize("layout", list(LAYOUTS))
 #: Nothing happens by itself.
 BY_REQUEST = dict.fromkeys(p.EXCLUDES.values(), False)
