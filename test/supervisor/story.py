@@ -161,6 +161,11 @@ def parachute(
     return i.ParachuteReport(link, status)
 
 
+def refused(token: int, why: str) -> i.Finish:
+    """The answer to a request that is not taken."""
+    return i.Finish(token, False, False, f"refused: {why}")
+
+
 @dataclass
 class Story:
     """One supervisor from its start; t is seconds since then."""
@@ -260,6 +265,26 @@ class Story:
         self.ready()
         self.at(self.t, i.VehicleReport(FLYING))
         assert self.state.stage is Stage.IN_FLIGHT
+        return self
+
+    def ordered(self, *heard: i.Input) -> Story:
+        """In flight; a person asks for a deploy at 1.0 (token 5), heard comes just before."""
+        self.flying()
+        if heard:
+            self.at(0.9, *heard)
+        self.at(1.0, i.DeployRequest(5, False, "it falls"))
+        return self
+
+    def deploying(self, *heard: i.Input, confirmed: float = 1.1) -> Story:
+        """The same, its kill confirmed."""
+        self.ordered(*heard)
+        self.at(confirmed, self.report(Action.KILL, Outcome.CONFIRMED))
+        assert self.state.stage is Stage.DEPLOYING
+        return self
+
+    def follows(self) -> Story:
+        """Another supervisor decides from now on."""
+        self.at(self.t, i.StepDown("the other was first"))
         return self
 
     def report(
