@@ -161,6 +161,11 @@ def parachute(
     return i.ParachuteReport(link, status)
 
 
+def refused(token: int, why: str) -> i.Finish:
+    """The answer to a request that is not taken."""
+    return i.Finish(token, False, False, f"refused: {why}")
+
+
 @dataclass
 class Story:
     """One supervisor from its start; t is seconds since then."""
@@ -239,6 +244,14 @@ class Story:
             self.at(start + step * 0.05, self.heartbeat(), self.told(**parts))
         return self
 
+    def sent(self, *actions: Action, start: float = 0.0) -> list[tuple[float, Action, bool]]:
+        """When each of these decisions left since start, and whether it was sent again."""
+        return [
+            (t, o.decision.action, o.again)
+            for t, o in self.outputs
+            if t >= start and isinstance(o, i.Decide) and o.decision.action in actions
+        ]
+
     def fired(self) -> list[str]:
         """Every kill and deploy, each once, in their order."""
         return [d.action.name for d in self.decisions() if d.action >= Action.KILL]
@@ -260,6 +273,26 @@ class Story:
         self.ready()
         self.at(self.t, i.VehicleReport(FLYING))
         assert self.state.stage is Stage.IN_FLIGHT
+        return self
+
+    def ordered(self, *links: str) -> Story:
+        """In flight; a person asks for a deploy at 1.0 (token 5), heartbeats of links at 0.9."""
+        self.flying()
+        if links:
+            self.at(0.9, *[self.heartbeat(link) for link in links])
+        self.at(1.0, i.DeployRequest(5, False, "it falls"))
+        return self
+
+    def deploying(self, *links: str, confirmed: float = 1.1) -> Story:
+        """The same, its kill confirmed."""
+        self.ordered(*links)
+        self.at(confirmed, self.report(Action.KILL, Outcome.CONFIRMED))
+        assert self.state.stage is Stage.DEPLOYING
+        return self
+
+    def follows(self) -> Story:
+        """Another supervisor decides from now on."""
+        self.at(self.t, i.StepDown("the other was first"))
         return self
 
     def report(

@@ -1,9 +1,11 @@
 """Each condition holds, does not hold, or cannot be said, with its value and limit in words."""
 
 import math
+from types import MappingProxyType
+from typing import Any
 
 import pytest
-from story import LINK, SINKS, START, Story, parachute, rule, vehicle, with_rules
+from story import LINK, SINKS, START, Story, changed, parachute, rule, vehicle, with_rules
 from told import Told, told
 
 from chute_ros.model import Armed, LinkState, ParachuteState, ParachuteStatus
@@ -14,9 +16,14 @@ from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.pending import ASK_LASTS
 from chute_ros.supervisor.profile_lines import ALL, ANY
+from chute_ros.supervisor.rules import Profile
+from chute_ros.supervisor.state import HeardHere, State
 
+LINKS = ("a", "b")
 TWO = SupervisorConfig((LINK, "upf_can"), deploy_links=(LINK, "upf_can"))
 
 
@@ -65,28 +72,6 @@ def test_what_cannot_be_used_says_nothing_about_the_vehicle() -> None:
 LOST = (LinkJudgement.LOST,)
 
 
-def test_a_link_is_judged_by_name() -> None:
-    story = Story(TWO)
-    story.at(0.0, story.heartbeat(LINK), story.heartbeat("upf_can"))
-    story.alive(1.2)
-    assert not look(story, LinkCondition(LINK, LOST)).holds
-    found = look(story, LinkCondition("upf_can", LOST))
-    assert found.holds
-    assert found.text == "link upf_can is LOST, heard 1.20 s ago (asked for: LOST)"
-    either = LinkCondition(LINK, (LinkJudgement.LOST, LinkJudgement.OK))
-    assert look(story, either).holds
-
-
-@pytest.mark.parametrize(("which", "holds"), [(ANY, True), (ALL, False)])
-def test_any_is_one_of_the_required_links_and_all_is_each(which: str, holds: bool) -> None:
-    story = Story(TWO)
-    story.at(0.0, story.heartbeat(LINK), story.heartbeat("upf_can"))
-    story.alive(1.2)
-    assert look(story, LinkCondition(which, LOST)).holds is holds
-    story.at(9.0)
-    assert look(story, LinkCondition(which, LOST)).holds
-
-
 def test_a_link_that_is_still_starting_is_not_held_against_it() -> None:
     story = Story(TWO)
     story.at(5.0, story.heartbeat(LINK))
@@ -132,15 +117,20 @@ def test_an_autopilot_that_says_disarmed_must_say_so_freshly() -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "holds"), [(0, False), (4, False), (5, False), (6, True), (8, True)]
+    ("status", "holds"), [(0, False), (4, False), (5, False), (6, True), (7, False), (8, True)]
 )
-def test_an_autopilot_that_terminates_says_so(status: int, holds: bool) -> None:
+def test_an_autopilot_that_terminates_says_so_and_counts_up_to_its_age(
+    status: int, holds: bool
+) -> None:
     story = Story()
     story.at(0.0, vehicle(system_status=status))
-    found = autopilot(story, AutopilotFact.EMERGENCY)
-    assert found == Told(holds, f"autopilot's own state is {status} (6 or 8)")
+    for t in (0.0, 2.5):
+        story.at(t)
+        found = autopilot(story, AutopilotFact.EMERGENCY)
+        assert found == Told(holds, f"autopilot's own state is {status} (6 or 8)")
     story.at(2.6)
-    assert autopilot(story, AutopilotFact.EMERGENCY).holds is None, "what is old is absent"
+    old = Told(None, "autopilot's own state is old")
+    assert autopilot(story, AutopilotFact.EMERGENCY) == old
 
 
 def test_an_autopilot_that_restarts_counts_in_flight_only() -> None:
@@ -171,20 +161,21 @@ def test_a_device_that_asks_for_a_kill_wants_it_for_a_second() -> None:
     assert not device(story, DeviceFact.ASKS_FOR_KILL, LINK).holds
     story.at(1.1)
     assert device(story, DeviceFact.ASKS_FOR_KILL) == Told(False, "no device asks for a kill")
+    story.at(2.0, i.KillRequest(0, "stranger 9", "fire"), i.KillRequest(0, "b 2", "smoke"))
+    found = device(story, DeviceFact.ASKS_FOR_KILL)
+    assert found == Told(True, "stranger 9: fire; b 2: smoke"), "also one that is not ours"
+    for t, holds in ((2.0 + ASK_LASTS - 0.01, True), (2.0 + ASK_LASTS, False)):
+        story.at(t)
+        assert device(story, DeviceFact.ASKS_FOR_KILL).holds is holds
 
 
-def test_one_that_is_not_ours_may_ask_for_a_kill_all_the_same() -> None:
-    story = Story()
-    story.at(0.0, i.KillRequest(0, "stranger 9", "fire"))
-    assert device(story, DeviceFact.ASKS_FOR_KILL).holds
-
-
-def test_a_parachute_that_is_out_is_named_with_its_link() -> None:
+def test_parachutes_that_are_out_are_named_with_their_link() -> None:
     story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can"))).flying()
     assert device(story, DeviceFact.DEPLOYED) == Told(False, "no parachute is out")
-    story.at(0.1, story.heartbeat("upf_can"), parachute("upf_can", "33", deployed=True))
+    out = [parachute("upf_can", name, deployed=True) for name in ("33", "34")]
+    story.at(0.1, story.heartbeat("upf_can"), *out)
     found = device(story, DeviceFact.DEPLOYED)
-    assert found == Told(True, "upf_can 33: its own status says deployed")
+    assert found == Told(True, "upf_can 33, upf_can 34: its own status says deployed")
     assert not device(story, DeviceFact.DEPLOYED, LINK).holds
 
 
@@ -247,9 +238,30 @@ def test_the_weights_of_those_that_hold_must_reach_what_is_needed(
     assert bool(story.fired()) is fires
 
 
-def test_only_those_that_hold_are_told_as_reasons() -> None:
+PATIENT = LinkLimits(stale_after=50.0, lost_after=100.0)
+CONFIG = SupervisorConfig(required_links=LINKS, kill_links=LINKS, deploy_links=LINKS)
+NOW = 100.0
+SILENT = (LinkJudgement.STALE, LinkJudgement.LOST)
+
+
+def state(**known: Any) -> State:
+    return changed(State(epoch=7, started_at=0.0), **known)
+
+
+def links(**evidence: LinkEvidence) -> MappingProxyType[str, LinkEvidence]:
+    return MappingProxyType(evidence)
+
+
+def heard(ago: float, *devices: ParachuteStatus) -> LinkEvidence:
+    told = MappingProxyType({one.device: one for one in devices})
+    return LinkEvidence(heard=NOW - ago, reported=LinkState.OK, devices=told)
+
+
+def test_only_those_that_hold_are_told_as_reasons_and_what_cannot_be_said_does_not() -> None:
     story = Story(with_rules(rule(TILT, FALLS, HEAVY, needed=2.0, hold=0.1))).flying()
-    story.fly(0.3, tilt=61.0, acceleration=1.0)
+    story.fly(0.3, tilt=61.0, acceleration=math.nan)
+    assert story.fired() == []
+    story.fly(0.6, tilt=61.0, acceleration=1.0)
     reasons = "; ".join(story.decisions()[-1].reasons)
     assert "tilt_deg 61.00 (above 60); acceleration 1.00 (below 2); counter 0.10 s of 0.1 s" in (
         reasons
@@ -257,7 +269,83 @@ def test_only_those_that_hold_are_told_as_reasons() -> None:
     assert "height" not in reasons
 
 
-def test_one_that_cannot_be_said_counts_as_not_holding() -> None:
-    story = Story(with_rules(rule(TILT, FALLS))).flying()
-    story.fly(0.5, tilt=61.0, acceleration=math.nan)
-    assert story.fired() == []
+# -- at their limits -----------------------------------------------------------------------------
+
+
+def test_samples_that_cannot_be_used_were_seen_all_the_same() -> None:
+    old = Measured(value=70.0, measured_at=NOW - 9.0, same_since=NOW - 9.0, count=4)
+    known = state(measurements=MappingProxyType({"tilt_deg": old}))
+    found = told(CONFIG, known, MeasurementCondition("tilt_deg", above=60.0), NOW)
+    assert (found.holds, found.samples) == (None, 4)
+
+
+def test_every_link_is_told_with_what_was_asked_for_and_judged_by_its_own_limits() -> None:
+    known = state(links=links(a=heard(0.2), b=heard(5.0)))
+    text = "link a is OK, heard 0.20 s ago, b is LOST, heard 5.00 s ago (asked for: STALE or LOST)"
+    assert told(CONFIG, known, LinkCondition(ANY, SILENT), NOW) == Told(True, text)
+    assert told(CONFIG, known, LinkCondition(ALL, SILENT), NOW) == Told(False, text)
+    assert told(CONFIG, known, LinkCondition(ALL, SILENT), NOW + 9.0).holds is True
+    one = "link b is LOST, heard 5.00 s ago (asked for: LOST)"
+    assert told(CONFIG, known, LinkCondition("b", LOST), NOW) == Told(True, one)
+    assert told(CONFIG, known, LinkCondition("a", LOST), NOW).holds is False
+    either = LinkCondition("a", (LinkJudgement.LOST, LinkJudgement.OK))
+    assert told(CONFIG, known, either, NOW).holds is True
+    patient = SupervisorConfig(required_links=LINKS, link_limits=MappingProxyType({"b": PATIENT}))
+    assert told(patient, known, LinkCondition(ANY, SILENT), NOW).holds is False
+
+
+def test_one_that_is_still_starting_does_not_hide_the_next() -> None:
+    known = State(epoch=7, started_at=NOW - 1.0, heard=HeardHere(links=links(b=heard(5.0))))
+    found = told(CONFIG, known, LinkCondition(ANY, SILENT), NOW)
+    assert found.holds is True
+    assert found.text.startswith("link a is still starting, b is LOST")
+
+
+def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link() -> None:
+    wrong = [
+        ParachuteStatus("1", LinkState.OK, ParachuteState.ABNORMAL, faults=("hot",)),
+        ParachuteStatus("2", LinkState.OK, ParachuteState.ABNORMAL),
+    ]
+    known = state(links=links(a=heard(5.0, *wrong)))
+    config = SupervisorConfig(required_links=LINKS, link_limits=MappingProxyType({"a": PATIENT}))
+    abnormal = DeviceCondition(DeviceFact.ABNORMAL)
+    text = "a 1 is ABNORMAL (hot); a 2 is ABNORMAL (no reason given)"
+    assert told(config, known, abnormal, NOW) == Told(True, text)
+    assert told(CONFIG, known, abnormal, NOW) == Told(False, "no device is ABNORMAL")
+
+
+def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
+    height = Measured(value=30.0, measured_at=NOW, same_since=NOW, count=7)
+    known = state(
+        measurements=MappingProxyType({"height": height}),
+        heights=((NOW - 1.0, 50.0), (NOW, 30.0)),
+    )
+    found = told(CONFIG, known, MeasurementCondition("vertical_speed", below=-12.0), NOW)
+    assert (found.holds, found.samples) == (True, 7)
+
+
+@pytest.mark.parametrize(
+    ("minimum", "speed", "holds", "words"),
+    [
+        (50.0, math.nan, True, "(minimum 50 m), and nothing tells whether it falls"),
+        (50.1, math.nan, False, "(minimum 50.1 m), and nothing tells whether it falls"),
+        (50.0, -4.0, False, "(minimum 50 m), and something tells whether it falls"),
+    ],
+)
+def test_a_kill_aloft_is_told_with_what_is_left_of_the_height(
+    minimum: float, speed: float, holds: bool, words: str
+) -> None:
+    config = SupervisorConfig(profile=Profile("tested", (), minimum_height=minimum))
+    told_speed = {} if math.isnan(speed) else {"vertical_speed": Measured(speed, NOW, NOW, 1)}
+    known = state(
+        killed_in_flight=True,
+        killed_at=NOW - 2.0,
+        # What a body loses in 2 s.
+        killed_height=50.0 + 9.81 / 2.0 * 4.0,
+        killed_sinking=0.0,
+        vehicle_received=NOW - 1.0,
+        measurements=MappingProxyType(told_speed),
+        links=MappingProxyType({one: LinkEvidence(heard=NOW) for one in config.kill_links}),
+    )
+    found = told(config, known, AutopilotCondition(AutopilotFact.KILLED_ALOFT), NOW)
+    assert found == Told(holds, f"killed aloft 2.00 s ago, at least 50.0 m are left {words}")

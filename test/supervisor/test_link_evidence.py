@@ -50,6 +50,8 @@ def heard(*times: float, limits: LinkLimits = LIMITS, **said: Any) -> LinkEviden
         ((1.0, 5.0), 5.0, J.REGAINED),
         ((1.0, 5.0, 5.4, 5.8), 5.99, J.REGAINED),
         ((1.0, 5.0, 5.4, 5.8), 6.0, J.OK),
+        # A break at the very end of the wait does not begin it anew.
+        ((1.0, 5.0, 5.4, 6.0), 6.0, J.OK),
         # A break while it is being regained begins the wait anew.
         ((1.0, 5.0, 5.6), 6.05, J.REGAINED),
         ((1.0, 5.0, 5.6, 6.0, 6.4), 6.59, J.REGAINED),
@@ -75,20 +77,35 @@ def test_a_node_that_lives_tells_of_its_device(said: LinkState, judged: LinkJudg
     assert heard(1.0, state=said).judged(LIMITS, 1.1) is judged
 
 
+def beat(
+    seq: int = 1, state: LinkState = LinkState.OK, difference: float = 0.0
+) -> i.LinkHeartbeat:
+    return i.LinkHeartbeat(LINK, state, True, seq, clock_difference=difference)
+
+
+def beats(*told: tuple[float, i.LinkHeartbeat]) -> LinkEvidence:
+    evidence = LinkEvidence()
+    for t, one in told:
+        evidence = evidence.with_heartbeat(one, LIMITS, t)
+    return evidence
+
+
 def test_the_silence_of_the_node_is_worse_than_what_it_said_last() -> None:
     assert heard(1.0, state=LinkState.STALE).judged(LIMITS, 2.0) is J.LOST
 
 
 def test_a_device_that_was_lost_behind_a_living_node_is_regained_like_a_node() -> None:
-    evidence = heard(1.0, 1.1, state=LinkState.LOST)
-    evidence = evidence.with_heartbeat(i.LinkHeartbeat(LINK, LinkState.OK, True, 9), LIMITS, 1.2)
-    assert evidence.judged(LIMITS, 1.2) is J.REGAINED
-    assert evidence.lost_count == 1
+    lost = beat(state=LinkState.LOST)
+    assert beats((1.0, lost), (1.1, lost), (1.2, beat())).judged(LIMITS, 1.2) is J.REGAINED
 
 
 def test_each_loss_is_counted_once() -> None:
     assert heard(1.0, 1.4, 1.8).lost_count == 0
     assert heard(1.0, 5.0, 9.0, 9.4).lost_count == 2
+    lost, well = beat(state=LinkState.LOST), beat()
+    assert beats((1.0, lost), (1.1, lost), (1.2, well)).lost_count == 1
+    assert beats((1.0, well), (1.2, lost), (1.4, lost), (1.6, lost)).lost_count == 1
+    assert beats((1.0, well), (1.2, lost), (1.4, well), (1.6, lost)).lost_count == 2
 
 
 def test_links_have_limits_of_their_own() -> None:
@@ -111,17 +128,6 @@ def test_a_slow_link_is_followed_by_its_own_limits_in_the_whole_core() -> None:
     assert "slow: STALE, heartbeat of its node 2.00 s old (limit 2 s)" in story.said()
 
 
-def test_while_it_starts_a_silent_link_is_no_fault_before_the_grace_of_the_slowest_is_over() -> (
-    None
-):
-    slow = LinkLimits(startup_grace=20.0)
-    story = Story(SupervisorConfig((LINK, "slow"), link_limits={"slow": slow}))
-    story.at(19.9)
-    assert story.state.stage is Stage.STARTUP
-    story.at(20.1)
-    assert story.state.stage is Stage.BLOCKED
-
-
 def test_a_link_that_flaps_at_its_limit_keeps_flight_blocked_and_fires_nothing() -> None:
     story = Story().ready()
     for n in range(1, 21):
@@ -135,20 +141,28 @@ def test_a_link_that_flaps_at_its_limit_keeps_flight_blocked_and_fires_nothing()
     assert story.state.stage is Stage.READY
 
 
+NEED = "need a number (1.0, not 1) from"
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ((0.0, 1.0), "stale_after is 0.0: need a number .* from 0.05 to 600 s"),
+        ((0.04, 1.0), f"stale_after is 0.04: {NEED} 0.05 to 600 s (silence of a node after"),
+        ((math.nan, 1.0), f"stale_after is nan: {NEED} 0.05 to 600 s"),
         ((1.0, 1.0), "stale_after is 1.0 and lost_after is 1.0: a link is STALE before"),
-        ((1.0, 601.0), "lost_after is 601.0: need a number .* to 600 s"),
-        ((math.nan, 1.0), "stale_after is nan"),
-        ((0.5, 1.0, -1.0), "regain_after is -1.0: need a number .* from 0 to 60 s"),
-        ((0.5, 1.0, 1.0, 61.0), "startup_grace is 61.0: need a number .* from 0 to 60 s"),
+        ((1.0, 601.0), "lost_after is 601.0: need a number (1.0, not 1) from"),
+        ((0.5, 1.0, -1.0), f"regain_after is -1.0: {NEED} 0 to 60 s"),
+        ((0.5, 1.0, 60.5), f"regain_after is 60.5: {NEED} 0 to 60 s (a node whose link"),
+        ((0.5, 1.0, 1.0, -0.5), f"startup_grace is -0.5: {NEED} 0 to 60 s (links may take"),
+        ((0.5, 1.0, 1.0, 61.0), f"startup_grace is 61.0: {NEED} 0 to 60 s"),
     ],
 )
-def test_limits_that_contradict_themselves_say_so(wrong: tuple[float, ...], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
+def test_limits_past_their_ends_are_told_in_full(wrong: tuple[float, ...], words: str) -> None:
+    with pytest.raises(ParameterError) as caught:
         LinkLimits(*wrong)
+    assert str(caught.value).startswith(f"parameter {words}")
+    for ends in (LinkLimits(0.5, 600.0, 60.0, 60.0), LinkLimits(0.5, 1.0, 0.0, 0.0)):
+        assert ends.stale_after == 0.5
 
 
 def status(
@@ -168,6 +182,7 @@ def test_a_lost_device_cannot_say_that_it_is_released() -> None:
     for known in (LinkEvidence(), LinkEvidence().with_status(status(), 3.0)):
         evidence = known.with_status(status(deployed=True, state=LinkState.LOST), 4.0)
         assert evidence.deployed == set()
+        assert evidence.devices["1/161"].deployed is False
         assert math.isnan(evidence.released_at)
 
 
@@ -192,6 +207,48 @@ def test_made_up_devices_do_not_grow_it_and_the_known_ones_go_on_being_heard() -
     assert len(evidence.devices) == MOST_DEVICES
     evidence = evidence.with_status(status("made up 0", deployed=True), 2.0)
     assert evidence.deployed == {"made up 0"}
+
+
+def test_a_heartbeat_tells_its_number_its_device_and_its_clock() -> None:
+    evidence = beats((1.0, beat(seq=8, difference=0.02)), (1.1, beat(seq=9, difference=0.03)))
+    assert (evidence.heard, evidence.seq, evidence.clock_difference) == (1.1, 9, 0.03)
+    assert evidence.device_healthy
+    assert evidence.reported is LinkState.OK
+
+
+def test_it_is_looked_at_again_when_it_grows_stale_lost_or_is_regained() -> None:
+    never = beats((2.0, beat())).deadlines(LIMITS)
+    assert never[:2] == (2.5, 3.0)
+    assert math.isnan(never[2]), "it was never lost"
+    assert math.isnan(never[3]), "none was released"
+    regained = beats((2.0, beat()), (8.0, beat()), (8.4, beat())).deadlines(LIMITS)
+    assert regained[:3] == (8.9, 9.4, 9.0)
+    released = LinkEvidence(released_at=5.0).deadlines(LIMITS)
+    assert released[3] == 6.0, "its word counts no longer than its node may be silent"
+
+
+def clocks(*told: tuple[float, float]) -> LinkEvidence:
+    return beats(*((t, beat(seq=n, difference=d)) for n, (t, d) in enumerate(told)))
+
+
+def test_a_clock_is_judged_by_the_smallest_difference_of_this_spell_and_the_one_before() -> None:
+    first = clocks((10.0, 0.5), (10.5, 0.3), (10.9, 0.4))
+    assert (first.clock_spell_since, first.clock_least) == (10.0, 0.3)
+    assert math.isnan(first.clocks_differ_by), "one spell is not enough"
+    second = clocks((10.0, 0.5), (10.5, 0.3), (11.0, 0.6), (11.9, 0.7))
+    assert (second.clock_spell_since, second.clock_least) == (11.0, 0.6)
+    assert second.clocks_differ_by == 0.3
+    third = clocks((10.0, 0.5), (10.5, 0.3), (11.0, 0.6), (12.0, 0.8))
+    assert (third.clock_least_before, third.clock_least, third.clocks_differ_by) == (0.6, 0.8, 0.6)
+
+
+@pytest.mark.parametrize(("pause", "known"), [(2.9, True), (3.0, False), (3.5, False)])
+def test_what_was_heard_before_a_long_silence_says_nothing_of_a_clock(
+    pause: float, known: bool
+) -> None:
+    after = clocks((10.0, 0.5), (10.0 + pause, 0.6))
+    assert after.clock_least == 0.6
+    assert after.clock_least_before == 0.5 if known else math.isnan(after.clock_least_before)
 
 
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), st.sampled_from(LinkState)), max_size=30))
