@@ -23,14 +23,14 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = {module_of(name).rpartition(".")[2]: name for name in links()}
 
 
-def test_each_folder_is_registered() -> None:
+def test_each_folder_is_registered():
     found = {path.parent.name for path in (ROOT / "chute_ros" / "links").glob("*/__init__.py")}
     assert found == FOLDERS.keys()
     assert len(found) == 4
 
 
 @pytest.mark.parametrize("name", links())
-def test_what_it_names_is_there(name: str) -> None:
+def test_what_it_names_is_there(name):
     kind = links()[name]
     assert inspect.isclass(load(kind.node))
     assert load(kind.parameters)
@@ -40,7 +40,7 @@ def test_what_it_names_is_there(name: str) -> None:
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_its_protocol_is_a_link(folder: str) -> None:
+def test_its_protocol_is_a_link(folder):
     module = import_module(f"chute_ros.links.{folder}.protocol.link")
     (made,) = [
         one
@@ -63,7 +63,7 @@ def test_its_protocol_is_a_link(folder: str) -> None:
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_its_node_passes_the_stories_of_all_device_nodes(folder: str) -> None:
+def test_its_node_passes_the_stories_of_all_device_nodes(folder):
     (file,) = (ROOT / "test" / "links" / folder).glob("test_*_device_suite.py")
     suites = [
         node
@@ -80,7 +80,7 @@ def test_its_node_passes_the_stories_of_all_device_nodes(folder: str) -> None:
     assert named == [FOLDERS[folder]]
 
 
-def test_each_vehicle_carries_links_that_there_are() -> None:
+def test_each_vehicle_carries_links_that_there_are():
     for vehicle in vehicles().values():
         assert {*vehicle.links} <= links().keys()
         for name in ("required_links", "kill_links", "deploy_links"):
@@ -107,7 +107,7 @@ print(json.dumps([list(links()), list(vehicles()), module_of("rocket_motor")]))
 """
 
 
-def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+def python(code, folder):
     path = os.pathsep.join([str(folder), *filter(None, sys.path)])
     return subprocess.run(
         [sys.executable, "-c", code],
@@ -118,7 +118,7 @@ def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def other_package(folder: Path, entry: str, code: str = OTHERS) -> None:
+def other_package(folder, entry, code=OTHERS):
     (folder / "other_link").mkdir()
     (folder / "other_link" / "__init__.py").write_text(code)
     information = folder / "other_package-1.0.dist-info"
@@ -127,7 +127,7 @@ def other_package(folder: Path, entry: str, code: str = OTHERS) -> None:
     (information / "entry_points.txt").write_text(f"[chute_ros.links]\n{entry}\n")
 
 
-def test_a_link_of_another_package_is_found_behind_ours(tmp_path: Path) -> None:
+def test_a_link_of_another_package_is_found_behind_ours(tmp_path):
     other_package(tmp_path, "rocket_motor = other_link:LINK")
     done = python(TELL, tmp_path)
     assert done.returncode == 0, done.stderr
@@ -137,9 +137,7 @@ def test_a_link_of_another_package_is_found_behind_ours(tmp_path: Path) -> None:
     assert module == "other_link"
 
 
-def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(
-    tmp_path: Path,
-) -> None:
+def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(tmp_path):
     code = OTHERS.replace('name="rocket_motor"', 'name="rocket_motor", part=""')
     tell = (
         "from pathlib import Path; from chute_ros.campaign.draw import draw; "
@@ -163,7 +161,7 @@ def test_a_link_that_the_campaign_cannot_fly_leaves_its_flights_as_they_are(
         ("rocket_motor = other_link:replace", "need a LinkKind with the name 'rocket_motor'"),
     ],
 )
-def test_an_entry_that_is_none_is_named(tmp_path: Path, entry: str, said: str) -> None:
+def test_an_entry_that_is_none_is_named(tmp_path, entry, said):
     other_package(tmp_path, entry)
     done = python(TELL, tmp_path)
     assert done.returncode == 1
@@ -171,7 +169,7 @@ def test_an_entry_that_is_none_is_named(tmp_path: Path, entry: str, said: str) -
     assert said in line
 
 
-def test_without_any_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_any_it_says_what_to_do(monkeypatch):
     monkeypatch.setattr(registered, "entry_points", lambda group: ())
     links.cache_clear()
     try:
@@ -182,7 +180,7 @@ def test_without_any_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None
         links.cache_clear()
 
 
-def test_a_kind_is_made_of_texts_and_functions_alone() -> None:
+def test_a_kind_is_made_of_texts_and_functions_alone():
     """It is read by launch files and by the campaign, which have no ROS."""
     code = "import sys; from chute_ros.links.registered import links; links(); print(*sys.modules)"
     done = python(code, ROOT)

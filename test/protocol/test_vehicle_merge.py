@@ -490,7 +490,7 @@ def test_who_tells_a_part_is_named_where_it_is_not_the_first():
     assert one.told_by(10.51)["attitude"] == "imu"
 
 
-def test_every_state_of_a_link_has_its_place_among_the_others() -> None:
+def test_every_state_of_a_link_has_its_place_among_the_others():
     """What another node says of the autopilot is taken, whatever it is."""
     for state in LinkState:
         one = VehicleMerge((VEHICLE_STATE, IMU), 2.5)

@@ -1,23 +1,21 @@
 """What the tests of mavlink_parachute share: quick parameters, and devices that remember."""
 
 import time
-from typing import Any
 
-from node_bench import LOCAL, Bench, port_of
+from node_bench import LOCAL, port_of
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
-from chute_ros.model import DeploymentTrigger, SafetyFlags
+from chute_ros.model import SafetyFlags
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
-from chute_ros.protocol.mavlink.frames import Frame
 from chute_ros.sim.autopilot_device import AutopilotDevice
-from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind
+from chute_ros.sim.autopilot_kinds import GENERIC
 
 #: Between two heartbeats and two statuses of the simulated devices, s.
 INTERVAL = 0.05
 
 
-def quick(**parameters: Any) -> dict[str, Any]:
+def quick(**parameters):
     """Parameters with short limits on a free port."""
     return {
         "connection": f"udpin:{LOCAL}:0",
@@ -38,7 +36,7 @@ class Remembering:
 
     commands_heard: list[tuple[float, int, tuple[float, ...]]]
 
-    def _command(self, frame: Frame) -> None:
+    def _command(self, frame):
         message = frame.message
         params = tuple(getattr(message, f"param{number}") for number in range(1, 8))
         mine = message.target_system in (0, self.system_id)  # type: ignore[attr-defined]
@@ -46,7 +44,7 @@ class Remembering:
             self.commands_heard.append((time.monotonic(), message.command, params))
         super()._command(frame)  # type: ignore[misc]
 
-    def heard_command(self, number: int, first: float | None = None) -> list[Any]:
+    def heard_command(self, number, first=None):
         """The commands of this number (and first parameter) so far."""
         return [
             heard
@@ -58,7 +56,7 @@ class Remembering:
 class Module(Remembering, ParachuteDevice):
     """A parachute module that speaks often and can be stuck."""
 
-    def __init__(self, settings: ParachuteSettings | None = None, interval: float = INTERVAL):
+    def __init__(self, settings=None, interval=INTERVAL):
         self.commands_heard = []
         #: It says yes, but nothing comes out.
         self.stuck = False
@@ -69,15 +67,15 @@ class Module(Remembering, ParachuteDevice):
         self.default_intervals[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS] = interval
 
     @property
-    def releases(self) -> list[Any]:
+    def releases(self):
         """The commands to release."""
         return self.heard_command(dialect.MAV_CMD_DO_PARACHUTE, float(dialect.PARACHUTE_RELEASE))
 
-    def safety(self) -> SafetyFlags:
+    def safety(self):
         flags = super().safety()
         return flags if self.cleared else flags & ~SafetyFlags.GROUND_CLEARED
 
-    def _deploy(self, trigger: DeploymentTrigger) -> None:
+    def _deploy(self, trigger):
         if not self.stuck:
             super()._deploy(trigger)
 
@@ -85,9 +83,7 @@ class Module(Remembering, ParachuteDevice):
 class Autopilot(Remembering, AutopilotDevice):
     """An autopilot that speaks often."""
 
-    def __init__(
-        self, system_id: int = 1, interval: float = INTERVAL, kind: AutopilotKind = GENERIC
-    ):
+    def __init__(self, system_id=1, interval=INTERVAL, kind=GENERIC):
         self.commands_heard = []
         #: Names of the parameters that were asked for.
         self.asked_for: set[str] = set()
@@ -99,19 +95,19 @@ class Autopilot(Remembering, AutopilotDevice):
         ):
             self.default_intervals[message_id] = interval
 
-    def heard(self, frame: Frame) -> None:
+    def heard(self, frame):
         if frame.message.get_type() == "PARAM_REQUEST_READ":
             self.asked_for.add(frame.message.param_id)
         super().heard(frame)
 
     @property
-    def forced(self) -> list[Any]:
+    def forced(self):
         """The orders to disarm by force."""
         orders = self.heard_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         return [heard for heard in orders if heard[2][1] == FORCE_DISARM]
 
 
-def airborne(height: float, kind: AutopilotKind = GENERIC) -> Autopilot:
+def airborne(height, kind=GENERIC):
     """One that holds its vehicle at height, m."""
     autopilot = Autopilot(kind=kind)
     autopilot.update(time.monotonic())  # it has started, disarmed
@@ -124,21 +120,21 @@ def airborne(height: float, kind: AutopilotKind = GENERIC) -> Autopilot:
 class Network:
     """The node, and what is plugged into its network."""
 
-    def __init__(self, bench: Bench, **parameters: Any) -> None:
+    def __init__(self, bench, **parameters):
         self.bench = bench
         self.node = bench.add(MavlinkParachuteNode, **quick(**parameters))
         self.wire = f"udpout:{LOCAL}:{port_of(self.node.loop)}"
 
-    def plug(self, device: Any, **options: Any) -> Any:
+    def plug(self, device, **options):
         """Plug a device in; the loop it runs in."""
         return self.bench.simulate(device, self.wire, **options)
 
 
-def do(bench: Bench, loop: Any, function: Any) -> None:
+def do(bench, loop, function):
     """Have function() called in the thread of a simulated device, and wait for it."""
     done: list[float] = []
 
-    def call(link: Any, now: float) -> None:
+    def call(link, now):
         function()
         done.append(now)
 

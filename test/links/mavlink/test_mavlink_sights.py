@@ -1,14 +1,10 @@
 """mavlink_parachute on a real network: what it sees of the vehicle, and what it does not."""
 
-import math
-import time
-
 import pytest
-from chute_msgs.msg import LinkHeartbeat, VehicleState
+from chute_msgs.msg import VehicleState
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from mavlink_bench import Autopilot, Module, Network, airborne
+from mavlink_bench import Autopilot, Network, airborne
 
-from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.protocol.mavlink.dialect import dialect
 
 
@@ -71,30 +67,3 @@ def test_a_stream_that_is_too_slow_is_named_in_the_state_and_in_diagnostics(benc
         "diagnostics tell it as well",
     )
     assert told(diagnostics, "autopilot").level == DiagnosticStatus.ERROR
-
-
-def test_two_autopilots_with_the_same_ids_forbid_take_off(bench):
-    network = Network(bench, expect_parachute=False)
-    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-    states = bench.follow(VehicleState, "vehicle/state")
-    network.plug(Autopilot())
-    bench.until(lambda: beats and beats[-1].device_healthy, "one alone is ours")
-    other = Autopilot()
-    other.update(time.monotonic())  # it has started
-    other.booted_at -= 500.0
-    network.plug(other)
-    bench.until(lambda: beats[-1].reasons, "two are an error")
-    assert not beats[-1].device_healthy
-    (reason,) = beats[-1].reasons
-    assert reason.startswith("two autopilots have the ids 1/1 (their clocks are ")
-    assert states[-1].reboot_count <= 1
-    assert math.isfinite(states[-1].height)
-
-
-def test_a_parachute_that_is_not_ready_has_its_reason_in_the_heartbeat(bench):
-    network = Network(bench)
-    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
-    bench.until(lambda: beats, "they come")
-    assert beats[-1].reasons[0].startswith("no parachute was received: check its power")
-    network.plug(Module(ParachuteSettings(deployment=4)))
-    bench.until(lambda: "1/161 is released" in beats[-1].reasons, "a released one is no parachute")

@@ -1,9 +1,7 @@
 """The node relay and a simulated relay board on a real pty."""
 
-from collections.abc import Hashable
 from typing import Any
 
-from node_bench import Bench
 from simulated_device import SimulatedDevice
 
 from chute_ros.links.relay.node import RelayNode
@@ -17,7 +15,7 @@ class CountingBoard(RelayBoard):
 
     pulses = 0
 
-    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+    def receive(self, data, now, stream=None):
         before, orders = self.closed, self.orders
         super().receive(data, now, stream)
         self.pulses += self.orders > orders and not before
@@ -26,7 +24,7 @@ class CountingBoard(RelayBoard):
 class Board(SimulatedDevice):
     """The node, and a board that can be plugged into its port and pulled out."""
 
-    def __init__(self, bench: Bench, **parameters: Any) -> None:
+    def __init__(self, bench, **parameters):
         self.bench = bench
         self.path = bench.folder / "ttyRELAY"
         self.board = CountingBoard()
@@ -34,27 +32,27 @@ class Board(SimulatedDevice):
         connection = f"serial:{self.path}:9600"
         self.node = bench.add(RelayNode, **{"connection": connection, **parameters})
 
-    def plug_in(self) -> None:
+    def plug_in(self):
         self.loop = self.bench.simulate_on(PtyWire(str(self.path)), self.board)
 
-    def pull_out(self) -> None:
+    def pull_out(self):
         """It is gone from the port."""
         assert self.loop is not None
         self.bench.unplug(self.loop)
 
-    def commands_to_deploy(self) -> int:
+    def commands_to_deploy(self):
         return self.board.pulses
 
     @property
-    def deployed(self) -> bool:
+    def deployed(self):
         return self.board.fired
 
     # What a board that says nothing cannot do.
 
-    def fall_silent(self) -> None:
+    def fall_silent(self):
         raise NotImplementedError
 
     speak_again = stop_answering = come_to_ground = be_stuck = fall_silent
 
-    def break_down(self) -> str:
+    def break_down(self):
         raise NotImplementedError

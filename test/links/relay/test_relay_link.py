@@ -17,14 +17,14 @@ FIRE, REST = bytes([0xA0, 1, 1, 0xA2]), bytes([0xA0, 1, 0, 0xA1])
 class Output:
     """The link on an output that takes what it is given, or does not."""
 
-    def __init__(self, config: RelayConfig | None = None) -> None:
+    def __init__(self, config=None):
         self.link = RelayLink(config or RelayConfig())
         self.t, self.takes = 100.0, True
         #: (s, bytes) that the output took.
         self.written: list[tuple[float, bytes]] = []
         self.events: list[Any] = []
 
-    def turn(self) -> None:
+    def turn(self):
         """As the loop does: what is to be written, then what happened."""
         for frame in self.link.take_output():
             if self.takes:
@@ -33,7 +33,7 @@ class Output:
                 self.link.not_written(frame)
         self.events += self.link.take_events()
 
-    def to(self, t: float) -> None:
+    def to(self, t):
         """Go there, by every deadline on the way."""
         while (due := self.link.next_deadline() - 100.0) < t:
             self.t = max(self.t, 100.0 + due)
@@ -43,27 +43,27 @@ class Output:
         self.link.update(self.t)
         self.turn()
 
-    def open(self) -> None:
+    def open(self):
         self.link.wire_opened(self.t)
         self.turn()
 
-    def lose(self) -> None:
+    def lose(self):
         self.link.stream_ended(None)
         self.turn()
 
-    def deploy(self, token: int = 1, force: bool = True) -> None:
+    def deploy(self, token=1, force=True):
         self.link.deploy(token, force, self.t)
         self.turn()
 
-    def outcomes(self) -> list[tuple[int, Outcome]]:
+    def outcomes(self):
         reports = [one.report for one in self.events if isinstance(one, RequestReport)]
         return [(one.token, one.outcome) for one in reports]
 
-    def ends(self) -> list[Any]:
+    def ends(self):
         return [one.finished for one in self.events if isinstance(one, RequestFinished)]
 
 
-def test_at_rest_it_is_written_again_and_again_and_is_unmonitored() -> None:
+def test_at_rest_it_is_written_again_and_again_and_is_unmonitored():
     output = Output()
     assert output.link.state is LinkState.NEVER_SEEN
     output.open()
@@ -72,7 +72,7 @@ def test_at_rest_it_is_written_again_and_again_and_is_unmonitored() -> None:
     assert output.link.state is LinkState.UNMONITORED
 
 
-def test_a_deploy_is_one_pulse_repeated_for_its_time_and_then_rest() -> None:
+def test_a_deploy_is_one_pulse_repeated_for_its_time_and_then_rest():
     output = Output(RelayConfig(pulse_time=0.35))
     output.open()
     output.to(0.5)
@@ -87,7 +87,7 @@ def test_a_deploy_is_one_pulse_repeated_for_its_time_and_then_rest() -> None:
     assert output.link.fired == 1
 
 
-def test_a_second_deploy_in_the_pulse_makes_it_longer() -> None:
+def test_a_second_deploy_in_the_pulse_makes_it_longer():
     output = Output(RelayConfig(pulse_time=1.0, repeat_interval=0.125))
     output.open()
     output.deploy(1)
@@ -99,7 +99,7 @@ def test_a_second_deploy_in_the_pulse_makes_it_longer() -> None:
     assert output.outcomes() == [(1, Outcome.SENT), (2, Outcome.SENT)]
 
 
-def test_what_the_output_does_not_take_is_tried_again_and_never_told_as_sent() -> None:
+def test_what_the_output_does_not_take_is_tried_again_and_never_told_as_sent():
     output = Output(RelayConfig(repeat_interval=0.125))
     output.open()
     output.takes = False
@@ -115,7 +115,7 @@ def test_what_the_output_does_not_take_is_tried_again_and_never_told_as_sent() -
     assert (fired[0], fired[-1]) == (0.375, 2.25), "the pulse begins when it is taken"
 
 
-def test_one_that_cannot_be_written_fails_in_time_and_fires_nothing_later() -> None:
+def test_one_that_cannot_be_written_fails_in_time_and_fires_nothing_later():
     output = Output(RelayConfig(give_up_after=1.5))
     output.deploy()
     output.to(3.0)
@@ -125,7 +125,7 @@ def test_one_that_cannot_be_written_fails_in_time_and_fires_nothing_later() -> N
     assert {data for _, data in output.written} == {REST}
 
 
-def test_one_that_was_ordered_while_the_output_was_away_leaves_once_it_is_back() -> None:
+def test_one_that_was_ordered_while_the_output_was_away_leaves_once_it_is_back():
     output = Output()
     output.open()
     output.lose()
@@ -138,7 +138,7 @@ def test_one_that_was_ordered_while_the_output_was_away_leaves_once_it_is_back()
     assert output.outcomes() == [(1, Outcome.SENT)]
 
 
-def test_an_output_that_comes_back_within_a_pulse_goes_on_with_it() -> None:
+def test_an_output_that_comes_back_within_a_pulse_goes_on_with_it():
     output = Output(RelayConfig(pulse_time=1.0))
     output.open()
     output.deploy()
@@ -151,7 +151,7 @@ def test_an_output_that_comes_back_within_a_pulse_goes_on_with_it() -> None:
     assert output.written[-1][1] == REST
 
 
-def test_without_force_nothing_leaves() -> None:
+def test_without_force_nothing_leaves():
     output = Output()
     output.open()
     output.deploy(force=False)
@@ -161,7 +161,7 @@ def test_without_force_nothing_leaves() -> None:
 
 
 @pytest.mark.parametrize(("arm", "success"), [(True, True), (False, False)])
-def test_arming_says_that_there_is_none(arm: bool, success: bool) -> None:
+def test_arming_says_that_there_is_none(arm, success):
     output = Output()
     output.open()
     output.link.arm(3, arm, 0, output.t)
@@ -172,7 +172,7 @@ def test_arming_says_that_there_is_none(arm: bool, success: bool) -> None:
     assert {data for _, data in output.written} == {REST}
 
 
-def test_what_comes_back_is_counted_and_means_nothing() -> None:
+def test_what_comes_back_is_counted_and_means_nothing():
     output = Output()
     output.open()
     output.link.receive(b"\xa0\x01\x01\xa2deployed", output.t)
@@ -190,9 +190,7 @@ STEPS = st.lists(
 
 
 @given(STEPS, st.floats(0.01, 3.0))
-def test_whatever_happens_it_fires_only_as_ordered_and_every_request_ends_once(
-    steps: list[str], wait: float
-) -> None:
+def test_whatever_happens_it_fires_only_as_ordered_and_every_request_ends_once(steps, wait):
     output, ordered, last = Output(), 0, -100.0
     config = RelayConfig()
     for token, step in enumerate(steps, 1):

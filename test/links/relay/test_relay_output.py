@@ -4,7 +4,6 @@ import os
 from pathlib import Path
 
 import pytest
-from node_bench import Bench
 from relay_bench import Board
 
 from chute_ros.errors import ParameterError
@@ -13,7 +12,7 @@ from chute_ros.links.relay.protocol.link import RelayConfig
 from chute_ros.model import LinkState
 
 
-def test_a_file_is_written_from_its_beginning_each_time(tmp_path: Path) -> None:
+def test_a_file_is_written_from_its_beginning_each_time(tmp_path):
     path = tmp_path / "value"
     path.write_text("0")
     wire = FileWire(path)
@@ -28,13 +27,13 @@ def test_a_file_is_written_from_its_beginning_each_time(tmp_path: Path) -> None:
     wire.close()
 
 
-def test_a_file_that_is_not_there_is_not_made(tmp_path: Path) -> None:
+def test_a_file_that_is_not_there_is_not_made(tmp_path):
     with pytest.raises(FileNotFoundError):
         FileWire(tmp_path / "value").open()
     assert not list(tmp_path.iterdir())
 
 
-def test_a_pipe_is_an_output_while_somebody_reads_it(tmp_path: Path) -> None:
+def test_a_pipe_is_an_output_while_somebody_reads_it(tmp_path):
     path = tmp_path / "pipe"
     os.mkfifo(path)
     wire = FileWire(path)
@@ -50,7 +49,7 @@ def test_a_pipe_is_an_output_while_somebody_reads_it(tmp_path: Path) -> None:
     wire.close()
 
 
-def test_what_is_not_taken_whole_is_not_taken(tmp_path: Path) -> None:
+def test_what_is_not_taken_whole_is_not_taken(tmp_path):
     path = tmp_path / "pipe"
     os.mkfifo(path)
     reader = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -64,7 +63,7 @@ def test_what_is_not_taken_whole_is_not_taken(tmp_path: Path) -> None:
     os.close(reader)
 
 
-def test_a_device_that_says_it_is_gone_is_opened_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_device_that_says_it_is_gone_is_opened_again(monkeypatch):
     wire = FileWire(Path("/dev/full"))
     wire.open()
     with pytest.raises(OSError) as full:
@@ -83,7 +82,7 @@ def test_a_device_that_says_it_is_gone_is_opened_again(monkeypatch: pytest.Monke
         ("usb:1a86:7523", "usb:1a86:7523"),
     ],
 )
-def test_what_can_be_named(given: str, described: str) -> None:
+def test_what_can_be_named(given, described):
     assert make_output(given).describe() == described
 
 
@@ -98,13 +97,13 @@ def test_what_can_be_named(given: str, described: str) -> None:
         ("file:~nobody_at_all/x", "parameter connection is '~nobody_at_all/x'"),
     ],
 )
-def test_what_cannot(given: str, said: str) -> None:
+def test_what_cannot(given, said):
     with pytest.raises(ParameterError) as error:
         make_output(given)
     assert said in str(error.value)
 
 
-def test_bytes_as_text_and_as_digits() -> None:
+def test_bytes_as_text_and_as_digits():
     assert RelayConfig(output_fire="1").fire == b"1"
     assert RelayConfig(output_fire="hex:a00101a2").fire == b"\xa0\x01\x01\xa2"
     assert RelayConfig(output_rest="hex:A0 01").rest == b"\xa0\x01"
@@ -115,14 +114,14 @@ def test_bytes_as_text_and_as_digits() -> None:
             RelayConfig(output_fire=wrong)
 
 
-def test_a_node_that_would_fire_at_rest_does_not_start(bench: Bench) -> None:
+def test_a_node_that_would_fire_at_rest_does_not_start(bench):
     with pytest.raises(
         ParameterError, match="output_fire is 1 and output_rest is 1: the output would always fire"
     ):
         Board(bench, output_fire="1", output_rest="1")
 
 
-def test_a_node_fires_a_gpio(bench: Bench, tmp_path: Path) -> None:
+def test_a_node_fires_a_gpio(bench, tmp_path):
     path = tmp_path / "value"
     path.write_text("?")
     board = Board(

@@ -1,13 +1,11 @@
 """Supervisor, mavlink_parachute, relay and the simulators: from the autopilot to the channel."""
 
-from typing import Any
-
 import pytest
 from chute_msgs.msg import SafetyState, VehicleState
 from chute_msgs.srv import Arm, Deploy
 from mavlink_bench import Autopilot, do
 from mavlink_bench import quick as quick_mavlink
-from node_bench import LOCAL, Bench, port_of
+from node_bench import LOCAL, port_of
 from relay_bench import Board
 from std_srvs.srv import Trigger
 
@@ -21,7 +19,7 @@ HEIGHT = 20.0  # m
 class Flight:
     """A vehicle whose autopilot speaks MAVLink and whose parachute hangs on a relay."""
 
-    def __init__(self, bench: Bench, **supervisor: Any) -> None:
+    def __init__(self, bench, **supervisor):
         self.bench = bench
         self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
         self.vehicle = bench.follow(VehicleState, "vehicle/state")
@@ -45,15 +43,15 @@ class Flight:
         )
         self.board = Board(bench)
 
-    def act(self, action: str) -> None:
+    def act(self, action):
         do(self.bench, self.autopilot.loop, lambda: self.autopilot.act(action))
 
-    def await_stage(self, stage: int) -> None:
+    def await_stage(self, stage):
         self.bench.until(
             lambda: self.safety and self.safety[-1].state == stage, f"the stage is {stage}"
         )
 
-    def take_off(self) -> None:
+    def take_off(self):
         self.board.plug_in()
         self.await_stage(SafetyState.READY)
         self.act("arm")
@@ -62,9 +60,7 @@ class Flight:
         self.bench.until(lambda: self.vehicle[-1].height > HEIGHT - 5.0, "it is up")
 
 
-def test_a_deploy_stops_the_motors_fires_the_output_and_says_that_nothing_confirms_it(
-    bench: Bench,
-) -> None:
+def test_a_deploy_stops_the_motors_fires_the_output_and_says_that_nothing_confirms_it(bench):
     flight = Flight(bench)
     flight.take_off()
     answer = bench.call(Deploy, "safety/deploy", reason="it falls")
@@ -76,7 +72,7 @@ def test_a_deploy_stops_the_motors_fires_the_output_and_says_that_nothing_confir
     assert flight.board.commands_to_deploy() == 1
 
 
-def test_a_release_by_hand_on_the_ground_blocks_flight_until_a_reset(bench: Bench) -> None:
+def test_a_release_by_hand_on_the_ground_blocks_flight_until_a_reset(bench):
     flight = Flight(bench)
     flight.board.plug_in()
     flight.await_stage(SafetyState.READY)
@@ -92,7 +88,7 @@ def test_a_release_by_hand_on_the_ground_blocks_flight_until_a_reset(bench: Benc
     flight.await_stage(SafetyState.READY)
 
 
-def test_nobody_flies_with_it_who_has_not_said_so(bench: Bench) -> None:
+def test_nobody_flies_with_it_who_has_not_said_so(bench):
     flight = Flight(bench, unmonitored_links=[""])
     flight.board.plug_in()
     flight.await_stage(SafetyState.BLOCKED)
@@ -103,7 +99,7 @@ def test_nobody_flies_with_it_who_has_not_said_so(bench: Bench) -> None:
     )
 
 
-def test_arming_passes_and_disarming_says_what_a_person_must_do(bench: Bench) -> None:
+def test_arming_passes_and_disarming_says_what_a_person_must_do(bench):
     flight = Flight(bench)
     flight.board.plug_in()
     flight.await_stage(SafetyState.READY)
@@ -117,7 +113,7 @@ def test_arming_passes_and_disarming_says_what_a_person_must_do(bench: Bench) ->
 
 
 @pytest.mark.parametrize("away", [True, False])
-def test_an_output_that_is_pulled_out_forbids_take_off(bench: Bench, away: bool) -> None:
+def test_an_output_that_is_pulled_out_forbids_take_off(bench, away):
     flight = Flight(bench)
     if away:
         flight.board.plug_in()

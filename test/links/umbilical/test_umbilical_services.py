@@ -56,16 +56,6 @@ def test_each_command_by_its_name_with_the_effect_that_telemetry_shows(cable):
     assert (answer.success, answer.sent, answer.confirmed) == (True, True, False)
 
 
-def test_drogue_and_main_are_refused_on_the_ground_unless_forced(cable):
-    for name in ("drogue", "main"):
-        answer = cable.command(name)
-        assert (answer.success, answer.sent) == (False, False), name
-        assert f"the {name} is not fired on the ground" in answer.message
-        assert "force sends it all the same; nothing was sent" in answer.message
-        assert cable.command(name, force=True).confirmed, name
-    assert cable.tokens() == ["<D>", "<d>"]
-
-
 def test_a_wipe_lasts_and_its_progress_is_told(bench):
     settings = FlightComputerSettings(rate=RATE, wipe_time=1.0, wipe_sectors=8, interlock=True)
     cable = Cable(bench, settings, **PATIENT)

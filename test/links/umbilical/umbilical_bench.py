@@ -1,15 +1,12 @@
 """What the tests of umbilical share: quick parameters, and a flight computer on a pty."""
 
-from collections.abc import Callable
 from typing import Any
 
 from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, Telem
 from chute_msgs.srv import Arm, Deploy, Dump, SetTarget, UmbilicalCommand
-from node_bench import Bench
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 from chute_ros.links.umbilical.node import UmbilicalNode
-from chute_ros.links.umbilical.protocol.layouts import Layout
 from chute_ros.links.umbilical.simulator.flight_computer import FlightComputer
 from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings
 from chute_ros.model import LinkState
@@ -27,7 +24,7 @@ PATIENT = {
 }
 
 
-def quick(**parameters: Any) -> dict[str, Any]:
+def quick(**parameters):
     """Parameters with short limits."""
     return {
         "telemetry_stale_after": 0.4,
@@ -46,13 +43,7 @@ def quick(**parameters: Any) -> dict[str, Any]:
 class Cable:
     """A node, and a flight computer that can be plugged into its cable. sends: its layout."""
 
-    def __init__(
-        self,
-        bench: Bench,
-        settings: FlightComputerSettings | None = None,
-        sends: str = "telem57_airbrake_state",
-        **parameters: Any,
-    ) -> None:
+    def __init__(self, bench, settings=None, sends="telem57_airbrake_state", **parameters):
         self.bench = bench
         self.path = bench.folder / "ttyACM0"
         self.heartbeats = bench.follow(LinkHeartbeat, "safety/heartbeat")
@@ -72,29 +63,29 @@ class Cable:
         self.loop: WireLoop[Any] | None = None
 
     @staticmethod
-    def shipped_layouts() -> list[Layout]:
+    def shipped_layouts():
         """Those that were built."""
         return load_layouts("", "test")
 
     # -- the cable -----------------------------------------------------------------------------
 
-    def plug(self) -> None:
+    def plug(self):
         """The flight computer is at the end of the cable."""
         self.loop = self.bench.simulate_on(PtyWire(str(self.path)), self.computer)
 
-    def plug_mute(self) -> None:
+    def plug_mute(self):
         """Something is at the end of the cable that never says a word."""
         wire = PtyWire(str(self.path))
         wire.open()
         self.bench.at_end.callback(wire.close)
 
-    def pull(self) -> None:
+    def pull(self):
         """The cable is pulled."""
         assert self.loop is not None
         self.bench.unplug(self.loop)
         self.loop = None
 
-    def call(self, function: Callable[[Any], Any]) -> Any:
+    def call(self, function):
         """Have function(flight computer) called in its own thread, and wait for what it gives."""
         assert self.loop is not None
         done: list[Any] = []
@@ -102,30 +93,30 @@ class Cable:
         self.bench.until(lambda: done, "the simulator has done so")
         return done[0]
 
-    def act(self, action: str) -> None:
+    def act(self, action):
         """An action of --at."""
         self.call(lambda computer: computer.act(action))
 
-    def tokens(self) -> list[str]:
+    def tokens(self):
         """The commands that came, oldest first."""
         return [token for _, token in self.computer.came]
 
     # -- awaiting ------------------------------------------------------------------------------
 
-    def await_link(self, state: LinkState) -> None:
+    def await_link(self, state):
         self.bench.until(
             lambda: self.heartbeats and self.heartbeats[-1].link_state == state,
             f"the link is {state.name}",
         )
 
-    def await_telemetry(self, condition: Callable[[Telem], Any], what: str) -> Telem:
+    def await_telemetry(self, condition, what):
         self.bench.until(lambda: self.telemetry and condition(self.telemetry[-1]), what)
         return self.telemetry[-1]
 
-    def await_mode(self, mode: int) -> None:
+    def await_mode(self, mode):
         self.await_telemetry(lambda t: t.flight_mode == mode, f"flight mode {mode}")
 
-    def plugged(self) -> None:
+    def plugged(self):
         """Plugged in, heard and healthy."""
         self.plug()
         self.await_link(LinkState.OK)
@@ -134,21 +125,21 @@ class Cable:
 
     # -- services ------------------------------------------------------------------------------
 
-    def command(self, name: str, force: bool = False) -> Any:
+    def command(self, name, force=False):
         """~/command."""
         return self.bench.call(
             UmbilicalCommand, "umbilical/command", command=name, force=force, reason="a test"
         )
 
-    def arm(self, arm: bool = True, **fields: Any) -> Any:
+    def arm(self, arm=True, **fields):
         """~/arm."""
         return self.bench.call(Arm, "umbilical/arm", arm=arm, **fields)
 
-    def deploy(self, force: bool = False) -> Any:
+    def deploy(self, force=False):
         """~/deploy."""
         return self.bench.call(Deploy, "umbilical/deploy", force=force, reason="a test")
 
-    def set_target(self, *values: float) -> Any:
+    def set_target(self, *values):
         """~/set_target."""
         names = ("latitude", "longitude", "third", "fourth")
         padded = [*values, *[float("nan")] * (4 - len(values))]
@@ -156,6 +147,6 @@ class Cable:
             SetTarget, "umbilical/set_target", **dict(zip(names, padded, strict=True))
         )
 
-    def dump(self, memory: str, path: str = "") -> Any:
+    def dump(self, memory, path=""):
         """~/dump."""
         return self.bench.call(Dump, "umbilical/dump", memory=memory, path=path)

@@ -1,13 +1,14 @@
 """What upf_can says on /diagnostics, and in its log at the start."""
 
 import pytest
-from chute_msgs.msg import TriggerStatus
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from upf_bench import OTHER_LAYOUT, Devices, Network, tasks, values
 
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import NODE_ID
 from chute_ros.links.upf.protocol.definitions import TRIGGER_STATUS, VEHICLE_SERVICE
+from chute_ros.model import LinkState
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -109,11 +110,11 @@ def test_fields_that_the_types_lack_are_in_the_log_at_the_start(bench):
 
 
 @pytest.mark.parametrize("without_controller", [False, True])
-def test_a_controller_that_is_missing_beside_its_trigger_is_an_error(
-    bench, without_controller: bool
-) -> None:
+def test_a_controller_that_is_missing_beside_its_trigger_is_an_error(bench, without_controller):
     network = Network(bench, without_controller=without_controller)
     diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    beats = bench.follow(LinkHeartbeat, "safety/heartbeat")
+    statuses = bench.follow(ParachuteStatus, "parachute/status")
     network.party(34).say(
         TRIGGER_STATUS, state=network.definitions.constant(TRIGGER_STATUS, "STATE_READY")
     )
@@ -123,3 +124,9 @@ def test_a_controller_that_is_missing_beside_its_trigger_is_an_error(
     if not without_controller:
         assert said["controller"].level == ERROR
         assert said["controller"].message.startswith("never received, and without it")
+        beats.clear()
+        bench.until(lambda: len(beats) >= 3, "it beats")
+        assert {(one.link_state, one.device_healthy) for one in beats} == {
+            (LinkState.NEVER_SEEN, False)
+        }
+        assert statuses == [], "a trigger alone is no parachute"

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_msgs.msg import LinkHeartbeat, VehicleState
-from node_bench import Bench, stamped
+from node_bench import stamped
 from upf_party import Party
 
 from chute_ros.links.upf.node import UpfCanNode
@@ -17,12 +17,11 @@ from chute_ros.links.upf.simulator.controller import (
     ControllerSettings,
     UpfController,
 )
-from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
+from chute_ros.links.upf.simulator.node import NodeSettings
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import LinkState
-from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.sim.bundle import WireBundle
-from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
+from chute_ros.sim.can_faults import CanFaultyLink
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.transport.can_address import parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
@@ -40,7 +39,7 @@ INTERVAL = 50
 PATIENT = {"call_timeout": 2.0, "effect_timeout": 5.0, "give_up_after": 15.0}
 
 
-def quick(**parameters: Any) -> dict[str, Any]:
+def quick(**parameters):
     """Parameters with short limits on a bus that nobody else uses."""
     return {
         "connection": f"mcast:0:{free_udp_ports(1)[0]}",
@@ -62,13 +61,7 @@ def quick(**parameters: Any) -> dict[str, Any]:
 class Controller(UpfController):
     """A controller that speaks often, and refuses to deploy when told to."""
 
-    def __init__(
-        self,
-        definitions: Definitions,
-        self_test: float = 0.0,
-        kill_wait: float = 0.05,
-        **values: p.Value,
-    ) -> None:
+    def __init__(self, definitions, self_test=0.0, kill_wait=0.05, **values):
         #: False: it says that it is too near the ground.
         self.cleared = True
         #: TYPE_* of every request that came over the wire, answered or not.
@@ -78,12 +71,12 @@ class Controller(UpfController):
         node = NodeSettings("upf.controller", all_values)
         super().__init__(definitions, ControllerSettings(node, self_test, kill_wait=kill_wait))
 
-    def _serve(self, request: Heard) -> None:
+    def _serve(self, request):
         if request.name == PARACHUTE_SERVICE:
             self.came.append(self.definitions.type_name(PARACHUTE_SERVICE, request.values))
         super()._serve(request)
 
-    def decide(self, name: str) -> str:
+    def decide(self, name):
         if name.startswith("TYPE_DEPLOY") and not self.cleared:
             return "TEMPORARILY_REJECTED"
         return super().decide(name)
@@ -92,7 +85,7 @@ class Controller(UpfController):
 class Network:
     """The node, and what is plugged into its bus."""
 
-    def __init__(self, bench: Bench, **parameters: Any) -> None:
+    def __init__(self, bench, **parameters):
         self.bench = bench
         self.connection = quick(**parameters)["connection"]
         self.parameters = quick(**parameters) | {"connection": self.connection}
@@ -103,47 +96,45 @@ class Network:
         self.definitions = Definitions(load_data_types(folder, "test"))
 
     @property
-    def link(self) -> Any:
+    def link(self):
         """The node's link, to look at."""
         return self.node.loop.link
 
-    def restart(self) -> None:
+    def restart(self):
         """The node ends and starts anew."""
         self.bench.remove(self.node)
         self.node = self.bench.add(UpfCanNode, **self.parameters)
 
-    def controller(
-        self, self_test: float = 0.0, kill_wait: float = 0.05, **values: p.Value
-    ) -> Controller:
+    def controller(self, self_test=0.0, kill_wait=0.05, **values):
         """A controller for this bus, not plugged in."""
         return Controller(self.definitions, self_test, kill_wait, **values)
 
-    def trigger(self, name: str = "upf.trigger", **values: p.Value) -> UpfTrigger:
+    def trigger(self, name="upf.trigger", **values):
         """A trigger for this bus, not plugged in."""
         all_values = TRIGGER_PARAMETERS | {p.NODE_STATUS_INTERVAL: 100} | values
         trigger = UpfTrigger(self.definitions, NodeSettings(name, all_values))
         trigger.status_interval = INTERVAL / 1000.0
         return trigger
 
-    def plug(self, *nodes: UpfNode, knobs: CanFaultKnobs | None = None) -> WireLoop[Any]:
+    def plug(self, *nodes, knobs=None):
         """Plug devices in; the loop they run in."""
         bus: Any = UpfBus(list(nodes), [])
         return self._run(bus if knobs is None else CanFaultyLink(bus, knobs, seed=1))
 
-    def party(self, node_id: int = 50) -> Party:
+    def party(self, node_id=50):
         """Plug a node of the test's own in."""
         party = Party(self.definitions, node_id)
         party.loop = self._run(party)
         return party
 
-    def _run(self, link: Any) -> WireLoop[Any]:
+    def _run(self, link):
         wire = make_can_wire(parse_can_address(self.connection))
         loop = WireLoop(link, WireBundle([wire]), self._note)
         loop.start()
         self.bench.loops.append(loop)
         return loop
 
-    def _note(self, events: list[Any]) -> None:
+    def _note(self, events):
         self.said += [event for event in events if isinstance(event, str)]
 
 
@@ -151,51 +142,51 @@ class Devices:
     """A controller and a trigger on the network, heard and well, the controller's parameters
     known."""
 
-    def __init__(self, network: Network, self_test: float = 0.0, **values: p.Value) -> None:
+    def __init__(self, network, self_test=0.0, **values):
         self.network, self.bench = network, network.bench
         self.controller, self.trigger = network.controller(self_test, **values), network.trigger()
         self.beats = self.bench.follow(LinkHeartbeat, "safety/heartbeat")
         self.loop = network.plug(self.controller, self.trigger)
         self.await_well()
 
-    def await_well(self) -> None:
+    def await_well(self):
         """All is known of them and all is well."""
         known = self.network.link.devices.controllers
 
-        def well() -> bool:
+        def well():
             read = [len(one.parameters) for one in known.values()]
             ours = [beat for beat in self.beats if beat.link == "upf_can"]
             return bool(read == [12] and ours and ours[-1].device_healthy)
 
         self.bench.until(well, "the devices are heard and well")
 
-    def await_beat(self, **fields: Any) -> LinkHeartbeat:
+    def await_beat(self, **fields):
         """The newest heartbeat of the node has these fields."""
 
-        def so() -> LinkHeartbeat | None:
+        def so():
             ours = [beat for beat in self.beats if beat.link == "upf_can"]
             fits = ours and all(getattr(ours[-1], n) == value for n, value in fields.items())
             return ours[-1] if fits else None
 
         return self.bench.until(so, f"the heartbeat reports {fields}")
 
-    def act(self, action: str) -> None:
+    def act(self, action):
         """Have them do so."""
         done: list[float] = []
 
-        def act(link: Any, now: float) -> None:
+        def act(link, now):
             link.act(action)
             done.append(now)
 
         self.loop.call(act)
         self.bench.until(lambda: done, f"the simulator has done {action}")
 
-    def fly(self) -> None:
+    def fly(self):
         """The vehicle says that it is in the air, until the node has heard it."""
         fly(self.bench, self.network)
 
 
-def vehicle_state(bench: Bench, **fields: Any) -> VehicleState:
+def vehicle_state(bench, **fields):
     """A vehicle/state of which only these parts are known, now."""
     unknown = {
         name: math.nan
@@ -207,10 +198,10 @@ def vehicle_state(bench: Bench, **fields: Any) -> VehicleState:
     return stamped(bench.client, VehicleState(**(unknown | numbers | known | fields)))
 
 
-def fly(bench: Bench, network: Network) -> None:
+def fly(bench, network):
     """The vehicle says that it is in the air, until the node has heard it."""
 
-    def said() -> bool:
+    def said():
         message = vehicle_state(bench, landed_state=2, landed_state_age=0.0)
         bench.publish(message, "vehicle/state")
         return network.link._vehicle._state.landed_state == 2
@@ -218,7 +209,7 @@ def fly(bench: Bench, network: Network) -> None:
     bench.until(said, "the node knows that it flies")
 
 
-def tasks(diagnostics: list[Any]) -> dict[str, Any]:
+def tasks(diagnostics):
     """Task of upf_can -> its newest status."""
     found = {}
     for status in (status for array in diagnostics for status in array.status):
@@ -228,6 +219,6 @@ def tasks(diagnostics: list[Any]) -> dict[str, Any]:
     return found
 
 
-def values(status: Any) -> dict[str, str]:
+def values(status):
     """Key -> value of one diagnostic status."""
     return {pair.key: pair.value for pair in status.values}

@@ -1,18 +1,14 @@
 """What the stories of the DroneCAN protocol share: the data types, devices' frames, a bus node."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.dronecan.bus_node import BusNode, BusNodeConfig
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack, unpack
-from chute_ros.protocol.dronecan.data_types import DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
 from chute_ros.protocol.events import Notice
 from chute_ros.transport.data_types import load_data_types
@@ -35,12 +31,12 @@ UID = bytes(range(16))
 
 
 @cache
-def types() -> DataTypes:
+def types():
     """The standard types and those of this repository, not of an older build."""
     return load_data_types(str(FLYFIRE), "here")
 
 
-def reference(tasks: list[dict[str, Any]]) -> list[Any]:
+def reference(tasks):
     """What the dronecan library itself makes of these, in a process of its own: see there."""
     done = subprocess.run(
         [sys.executable, REFERENCE, FLYFIRE],
@@ -52,12 +48,12 @@ def reference(tasks: list[dict[str, Any]]) -> list[Any]:
     return json.loads(done.stdout)
 
 
-def raw(identifier: int, data: str) -> bytes:
+def raw(identifier, data):
     """A frame from its identifier and its data in hex."""
     return pack(CanFrame(identifier, bytes.fromhex(data)))
 
 
-def shown(frames: list[bytes]) -> list[str]:
+def shown(frames):
     """Frames as one reads them: identifier#data."""
     made = [unpack(frame) for frame in frames]
     return [f"{one.identifier:08x}#{one.data.hex()}" for one in made if one is not None]
@@ -66,7 +62,7 @@ def shown(frames: list[bytes]) -> list[str]:
 class Bench:
     """Our node on a bus; t is seconds since the start of the story."""
 
-    def __init__(self, node_id: int = OWN, **config: Any) -> None:
+    def __init__(self, node_id=OWN, **config):
         config = {"allocator": False, "time_master": False, **config}
         self.node = BusNode(types(), BusNodeConfig(node_id, "org.test.us", UID, **config))
         self.t = 0.0
@@ -80,10 +76,10 @@ class Bench:
         self._update()
 
     @property
-    def now(self) -> float:
+    def now(self):
         return START + self.t
 
-    def at(self, t: float) -> Bench:
+    def at(self, t):
         """Go to t, waking at each deadline on the way."""
         assert t >= self.t
         for _ in range(10_000):
@@ -99,29 +95,29 @@ class Bench:
         self._update()
         return self
 
-    def speaker(self, node_id: int) -> Endpoint:
+    def speaker(self, node_id):
         """What node_id speaks with."""
         return self._speakers.setdefault(node_id, Endpoint(types(), node_id))
 
-    def hear(self, node_id: int, name: str, /, **values: Any) -> Bench:
+    def hear(self, node_id, name, /, **values):
         """This message comes from node_id."""
         self.speaker(node_id).broadcast(name, values)
         return self.carry(node_id)
 
-    def asked(self, node_id: int, name: str, transfer_id: int = 0, /, **values: Any) -> Bench:
+    def asked(self, node_id, name, transfer_id=0, /, **values):
         """This request comes from node_id."""
         self.speaker(node_id).request(self.node.config.node_id, name, transfer_id, values, 16)
         return self.carry(node_id)
 
-    def answer(self, request: Heard, server: int, /, **values: Any) -> Bench:
+    def answer(self, request, server, /, **values):
         """node server answers a request of ours."""
         self.speaker(server).respond(request, values)
         return self.carry(server)
 
-    def carry(self, node_id: int) -> Bench:
+    def carry(self, node_id):
         return self.feed(*self.speaker(node_id).take_output())
 
-    def feed(self, *frames: bytes) -> Bench:
+    def feed(self, *frames):
         for frame in frames:
             heard = self.node.receive(frame, self.now)
             if heard is not None:
@@ -129,7 +125,7 @@ class Bench:
         self._update()
         return self
 
-    def _update(self) -> None:
+    def _update(self):
         self.node.update(self.now)
         self.events += self.node.take_events()
         for frame in self.node.take_output():
@@ -145,26 +141,26 @@ class Bench:
 
     # -- what came out -------------------------------------------------------------------------
 
-    def said(self, name: str) -> list[tuple[float, dict[str, Any]]]:
+    def said(self, name):
         """(t, values) of what was sent of this type."""
         return [(t, heard.values) for t, heard in self.sent if heard.name == name]
 
-    def requests(self, name: str) -> list[Heard]:
+    def requests(self, name):
         return [h for _, h in self.sent if h.name == name and h.kind.value == "request"]
 
-    def notices(self) -> list[str]:
+    def notices(self):
         return [one.text for one in self.events if isinstance(one, Notice)]
 
-    def tables(self) -> list[KeepTable]:
+    def tables(self):
         return [one for one in self.events if isinstance(one, KeepTable)]
 
-    def clear(self) -> Bench:
+    def clear(self):
         self.sent.clear()
         self.frames.clear()
         self.events.clear()
         return self
 
 
-def information(unique_id: bytes = b"\x77" * 16, name: str = "org.test.other") -> dict[str, Any]:
+def information(unique_id=b"\x77" * 16, name="org.test.other"):
     """Values of a GetNodeInfo response."""
     return {"hardware_version": {"unique_id": unique_id}, "name": name.encode()}

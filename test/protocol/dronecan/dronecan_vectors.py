@@ -3,8 +3,6 @@
 Floats are such as a float16 holds exactly.
 """
 
-from typing import Any
-
 from chute_ros.protocol.dronecan.can_frame import CanFrame
 from chute_ros.protocol.dronecan.transfer import Kind, Transfer
 
@@ -19,9 +17,7 @@ class Vector:
     priority. frames: identifier#data, and the data of each further one.
     """
 
-    def __init__(
-        self, what: str, where: tuple[int, int, int, int], frames: str, values: dict[str, Any]
-    ) -> None:
+    def __init__(self, what, where, frames, values):
         self.story, _, kind = what.partition(": ")
         self.name, _, mode = kind.partition(" ")
         self.mode = mode or None
@@ -34,11 +30,11 @@ class Vector:
         self.values = values
 
     @property
-    def can_frames(self) -> list[CanFrame]:
+    def can_frames(self):
         pairs = [one.split("#") for one in self.frames]
         return [CanFrame(int(number, 16), bytes.fromhex(data)) for number, data in pairs]
 
-    def transfer(self, type_id: int) -> Transfer:
+    def transfer(self, type_id):
         payload = bytes.fromhex(self.payload)
         where = (self.source, self.destination, self.transfer_id)
         return Transfer(Kind(self.mode), type_id, *where, payload, self.priority)

@@ -18,7 +18,7 @@ GOLDEN = {
 }
 
 
-def crc(data: bytes) -> int:
+def crc(data):
     """CRC-16/MCRF4XX, bit by bit, independent of the library."""
     value = 0xFFFF
     for byte in data:
@@ -28,7 +28,7 @@ def crc(data: bytes) -> int:
     return value
 
 
-def heartbeat(version: int = 2, sequence: int = 0) -> bytes:
+def heartbeat(version=2, sequence=0):
     """A parachute's HEARTBEAT put together by hand from the layout of the developer guide."""
     payload = struct.pack("<IBBBBB", 0, 37, 8, 0, 3, 3)
     if version == 2:
@@ -41,7 +41,7 @@ def heartbeat(version: int = 2, sequence: int = 0) -> bytes:
     return mark + body + struct.pack("<H", crc(body + b"\x32"))
 
 
-def names(found: list[frames.Frame]) -> list[str]:
+def names(found):
     return [frame.message.get_type() for frame in found]
 
 

@@ -1,7 +1,5 @@
 """An autopilot whose messages come over the wire's bytes, and the commonest of them."""
 
-from __future__ import annotations
-
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
 from chute_ros.protocol.liveness import LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect as d
@@ -11,14 +9,14 @@ from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
 class Told:
     """What its tracker makes of them."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.tracker = AutopilotTracker(1, 1, LivenessLimits(2.5, 5.0), 5.0)
         self._encoder, self._decoder = FrameEncoder(1, 1), FrameDecoder()
 
-    def hear(self, *messages, now: float = 0.0) -> Told:
+    def hear(self, *messages, now=0.0):
         return self.hear_bytes(*(self._encoder.encode(one, now) for one in messages), now=now)
 
-    def hear_bytes(self, *frames: bytes, now: float = 0.0) -> Told:
+    def hear_bytes(self, *frames, now=0.0):
         for raw in frames:
             (frame,) = self._decoder.feed_datagram(raw, now)
             if frame.message.get_type() == "HEARTBEAT":
@@ -27,7 +25,7 @@ class Told:
                 self.tracker.message(frame.message, now)
         return self
 
-    def at(self, now: float = 0.0):
+    def at(self, now=0.0):
         return self.tracker.vehicle_state(now)
 
 

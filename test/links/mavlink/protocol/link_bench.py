@@ -1,7 +1,5 @@
 """Tells timed stories to a MavlinkLink over bytes: what devices send, what comes out."""
 
-from __future__ import annotations
-
 import struct
 from typing import Any
 
@@ -11,76 +9,60 @@ from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
 from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
-from chute_ros.protocol.mavlink.signing import Signer, Verifier
 
 START = 1000.0
 ASLEEP = {"autopilot_message_rate": 0.0}
 
 
 def heartbeat(
-    kind: int = d.MAV_TYPE_PARACHUTE,
-    autopilot: int = d.MAV_AUTOPILOT_INVALID,
-    mode: int = 0,
-    state: int = d.MAV_STATE_ACTIVE,
-) -> Any:
+    kind=d.MAV_TYPE_PARACHUTE, autopilot=d.MAV_AUTOPILOT_INVALID, mode=0, state=d.MAV_STATE_ACTIVE
+):
     """A HEARTBEAT; by default a healthy parachute's."""
     return d.MAVLink_heartbeat_message(kind, autopilot, mode, 0, state, 3)
 
 
-def copter(armed: bool = False, state: int = d.MAV_STATE_ACTIVE) -> Any:
+def copter(armed=False, state=d.MAV_STATE_ACTIVE):
     """An autopilot's HEARTBEAT."""
     mode = d.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
     return heartbeat(d.MAV_TYPE_QUADROTOR, d.MAV_AUTOPILOT_PX4, mode, state)
 
 
-def ardupilot(
-    armed: bool = False, state: int = d.MAV_STATE_ACTIVE, kind: int = d.MAV_TYPE_QUADROTOR
-) -> Any:
+def ardupilot(armed=False, state=d.MAV_STATE_ACTIVE, kind=d.MAV_TYPE_QUADROTOR):
     """An ArduPilot's HEARTBEAT."""
     mode = d.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
     return heartbeat(kind, d.MAV_AUTOPILOT_ARDUPILOTMEGA, mode, state)
 
 
-def setting(name: str, value: float, kind: int = d.MAV_PARAM_TYPE_REAL32) -> Any:
+def setting(name, value, kind=d.MAV_PARAM_TYPE_REAL32):
     """A PARAM_VALUE as ArduPilot sends it, and PX4 a float."""
     return d.MAVLink_param_value_message(name.encode(), value, kind, 1000, 0xFFFF)
 
 
-def px4_integer(name: str, value: int) -> Any:
+def px4_integer(name, value):
     """A PARAM_VALUE as PX4 sends an integer: its bytes in the float."""
     (as_float,) = struct.unpack("<f", struct.pack("<i", value))
     return setting(name, as_float, d.MAV_PARAM_TYPE_INT32)
 
 
-def no_setting(name: str) -> Any:
+def no_setting(name):
     """A PARAM_ERROR: there is no such parameter."""
     missing = d.MAV_PARAM_ERROR_DOES_NOT_EXIST
     return d.MAVLink_param_error_message(255, 0, name.encode(), -1, missing)
 
 
-def landed(state: int = d.MAV_LANDED_STATE_ON_GROUND) -> Any:
+def landed(state=d.MAV_LANDED_STATE_ON_GROUND):
     """An EXTENDED_SYS_STATE."""
     return d.MAVLink_extended_sys_state_message(0, state)
 
 
-def status(
-    boot_ms: int = 5000,
-    errors: int = 0,
-    armed: int = 0,
-    deployed: int = 0,
-    safety: int = 0,
-    ats: int = 20,
-    packed: bytes = b"2026-01-31",
-) -> Any:
+def status(boot_ms=5000, errors=0, armed=0, deployed=0, safety=0, ats=20, packed=b"2026-01-31"):
     """A PARACHUTE_STATUS."""
     return d.MAVLink_parachute_status_message(
         boot_ms, errors, armed, deployed, safety, ats, packed
     )
 
 
-def ack(
-    command: int, result: int = d.MAV_RESULT_ACCEPTED, target: tuple[int, int] = (0, 0)
-) -> Any:
+def ack(command, result=d.MAV_RESULT_ACCEPTED, target=(0, 0)):
     """A COMMAND_ACK."""
     return d.MAVLink_command_ack_message(command, result, 255, 0, *target)
 
@@ -88,9 +70,7 @@ def ack(
 class Bench:
     """One link; t is seconds since the start of the story."""
 
-    def __init__(
-        self, signer: Signer | None = None, verifier: Verifier | None = None, **config: Any
-    ) -> None:
+    def __init__(self, signer=None, verifier=None, **config):
         self.link = MavlinkLink(MavlinkConfig(**{**ASLEEP, **config}), signer, verifier)
         self.t = 0.0
         self.sent: list[tuple[float, Any]] = []
@@ -99,13 +79,13 @@ class Bench:
         self._decoder = FrameDecoder()
 
     @property
-    def now(self) -> float:
+    def now(self):
         return START + self.t
 
-    def encoder(self, ids: tuple[int, int]) -> FrameEncoder:
+    def encoder(self, ids):
         return self._senders.setdefault(ids, FrameEncoder(*ids))
 
-    def at(self, t: float) -> Bench:
+    def at(self, t):
         """Go to t, waking at each deadline on the way."""
         assert t >= self.t
         for _ in range(10_000):
@@ -120,29 +100,29 @@ class Bench:
         self._update()
         return self
 
-    def hear(self, ids: tuple[int, int], *messages: Any) -> Bench:
+    def hear(self, ids, *messages):
         """These messages come from ids, each in a datagram."""
         for message in messages:
             self.link.receive(self.encoder(ids).encode(message, self.now), self.now)
         self._update()
         return self
 
-    def stream(self, until: float, every: float, ids: tuple[int, int], make: Any) -> Bench:
+    def stream(self, until, every, ids, make):
         """make() comes from ids again and again."""
         while self.t + every <= until + 1e-9:
             self.at(self.t + every).hear(ids, make())
         return self
 
-    def _update(self) -> None:
+    def _update(self):
         self.link.update(self.now)
         self.collect()
 
-    def call(self, what: str, *arguments: Any) -> Bench:
+    def call(self, what, *arguments):
         """Call this method of the link now; what it sends at once has left."""
         getattr(self.link, what)(*arguments, self.now)
         return self.collect()
 
-    def collect(self) -> Bench:
+    def collect(self):
         for raw in self.link.take_output():
             frames = self._decoder.feed_datagram(raw, self.now)
             assert len(frames) == 1
@@ -152,37 +132,37 @@ class Bench:
 
     # -- what came out -------------------------------------------------------------------------
 
-    def commands(self, number: int | None = None) -> list[Any]:
+    def commands(self, number=None):
         """The COMMAND_LONGs sent so far."""
         longs = [m for _, m in self.sent if m.get_type() == "COMMAND_LONG"]
         return [m for m in longs if number in (None, m.command)]
 
-    def reads(self) -> list[Any]:
+    def reads(self):
         """The PARAM_REQUEST_READs sent so far."""
         return [m for _, m in self.sent if m.get_type() == "PARAM_REQUEST_READ"]
 
-    def clear(self) -> Bench:
+    def clear(self):
         self.sent.clear()
         self.events.clear()
         return self
 
-    def ends(self, token: int) -> list[Any]:
+    def ends(self, token):
         return [
             e for e in self.events if isinstance(e, RequestFinished) and e.finished.token == token
         ]
 
-    def end(self, token: int) -> Any:
+    def end(self, token):
         """How the request ended; exactly once."""
         (end,) = self.ends(token)
         return end
 
-    def notices(self) -> list[str]:
+    def notices(self):
         return [e.text for e in self.events if isinstance(e, Notice)]
 
-    def last_status(self) -> Any:
+    def last_status(self):
         return [e.status for e in self.events if isinstance(e, ParachuteChanged)][-1]
 
-    def texts(self) -> list[str]:
+    def texts(self):
         """What a ground station reads."""
         whole = StatusTexts()
         said = [(t, m) for t, m in self.sent if m.get_type() == "STATUSTEXT"]

@@ -25,7 +25,7 @@ def pressure(_):
 class Line:
     """An autopilot that is told of, and asked, each tenth of a second."""
 
-    def __init__(self, heartbeat=None) -> None:
+    def __init__(self, heartbeat=None):
         self.told = Told().hear(heartbeat or vehicle())
         self.tenth = 0
         #: (time, message, interval)

@@ -14,7 +14,7 @@ class Thing:
     liveness: Liveness = field(default_factory=lambda: Liveness(LivenessLimits(1.0, 2.0)))
 
 
-def heard(roster: Roster, system_id: int, component_id: int) -> bool:
+def heard(roster, system_id, component_id):
     if not roster.admits(system_id, component_id):
         return False
     if roster.get(system_id, component_id) is None:

@@ -18,7 +18,7 @@ NAN = math.nan
 G = 9.80665
 
 
-def golden(number: int, crc_extra: int, layout: str, *values: float) -> bytes:
+def golden(number, crc_extra, layout, *values):
     """A MAVLink 2 frame of 1/1, its zero bytes at the end cut off."""
     payload = struct.pack("<" + layout, *values).rstrip(b"\0") or b"\0"
     body = struct.pack("<BBBBBB3s", len(payload), 0, 0, 0, 1, 1, number.to_bytes(3, "little"))

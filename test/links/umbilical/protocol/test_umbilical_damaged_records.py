@@ -1,7 +1,7 @@
 """One damaged record proves nothing: $TELEM is text without a checksum."""
 
 import pytest
-from umbilical_link_bench import ASCENT, COAST, FAULT, STANDBY, STARTUP, Bench, in_situation, ready
+from umbilical_link_bench import ASCENT, COAST, FAULT, STANDBY, STARTUP, in_situation, ready
 from umbilical_rocket import flown, vehicle
 
 from chute_ros.links.umbilical.protocol.config import DeployStage
@@ -10,7 +10,7 @@ from chute_ros.model import LandedState
 from chute_ros.protocol.boot_clock import Age
 
 
-def damaged(bench: Bench, **fields: int) -> Bench:
+def damaged(bench, **fields):
     """One line that says this, between those that say what is so."""
     before = dict(bench.fields)
     bench.fields |= fields
@@ -99,7 +99,7 @@ def test_what_was_fired_on_the_ground_is_packed_anew_before_the_flight():
     assert set(bench.after(0.5).tokens) == {"<D>"}
 
 
-def refused(bench: Bench) -> Bench:
+def refused(bench):
     """The port takes nothing that the link hands out now."""
     for token in bench.link.take_output():
         bench.link.not_written(token)

@@ -1,7 +1,5 @@
 """Tells timed stories to an UmbilicalLink: what the flight computer says, what is written."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
@@ -36,7 +34,7 @@ ONE_TOKEN = re.compile(rb"<[^<>]+>")
 PACKET = 64
 
 
-def zeros(layout: Any, **values: Any) -> bytes:
+def zeros(layout, **values):
     """A line with all fields 0 but these."""
     strange = set(values) - set(layout.index)
     assert not strange, f"{layout.name} has no {strange}"
@@ -54,14 +52,7 @@ class Bench:
     The flight computer sends a line each 0.1 s once it talks. always_alive: our owner never hangs.
     """
 
-    def __init__(
-        self,
-        layout: str = STATE,
-        layout_setting: str = "",
-        wire: bool = True,
-        always_alive: bool = False,
-        **config: Any,
-    ) -> None:
+    def __init__(self, layout=STATE, layout_setting="", wire=True, always_alive=False, **config):
         settings = {"effect": EFFECT, **config}
         self.link = UmbilicalLink(UmbilicalConfig(layout_setting, **settings), LAYOUTS)
         self.layout = BY_NAME[layout]
@@ -81,12 +72,12 @@ class Bench:
             self.link.wire_opened(self.now)
 
     @property
-    def now(self) -> float:
+    def now(self):
         return START + self.t
 
     # -- the flight computer ---------------------------------------------------------------------
 
-    def talk(self, **fields: Any) -> Bench:
+    def talk(self, **fields):
         """From now on its lines have these fields, besides those of before."""
         self.fields |= fields
         if not self.talks:
@@ -94,33 +85,33 @@ class Bench:
             self._next_line()
         return self
 
-    def _next_line(self) -> None:
+    def _next_line(self):
         self._lines = int(self.t * 10 + 1e-6) + 1
 
-    def silent(self) -> Bench:
+    def silent(self):
         self.talks = False
         return self
 
-    def restarts(self, **fields: Any) -> Bench:
+    def restarts(self, **fields):
         """Its clock starts anew."""
         self._booted = self.t
         return self.talk(**fields)
 
-    def line(self) -> bytes:
+    def line(self):
         clock = {"ms_since_boot_cfc": round((self.t - self._booted) * 1000)}
         return zeros(self.layout, **{**clock, **self.fields})
 
-    def hear(self, *texts: str) -> Bench:
+    def hear(self, *texts):
         """These lines come."""
         return self.hear_bytes("".join(f"{text}\n" for text in texts).encode())
 
-    def hear_bytes(self, data: bytes) -> Bench:
+    def hear_bytes(self, data):
         self.link.receive(data, self.now, ("port", self.port))
         return self._woken()
 
     # -- time ------------------------------------------------------------------------------------
 
-    def at(self, t: float) -> Bench:
+    def at(self, t):
         """Go to t, waking at each deadline and each line on the way."""
         assert t >= self.t
         for _ in range(20_000):
@@ -139,15 +130,15 @@ class Bench:
         self.t = t
         return self._woken()
 
-    def after(self, seconds: float) -> Bench:
+    def after(self, seconds):
         return self.at(self.t + seconds)
 
-    def _woken(self) -> Bench:
+    def _woken(self):
         self.link.update(self.now)
         assert self.link.next_deadline() > self.now
         return self.collect()
 
-    def collect(self) -> Bench:
+    def collect(self):
         for data in self.link.take_output():
             assert ONE_TOKEN.fullmatch(data), data
             assert len(data) < PACKET
@@ -157,12 +148,12 @@ class Bench:
 
     # -- the cable -------------------------------------------------------------------------------
 
-    def pull(self) -> Bench:
+    def pull(self):
         self.plugged = False
         self.link.stream_ended(("port", self.port))
         return self._woken()
 
-    def plug(self) -> Bench:
+    def plug(self):
         self.port += 1
         self.plugged = True
         self._next_line()
@@ -171,20 +162,20 @@ class Bench:
 
     # -- orders ----------------------------------------------------------------------------------
 
-    def order(self, name: str, force: bool = False) -> int:
+    def order(self, name, force=False):
         """A command by its name; the number of the request."""
         self._number += 1
         self.link.command(self._number, name, force, self.now)
         self.collect()
         return self._number
 
-    def target(self, *values: float) -> int:
+    def target(self, *values):
         self._number += 1
         self.link.set_target(self._number, values, self.now)
         self.collect()
         return self._number
 
-    def deploy(self, force: bool = False, again: bool = False) -> int:
+    def deploy(self, force=False, again=False):
         self._number += 1
         self.link.deploy(self._number, force, self.now, again)
         self.collect()
@@ -192,46 +183,46 @@ class Bench:
 
     # -- what came out ---------------------------------------------------------------------------
 
-    def clear(self) -> Bench:
+    def clear(self):
         self.writes.clear()
         self.events.clear()
         return self
 
     @property
-    def tokens(self) -> list[str]:
+    def tokens(self):
         """What was written, but heartbeats."""
         return [data.decode() for _, data in self.writes if data != b"<H>"]
 
-    def times(self, token: str) -> list[float]:
+    def times(self, token):
         return [round(t, 3) for t, data in self.writes if data == token.encode()]
 
-    def of(self, *kinds: type) -> list[Any]:
+    def of(self, *kinds):
         return [event for event in self.events if isinstance(event, kinds)]
 
-    def steps(self, number: int) -> list[str]:
+    def steps(self, number):
         reports = [event.report for event in self.of(RequestReport)]
         return [one.outcome.name for one in reports if one.token == number]
 
-    def ends(self, number: int) -> list[Any]:
+    def ends(self, number):
         finished = [event.finished for event in self.of(RequestFinished)]
         return [one for one in finished if one.token == number]
 
-    def end(self, number: int) -> Any:
+    def end(self, number):
         """How the request ended; exactly once."""
         (end,) = self.ends(number)
         return end
 
-    def notices(self) -> list[str]:
+    def notices(self):
         return [event.text for event in self.of(Notice)]
 
-    def link_states(self) -> list[str]:
+    def link_states(self):
         return [event.change.after.name for event in self.of(DeviceLinkChanged)]
 
-    def status(self) -> Any:
+    def status(self):
         return self.of(ParachuteChanged)[-1].status
 
 
-def ready(mode: int = STANDBY, layout: str = STATE, **rest: Any) -> Bench:
+def ready(mode=STANDBY, layout=STATE, **rest):
     """Telemetry in this mode has come for a while; nothing of it waits to be looked at.
 
     rest: fields of the layout, or settings of the bench.
@@ -242,7 +233,7 @@ def ready(mode: int = STANDBY, layout: str = STATE, **rest: Any) -> Bench:
     return bench.clear()
 
 
-def in_situation(situation: Situation, **rest: Any) -> Bench:
+def in_situation(situation, **rest):
     """A rocket that is there."""
     if situation in MODES:
         bench = ready(MODES[situation], **rest)

@@ -1,7 +1,6 @@
 """A trigger that says "launched" though nobody ordered it: one frame may have been damaged."""
 
 import pytest
-from upf_link_bench import Bench
 
 from chute_ros.model import LinkState, ParachuteState
 
@@ -12,17 +11,17 @@ DOUBT = (
 )
 
 
-def flying(bench, **config) -> Bench:
+def flying(bench, **config):
     """An armed controller and its trigger, both made up."""
     return bench("", **config).trigger_status().status("ARMED").at(0.1).clear()
 
 
-def damaged(story: Bench) -> Bench:
+def damaged(story):
     """READY, whose bit for "launched" was turned over between the adapter and us."""
     return story.trigger_status(is_launched=True, **no_bit(story))
 
 
-def no_bit(story: Bench) -> dict[str, str]:
+def no_bit(story):
     """The types that have no such bit tell it by the state alone."""
     has = "is_launched" in story.layout.types.message("flyfire.TriggerStatus").fields
     return {} if has else {"state": "LAUNCHED"}

@@ -1,19 +1,17 @@
 """Arm and disarm at nearly one time: the newer order has the last word."""
 
-from upf_link_bench import Bench
-
 
 class Slow:
     """The devices take what the link sends so much later, s."""
 
-    def __init__(self, story: Bench, delay: float) -> None:
+    def __init__(self, story, delay):
         self._story = story
         self._delay = delay
         self._take = story.devices.receive
         self._held: list[tuple[float, bytes]] = []
         story.devices.receive = lambda data, now: self._held.append((story.t + delay, data))
 
-    def after(self, seconds: float) -> Bench:
+    def after(self, seconds):
         story, end = self._story, self._story.t + seconds
         while story.t < end - 1e-9:
             story.t = round(story.t + 0.001, 6)

@@ -1,7 +1,7 @@
 """Take-off, arm, disarm, land: sent, answered, shown by the controller's own status."""
 
 import pytest
-from upf_link_bench import BY_REQUEST, CONTROLLER_PARAMETERS, Bench
+from upf_link_bench import BY_REQUEST, CONTROLLER_PARAMETERS
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import parameters as p
@@ -17,7 +17,7 @@ CASES = {
 EACH = pytest.mark.parametrize("type_name", CASES)
 
 
-def standing_at(story: Bench, state: str) -> Bench:
+def standing_at(story, state):
     """The simulated controller is in this state."""
     story.ready()
     way = {"READY": [], "TAKEOFF": ["TYPE_TAKEOFF"], "ARMED": ["TYPE_TAKEOFF", "TYPE_ARM"]}[state]
@@ -27,7 +27,7 @@ def standing_at(story: Bench, state: str) -> Bench:
     return story.clear()
 
 
-def made_up(bench, state="READY") -> Bench:
+def made_up(bench, state="READY"):
     """A made-up controller in this state."""
     return bench("").status(state).after(0.1).clear()
 

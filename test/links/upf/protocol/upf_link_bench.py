@@ -1,10 +1,8 @@
 """Tells timed stories to a UpfLink over frames: simulated devices, made-up ones, the answers."""
 
-from __future__ import annotations
-
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,19 +60,19 @@ class Layout:
     definitions: Definitions
 
 
-def types_of(folder: Path) -> DataTypes:
+def types_of(folder):
     """The standard types, and those in folder."""
     standard = [one for name, one in dronecan.TYPENAMES.items() if name.startswith("uavcan.")]
     return DataTypes([*standard, *parse_namespaces([str(folder)])])
 
 
 @functools.cache
-def layout_of(name: str) -> Layout:
+def layout_of(name):
     types = types_of(LAYOUTS[name])
     return Layout(name, types, Definitions(types))
 
 
-def flying(**changes: Any) -> VehicleState:
+def flying(**changes):
     """A vehicle/state of a vehicle in the air."""
     values = {
         "link_state": LinkState.OK,
@@ -90,7 +88,7 @@ def flying(**changes: Any) -> VehicleState:
     return VehicleState(**{**values, **changes})
 
 
-def landed(**changes: Any) -> VehicleState:
+def landed(**changes):
     """One on the ground with its motors off."""
     return flying(
         **{
@@ -109,13 +107,8 @@ class Bench:
     """
 
     def __init__(
-        self,
-        layout: Layout,
-        devices: str = "controller trigger",
-        parameters: Mapping[str, p.Value] = BY_REQUEST,
-        settings: Mapping[str, Any] | None = None,
-        **config: Any,
-    ) -> None:
+        self, layout, devices="controller trigger", parameters=BY_REQUEST, settings=None, **config
+    ):
         self.layout, self.definitions = layout, layout.definitions
         values = {**CONTROLLER_PARAMETERS, **parameters}
         node = NodeSettings("upf.controller", values)
@@ -143,14 +136,14 @@ class Bench:
             self.puppet(node_id)
 
     @property
-    def now(self) -> float:
+    def now(self):
         return START + self.t
 
-    def ready(self) -> Bench:
+    def ready(self):
         """The devices are up, and what happened on the way is forgotten."""
         return self.at(3.0).clear()
 
-    def in_flight(self) -> Bench:
+    def in_flight(self):
         """The controller is armed, up high."""
         self.ready()
         self.link.arm(-100, True, 0, self.now)
@@ -158,7 +151,7 @@ class Bench:
         assert self.end(-100).success
         return self.clear()
 
-    def at(self, t: float) -> Bench:
+    def at(self, t):
         """Go to t, waking at each deadline on the way."""
         assert t >= self.t
         for _ in range(100_000):
@@ -173,10 +166,10 @@ class Bench:
         self.t = t
         return self.step()
 
-    def after(self, seconds: float) -> Bench:
+    def after(self, seconds):
         return self.at(self.t + seconds)
 
-    def step(self) -> Bench:
+    def step(self):
         """All that can happen at this moment."""
         if self.owner_lives:
             self.link.owner_alive(self.now + 1.0)
@@ -200,7 +193,7 @@ class Bench:
             self._collect()
         return self
 
-    def call(self, what: str, *arguments: Any, **more: Any) -> Bench:
+    def call(self, what, *arguments, **more):
         """Call this method of the link now; what it sends at once comes."""
         if what == "deploy":
             self.link.deploy(*arguments, self.now, **more)
@@ -210,11 +203,11 @@ class Bench:
 
     # -- devices that are made up -----------------------------------------------------------------
 
-    def puppet(self, node_id: int) -> Endpoint:
+    def puppet(self, node_id):
         """What speaks and listens in the name of this node."""
         return self._ears.setdefault(node_id, Endpoint(self.layout.types, node_id))
 
-    def say(self, node_id: int, name: str, **values: Any) -> Bench:
+    def say(self, node_id, name, **values):
         """This node broadcasts; state in words."""
         if "state" in values:
             values["state"] = self.definitions.constant(name, f"STATE_{values['state']}")
@@ -222,36 +215,34 @@ class Bench:
         puppet.broadcast(name, self.definitions.present(name, values))
         return self.deliver(puppet)
 
-    def status(self, state: str, node_id: int = CONTROLLER, **values: Any) -> Bench:
+    def status(self, state, node_id=CONTROLLER, **values):
         """A ParachuteStatus."""
         filled = {"is_vehicle_connected": True, "is_enable_auto_launch": True, **values}
         return self.say(node_id, names.PARACHUTE_STATUS, state=state, **filled)
 
-    def trigger_status(self, state: str = "READY", node_id: int = TRIGGER, **more: Any) -> Bench:
+    def trigger_status(self, state="READY", node_id=TRIGGER, **more):
         """A TriggerStatus."""
         more = {"is_launched": state == "LAUNCHED", **more}
         return self.say(node_id, names.TRIGGER_STATUS, state=state, **more)
 
-    def trigger_out(self, node_id: int = TRIGGER) -> Bench:
+    def trigger_out(self, node_id=TRIGGER):
         """A trigger says that it has fired so often that it is believed of itself."""
         for _ in range(SAYINGS):
             self.trigger_status("LAUNCHED", node_id)
         return self
 
-    def trigger_fired(self, node_id: int = TRIGGER) -> Bench:
+    def trigger_fired(self, node_id=TRIGGER):
         """A trigger says so often enough that it has fired as it was ordered to."""
         for _ in range(SAYINGS_ORDERED):
             self.trigger_status("LAUNCHED", node_id)
         return self
 
-    def node_status(self, node_id: int = CONTROLLER, uptime: int = 5, health: int = 0) -> Bench:
+    def node_status(self, node_id=CONTROLLER, uptime=5, health=0):
         """A NodeStatus."""
         values = {"uptime_sec": uptime, "health": health}
         return self.say(node_id, "uavcan.protocol.NodeStatus", **values)
 
-    def ask(
-        self, type_name: str, node_id: int = CONTROLLER, number: int = 0, **values: Any
-    ) -> Bench:
+    def ask(self, type_name, node_id=CONTROLLER, number=0, **values):
         """A request of VehicleService."""
         filled = dict(values)
         if type_name:
@@ -260,20 +251,20 @@ class Bench:
         puppet.request(US, names.VEHICLE_SERVICE, number, filled, 16)
         return self.deliver(puppet)
 
-    def answer_result(self, request: Heard, result: str, node_id: int = CONTROLLER) -> Bench:
+    def answer_result(self, request, result, node_id=CONTROLLER):
         """Answer with one of the results of the flyfire services."""
         puppet = self.puppet(node_id)
         values = self.definitions.result(request.name, result)
         puppet.respond_to(US, request.name, request.transfer_id, values)
         return self.deliver(puppet)
 
-    def answer_values(self, request: Heard, values: Mapping[str, Any], node_id: int) -> Bench:
+    def answer_values(self, request, values, node_id):
         """Answer with these values."""
         puppet = self.puppet(node_id)
         puppet.respond_to(US, request.name, request.transfer_id, values)
         return self.deliver(puppet)
 
-    def deliver(self, puppet: Endpoint) -> Bench:
+    def deliver(self, puppet):
         """What this node has sent comes."""
         for data in puppet.take_output():
             self.link.receive(data, self.now)
@@ -281,7 +272,7 @@ class Bench:
 
     # -- what came out --------------------------------------------------------------------------
 
-    def clear(self) -> Bench:
+    def clear(self):
         self.events.clear()
         self.heard.clear()
         self.said.clear()
@@ -289,34 +280,34 @@ class Bench:
         self.controller.requests_heard.clear()
         return self
 
-    def messages(self, name: str) -> list[dict[str, Any]]:
+    def messages(self, name):
         """What the link broadcast under this name."""
         return [one.values for _, one in self.heard if one.name == name]
 
-    def requests(self, name: str, type_name: str = "") -> list[Heard]:
+    def requests(self, name, type_name=""):
         """What the link asked by this service."""
         asked = [one for _, one in self.heard if one.name == name and one.kind is Kind.REQUEST]
         if not type_name:
             return asked
         return [one for one in asked if self.definitions.type_name(name, one.values) == type_name]
 
-    def answers(self) -> list[str]:
+    def answers(self):
         """What the link answered to VehicleService, as results without their prefix."""
         service = names.VEHICLE_SERVICE
         responses = [one for _, one in self.heard if one.kind is Kind.RESPONSE]
         flyfire = [one for one in responses if one.name == service]
         return [self.definitions.result_name(service, one.values) for one in flyfire]
 
-    def ends(self, token: int) -> list[Any]:
+    def ends(self, token):
         requests = [one.finished for one in self.events if isinstance(one, RequestFinished)]
         return [one for one in requests if one.token == token]
 
-    def end(self, token: int) -> Any:
+    def end(self, token):
         """How the request ended; exactly once."""
         (end,) = self.ends(token)
         return end
 
-    def errand(self, token: int) -> Any:
+    def errand(self, token):
         """How the errand ended; exactly once."""
         (done,) = [
             one.done
@@ -325,41 +316,41 @@ class Bench:
         ]
         return done
 
-    def steps(self, token: int) -> list[str]:
+    def steps(self, token):
         reports = [one.report for one in self.events if isinstance(one, RequestReport)]
         return [report.outcome.name for report in reports if report.token == token]
 
-    def notices(self) -> list[str]:
+    def notices(self):
         return [one.text for one in self.events if isinstance(one, Notice)]
 
-    def pictures(self) -> list[Any]:
+    def pictures(self):
         return [one.status for one in self.events if isinstance(one, ParachuteChanged)]
 
-    def picture(self) -> Any:
+    def picture(self):
         return self.link.devices.picture(self.now)
 
-    def asked(self) -> list[tuple[str, str]]:
+    def asked(self):
         """What the supervisor was asked for: (what, for whom)."""
         return [(ask.ask.name, ask.device) for _, ask in self.asks]
 
-    def supervisor_says(self) -> Bench:
+    def supervisor_says(self):
         """Its state, as it is."""
         self.link.supervisor_said(bool(self.standing), set(self.standing), self.now)
         return self.step()
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _devices_want(self) -> float:
+    def _devices_want(self):
         return self.devices.next_deadline() if self.devices.nodes else math.inf
 
-    def _listen(self, data: bytes) -> None:
+    def _listen(self, data):
         first = min(self._ears)
         for node_id, ear in self._ears.items():
             one = ear.receive(data, self.now)
             if one is not None and (one.kind is not Kind.MESSAGE or node_id == first):
                 self.heard.append((self.t, one))
 
-    def _collect(self) -> None:
+    def _collect(self):
         new = self.link.take_events()
         self.events += new
         self.said += self.devices.take_events()
@@ -370,7 +361,7 @@ class Bench:
                 self.asks.append((self.t, event))
                 self._supervise(event)
 
-    def _supervise(self, event: AskSupervisor) -> None:
+    def _supervise(self, event):
         if not self.supervised:
             return
         if event.ask is Ask.KILL:

@@ -1,9 +1,6 @@
 """Simulated UPF devices on a bus without any wire, and a small vehicle to talk to them."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -24,7 +21,7 @@ from chute_ros.links.upf.simulator.controller import (
 from chute_ros.links.upf.simulator.node import NodeSettings
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS, UpfTrigger
 from chute_ros.model import ParachuteState
-from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
+from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.dronecan.transfer import Kind
 from chute_ros.sim.flight import FlightModel
 from chute_ros.sim.motion import Motion
@@ -41,7 +38,7 @@ NODE_STATUS = "uavcan.protocol.NodeStatus"
 
 
 @cache
-def definitions(layout: str = "ours") -> Definitions:
+def definitions(layout="ours"):
     """The data types; the parser takes its time."""
     return Definitions(load_data_types(LAYOUTS[layout], "test"))
 
@@ -66,7 +63,7 @@ class Vehicle:
     #: It says VehicleStatus.
     speaks: bool = True
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         self.endpoint = Endpoint(self.definitions.types, self.node_id)
         self.messages: dict[str, list[Message]] = {}
         #: (when, TYPE_*) of each request that was heard.
@@ -75,7 +72,7 @@ class Vehicle:
         self._status_at = -math.inf
         self._transfer_id = 0
 
-    def receive(self, data: bytes, now: float) -> None:
+    def receive(self, data, now):
         heard = self.endpoint.receive(data, now)
         # A device that has just restarted begins to count anew.
         wrong = set(self.endpoint.counts) - {"duplicate transfers"}
@@ -90,19 +87,19 @@ class Vehicle:
             message = Message(now, heard.source, heard.values)
             self.messages.setdefault(heard.name, []).append(message)
 
-    def update(self, now: float) -> None:
+    def update(self, now):
         if self.speaks and now >= self._status_at:
             self._status_at = now + 0.1
             self.endpoint.broadcast(names.VEHICLE_STATUS, {})
 
-    def ask(self, server: int, service: str, values: Mapping[str, Any]) -> int:
+    def ask(self, server, service, values):
         """Send a request; its transfer id."""
         self._transfer_id = (self._transfer_id + 1) % 32
         self.answers.pop((service, self._transfer_id), None)
         self.endpoint.request(server, service, self._transfer_id, values, 16)
         return self._transfer_id
 
-    def _serve(self, heard: Heard, now: float) -> None:
+    def _serve(self, heard, now):
         if heard.name != names.VEHICLE_SERVICE:
             return
         name = self.definitions.type_name(heard.name, heard.values)
@@ -117,14 +114,7 @@ class Story:
 
     STEP = 0.01
 
-    def __init__(
-        self,
-        layout: str = "ours",
-        values: Mapping[str, p.Value] | None = None,
-        trigger_values: Mapping[str, p.Value] | None = None,
-        script: list[tuple[float, str]] | None = None,
-        **settings: Any,
-    ) -> None:
+    def __init__(self, layout="ours", values=None, trigger_values=None, script=None, **settings):
         self.definitions = definitions(layout)
         self.now = 1000.0
         self.began = self.now
@@ -139,7 +129,7 @@ class Story:
 
     # -- time -----------------------------------------------------------------------------------
 
-    def run(self, seconds: float) -> Story:
+    def run(self, seconds):
         """Let time pass."""
         for _ in range(max(1, round(seconds / self.STEP))):
             self.now += self.STEP
@@ -149,7 +139,7 @@ class Story:
             self.exchange()
         return self
 
-    def exchange(self) -> None:
+    def exchange(self):
         """Everybody hears what the others have said, until all is said."""
         self.vehicle.update(self.now)
         self.bus.update(self.now)
@@ -165,7 +155,7 @@ class Story:
                 self.vehicle.receive(frame, self.now)
         self.log += [(self.now, event) for event in self.bus.take_events()]
 
-    def until(self, condition: Any, limit: float = 60.0) -> float:
+    def until(self, condition, limit=60.0):
         """Run until condition() holds; how long that took, s."""
         began = self.now
         while not condition():
@@ -175,46 +165,42 @@ class Story:
 
     # -- asking ---------------------------------------------------------------------------------
 
-    def call(
-        self, service: str, values: Mapping[str, Any], server: int = CONTROLLER
-    ) -> dict[str, Any] | None:
+    def call(self, service, values, server=CONTROLLER):
         """Ask; the response, None: there was none at once."""
         transfer_id = self.vehicle.ask(server, service, values)
         self.exchange()
         return self.vehicle.answers.get((service, transfer_id))
 
-    def result(
-        self, service: str, values: Mapping[str, Any], server: int = CONTROLLER
-    ) -> str | None:
+    def result(self, service, values, server=CONTROLLER):
         """The name of the result of a flyfire service; None: no response."""
         answer = self.call(service, values, server)
         return None if answer is None else self.definitions.result_name(service, answer)
 
-    def ask(self, name: str, server: int = CONTROLLER) -> str | None:
+    def ask(self, name, server=CONTROLLER):
         """Ask the controller for TYPE_name; the name of its result."""
         values = self.definitions.request(names.PARACHUTE_SERVICE, f"TYPE_{name}")
         return self.result(names.PARACHUTE_SERVICE, values, server)
 
-    def get(self, name: str, server: int = CONTROLLER) -> dict[str, Any]:
+    def get(self, name, server=CONTROLLER):
         """GetSet without a value."""
         answer = self.call(errands.GET_SET, {"name": name.encode()}, server)
         assert answer is not None
         return answer
 
-    def set(self, name: str, value: p.Value, server: int = CONTROLLER) -> p.Value | None:
+    def set(self, name, value, server=CONTROLLER):
         """GetSet with a value; the value after it."""
         request = {"name": name.encode(), "value": p.union_of(value)}
         answer = self.call(errands.GET_SET, request, server)
         assert answer is not None
         return p.value_of(answer["value"])
 
-    def opcode(self, opcode: int) -> bool:
+    def opcode(self, opcode):
         """ExecuteOpcode; whether it was done."""
         answer = self.call(errands.EXECUTE_OPCODE, {"opcode": opcode})
         assert answer is not None
         return bool(answer["ok"])
 
-    def restart(self, server: int = CONTROLLER) -> None:
+    def restart(self, server=CONTROLLER):
         """RestartNode."""
         answer = self.call(errands.RESTART_NODE, {"magic_number": errands.RESTART_MAGIC}, server)
         assert answer == {"ok": True}
@@ -222,16 +208,16 @@ class Story:
     # -- what is seen ---------------------------------------------------------------------------
 
     @property
-    def status(self) -> dict[str, Any]:
+    def status(self):
         """The newest ParachuteStatus that the vehicle heard."""
         return self.vehicle.messages[names.PARACHUTE_STATUS][-1].values
 
     @property
-    def state(self) -> ParachuteState | None:
+    def state(self):
         """The state in it."""
         return self.definitions.state(self.status["state"])
 
-    def states(self) -> list[ParachuteState | None]:
+    def states(self):
         """The states so far, one after the other."""
         passed: list[ParachuteState | None] = []
         for message in self.vehicle.messages.get(names.PARACHUTE_STATUS, []):
@@ -240,54 +226,54 @@ class Story:
                 passed.append(state)
         return passed
 
-    def asked(self) -> list[str]:
+    def asked(self):
         """What was asked of the vehicle so far."""
         return [name for _, name in self.vehicle.asked]
 
-    def heard(self, name: str, source: int = CONTROLLER) -> list[Message]:
+    def heard(self, name, source=CONTROLLER):
         """Messages of this name and node so far."""
         return [one for one in self.vehicle.messages.get(name, []) if one.source == source]
 
-    def faults(self) -> list[str]:
+    def faults(self):
         """What the newest ParachuteStatus tells."""
         return self.definitions.faults(names.PARACHUTE_STATUS, self.status)
 
-    def forget(self) -> None:
+    def forget(self):
         """Begin to collect anew."""
         self.vehicle.messages.clear()
         self.vehicle.asked.clear()
         self.log.clear()
 
-    def _canopy(self) -> None:
+    def _canopy(self):
         if self.flight is not None:
             self.flight.release()
 
     # -- flying ---------------------------------------------------------------------------------
 
-    def at(self, height: float, vertical_speed: float = 0.0, **more: float) -> Story:
+    def at(self, height, vertical_speed=0.0, **more):
         """The controller feels this from now on."""
         self.controller.motion = Motion(height, vertical_speed, **more)
         return self.run(0.1)
 
-    def fall(self, height: float) -> Story:
+    def fall(self, height):
         """It falls; the controller has not noticed yet."""
         self.controller.motion = Motion(height, -3.0, acceleration=0.5)
         return self
 
 
-def feel(flight: FlightModel) -> Motion:
+def feel(flight):
     """What sensors tell of a flight."""
     return Motion(flight.height, flight.vertical_speed, abs(flight.roll), flight.acceleration)
 
 
-def ready(layout: str = "ours", values: Mapping[str, p.Value] | None = None, **more: Any) -> Story:
+def ready(layout="ours", values=None, **more):
     """A READY parachute that does nothing by itself, but what values say."""
     story = Story(layout, BY_REQUEST | dict(values or {}), **more).run(1.0)
     assert story.state is ParachuteState.READY
     return story
 
 
-def armed(layout: str = "ours", values: Mapping[str, p.Value] | None = None, **more: Any) -> Story:
+def armed(layout="ours", values=None, **more):
     """The same, ARMED at 50 m."""
     story = ready(layout, values, **more).at(50.0)
     for name, request in (("TAKEOFF", p.AUTO_TAKEOFF), ("ARM", p.AUTO_ARM)):
