@@ -61,7 +61,8 @@ class Health:
         elif self._shown:
             # What a network loses is said again soon; what the loop did not do is not.
             level = diagnostics.ERROR if self._own_fault else diagnostics.WARN
-            text = f"internal errors {seen[0]}, messages lost {seen[1]}, updates late {seen[2]}"
+            named = zip(("internal errors", "messages lost", "updates late"), seen, strict=True)
+            text = ", ".join(f"{name} {count}" for name, count in named if count)
         elif not lease.leading and math.isnan(lease.lease.leader_heard):
             level, text = diagnostics.WARN, "standby, and receives no leader"
         elif lease.leading and lease.config.standby and not lease.followers(now):

@@ -102,7 +102,9 @@ class Measured:
             return self.rejected
         same = self.measured_at - self.same_since
         if 0.0 < limits.stuck_after <= same:
-            return f"stuck at {self.value:g} for {same:.1f} s (limit {limits.stuck_after:g} s)"
+            return (
+                f"stuck at {self.value + 0.0:g} for {same:.1f} s (limit {limits.stuck_after:g} s)"
+            )
         return ""
 
     def turns_at(self, limits: Limits, now: float) -> float:

@@ -28,6 +28,8 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.measurements import STANDARD_LIMITS
 from chute_ros.supervisor.pending import Ask, Pending
 from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import State
@@ -623,3 +625,10 @@ def test_for_how_long_a_node_lives_on_in_silence_is_its_own_setting() -> None:
     for tick in range(1, 100):
         story.at(tick * 0.1)
     assert 4.0 < again(story, BLOCK)[-1] < 5.0
+
+
+def test_a_value_that_is_no_more_than_nothing_has_no_sign() -> None:
+    stuck = Measured(value=-0.0, measured_at=100.0, same_since=90.0, count=9)
+    assert stuck.unusable(STANDARD_LIMITS["vertical_speed"], 100.0).startswith(
+        "stuck at 0 for 10.0 s"
+    )

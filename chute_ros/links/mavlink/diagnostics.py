@@ -93,6 +93,7 @@ def _parachute(one: ParachuteTracker, now: float) -> Task:
     }
     level = diagnostics.OK if status.healthy else diagnostics.ERROR
     text = "; ".join(status.faults) or status.state.name
+    text = f"released; {text}" if status.deployed else text
     return f"parachute {status.device}", level, text, values, status.device
 
 
