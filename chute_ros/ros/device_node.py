@@ -31,6 +31,7 @@ from chute_ros.protocol.events import Notice
 from chute_ros.ros import diagnostics, messages, qos
 from chute_ros.ros.inbox import Inbox
 from chute_ros.ros.link_log import UselessWire, log_notice
+from chute_ros.ros.person_requests import PersonRequests, orders
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.ros.suite_node import SuiteNode
 from chute_ros.runtime.device import OWNER_SILENCE, DeviceRuntime, Summary
@@ -81,6 +82,7 @@ class DeviceNode(SuiteNode, ABC):
         )
         self.follow(DeviceRequest, self._request)
         self.follow(ParachuteReport, self._parachute)
+        self._person_requests = PersonRequests(self)
 
     def carry(self, runtime: DeviceRuntime[Any]) -> None:
         """Be the shell of this runtime; before anything that may bring events."""
@@ -116,6 +118,12 @@ class DeviceNode(SuiteNode, ABC):
             self.loop = None
         super().destroy_node()
         self.at_end.close()
+
+    def create_service(self, kind: Any, name: str, callback: Any, **options: Any) -> Any:
+        """As of every node of the suite; the record has the calls that order something."""
+        if orders(kind):
+            callback = self._person_requests.followed(name, callback)
+        return super().create_service(kind, name, callback, **options)
 
     def serve(self, kind: Any, name: str, callback: Any) -> None:
         """Offer a service whose callback may await the device."""

@@ -268,12 +268,15 @@ def json_value(value: object) -> object:
     return value
 
 
+def request_words(request: Any) -> str:
+    """The fields of a service's request in words, of each value the first 200 characters."""
+    fields = request.get_fields_and_field_types()
+    return ", ".join(f"{key}={getattr(request, key)!r:.200}" for key in fields)
+
+
 def answered(service: str, request: Any, response: Any) -> str:
     """A service call with its answer, for a log."""
-    asked = [
-        f"{key}={getattr(request, key)!r:.200}" for key in request.get_fields_and_field_types()
-    ]
-    return f"{service}({', '.join(asked)}) answered: {response.message}"
+    return f"{service}({request_words(request)}) answered: {response.message}"
 
 
 EnumT = TypeVar("EnumT", bound=enum.IntEnum)

@@ -8,6 +8,7 @@ from chute_msgs.msg import (
     ActionReport,
     LinkHeartbeat,
     ParachuteStatus,
+    PersonRequest,
     SafetyDecision,
     SafetyRequest,
     SafetyState,
@@ -36,6 +37,7 @@ _OWN: dict[str, tuple[Any, Any]] = {
 #: What is heard only to be kept, or elsewhere as well.
 BESIDES: dict[str, tuple[Any, Any]] = {
     "vehicle/state": (VehicleState, qos.STATUS),
+    "safety/person": (PersonRequest, qos.STATUS),
     "safety/lease": (SupervisorLease, qos.STATUS),
     "upf/trigger_status": (TriggerStatus, qos.STATUS),
     "umbilical/telem": (Telem, qos.STATUS),

@@ -1,5 +1,5 @@
 """What happened in a recorded flight: decisions with their outcomes, requests with their
-answers, alarms, and the rows of its timeline."""
+answers, alarms, what devices and vehicle reported, and the rows of its timeline."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import enum
 import typing
 from dataclasses import dataclass, field
 
-from chute_ros.model import Action, Decision
-from chute_ros.ros.messages import decision_from
+from chute_ros.model import Action, Decision, VehicleState
+from chute_ros.ros.messages import decision_from, nanoseconds
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.recording import Recording
 from chute_ros.tools.timeline_rows import ACTION_TONES, OUTCOME_TONES, Mark
 
-DECISION = "safety/decision"
+DECISION, PERSON = "safety/decision", "safety/person"
 #: The inputs by which somebody asks for something.
 _REQUESTS = tuple(kind for kind in typing.get_args(i.Input) if kind.__name__.endswith("Request"))
 
@@ -43,27 +43,43 @@ class Decided:
 
 @dataclass
 class Asked:
-    """A request, when it came (s from the start), and its answer."""
+    """A request, when it came (s from the start), and its answer. link: whose service was called;
+    empty: the supervisor's."""
 
     at: float
     what: str
     details: str
     #: Seconds until the answer, and the answer; None: none came, or none is given.
     answer: tuple[float, i.Finish] | None = None
+    link: str = ""
 
 
 @dataclass
 class FlightStory:
-    """All of it, each list in the order of time. said: (s from the start, line of the log)."""
+    """All of it, each list in the order of time, times in s from the start. requests: of the
+    supervisor; calls: of device nodes' services; said: lines of the log; foreign_reports: on
+    decisions that are not in the recording."""
 
     decisions: list[Decided] = field(default_factory=list)
     requests: list[Asked] = field(default_factory=list)
+    calls: list[Asked] = field(default_factory=list)
     said: list[tuple[float, i.LogMessage]] = field(default_factory=list)
+    statuses: list[tuple[float, i.ParachuteReport]] = field(default_factory=list)
+    vehicle: list[tuple[float, VehicleState]] = field(default_factory=list)
+    foreign_reports: list[tuple[float, i.ActionReport]] = field(default_factory=list)
+    #: The recording has the topic of the calls, if only without any.
+    has_calls: bool = True
 
     @property
     def alarms(self) -> list[tuple[float, str]]:
         """What was said as an alarm."""
         return [(at, say.text) for at, say in self.said if say.alarm]
+
+    @property
+    def parachutes(self) -> list[tuple[float, i.ParachuteReport]]:
+        """The newest status of every parachute."""
+        newest = {(one.link, one.status.device): (at, one) for at, one in self.statuses}
+        return list(newest.values())
 
     @property
     def fired(self) -> list[float]:
@@ -99,8 +115,8 @@ class FlightStory:
 
 
 def tell(recording: Recording) -> FlightStory:
-    """The story of a recording, of which DECISION was read as well."""
-    story = FlightStory()
+    """The story of a recording, of which DECISION and PERSON were read as well."""
+    story = FlightStory(calls=_calls(recording), has_calls=recording.has(PERSON))
     decided = _published(recording)
     in_turns: set[tuple[int, int]] = set()
     waiting: dict[int, Asked] = {}
@@ -108,7 +124,15 @@ def tell(recording: Recording) -> FlightStory:
         at = recording.seconds(recorded.wall)
         for one in recorded.turn.inputs:
             if isinstance(one, i.ActionReport):
-                _report(decided.get((one.epoch, one.id)), at, one)
+                about = decided.get((one.epoch, one.id))
+                if about is None:
+                    story.foreign_reports.append((at, one))
+                else:
+                    _report(about, at, one)
+            elif isinstance(one, i.ParachuteReport):
+                story.statuses.append((at, one))
+            elif isinstance(one, i.VehicleReport):
+                story.vehicle.append((at, one.state))
             elif isinstance(one, _REQUESTS):
                 asked = Asked(at, _words(type(one).__name__), fields_of(one))
                 story.requests.append(asked)
@@ -156,9 +180,23 @@ def _published(recording: Recording) -> dict[tuple[int, int], Decided]:
     return found
 
 
-def _report(decided: Decided | None, at: float, report: i.ActionReport) -> None:
-    if decided is None:
-        return  # of a decision before the recording, or of another supervisor
+def _calls(recording: Recording) -> list[Asked]:
+    """Each with its answer, which has the stamp of its call."""
+    found: dict[tuple[str, str, int], Asked] = {}
+    for wall, message in recording.messages.get(PERSON, []):
+        key = (message.link, message.service, nanoseconds(message.header.stamp))
+        at = recording.seconds(wall)
+        if message.answered:
+            finish = i.Finish(0, message.success, message.accepted, message.message)
+            # The recording may have begun between the two.
+            asked = Asked(at - message.after, message.service, message.request, link=message.link)
+            found.setdefault(key, asked).answer = (message.after, finish)
+        else:
+            found[key] = Asked(at, message.service, message.request, link=message.link)
+    return sorted(found.values(), key=lambda one: one.at)
+
+
+def _report(decided: Decided, at: float, report: i.ActionReport) -> None:
     known = {(one.link, one.outcome, one.detail) for _, one in decided.reports}
     if (report.link, report.outcome, report.detail) not in known:
         decided.reports.append((at - decided.at, report))

@@ -59,6 +59,11 @@ class McapEntries:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
 
+    @property
+    def topics(self) -> set[str]:
+        """Of every channel so far, also without messages."""
+        return {one.topic for one in self._channels.values()}
+
     def __iter__(self) -> Iterator[Entry]:
         """RecordError if there is no such file, or if it is no MCAP from its first byte on."""
         try:

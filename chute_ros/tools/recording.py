@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import bisect
+import datetime
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -45,6 +47,12 @@ class Recording:
     remarks: list[str] = field(default_factory=list)
     #: The namespace of the vehicle, as in "/drone1"; empty: none.
     namespace: str = ""
+    #: Full names of all topics of the files, also of those without any message.
+    topics: set[str] = field(default_factory=set)
+
+    def has(self, name: str) -> bool:
+        """Whether the vehicle's topic of this relative name was recorded."""
+        return f"{self.namespace}/{name}" in self.topics
 
     @property
     def start(self) -> int:
@@ -75,6 +83,35 @@ class Recording:
         return [wall for wall, _ in passed], [seconds for _, seconds in passed]
 
 
+#: Number of the first turn that a supervisor records.
+_FIRST_TURN = 2
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Where a replay of a file can begin: the vehicle's namespace, and the first turn with a
+    state."""
+
+    namespace: str
+    turn: RecordedTurn
+
+    def is_start_after(self, former: Beginning) -> bool:
+        """Whether the supervisor has started since former, of an earlier file of its."""
+        if self.turn.number <= max(_FIRST_TURN, former.turn.number):
+            return True
+        state, before = self.turn.state, former.turn.state
+        assert state is not None
+        assert before is not None
+        # Its very first turns may be lost. A takeover changes only the epoch, a reset the time.
+        return state.epoch != before.epoch and state.started_at != before.started_at
+
+
+def utc(wall: int) -> str:
+    """A wall clock (Unix ns) as date and time."""
+    when = datetime.datetime.fromtimestamp(wall / 1e9, datetime.timezone.utc)
+    return f"{when:%Y-%m-%d %H:%M:%S}"
+
+
 def files_of(paths: Iterable[Path]) -> list[Path]:
     """The files themselves; a folder stands for all files in it, in their order."""
     files: list[Path] = []
@@ -94,7 +131,19 @@ def read(files: Iterable[Path], kinds: Mapping[str, Any]) -> Recording:
     if not recording.turns:
         told = "; ".join(recording.remarks) or "no turn of a supervisor is in it"
         raise RecordError(f"{', '.join(map(str, files))}: {told}")
+    starts = 1 + sum(b.number <= a.number for a, b in itertools.pairwise(recording.turns))
+    if starts > 1:
+        recording.remarks.append(f"{starts} starts of the supervisor are in it")
     return recording
+
+
+def beginning(path: Path) -> Beginning | None:
+    """The beginning of a file, read no further; None: there is none in it. RecordError as read."""
+    into = Recording()
+    reader = _Reader(into, path, {RECORD: SupervisorRecord})
+    turns = (reader.turn(entry) for entry in McapEntries(path) if reader.name(entry) == RECORD)
+    first = next((one for one in turns if one.state is not None), None)
+    return None if first is None else Beginning(into.namespace, first)
 
 
 class _Reader:
@@ -111,15 +160,20 @@ class _Reader:
         progress = Progress(f"reading {self._path.name}", size)
         for entry in entries:
             progress.at(entries.position)
-            if entry.channel.id not in self._names:
-                self._names[entry.channel.id] = self._name(entry)
-            name = self._names[entry.channel.id]
+            name = self.name(entry)
             if name == RECORD:
-                self._into.turns.append(self._turn(entry))
+                self._into.turns.append(self.turn(entry))
             elif name:
                 message = self._message(entry, self._kinds[name])
                 self._into.messages.setdefault(name, []).append((entry.time, message))
         self._into.remarks += entries.remarks
+        self._into.topics |= entries.topics
+
+    def name(self, entry: Entry) -> str:
+        """The relative name of its topic; empty: not asked for, or not readable."""
+        if entry.channel.id not in self._names:
+            self._names[entry.channel.id] = self._name(entry)
+        return self._names[entry.channel.id]
 
     def _name(self, entry: Entry) -> str:
         """What the topic of a channel is called here."""
@@ -151,7 +205,8 @@ class _Reader:
             told = f"{self._path}: message {entry.number} of {topic} cannot be read"
             raise RecordError(f"{told}: {error}") from None
 
-    def _turn(self, entry: Entry) -> RecordedTurn:
+    def turn(self, entry: Entry) -> RecordedTurn:
+        """The core's turn in it."""
         message = self._message(entry, SupervisorRecord)
         try:
             turn = CoreTurn(

@@ -22,6 +22,12 @@ def recording_options(program: str, description: str | None) -> argparse.Argumen
         type=Path,
         help="files of a black box in their order, or its folder",
     )
+    options.add_argument(
+        "--recording",
+        type=int,
+        metavar="NUMBER",
+        help="which recording, if the files are of several (without it they are listed)",
+    )
     return options
 
 

@@ -21,8 +21,9 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
 from chute_ros.tools.parameter_file import NODE, other_from
 from chute_ros.tools.progress import Progress
-from chute_ros.tools.recording import Recording, files_of, read
+from chute_ros.tools.recording import Recording, read
 from chute_ros.tools.recording_options import complain, recording_options, write
+from chute_ros.tools.recordings import chosen, listed
 from chute_ros.tools.replay_picture import Track, picture
 from chute_ros.tools.replaying import Other, Replayer, Row, require_replayable, rows
 
@@ -31,7 +32,8 @@ _PROFILE = "profile.name"
 
 
 def main() -> None:
-    """Exit code 0: the same decisions; 1: others; 2: the recording cannot be read."""
+    """Exit code 0: the same decisions; 1: others; 2: the recording cannot be read, or which one
+    of several is not known."""
     options = recording_options("replay", __doc__)
     options.add_argument(
         "--config", type=Path, metavar="YAML", help="decide with this ROS parameter file instead"
@@ -42,9 +44,9 @@ def main() -> None:
         metavar="SVG",
         help="output file of the timeline (default with --config: FILE.replay.svg)",
     )
-    chosen = options.parse_args()
+    given = options.parse_args()
     try:
-        code = _replay(chosen.files, chosen.config, chosen.picture)
+        code = _replay(_files(given.files, given.recording), given.config, given.picture)
     except ChuteError as error:
         complain("replay", error)
         code = UNREADABLE
@@ -55,8 +57,15 @@ def main() -> None:
     sys.exit(code)
 
 
-def _replay(paths: list[Path], config: Path | None, wanted: Path | None) -> int:
-    files = files_of(paths)
+def _files(paths: list[Path], number: int | None) -> list[Path]:
+    found = chosen(paths, number)
+    if len(found) > 1:
+        text = f"{len(found)} recordings: choose one with --recording NUMBER, or name its files"
+        raise ChuteError(f"{text}\n{listed(found)}")
+    return found[0].files
+
+
+def _replay(files: list[Path], config: Path | None, wanted: Path | None) -> int:
     recording = read(files, {})
     require_replayable(recording.turns)
     other = other_from(config, f"{recording.namespace}/{NODE}") if config else None

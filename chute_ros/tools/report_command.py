@@ -1,7 +1,7 @@
-"""Writes one HTML page of a recorded flight. The page needs no other file.
+"""Writes one HTML page of each recorded flight. A page needs no other file.
 
-It has the timeline of the links, states, height and speed, the rules and their counters, and the
-decisions with their reasons and outcomes.
+It has each release of a parachute, the timeline of the links, states, height and speed, the rules
+and their counters, and the decisions with their reasons and outcomes.
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from chute_msgs.msg import SafetyDecision, SafetyState
+from chute_msgs.msg import PersonRequest, SafetyDecision, SafetyState
 
 from chute_ros.errors import ChuteError
 from chute_ros.ros.supervisor_messages import state_message
 from chute_ros.runtime.topics import SafetyTold
-from chute_ros.tools.flight_story import DECISION, tell
+from chute_ros.tools.flight_story import DECISION, PERSON, tell
 from chute_ros.tools.progress import Progress
-from chute_ros.tools.recording import Recording, files_of, read
+from chute_ros.tools.recording import Recording, read
 from chute_ros.tools.recording_options import complain, recording_options, write
+from chute_ros.tools.recordings import chosen, listed
+from chute_ros.tools.releases import releases
 from chute_ros.tools.replay_picture import vehicle_curves
 from chute_ros.tools.replaying import Replayer
 from chute_ros.tools.report_page import page
@@ -34,22 +36,31 @@ _APART, _MOST = 0.05, 20_000
 
 
 def main() -> None:
-    """Exit code 0: written; 2: the recording cannot be read, or the page cannot be written."""
+    """Exit code 0: written; 2: a recording cannot be read, or a page cannot be written."""
     options = recording_options("report", __doc__)
     options.add_argument(
         "--output", type=Path, metavar="HTML", help="output file (default: FILE.html)"
     )
-    chosen = options.parse_args()
+    given = options.parse_args()
+    failed = False
     try:
-        path = _report(chosen.files, chosen.output)
+        found = chosen(given.files, given.recording)
+        if given.output is not None and len(found) > 1:
+            text = f"--output is one page, and these are {len(found)} recordings"
+            raise ChuteError(f"{text}: choose one with --recording NUMBER\n{listed(found)}")
+        for one in found:
+            try:
+                print(_report(one.files, given.output), flush=True)
+            except ChuteError as error:
+                failed = True
+                complain("report", error)
     except ChuteError as error:
+        failed = True
         complain("report", error)
-        sys.exit(2)
-    print(path)
+    sys.exit(2 if failed else 0)
 
 
-def _report(paths: list[Path], output: Path | None) -> Path:
-    files = files_of(paths)
+def _report(files: list[Path], output: Path | None) -> Path:
     path = output or files[0].with_name(f"{files[0].name}.html")
     write(path, report(files))
     return path
@@ -57,7 +68,8 @@ def _report(paths: list[Path], output: Path | None) -> Path:
 
 def report(files: list[Path]) -> str:
     """The page of these files; RecordError if they cannot be read."""
-    recording = read(files, {STATE: SafetyState, DECISION: SafetyDecision})
+    kinds = {STATE: SafetyState, DECISION: SafetyDecision, PERSON: PersonRequest}
+    recording = read(files, kinds)
     story = tell(recording)
     published = recording.messages.get(STATE, [])
     states = replayed_states(recording) or [
@@ -75,7 +87,8 @@ def report(files: list[Path]) -> str:
     title = f"Flight report: {files[0].name}"
     if len(files) > 1:
         title += f" and {len(files) - 1} more"
-    return page(title, recording, story, rules_of(states), draw(rows, windows, title))
+    timeline = draw(rows, windows, title)
+    return page(title, recording, story, releases(story, end), rules_of(states), timeline)
 
 
 def replayed_states(recording: Recording) -> list[tuple[float, Any]]:

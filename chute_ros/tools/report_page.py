@@ -5,13 +5,15 @@ Everything that came over a wire is escaped on its way in.
 
 from __future__ import annotations
 
-import datetime
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from chute_ros.supervisor.record import CODEC
 from chute_ros.tools.flight_story import Decided, FlightStory
-from chute_ros.tools.recording import Recording
+from chute_ros.tools.recording import Recording, utc
+from chute_ros.tools.releases import Release
+from chute_ros.tools.report_parts import answer_of, cell, listing, number, section, table, words
+from chute_ros.tools.report_release import calls_of, parachutes_of, release_of
 from chute_ros.tools.state_rows import RuleTold
 from chute_ros.tools.timeline import escaped
 from chute_ros.tools.timeline_rows import OUTCOME_TONES
@@ -41,6 +43,7 @@ th, td { text-align: left; vertical-align: top; padding: 5px 10px 5px 0;
 td.words { overflow-wrap: anywhere; min-width: 14em; }
 th { color: var(--dim); font-weight: 600; font-size: 12px; }
 td.number { font-variant-numeric: tabular-nums; white-space: nowrap; text-align: right; }
+td.motion { white-space: nowrap; }
 td ul { margin: 0; padding-left: 16px; }
 b.good { color: var(--good); } b.warn { color: var(--warn); } b.bad { color: var(--bad); }
 b.quiet { color: var(--quiet); } b.plain { color: var(--plain); } b.act { color: var(--act); }
@@ -53,19 +56,23 @@ def page(
     title: str,
     recording: Recording,
     story: FlightStory,
+    released: Sequence[Release],
     rules: Sequence[RuleTold],
     timeline: str,
 ) -> str:
     """The whole page. timeline: an <svg>."""
     parts = [
         _head(title, recording, story),
-        _section("Timeline", f'<div class="wide">{timeline}</div>'),
-        _section("Decisions", _decisions(story.decisions)),
-        _section("Requests and their answers", _requests(story)),
-        _section("Alarms", _alarms(story)),
-        _section("Rules and their counters", _rules(rules)),
-        _section("Log of the supervisor", _log(story)),
-        _section("Settings", _settings(recording)),
+        section("Release", release_of(released, story)),
+        section("Timeline", f'<div class="wide">{timeline}</div>'),
+        section("Decisions", _decisions(story.decisions)),
+        section("Requests and their answers", _requests(story)),
+        section("Requests to device nodes", calls_of(story)),
+        section("Parachutes", parachutes_of(story)),
+        section("Alarms", _alarms(story)),
+        section("Rules and their counters", _rules(rules)),
+        section("Log of the supervisor", _log(story)),
+        section("Settings", _settings(recording)),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -79,12 +86,12 @@ def _head(title: str, recording: Recording, story: FlightStory) -> str:
     span = recording.seconds(recording.turns[-1].wall)
     vehicle = recording.namespace or "no namespace"
     about = (
-        f"vehicle {vehicle}, from {_utc(recording.start)} UTC, {span:.1f} s, "
+        f"vehicle {vehicle}, from {utc(recording.start)} UTC, {span:.1f} s, "
         f"{len(recording.turns)} turns of the core"
     )
     counts = (
         f"{len(story.decisions)} decisions, {len(story.requests)} requests, "
-        f"{len(story.alarms)} alarms"
+        f"{len(story.calls)} calls of device nodes, {len(story.alarms)} alarms"
     )
     remarks = "".join(f'<p><b class="warn">{escaped(one)}</b></p>' for one in recording.remarks)
     return (
@@ -94,19 +101,19 @@ def _head(title: str, recording: Recording, story: FlightStory) -> str:
 
 
 def _decisions(decisions: Sequence[Decided]) -> str:
-    return _table(
+    return table(
         ("no.", "time, s", "decision", "rule", "reasons", "to", "outcome"),
         (
             (
-                _number(str(number)),
-                _number(f"{one.at:.3f}"),
-                _cell(f'<b class="{one.tone}">{escaped(one.name)}</b>{_besides(one)}'),
-                _cell(escaped(one.decision.rule)),
-                _words(_list(one.decision.reasons)),
-                _cell(escaped(", ".join(one.decision.targets) or "nobody")),
-                _words(_outcomes(one)),
+                number(str(count)),
+                number(f"{one.at:.3f}"),
+                cell(f'<b class="{one.tone}">{escaped(one.name)}</b>{_besides(one)}'),
+                cell(escaped(one.decision.rule)),
+                words(listing(one.decision.reasons)),
+                cell(escaped(", ".join(one.decision.targets) or "nobody")),
+                words(_outcomes(one)),
             )
-            for number, one in enumerate(decisions, 1)
+            for count, one in enumerate(decisions, 1)
         ),
     )
 
@@ -132,31 +139,25 @@ def _outcomes(one: Decided) -> str:
 
 
 def _requests(story: FlightStory) -> str:
-    rows = []
-    for one in story.requests:
-        answer = '<span class="dim">no answer</span>'
-        if one.answer is not None:
-            after, finish = one.answer
-            tone, word = ("good", "success") if finish.success else ("bad", "no success")
-            accepted = ", accepted" if finish.accepted else ""
-            answer = f'<b class="{tone}">{word}</b>{accepted} after {after:.3f} s: '
-            answer += escaped(finish.message)
-        rows.append(
+    return table(
+        ("time, s", "request", "details", "answer"),
+        (
             (
-                _number(f"{one.at:.3f}"),
-                _cell(escaped(one.what)),
-                _words(escaped(one.details)),
-                _words(answer),
+                number(f"{one.at:.3f}"),
+                cell(escaped(one.what)),
+                words(escaped(one.details)),
+                words(answer_of(one)),
             )
-        )
-    return _table(("time, s", "request", "details", "answer"), rows)
+            for one in story.requests
+        ),
+    )
 
 
 def _alarms(story: FlightStory) -> str:
-    return _table(
+    return table(
         ("time, s", "alarm"),
         (
-            (_number(f"{at:.3f}"), _words(f'<b class="bad">{escaped(text)}</b>'))
+            (number(f"{at:.3f}"), words(f'<b class="bad">{escaped(text)}</b>'))
             for at, text in story.alarms
         ),
     )
@@ -164,18 +165,18 @@ def _alarms(story: FlightStory) -> str:
 
 def _rules(rules: Sequence[RuleTold]) -> str:
     heads = ("rule", "action", "highest counter, s", "of, s", "at, s", "fulfilled at, s")
-    return _table(
+    return table(
         (*heads, "acted on at, s", "conditions at the highest counter"),
         (
             (
-                _cell(escaped(one.name)),
-                _cell(escaped(one.action)),
-                _number(f"{one.peak:.2f}"),
-                _number(f"{one.hold:.2f}"),
-                _number(_moment(one.peak_at)),
-                _number(_moment(one.fulfilled_at)),
-                _number(_moment(one.latched_at)),
-                _words(_rule(one)),
+                cell(escaped(one.name)),
+                cell(escaped(one.action)),
+                number(f"{one.peak:.2f}"),
+                number(f"{one.hold:.2f}"),
+                number(_moment(one.peak_at)),
+                number(_moment(one.fulfilled_at)),
+                number(_moment(one.latched_at)),
+                words(_rule(one)),
             )
             for one in rules
         ),
@@ -186,15 +187,15 @@ def _rule(rule: RuleTold) -> str:
     if not rule.alive:
         return '<span class="dim">never active in a state of this flight</span>'
     denied = f'<b class="warn">not acted on: {escaped(rule.denied)}</b>' if rule.denied else ""
-    return _list(rule.conditions) + denied
+    return listing(rule.conditions) + denied
 
 
 def _log(story: FlightStory) -> str:
-    table = _table(
+    lines = table(
         ("time, s", "line"),
-        ((_number(f"{at:.3f}"), _words(escaped(say.text))) for at, say in story.said),
+        ((number(f"{at:.3f}"), words(escaped(say.text))) for at, say in story.said),
     )
-    return f"<details><summary>{len(story.said)} lines</summary>{table}</details>"
+    return f"<details><summary>{len(story.said)} lines</summary>{lines}</details>"
 
 
 def _settings(recording: Recording) -> str:
@@ -205,43 +206,5 @@ def _settings(recording: Recording) -> str:
     return f"<details><summary>as recorded</summary>{inner}</details>"
 
 
-def _section(heading: str, inner: str) -> str:
-    return f"<section>\n<h2>{escaped(heading)}</h2>\n{inner}\n</section>\n"
-
-
-def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    body = "".join(f"<tr>{''.join(cells)}</tr>\n" for cells in rows)
-    if not body:
-        return '<p class="dim">none</p>'
-    head = "".join(f"<th>{escaped(one)}</th>" for one in heads)
-    return (
-        f'<div class="wide"><table>\n<thead><tr>{head}</tr></thead>\n'
-        f"<tbody>\n{body}</tbody></table></div>"
-    )
-
-
-def _cell(inner: str) -> str:
-    return f"<td>{inner}</td>"
-
-
-def _words(inner: str) -> str:
-    """A cell with text of any length: it may be parted anywhere."""
-    return f'<td class="words">{inner}</td>'
-
-
-def _number(text: str) -> str:
-    return f'<td class="number">{escaped(text)}</td>'
-
-
-def _list(texts: Iterable[str]) -> str:
-    items = "".join(f"<li>{escaped(one)}</li>" for one in texts)
-    return f"<ul>{items}</ul>" if items else ""
-
-
 def _moment(at: float) -> str:
     return "never" if math.isnan(at) else f"{at:.3f}"
-
-
-def _utc(wall: int) -> str:
-    when = datetime.datetime.fromtimestamp(wall / 1e9, datetime.timezone.utc)
-    return f"{when:%Y-%m-%d %H:%M:%S}"

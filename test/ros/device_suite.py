@@ -16,6 +16,7 @@ from chute_msgs.msg import (
     ActionReport,
     LinkHeartbeat,
     ParachuteStatus,
+    PersonRequest,
     SafetyDecision,
     SafetyState,
 )
@@ -401,6 +402,26 @@ class DeviceSuite(NodeSuite):
         assert (answer.success, answer.accepted) == expected, answer.message
         assert device.deployed
         self.bench.until(lambda: self.statuses[-1].deployed, "the status says so")
+
+    def test_a_call_of_deploy_is_published_when_it_comes_and_when_it_is_answered(
+        self, device: SimulatedDevice
+    ) -> None:
+        told = self.bench.follow(PersonRequest, "safety/person")
+        self.ready_to_deploy(device)
+        told.clear()
+        answer = self.bench.call(Deploy, f"{self.name}/deploy", force=True, reason="a test")
+        self.bench.until(lambda: len(told) == 2, "both are published")
+        called, answered = told
+        assert (called.link, called.service) == (self.name, "~/deploy")
+        assert called.request == "force=True, reason='a test'"
+        assert not called.answered
+        assert called.after != called.after, "not a number: it has no answer yet"
+        assert (answered.link, answered.service) == (called.link, called.service)
+        assert (answered.request, answered.header) == (called.request, called.header)
+        assert answered.answered
+        assert (answered.success, answered.accepted) == (answer.success, answer.accepted)
+        assert answered.message == answer.message
+        assert answered.after > 0.0
 
     def test_deploy_of_what_is_out_already_sends_nothing(self, device: SimulatedDevice) -> None:
         self.ready_to_deploy(device)

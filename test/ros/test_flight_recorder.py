@@ -1,7 +1,7 @@
 """The black box in its node: what it hears besides, what it says of itself, and being off."""
 
 import pytest
-from chute_msgs.msg import SupervisorRecord, TriggerStatus
+from chute_msgs.msg import PersonRequest, SupervisorRecord, TriggerStatus
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
@@ -37,10 +37,12 @@ def heard(bench):
 
 def test_it_hears_what_others_say_and_keeps_it_under_its_whole_name(bench, node):
     bench.publish(TriggerStatus(link="upf_can"), "upf/trigger_status")
+    bench.publish(PersonRequest(link="upf_can", service="~/deploy"), "safety/person")
     bench.publish(DiagnosticArray(), "diagnostics")
-    bench.until(lambda: node.recorder.box.counts()["entries written"] >= 2, "both are written")
+    bench.until(lambda: node.recorder.box.counts()["entries written"] >= 3, "all are written")
     node.recorder.close()
-    expected = {f"{bench.namespace}/{name}" for name in ("upf/trigger_status", "diagnostics")}
+    names = ("upf/trigger_status", "safety/person", "diagnostics")
+    expected = {f"{bench.namespace}/{name}" for name in names}
     assert expected <= set(heard(bench))
 
 

@@ -162,6 +162,7 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
         ("safety/lease", {"safety_supervisor", "standby"}),
         ("safety/state", {"safety_supervisor", "standby"}),
         ("safety/request", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
+        ("safety/person", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("safety/action", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("parachute/status", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("vehicle/state", {"mavlink_parachute", "umbilical"}),

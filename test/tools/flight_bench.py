@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
-from chute_msgs.msg import SafetyState
+from chute_msgs.msg import PersonRequest, SafetyState
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.ros.black_box import BlackBox
 from chute_ros.ros.box_folder import BoxFolder
+from chute_ros.ros.messages import stamp_of
 from chute_ros.ros.recorded_topics import recorded_topics
 from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor import inputs as i
@@ -35,8 +37,11 @@ def plain_config() -> SupervisorConfig:
 class Namespace:
     """What the black box asks of a node."""
 
+    def __init__(self, namespace: str) -> None:
+        self._namespace = namespace
+
     def resolve_topic_name(self, name: str) -> str:
-        return name if name.startswith("/") else f"{NAMESPACE}/{name}"
+        return name if name.startswith("/") else f"{self._namespace}/{name}"
 
 
 class Flight:
@@ -46,14 +51,17 @@ class Flight:
         self.folder = folder
         self.t = 0.0
         self.config = config or plain_config()
-        self.state = State(epoch=7, started_at=START)
+        #: Unix ns at its start.
+        self.wall = box.pop("wall", WALL)
+        self.state = State(epoch=box.pop("epoch", 7), started_at=START)
         self.reason = "it falls"
+        namespace, node = box.pop("namespace", NAMESPACE), box.pop("node", "safety_supervisor")
         limit, most = box.pop("limit", 64_000_000), box.pop("most_files", 32)
         self.box = BlackBox(
-            BoxFolder(str(folder), f"{NAMESPACE}/safety_supervisor", most),
-            recorded_topics(Namespace()),
+            BoxFolder(str(folder), f"{namespace}/{node}", most),
+            recorded_topics(Namespace(namespace)),
             limit,
-            wall=lambda: WALL + round(self.t * 1e9),
+            wall=lambda: self.wall + round(self.t * 1e9),
         )
         self.outputs: list[i.Output] = []
         self._seq = 0
@@ -81,6 +89,15 @@ class Flight:
             self._publish_state()
             self.t = round(self.t + STEP, 6)
         return self
+
+    def call(self, service: str, request: str, at: float, **answer: Any) -> None:
+        """A call of a service of LINK at this moment (s from the start), or its answer."""
+        message = PersonRequest(link=LINK, service=service, request=request, after=math.nan)
+        message.header.stamp = stamp_of(self.wall + round(at * 1e9))
+        for name, value in answer.items():
+            setattr(message, name, value)
+        message.answered = bool(answer)
+        self.box.message("safety/person", message)
 
     def land(self) -> Path:
         """End the recording; the newest file."""

@@ -3,6 +3,7 @@
 import random
 import struct
 import zlib
+from dataclasses import replace
 
 import pytest
 from chute_msgs.msg import SafetyState, SupervisorRecord
@@ -13,8 +14,9 @@ from zstandard import ZstdCompressor
 from chute_ros.errors import RecordError
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.record import CoreTurn
+from chute_ros.supervisor.state import State
 from chute_ros.tools.mcap_entries import McapEntries
-from chute_ros.tools.recording import RecordedTurn, Recording, files_of, read
+from chute_ros.tools.recording import Beginning, RecordedTurn, Recording, files_of, read
 
 pytestmark = pytest.mark.xdist_group("recording")
 KINDS = {"safety/state": SafetyState}
@@ -198,6 +200,30 @@ def test_ctrl_c_in_the_middle_of_a_message_is_not_the_fault_of_the_recording(fli
     monkeypatch.setattr(SupervisorRecord, "__init__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         read(flight.files(), {})
+
+
+@pytest.mark.parametrize(
+    ("number", "epoch", "started_at", "starts"),
+    [
+        (300, 7, 1000.0, False),
+        (300, 8, 1000.0, False),
+        (300, 7, 1500.0, False),
+        (300, 8, 1500.0, True),
+        (2, 7, 1000.0, True),
+        (100, 7, 1000.0, True),
+    ],
+    ids=["full", "takeover", "reset", "head lost", "first turn", "lower number"],
+)
+def test_a_file_of_another_start_is_told_from_the_next_of_the_same(
+    number, epoch, started_at, starts
+):
+    """Given an earlier file of the same supervisor that begins with turn 200."""
+    former = Beginning("", replace(turn(200, 100.0, 5.0), state=State(7, 1000.0)))
+    state = State(epoch, started_at)
+    assert (
+        Beginning("", replace(turn(number, 200.0, 9.0), state=state)).is_start_after(former)
+        is starts
+    )
 
 
 def turn(number, wall, now):

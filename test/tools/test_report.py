@@ -1,20 +1,27 @@
 """The report is one page that needs nothing else, and tells what happened."""
 
+import html
+import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
+import flight_bench
 import pytest
 from chute_msgs.msg import SafetyDecision, SafetyState
 from flight_bench import DEPLOY_AT, Flight, run
 
-from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.model import Action, LinkState, Outcome, ParachuteState, ParachuteStatus
+from chute_ros.ros.recorded_topics import recorded_topics
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report_command as report
+from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.recording import read
+from chute_ros.tools.releases import Motion, Release
 from chute_ros.tools.report_command import replayed_states
+from chute_ros.tools.report_release import release_of
 from chute_ros.tools.state_rows import rules_of, state_rows
 from chute_ros.tools.timeline_rows import Band, Level
 
@@ -86,6 +93,161 @@ def test_it_needs_nothing_from_elsewhere_and_runs_nothing(page):
     assert not {"script", "link", "img", "iframe", "object"} & set(tags.tags)
     assert "url(" not in page
     assert "@import" not in page
+
+
+def text_of(part):
+    """Its words, a line for each cell of a table."""
+    cells = re.sub(r"</t[dh]>|</p>", "\n", re.sub(r"<br>|<li>", " / ", part))
+    lines = html.unescape(re.sub(r"<[^>]+>", "", cells)).splitlines()
+    return [line.strip() for line in lines if line.strip()]
+
+
+def test_the_first_section_tells_the_release_that_a_person_asked_the_supervisor_for(page):
+    """At t+7 a person calls safety/deploy; the kill goes first, and the deploy follows it."""
+    assert page.index("<h2>") == page.index("<h2>Release</h2>")
+    assert text_of(section(page, "Release")) == [
+        "Release",
+        *("time, s", "parachute", "by whose order", "height, vertical speed"),
+        *("what was reported", "what did not come"),
+        "7.300",
+        "mavlink_parachute",
+        (
+            "a person's request at safety/deploy (rule 'operator'), decision 3 of epoch 7 / "
+            "operator: it falls / kill confirmed after 0.30 s (limit 0.5 s)"
+        ),
+        "24.4 m / -12.0 m/s",
+        (
+            "mavlink_parachute SENT after 0.100 s: step 0 / "
+            "mavlink_parachute ACCEPTED after 0.200 s: step 1 / "
+            "mavlink_parachute CONFIRMED after 0.300 s: step 2"
+        ),
+        "no status of a parachute of mavlink_parachute in the 4.6 s to the recording's end",
+    ]
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory):
+    """A page: on the ground, ~/deploy at t+1 releases; at t+1.8 it is called again, in vain."""
+    flight = Flight(tmp_path_factory.mktemp("shot"))
+    status = ParachuteStatus("1/161", LinkState.OK, ParachuteState.ARMED, backup_voltage=8.25)
+    flight.fly(1.0).turn(i.ParachuteReport("mavlink_parachute", status))
+    flight.call("~/deploy", "force=False, reason='a <test>'", 1.0)
+    flight.fly(1.3)
+    status = replace(
+        status,
+        deployed=True,
+        state=ParachuteState.LAUNCHED,
+        deployment_trigger=4,
+        faults=("spent <now>",),
+    )
+    flight.turn(i.ParachuteReport("mavlink_parachute", status))
+    answer = {"success": True, "accepted": True, "message": "deployed after 0.3 s", "after": 0.35}
+    flight.call("~/deploy", "force=False, reason='a <test>'", 1.0, **answer)
+    flight.fly(1.8).call("~/deploy", "force=True, reason=''", 1.8)
+    flight.fly(3.0).turn(i.ParachuteReport("mavlink_parachute", status))
+    flight.land()
+    return report.report(flight.files())
+
+
+def test_a_shot_that_a_person_fired_past_the_supervisor_is_told(shot):
+    order = "a call of ~/deploy of mavlink_parachute, past the supervisor / "
+    assert text_of(section(shot, "Release"))[7:] == [
+        "1.000",
+        "mavlink_parachute 1/161",
+        order + "force=False, reason='a <test>'",
+        "0.0 m / 0.0 m/s",
+        (
+            "own status deployed after 0.300 s: 1/161, trigger MAVLINK; "
+            "not deployed 0.3 s before / "
+            "mavlink_parachute answered: success, accepted after 0.350 s: deployed after 0.3 s"
+        ),
+        "nothing",
+        "1.800",
+        "mavlink_parachute 1/161",
+        order + "force=True, reason=''",
+        "0.0 m / 0.0 m/s",
+        "own status deployed already after 0.000 s: 1/161 reported it before the order",
+        "no answer in the 1.2 s to the recording's end",
+    ]
+
+
+def test_what_was_asked_of_device_nodes_stands_beside_its_answer(shot):
+    assert text_of(section(shot, "Requests to device nodes"))[6:] == [
+        *("1.000", "mavlink_parachute", "~/deploy", "force=False, reason='a <test>'"),
+        "success, accepted after 0.350 s: deployed after 0.3 s",
+        *("1.800", "mavlink_parachute", "~/deploy", "force=True, reason=''", "no answer"),
+    ]
+
+
+def test_every_parachute_has_its_last_own_status(shot):
+    assert text_of(section(shot, "Parachutes"))[9:] == [
+        *("mavlink_parachute 1/161", "3.000", "OK", "LAUNCHED", "no, or not known"),
+        *("deployed, trigger MAVLINK", "8.2", "/ spent <now>"),
+    ]
+
+
+def test_an_answer_whose_call_came_before_the_recording_is_told(tmp_path):
+    flight = Flight(tmp_path).fly(1.0)
+    flight.call("~/arm", "arm=True, triggers=0", -2.0, success=False, message="no", after=2.5)
+    flight.fly(2.0).land()
+    told = text_of(section(report.report(flight.files()), "Requests to device nodes"))
+    assert told[6:] == [
+        *("-1.500", "mavlink_parachute", "~/arm", "arm=True, triggers=0"),
+        "no success after 2.500 s: no",
+    ]
+
+
+def test_a_flight_without_a_release_says_so_in_one_line(tmp_path):
+    flight = Flight(tmp_path).fly(3.0)
+    flight.land()
+    assert text_of(section(report.report(flight.files()), "Release")) == [
+        "Release",
+        (
+            "Nothing was released: no decision to deploy, no request to deploy, no call of a "
+            "device node that orders one, and no parachute that turned to deployed."
+        ),
+    ]
+
+
+def test_an_old_recording_is_read_and_says_that_it_lacks_the_calls(tmp_path, monkeypatch):
+    """Given a black box of a version that did not record safety/person."""
+
+    def as_before(node):
+        return {n: one for n, one in recorded_topics(node).items() if n != "safety/person"}
+
+    monkeypatch.setattr(flight_bench, "recorded_topics", as_before)
+    flight = Flight(tmp_path).fly(3.0)
+    flight.land()
+    page = report.report(flight.files())
+    lacks = "Requests to device nodes are not in this recording: it has no topic safety/person."
+    assert text_of(section(page, "Release")) == [
+        "Release",
+        (
+            "Nothing was released: no decision to deploy, no request to deploy, and no parachute "
+            "that turned to deployed."
+        ),
+        lacks,
+    ]
+    assert text_of(section(page, "Requests to device nodes")) == [
+        "Requests to device nodes",
+        lacks,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("age", "told"),
+    [
+        (0.5, "32.1 m / -4.0 m/s"),
+        (
+            3.0,
+            "height not known / (32.1 m 3.0 s before) / speed not known / (-4.0 m/s 3.0 s before)",
+        ),
+        (math.nan, "height not known / speed not known"),
+    ],
+)
+def test_a_height_that_is_old_or_missing_is_not_known(age, told):
+    one = Release(1.0, "upf_can 33", "rule 'free fall'", motion=Motion(32.1, age, -4.0, age))
+    assert text_of(release_of([one], FlightStory()))[-3] == told
 
 
 def test_each_decision_has_its_reasons_and_what_came_of_it(page, flight):
