@@ -11,7 +11,7 @@ from typing import Any
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.codec import CLASS
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.resume import Left, written
+from chute_ros.supervisor.resume import SavedState, dump
 from chute_ros.supervisor.state import Own, State
 from fuzz.program import Program
 
@@ -37,7 +37,7 @@ def _classes() -> tuple[type, ...]:
         for argument in typing.get_args(kind):
             learn(argument)
 
-    for kind in (State, SupervisorConfig, Left, *typing.get_args(i.Input)):
+    for kind in (State, SupervisorConfig, SavedState, *typing.get_args(i.Input)):
         learn(kind)
     return tuple(found.values())
 
@@ -66,7 +66,7 @@ def anything(p: Program, depth: int = 0) -> Any:
 def _left() -> str:
     """As a supervisor leaves it."""
     state = State(7, NOW - 100.0, own=Own(updated_at=NOW - 5.0))
-    return written(Left(BOOT, SETTINGS, state))
+    return dump(SavedState(BOOT, SETTINGS, state))
 
 
 def left(p: Program) -> Any:

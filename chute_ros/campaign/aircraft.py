@@ -148,10 +148,10 @@ class Aircraft(Rig):
         elif not carried and not self.truth.falls and math.isnan(self.released):
             self.truth = observe(model, now)
         if self.truth.falls:
-            self._look_at_fall(now)
+            self._check_fall(now)
         self._speed = max(0.0, -model.vertical_speed)
 
-    def _look_at_fall(self, now: float) -> None:
+    def _check_fall(self, now: float) -> None:
         model = self.model
         if model.acceleration < GRAVITY / 2.0:
             self.light_until = now

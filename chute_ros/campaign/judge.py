@@ -24,7 +24,7 @@ _CARRIES_WITHIN = 3.0
 class Count(enum.Enum):
     """Under which a flight is counted."""
 
-    RIGHT = "correct"
+    CORRECT = "correct"
     MISSED = "missed: it should have been released and was not"
     LATE = "late: released too late for a soft landing"
     FALSE = "false: killed or released although it flew well"
@@ -38,7 +38,7 @@ class Count(enum.Enum):
 
 
 #: What must not happen.
-WRONG = tuple(one for one in Count if one not in (Count.RIGHT, Count.NO_TIME, Count.NOT_TOLD))
+WRONG = tuple(one for one in Count if one not in (Count.CORRECT, Count.NO_TIME, Count.NOT_TOLD))
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def judge(flown: Flown) -> Judged:
     """The gravest that is true of it."""
     if flown.grounded:
         return Judged(Count.GROUNDED, flown.grounded)
-    return _never(flown) or _owed(flown) or _ordered(flown) or Judged(Count.RIGHT)
+    return _never(flown) or _owed(flown) or _ordered(flown) or Judged(Count.CORRECT)
 
 
 def _never(flown: Flown) -> Judged | None:

@@ -26,7 +26,7 @@ from chute_ros.runtime.vehicle_hearing import VehicleHearing
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.lease import LeaseConfig
-from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written
+from chute_ros.supervisor.resume import SavedState, dump, load, worth_saving
 from chute_ros.supervisor.state import State
 
 _BOOT = _SETTINGS = "the same"
@@ -190,9 +190,9 @@ class SupervisorHost:
         """It was killed; what it left is what it goes on with."""
         left, self._kept = self._kept, None
         before = None
-        if left is not None and worth_leaving(left):
-            text = written(Left(_BOOT, _SETTINGS, left))
-            before = resumed(text, _BOOT, _SETTINGS, _RESUME_WITHIN, now)
+        if left is not None and worth_saving(left):
+            text = dump(SavedState(_BOOT, _SETTINGS, left))
+            before = load(text, _BOOT, _SETTINGS, _RESUME_WITHIN, now)
         # The epoch is made of the wall clock's seconds, which have moved on.
         self._begin(self.state.epoch, before, now)
         self._turn((), now)

@@ -20,7 +20,7 @@ from chute_ros.settings import Settings, parameter
 from chute_ros.transitions import after
 
 
-class Stimulus(enum.Enum):
+class Event(enum.Enum):
     """What can happen to a link."""
 
     HEARD = "heard"
@@ -28,13 +28,13 @@ class Stimulus(enum.Enum):
     LOST_LIMIT = "lost limit passed"
 
 
-TRANSITIONS: dict[tuple[LinkState, Stimulus], LinkState] = {
-    (LinkState.NEVER_SEEN, Stimulus.HEARD): LinkState.OK,
-    (LinkState.OK, Stimulus.HEARD): LinkState.OK,
-    (LinkState.OK, Stimulus.STALE_LIMIT): LinkState.STALE,
-    (LinkState.STALE, Stimulus.HEARD): LinkState.OK,
-    (LinkState.STALE, Stimulus.LOST_LIMIT): LinkState.LOST,
-    (LinkState.LOST, Stimulus.HEARD): LinkState.OK,
+TRANSITIONS: dict[tuple[LinkState, Event], LinkState] = {
+    (LinkState.NEVER_SEEN, Event.HEARD): LinkState.OK,
+    (LinkState.OK, Event.HEARD): LinkState.OK,
+    (LinkState.OK, Event.STALE_LIMIT): LinkState.STALE,
+    (LinkState.STALE, Event.HEARD): LinkState.OK,
+    (LinkState.STALE, Event.LOST_LIMIT): LinkState.LOST,
+    (LinkState.LOST, Event.HEARD): LinkState.OK,
 }
 
 
@@ -89,7 +89,7 @@ class Liveness:
         changes = self.update(now)
         silence = self.age(now)
         before = self.state
-        changes += self._take(Stimulus.HEARD, now, silence)
+        changes += self._take(Event.HEARD, now, silence)
         self.last_heard = now
         if before is LinkState.NEVER_SEEN:
             self.first_heard = now
@@ -103,9 +103,9 @@ class Liveness:
         silence = self.age(now)
         # Compared as next_deadline says it, so that rounding never leaves a deadline unserved.
         if self.state is LinkState.OK and now >= self.next_deadline():
-            changes += self._take(Stimulus.STALE_LIMIT, now, silence)
+            changes += self._take(Event.STALE_LIMIT, now, silence)
         if self.state is LinkState.STALE and now >= self.next_deadline():
-            changes += self._take(Stimulus.LOST_LIMIT, now, silence)
+            changes += self._take(Event.LOST_LIMIT, now, silence)
             self.lost_at = now
             self.lost_count += 1
         return changes
@@ -122,9 +122,9 @@ class Liveness:
             return self.last_heard + self.limits.lost_after
         return math.inf
 
-    def _take(self, stimulus: Stimulus, now: float, silence: float) -> list[LinkChange]:
+    def _take(self, event: Event, now: float, silence: float) -> list[LinkChange]:
         before = self.state
-        self.state = after(TRANSITIONS, before, stimulus)
+        self.state = after(TRANSITIONS, before, event)
         if self.state is before:
             return []
         self.since = now

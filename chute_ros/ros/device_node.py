@@ -312,7 +312,7 @@ class DeviceNode(SuiteNode, ABC):
             # What it said last says nothing of now.
             statuses = [hangs, *(_old(one) for one in statuses if one.name != hangs.name)]
         else:
-            self._look_at_wire(summary.link_state, statuses)
+            self._check_wire(summary.link_state, statuses)
         counts = {
             "exceptions in the link's thread": self._loop_faults,
             "statuses left out, executor too slow": self.inbox.left_out,
@@ -323,7 +323,7 @@ class DeviceNode(SuiteNode, ABC):
         statuses.append(diagnostics.supervisor_task(name, watch, counts))
         self.diagnostics_publisher.publish(self.stamp(), statuses)
 
-    def _look_at_wire(self, device: model.LinkState, statuses: list[DiagnosticStatus]) -> None:
+    def _check_wire(self, device: model.LinkState, statuses: list[DiagnosticStatus]) -> None:
         assert self.loop is not None
         link = next(one for one in statuses if one.name.endswith(": link"))
         never = device is model.LinkState.NEVER_SEEN

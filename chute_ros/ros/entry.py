@@ -45,7 +45,7 @@ def run(name: str, place: str) -> None:
     ctrl_c.install()
     try:
         limit_memory()
-        _look_at_arguments(name)
+        _check_arguments(name)
         _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
         executor = new_executor()
@@ -100,7 +100,7 @@ def _imported(module: str, class_name: str) -> Any:
         raise
 
 
-def _look_at_arguments(name: str) -> None:
+def _check_arguments(name: str) -> None:
     """What is not for ROS is for nobody: a node has parameters alone."""
     from rclpy.utilities import remove_ros_args
 

@@ -24,12 +24,12 @@ from chute_ros.ros.ros_home import ros_home
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.resume import (
-    Left,
-    released_in,
-    resumed,
-    worth_leaving,
-    written,
-    written_released,
+    SavedState,
+    dump,
+    dump_released,
+    load,
+    load_released,
+    worth_saving,
 )
 from chute_ros.supervisor.state import State
 
@@ -58,7 +58,7 @@ class Memory:
         self._boot = _BOOT_ID.read_text().strip() if self._within else ""
         self._file = KeptFile(self._path, self._text, "memory") if self._within else None
         self._released_file = KeptFile(
-            ros_home() / "released" / f"{own}.json", written_released, "released", durable=True
+            ros_home() / "released" / f"{own}.json", dump_released, "released", durable=True
         )
         self._released = frozenset[tuple[str, str]]()
 
@@ -67,7 +67,7 @@ class Memory:
         something may have been."""
         path = self._released_file.path
         try:
-            self._released = released_in(read_own_text(path))
+            self._released = load_released(read_own_text(path))
         except (FileNotFoundError, NotADirectoryError):
             pass  # nothing was ever kept there
         except (OSError, ValueError, RecordError) as error:
@@ -81,7 +81,7 @@ class Memory:
             text = read_own_text(self._path) if self._within else ""
             self._path.unlink(missing_ok=True)
             state = (
-                resumed(text, self._boot, self._settings, self._within, time.monotonic())
+                load(text, self._boot, self._settings, self._within, time.monotonic())
                 if text
                 else None
             )
@@ -125,4 +125,4 @@ class Memory:
         self._lock.close()
 
     def _text(self, state: State) -> str:
-        return written(Left(self._boot, self._settings, state)) if worth_leaving(state) else ""
+        return dump(SavedState(self._boot, self._settings, state)) if worth_saving(state) else ""

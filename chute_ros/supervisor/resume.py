@@ -17,7 +17,7 @@ from chute_ros.supervisor.state import State
 
 
 @dataclass(frozen=True)
-class Left:
+class SavedState:
     """What was left. boot: names the start of the host, with which its monotonic time began;
     settings: names the configuration."""
 
@@ -26,21 +26,21 @@ class Left:
     state: State
 
 
-_CODEC = Codec(Left)
+_CODEC = Codec(SavedState)
 
 
-def worth_leaving(state: State) -> bool:
+def worth_saving(state: State) -> bool:
     """On the ground with nothing under way a start anew is as good, and clears alarms."""
     return state.flight.airborne or state.stage not in ON_GROUND
 
 
-def written_released(state: State) -> str:
+def dump_released(state: State) -> str:
     """What was released since the last reset, as JSON text; empty: nothing was."""
     released = sorted(state.released_since_reset)
     return json.dumps(released) if released else ""
 
 
-def released_in(text: str) -> frozenset[tuple[str, str]]:
+def load_released(text: str) -> frozenset[tuple[str, str]]:
     """What was written. RecordError: nothing that was."""
     try:
         told = json.loads(text)
@@ -54,16 +54,16 @@ def released_in(text: str) -> frozenset[tuple[str, str]]:
     return frozenset((link, device) for link, device in told)
 
 
-def written(left: Left) -> str:
+def dump(left: SavedState) -> str:
     """As JSON text."""
     return _CODEC.to_json(left, whole=True)
 
 
-def resumed(text: str, boot: str, settings: str, within: float, now: float) -> State:
+def load(text: str, boot: str, settings: str, within: float, now: float) -> State:
     """The state to go on with: of one that looks on until it takes over. now: monotonic s, within:
     so old it may be, s. RecordError: it is not to be gone on with, and why."""
     left = _CODEC.from_json(text)
-    if not isinstance(left, Left) or not isinstance(left.state, State):
+    if not isinstance(left, SavedState) or not isinstance(left.state, State):
         raise RecordError(f"nothing that was left: {text[:80]!r}")
     if left.boot != boot:
         raise RecordError("the computer has started anew since")

@@ -13,7 +13,7 @@ from chute_ros.links.upf.allocation_file import AllocationFile
 from chute_ros.protocol.mavlink.signing import key_from_text
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.resume import resumed
+from chute_ros.supervisor.resume import load
 from chute_ros.tools.mcap_entries import McapEntries
 from chute_ros.transport.address import parse_address
 from chute_ros.transport.can_address import parse_can_address
@@ -61,7 +61,7 @@ def _record(data: bytes) -> None:
 
 
 def _left(data: bytes) -> None:
-    resumed(_json(data, left), BOOT, SETTINGS, 30.0, NOW)
+    load(_json(data, left), BOOT, SETTINGS, 30.0, NOW)
 
 
 def _profile(data: bytes) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import functools
 
 from chute_ros.errors import MessageError
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
-from chute_ros.links.upf.protocol import errands
 from chute_ros.protocol.dronecan.can_frame import pack
 from chute_ros.protocol.dronecan.data_types import DataType, DataTypes
 from chute_ros.protocol.dronecan.endpoint import Endpoint
@@ -34,8 +34,8 @@ NAMES = (
     "uavcan.protocol.GetTransportStats",
     "uavcan.protocol.GlobalTimeSync",
     "uavcan.protocol.dynamic_node_id.Allocation",
-    errands.GET_SET,
-    errands.EXECUTE_OPCODE,
+    bus_requests.GET_SET,
+    bus_requests.EXECUTE_OPCODE,
 )
 
 

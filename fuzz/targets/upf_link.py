@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from chute_ros.links.upf.protocol import bus_requests, parameters
 from chute_ros.links.upf.protocol import definitions as names
-from chute_ros.links.upf.protocol import errands, parameters
 from chute_ros.links.upf.protocol.config import UpfConfig
-from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.events import BusRequestFinished
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.model import Armed, LandedState, LinkState, VehicleState
 from chute_ros.protocol.dronecan.allocation import KeepTable
@@ -61,7 +61,7 @@ class UpfLinked(Linked):
             self._bytes,
             self._deploy,
             self._service,
-            self._errand,
+            self._bus_request,
             self._parameter,
             self._vehicle,
             self._supervisor,
@@ -131,17 +131,17 @@ class UpfLinked(Linked):
         token = self._orders.begin("deploy" if type_name in _DEPLOYS else type_name)
         self._link.service(token, type_name, node, self._now)
 
-    def _errand(self, p: Program) -> None:
-        token, what, node = self._orders.begin("errand"), p.byte(), p.choice(_NODES)
+    def _bus_request(self, p: Program) -> None:
+        token, what, node = self._orders.begin("bus request"), p.byte(), p.choice(_NODES)
         if what % 3 == 0:
-            self._link.errand(token, node, errands.list_parameters, self._now)
+            self._link.bus_request(token, node, bus_requests.list_parameters, self._now)
         elif what % 3 == 1:
-            self._link.errand(token, node, errands.node_info, self._now)
+            self._link.bus_request(token, node, bus_requests.node_info, self._now)
         else:
-            self._link.disturb(token, node, bool(what & 64), errands.restart, self._now)
+            self._link.disturb(token, node, bool(what & 64), bus_requests.restart, self._now)
 
     def _parameter(self, p: Program) -> None:
-        token, node, text = self._orders.begin("errand"), p.choice(_NODES), p.choice(_TEXTS)
+        token, node, text = self._orders.begin("bus request"), p.choice(_NODES), p.choice(_TEXTS)
         name = p.choice((parameters.LIGHT, parameters.ENABLE_APS, text))
         self._link.set_parameter(token, node, name, text, p.flag(), self._now)
 
@@ -189,7 +189,7 @@ class UpfLinked(Linked):
         super()._turn(now)
 
     def _happened(self, event: object) -> None:
-        if isinstance(event, ErrandFinished):
+        if isinstance(event, BusRequestFinished):
             self._orders.ended(event.token)
         elif isinstance(event, KeepTable):
             self._kept = [*self._kept, event.number][-4:]
@@ -230,8 +230,8 @@ class UpfLinked(Linked):
                 "TYPE_LAND": ("TYPE_LAND",),
             }
             self._orders.left(type_name, by.get(type_name, ("deploy",)))
-        elif name in (errands.EXECUTE_OPCODE, "uavcan.protocol.RestartNode"):
-            self._orders.left(name, ("errand",))
+        elif name in (bus_requests.EXECUTE_OPCODE, "uavcan.protocol.RestartNode"):
+            self._orders.left(name, ("bus request",))
 
 
 TARGETS = (

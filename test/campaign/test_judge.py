@@ -42,14 +42,14 @@ def test_each_thing_that_must_not_be_is_counted_as_such(good: Flown) -> None:
     assert set(cases) == set(WRONG) - {Count.BROKEN}
     for count, changed in cases.items():
         assert judge(replace(good, **changed)).count is count
-    assert judge(good).count is Count.RIGHT
+    assert judge(good).count is Count.CORRECT
 
 
 def test_what_a_person_orders_is_never_false(good: Flown) -> None:
     early = tuple(replace(one, at=good.up + 0.5) for one in fired(good))
     assert judge(replace(good, acted=early)).count is Count.FALSE
     wanted = replace(good.scenario, person=Person("kill", 0.4))
-    assert judge(replace(good, acted=early, scenario=wanted)).count is Count.RIGHT
+    assert judge(replace(good, acted=early, scenario=wanted)).count is Count.CORRECT
 
 
 def test_what_follows_a_kill_that_asks_for_nothing_more_is_false(good: Flown) -> None:
@@ -59,7 +59,7 @@ def test_what_follows_a_kill_that_asks_for_nothing_more_is_false(good: Flown) ->
     hard = {"landed": good.truth.latest + 1.0, "landing_speed": 20.0, "released": math.nan}
     person = replace(good.scenario, person=Person("kill_only", 0.5))
     alone = replace(good, scenario=person, decided=((good.killed, asked),), **hard)
-    assert judge(alone).count is Count.RIGHT
+    assert judge(alone).count is Count.CORRECT
     followed = replace(alone, decided=((good.killed, asked), (good.released, deploy)))
     assert judge(followed).count is Count.FALSE
     assert "asked for nothing more" in judge(followed).why
@@ -88,7 +88,7 @@ def test_a_parachute_that_is_told_a_wrong_height_refuses_and_another_does_not() 
     assert judge(alone).count is Count.NOT_TOLD
     two = flown(Failure.MOTOR, wrong, height=38.0, vehicle="both")
     assert math.isnan(two.refused)
-    assert judge(two).count is Count.RIGHT
+    assert judge(two).count is Count.CORRECT
     assert math.isnan(flown(Failure.MOTOR, height=38.0).refused)
 
 
@@ -105,7 +105,7 @@ def test_what_a_person_orders_and_is_not_done_is_missed(good: Flown, does: str) 
 
 def test_a_kill_under_a_canopy_is_not_false(good: Flown) -> None:
     out = replace(good, acted=fired(good)[:1], released=good.up + 0.1)
-    assert judge(out).count is Count.RIGHT
+    assert judge(out).count is Count.CORRECT
 
 
 @pytest.mark.parametrize(
@@ -240,14 +240,14 @@ def test_past_the_height_of_its_take_off_nobody_knows_where_the_ground_is() -> N
 def test_on_the_ground_motors_may_be_stopped_and_nothing_is_released(good: Flown) -> None:
     stands = replace(good.scenario, height=0.0, failure=Failure.NOTHING)
     stopped = replace(good, scenario=stands, truth=Truth(), acted=fired(good)[:1])
-    assert judge(replace(stopped, released=math.nan)).count is Count.RIGHT
+    assert judge(replace(stopped, released=math.nan)).count is Count.CORRECT
     assert judge(stopped).count is Count.FALSE
     assert judge(replace(stopped, acted=fired(good), released=math.nan)).count is Count.FALSE
 
 
 def test_a_kill_that_opens_a_parachute_where_none_may_open_is_false(good: Flown) -> None:
     opened = replace(good, opened_by_kill=good.truth.at + 0.1)
-    assert judge(opened).count is Count.RIGHT
+    assert judge(opened).count is Count.CORRECT
     assert judge(replace(opened, release_height=8.0)).count is Count.FALSE
     assert judge(replace(opened, opened_by_kill=good.truth.at - 0.1)).count is Count.FALSE
 
@@ -257,14 +257,14 @@ def test_a_canopy_that_does_not_carry_wants_an_alarm_and_the_next_parachute(good
     hard = replace(good, another=falls, landed=good.released + 7.0, landing_speed=22.0)
     assert judge(hard).why == "the canopy did not carry, and nobody was alarmed"
     alarmed = replace(hard, alarmed=((good.released + 3.0, "it falls on"),))
-    assert judge(alarmed).count is Count.RIGHT, "there is no other"
+    assert judge(alarmed).count is Count.CORRECT, "there is no other"
     both = replace(alarmed, scenario=replace(good.scenario, vehicle="both"))
     assert judge(both).why == "the canopy did not carry, and no other followed in time"
-    assert judge(replace(both, released_another=good.released + 4.0)).count is Count.RIGHT
+    assert judge(replace(both, released_another=good.released + 4.0)).count is Count.CORRECT
     late = replace(both, another=replace(falls, latest=falls.at + 1.0))
     assert judge(late).count is Count.NO_TIME
     assert judge(replace(hard, landed=good.released + 3.0)).count is Count.NO_TIME
-    assert judge(replace(hard, landing_speed=5.0)).count is Count.RIGHT, "it opened in the end"
+    assert judge(replace(hard, landing_speed=5.0)).count is Count.CORRECT, "it opened in the end"
 
 
 def test_one_that_glides_does_not_fall_and_one_whose_autopilot_is_gone_does() -> None:
@@ -272,7 +272,7 @@ def test_one_that_glides_does_not_fall_and_one_whose_autopilot_is_gone_does() ->
     body = {"profile": "fixed_wing", "descent": glide, "unheld": dive}
     glides = flown(Failure.GLIDE, **body)
     assert not glides.truth.falls
-    assert judge(glides).count is Count.RIGHT
+    assert judge(glides).count is Count.CORRECT
     assert flown(Failure.REBOOT, **body).truth.falls
 
 

@@ -23,9 +23,9 @@ def flights(*every: tuple[Failure, Count, str]) -> Tally:
 
 LOST = flights(
     *[(Failure.POWER, Count.NOT_TOLD, "")] * 3,
-    *[(Failure.POWER, Count.RIGHT, "imu, odometry")] * 2,
+    *[(Failure.POWER, Count.CORRECT, "imu, odometry")] * 2,
     (Failure.POWER, Count.LATE, "imu"),
-    (Failure.MOTOR, Count.RIGHT, "imu"),
+    (Failure.MOTOR, Count.CORRECT, "imu"),
 )
 
 

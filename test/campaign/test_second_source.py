@@ -31,7 +31,7 @@ def test_what_outlives_the_autopilot_shows_the_fall(
 ) -> None:
     how = {"profile": profile, "vehicle": vehicle, "height": 110.0}
     end = flown(Failure.POWER, vehicle_sources=sources, **how)
-    assert judge(end).count is Count.RIGHT
+    assert judge(end).count is Count.CORRECT
     assert end.truth.at < end.killed < end.released < end.truth.latest
 
 
@@ -44,14 +44,14 @@ def test_an_attitude_beside_an_autopilot_that_is_lost_is_enough(profile: str) ->
     end = flown(Failure.POWER, wrong, vehicle_sources=WITH_IMU, **how)
     rules = [one.decision.rule for one in fired(end)]
     assert rules[0] == "autopilot lost and falling"
-    assert judge(end).count is Count.RIGHT
+    assert judge(end).count is Count.CORRECT
 
 
 @pytest.mark.parametrize("sources", [WITH_IMU, WITH_ODOMETRY, IMU_FIRST, WITH_BOTH])
 @pytest.mark.parametrize("failure", [Failure.NOTHING, Failure.HANG])
 def test_what_flies_on_is_left_alone(failure: Failure, sources: tuple[str, ...]) -> None:
     end = flown(failure, gusts=1.0, vehicle_sources=sources)
-    assert judge(end).count is Count.RIGHT
+    assert judge(end).count is Count.CORRECT
     assert not fired(end)
 
 
@@ -59,7 +59,7 @@ def test_a_motor_that_fails_is_seen_with_a_second_source_that_is_silent() -> Non
     """The autopilot tells all that is needed, also where the other one is preferred."""
     for silent in (Stop(IMU, 0.0, 9.0, dies=True), WayFault(IMU, Spell(0.0, 9.0, loss=1.0))):
         end = flown(Failure.MOTOR, silent, vehicle_sources=IMU_FIRST, height=100.0)
-        assert judge(end).count is Count.RIGHT
+        assert judge(end).count is Count.CORRECT
         assert end.released < end.truth.latest
 
 
@@ -76,7 +76,7 @@ def test_what_kept_the_last_one_that_tells_from_it_is_named(
     judged = judge(flown(Failure.POWER, fault, vehicle_sources=WITH_ODOMETRY))
     assert (judged.count, judged.why) == (Count.NOT_TOLD, cause)
     both = flown(Failure.POWER, fault, vehicle_sources=WITH_BOTH)
-    assert judge(both).count is Count.RIGHT
+    assert judge(both).count is Count.CORRECT
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_a_second_source_that_was_killed_tells_again() -> None:
     """At t+0 the autopilot loses its power; from t-0.5 to t+0.5 there is no odometry."""
     dies = Stop(ODOMETRY, 0.5, 1.0, dies=True)
     end = flown(Failure.POWER, dies, vehicle_sources=WITH_ODOMETRY, height=110.0)
-    assert judge(end).count is Count.RIGHT
+    assert judge(end).count is Count.CORRECT
     assert end.released < end.truth.latest
 
 
@@ -129,7 +129,7 @@ def test_a_supervisor_that_starts_anew_hears_both_anew() -> None:
     how = {"vehicle_sources": WITH_BOTH, "height": 250.0}
     flight = Flight(scenario(Failure.POWER, dies, **how), SHIPPED)
     end = flight.run()
-    assert judge(end).count is Count.RIGHT
+    assert judge(end).count is Count.CORRECT
     assert end.up + 1.6 < end.killed < end.released < end.truth.latest
 
 

@@ -9,19 +9,19 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.model import LinkState
-from chute_ros.protocol.liveness import TRANSITIONS, Liveness, LivenessLimits, Stimulus
+from chute_ros.protocol.liveness import TRANSITIONS, Event, Liveness, LivenessLimits
 from chute_ros.transitions import after
 
 LIMITS = LivenessLimits(stale_after=2.5, lost_after=5.0)
 
 
 def test_a_pair_is_in_the_table_or_raises():
-    for state, stimulus in itertools.product(LinkState, Stimulus):
-        if (state, stimulus) in TRANSITIONS:
-            assert after(TRANSITIONS, state, stimulus) is TRANSITIONS[state, stimulus]
+    for state, event in itertools.product(LinkState, Event):
+        if (state, event) in TRANSITIONS:
+            assert after(TRANSITIONS, state, event) is TRANSITIONS[state, event]
         else:
             with pytest.raises(TransitionError, match=state.name):
-                after(TRANSITIONS, state, stimulus)
+                after(TRANSITIONS, state, event)
 
 
 def test_a_link_that_was_never_heard_is_neither_stale_nor_lost():

@@ -15,7 +15,7 @@ from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.link_reports import MOST_RELEASED
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.preflight import block_reasons
-from chute_ros.supervisor.resume import released_in, written_released
+from chute_ros.supervisor.resume import dump_released, load_released
 from chute_ros.supervisor.state import State
 
 WHO = f"{LINK} 1/161"
@@ -119,14 +119,14 @@ def test_made_up_names_do_not_grow_it() -> None:
 
 def test_what_is_left_of_it_in_a_file_comes_back() -> None:
     state = State(epoch=1, started_at=START)
-    assert written_released(state) == ""
+    assert dump_released(state) == ""
     released = frozenset({(LINK, "1/161"), ("upf_can", "33")})
-    text = written_released(replace(state, released_since_reset=released))
+    text = dump_released(replace(state, released_since_reset=released))
     assert text == '[["mavlink_parachute", "1/161"], ["upf_can", "33"]]'
-    assert released_in(text) == released
+    assert load_released(text) == released
 
 
 @pytest.mark.parametrize("text", ["", "{", "{}", "[1]", '["ab"]', '[["a"]]', '[["a", 1]]', "null"])
 def test_a_file_that_says_something_else_is_told(text: str) -> None:
     with pytest.raises(RecordError):
-        released_in(text)
+        load_released(text)

@@ -15,7 +15,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.handover import told
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.resume import Left, resumed, worth_leaving, written
+from chute_ros.supervisor.resume import SavedState, dump, load, worth_saving
 from chute_ros.supervisor.state import State
 
 K, D = Action.KILL, Action.DEPLOY
@@ -23,14 +23,14 @@ BOOT, SETTINGS = "this start of the computer", "these settings"
 
 
 def left(story: Story) -> str:
-    assert worth_leaving(story.state)
-    return written(Left(BOOT, SETTINGS, story.state))
+    assert worth_saving(story.state)
+    return dump(SavedState(BOOT, SETTINGS, story.state))
 
 
 def restart(story: Story, after: float) -> list[i.Output]:
     """It dies now and is there again so much later, s: no deadline wakes it in between."""
     now = START + story.t + after
-    story.state = resumed(left(story), BOOT, SETTINGS, 30.0, now)
+    story.state = load(left(story), BOOT, SETTINGS, 30.0, now)
     story.t += after
     return story._update((i.TakeOver(8),), story.t)
 
@@ -92,12 +92,12 @@ def test_while_it_was_away_nobody_was_silent() -> None:
 
 def test_on_the_ground_with_nothing_under_way_it_starts_anew() -> None:
     story = Story()
-    assert not worth_leaving(story.state)
+    assert not worth_saving(story.state)
     story.ready()
-    assert not worth_leaving(story.state)
+    assert not worth_saving(story.state)
     story.at(0.0, i.KillRequest(4, "operator", "smoke"))
     assert story.state.stage is Stage.KILLING
-    assert worth_leaving(story.state)
+    assert worth_saving(story.state)
 
 
 @pytest.mark.parametrize(
@@ -114,14 +114,14 @@ def test_what_does_not_belong_here_is_not_gone_on_with(
 ) -> None:
     story = Story().flying()
     with pytest.raises(RecordError) as error:
-        resumed(left(story), boot, settings, within, START + after)
+        load(left(story), boot, settings, within, START + after)
     assert str(error.value) == why
 
 
 def test_up_to_its_limit_it_is() -> None:
     story = Story().flying()
     for age in (0.0, 30.0):
-        state = resumed(left(story), BOOT, SETTINGS, 30.0, START + age)
+        state = load(left(story), BOOT, SETTINGS, 30.0, START + age)
         assert state.stage is Stage.IN_FLIGHT
         assert not state.own.leading
 
@@ -134,20 +134,20 @@ def test_up_to_its_limit_it_is() -> None:
         "[]",
         "7",
         told(Story().state, START),
-        written(Left(BOOT, SETTINGS, Story().state)).replace('"epoch":7', '"epic":7'),
-        written(Left(BOOT, SETTINGS, Story().state))[:-20],
-        '{"is":"Left","boot":"this start of the computer","settings":"these settings","state":7}',
+        dump(SavedState(BOOT, SETTINGS, Story().state)).replace('"epoch":7', '"epic":7'),
+        dump(SavedState(BOOT, SETTINGS, Story().state))[:-20],
+        dump(SavedState("this start of the computer", "these settings", 7)),  # type: ignore[arg-type]
     ],
 )
 def test_garbage_is_an_error_in_words(text: str) -> None:
     with pytest.raises(RecordError):
-        resumed(text, BOOT, SETTINGS, 30.0, START)
+        load(text, BOOT, SETTINGS, 30.0, START)
 
 
 @given(st.data())
 def test_a_damaged_file_never_raises_anything_else(data: st.DataObject) -> None:
-    text = written(Left(BOOT, SETTINGS, Story(SupervisorConfig()).flying().state))
+    text = dump(SavedState(BOOT, SETTINGS, Story(SupervisorConfig()).flying().state))
     at = data.draw(st.integers(0, len(text) - 1))
     damaged = text[:at] + data.draw(st.characters()) + text[at + 1 :]
     with contextlib.suppress(RecordError):
-        assert isinstance(resumed(damaged, BOOT, SETTINGS, 30.0, START), State)
+        assert isinstance(load(damaged, BOOT, SETTINGS, 30.0, START), State)

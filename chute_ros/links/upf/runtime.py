@@ -8,12 +8,12 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.links.upf.protocol.bus_requests import BusRequestDone
 from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.device_table import DeviceTable
 from chute_ros.links.upf.protocol.devices import Trigger
-from chute_ros.links.upf.protocol.errands import ErrandDone
-from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.events import BusRequestFinished
 from chute_ros.links.upf.protocol.link import UpfLink
-from chute_ros.links.upf.protocol.roster import UpfDevices
 from chute_ros.model import (
     NAN,
     Action,
@@ -50,7 +50,7 @@ class FailedEnd:
     """The end of a request that could not be begun, whichever kind it was."""
 
     finished: EffectFinished
-    done: ErrandDone
+    done: BusRequestDone
 
 
 class UpfRuntime(DeviceRuntime[UpfSettings]):
@@ -81,7 +81,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
         return Summary(liveness.state, healthy, liveness.age(now), () if healthy else reasons)
 
     def failed_end(self, token: int, text: str) -> FailedEnd:
-        return FailedEnd(failed_request(token, text).finished, ErrandDone(False, text, 0))
+        return FailedEnd(failed_request(token, text).finished, BusRequestDone(False, text, 0))
 
     def carry_out(self, decision: Decision) -> None:
         if decision.action is Action.DEPLOY:
@@ -125,7 +125,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
             text = f"{event.device} requests {event.ask.name} from the supervisor: {event.reason}"
             lets_go = event.ask is Ask.FLIGHT_BLOCK_RELEASE
             self.shell.log(Notice(Severity.INFO if lets_go else Severity.WARNING, text))
-        elif isinstance(event, ErrandFinished):
+        elif isinstance(event, BusRequestFinished):
             self.desk.finished(event.token, event)
         else:
             super().event(event)
@@ -155,7 +155,7 @@ class UpfRuntime(DeviceRuntime[UpfSettings]):
 
 def reasons_of(
     config: UpfConfig,
-    devices: UpfDevices,
+    devices: DeviceTable,
     picture: ParachuteStatus | None,
     troubles: Sequence[str],
     now: float,
@@ -178,7 +178,7 @@ def _never_heard(config: UpfConfig) -> str:
     return f"{name} was never received: need its {status} {where}"
 
 
-def _of_picture(picture: ParachuteStatus, devices: UpfDevices) -> list[str]:
+def _of_picture(picture: ParachuteStatus, devices: DeviceTable) -> list[str]:
     trigger = picture.device not in map(str, devices.controllers)
     name = f"{'trigger' if trigger else 'controller'} {picture.device}"
     found = list(picture.faults)

@@ -14,7 +14,7 @@ from chute_msgs.srv import (
     UpfCommand,
 )
 
-from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class UpfServices:
         return _fill(response, end.finished)
 
     async def _get_param(self, request: Any, response: Any) -> Any:
-        done = await self._errand(
-            request, lambda node_id: errands.get_parameter(node_id, request.name)
+        done = await self._bus_request(
+            request, lambda node_id: bus_requests.get_parameter(node_id, request.name)
         )
         _fill(response, done)
         for one in done.parameters:
@@ -86,7 +86,7 @@ class UpfServices:
         return response
 
     async def _list_params(self, request: Any, response: Any) -> Any:
-        done = await self._errand(request, errands.list_parameters)
+        done = await self._bus_request(request, bus_requests.list_parameters)
         _fill(response, done)
         response.names = [one.name for one in done.parameters]
         response.values = [p.words(one.value) for one in done.parameters]
@@ -94,29 +94,29 @@ class UpfServices:
 
     async def _save(self, request: Any, response: Any) -> Any:
         self._record("save_params", request)
-        done = await self._errand(
-            request, lambda node_id: errands.execute_opcode(node_id, errands.OPCODE_SAVE)
+        done = await self._bus_request(
+            request, lambda node_id: bus_requests.execute_opcode(node_id, bus_requests.OPCODE_SAVE)
         )
         return _fill(response, done)
 
     async def _erase(self, request: Any, response: Any) -> Any:
-        def make(node_id: int) -> errands.Errand:
-            return errands.execute_opcode(node_id, errands.OPCODE_ERASE)
+        def make(node_id: int) -> bus_requests.BusRequest:
+            return bus_requests.execute_opcode(node_id, bus_requests.OPCODE_ERASE)
 
         return await self._disturb("erase_params", request, response, make)
 
     async def _restart(self, request: Any, response: Any) -> Any:
-        return await self._disturb("restart", request, response, errands.restart)
+        return await self._disturb("restart", request, response, bus_requests.restart)
 
     async def _transport_stats(self, request: Any, response: Any) -> Any:
-        done = await self._errand(request, errands.transport_stats)
+        done = await self._bus_request(request, bus_requests.transport_stats)
         _fill(response, done)
         for name in ("transfers_tx", "transfers_rx", "transfer_errors"):
             setattr(response, name, done.values.get(name, 0))
         return response
 
     async def _node_info(self, request: Any, response: Any) -> Any:
-        done = await self._errand(request, errands.node_info)
+        done = await self._bus_request(request, bus_requests.node_info)
         _fill(response, done)
         if not done.values:
             return response
@@ -131,11 +131,11 @@ class UpfServices:
 
     # -- inside ---------------------------------------------------------------------------------
 
-    async def _errand(self, request: Any, make: Any) -> errands.ErrandDone:
+    async def _bus_request(self, request: Any, make: Any) -> bus_requests.BusRequestDone:
         end = await self._node.request(
-            lambda link, token, now: link.errand(token, request.node_id, make, now)
+            lambda link, token, now: link.bus_request(token, request.node_id, make, now)
         )
-        done: errands.ErrandDone = end.done
+        done: bus_requests.BusRequestDone = end.done
         return done
 
     async def _disturb(self, name: str, request: Any, response: Any, make: Any) -> Any:

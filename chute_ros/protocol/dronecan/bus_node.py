@@ -147,7 +147,7 @@ class BusNode(EventLog):
         return min(deadlines)
 
     def begin(self, token: object, script: Script, now: float) -> None:
-        """Run an errand; its result comes from take_ended."""
+        """Run a bus request; its result comes from take_ended."""
         self.scripts.begin(token, script, now)
         self._drive(now)
 
@@ -157,7 +157,7 @@ class BusNode(EventLog):
         self._answer_allocations()
 
     def take_ended(self) -> list[tuple[object, object]]:
-        """(token, result) of the errands that ended; each is handed out once."""
+        """(token, result) of the bus requests that ended; each is handed out once."""
         ended, self._ended = self._ended, []
         return ended
 

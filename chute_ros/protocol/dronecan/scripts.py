@@ -1,4 +1,4 @@
-"""Errands of several service calls in a row, each written as a generator that yields its calls.
+"""Bus requests of several service calls in a row: each is a generator that yields its calls.
 
 A script yields a Call and is resumed with its CallFinished; what it returns is its result. It
 knows neither the clock nor the bus.

@@ -165,20 +165,20 @@ def test_a_node_that_does_not_answer_is_taken_as_it_is():
     assert bench.node.counts["calls without an answer"] == 5
 
 
-def errand(*calls):
+def bus_request(*calls):
     values = []
     for call in calls:
         values.append((yield call).values)
     return values
 
 
-def test_an_errand_of_the_owner_ends_under_its_token():
+def test_an_bus_request_of_the_owner_ends_under_its_token():
     done = {"argument": 0, "ok": True}
-    # A call that cannot be sent ends, and the errand goes on.
+    # A call that cannot be sent ends, and the bus request goes on.
     bad, good = Call(33, GET_SET, {"name": b"x" * 200}), Call(33, OPCODE, {"opcode": 0})
     for calls, results in (([good], [done]), ([bad, good, bad], [None, done, None])):
         bench = Bench()
-        bench.node.begin("mine", errand(*calls), bench.now)
+        bench.node.begin("mine", bus_request(*calls), bench.now)
         bench.feed()
         (asked,) = bench.requests(OPCODE)
         bench.answer(asked, 33, ok=True)
@@ -231,7 +231,7 @@ STEPS = st.lists(
         st.tuples(st.just("time"), st.sampled_from([5, OWN, 33])),
         st.tuples(st.just("allocation"), st.sampled_from([0, 5]), st.booleans()),
         st.tuples(st.just("alive"), st.floats(-1, 2)),
-        st.tuples(st.just("errand")),
+        st.tuples(st.just("bus_request")),
         st.tuples(st.just("wait"), st.floats(0, 4)),
         st.tuples(st.just("late"), st.floats(0, 4)),
     ),
@@ -255,8 +255,8 @@ def test_its_next_deadline_is_never_in_the_past_and_all_comes_to_rest(steps):
         elif step == "alive":
             bench.node.owner_alive(bench.now + what[0])
             bench.feed()
-        elif step == "errand":
-            bench.node.begin("mine", errand(Call(33, OPCODE, {})), bench.now)
+        elif step == "bus_request":
+            bench.node.begin("mine", bus_request(Call(33, OPCODE, {})), bench.now)
             bench.feed()
         elif step == "wait":
             bench.at(bench.t + what[0])

@@ -26,7 +26,7 @@ Ids = tuple[int, int]
 MOST_DEVICES = 16
 
 
-class Roster(Generic[DeviceT]):
+class DeviceFilter(Generic[DeviceT]):
     """Which devices of one kind are ours, by (system id, component id). An id of 0 means any.
 
     More than one vehicle may be heard. A command that fires goes only to a system that was named
@@ -96,10 +96,10 @@ class Devices(EventLog):
 
     def __init__(self, config: MavlinkConfig) -> None:
         super().__init__()
-        self.parachutes: Roster[ParachuteTracker] = Roster(
+        self.parachutes: DeviceFilter[ParachuteTracker] = DeviceFilter(
             "parachute", config.parachute_system_id, config.parachute_component_id
         )
-        self.autopilots: Roster[AutopilotTracker] = Roster(
+        self.autopilots: DeviceFilter[AutopilotTracker] = DeviceFilter(
             "autopilot", config.autopilot_system_id, config.autopilot_component_id
         )
         #: By their PARACHUTE_STATUS, and not yet by a heartbeat.

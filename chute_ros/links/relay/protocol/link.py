@@ -152,7 +152,7 @@ class RelayLink(EventLog):
         return output
 
     def take_events(self) -> list[Any]:
-        self._look_at_written()
+        self._check_written()
         return super().take_events()
 
     # -- the owner -------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ class RelayLink(EventLog):
 
     # -- inside ----------------------------------------------------------------------------------
 
-    def _look_at_written(self) -> None:
+    def _check_written(self) -> None:
         given, self._given = self._given, []
         if given:
             self._to(LinkState.UNMONITORED)

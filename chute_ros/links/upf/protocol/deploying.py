@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import goals
 from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.device_table import DeviceTable
 from chute_ros.links.upf.protocol.devices import Controller, Trigger
-from chute_ros.links.upf.protocol.roster import UpfDevices
 from chute_ros.links.upf.protocol.vehicle_service import VehicleService
 from chute_ros.links.upf.protocol.vehicle_status import Vehicle
 from chute_ros.model import LinkState, Outcome
@@ -47,7 +47,7 @@ class Deploying:
     def __init__(
         self,
         config: UpfConfig,
-        devices: UpfDevices,
+        devices: DeviceTable,
         requests: Requests[ServiceCalls],
         endpoint: Endpoint,
         vehicle: Vehicle,

@@ -6,24 +6,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.links.upf.protocol.errands import ErrandDone
+from chute_ros.links.upf.protocol.bus_requests import BusRequestDone
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.events import AskSupervisor, Event
 
 
 @dataclass(frozen=True)
 class TriggerChanged:
-    """A trigger said something, or its silence grew too long. picture: see roster."""
+    """A trigger said something, or its silence grew too long. picture: see device table."""
 
     picture: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class ErrandFinished:
+class BusRequestFinished:
     """What was asked of a device besides flying ended."""
 
     token: int
-    done: ErrandDone
+    done: BusRequestDone
 
 
-UpfEvent = Event | TriggerChanged | ErrandFinished | AskSupervisor | KeepTable
+UpfEvent = Event | TriggerChanged | BusRequestFinished | AskSupervisor | KeepTable

@@ -12,14 +12,14 @@ from collections.abc import Callable, Collection, Hashable
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import goals
+from chute_ros.links.upf.protocol.bus_request_tracker import BusRequestTracker
+from chute_ros.links.upf.protocol.bus_requests import BusRequest
 from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.deploying import Deploying
-from chute_ros.links.upf.protocol.desk import ErrandDesk
+from chute_ros.links.upf.protocol.device_table import DeviceTable
 from chute_ros.links.upf.protocol.devices import Controller
-from chute_ros.links.upf.protocol.errands import Errand
 from chute_ros.links.upf.protocol.events import UpfEvent
-from chute_ros.links.upf.protocol.roster import UpfDevices
 from chute_ros.links.upf.protocol.vehicle_service import VehicleService
 from chute_ros.links.upf.protocol.vehicle_status import Vehicle
 from chute_ros.model import Armed, ParachuteState, TriggerFlags, VehicleState
@@ -40,7 +40,7 @@ class UpfLink:
         self.config = config
         self.definitions = Definitions(types)
         self.bus = BusNode(types, config.bus())
-        self.devices = UpfDevices(config, self.definitions)
+        self.devices = DeviceTable(config, self.definitions)
         self.vehicle_service = VehicleService(config, self.definitions)
         read = goals.read_answer(self.definitions, self._deploy_answered)
         calls = ServiceCalls(config.calls, read)
@@ -50,7 +50,7 @@ class UpfLink:
         self._deploying = Deploying(
             config, self.devices, self.requests, endpoint, self._vehicle, self.vehicle_service
         )
-        self._desk = ErrandDesk(self.bus, self.devices, self._vehicle.in_air)
+        self._desk = BusRequestTracker(self.bus, self.devices, self._vehicle.in_air)
         #: Our own requests to take off count down from -1; once one has succeeded, the request
         #: with this token arms this controller.
         self._next_takeoff = -1
@@ -217,9 +217,11 @@ class UpfLink:
         self._deploying.fire_triggers(token, now)
         self._pursue_deploys(now)
 
-    def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
-        """Ask something of a device: ends in one ErrandFinished. node_id 0: the chosen one."""
-        self._desk.errand(token, node_id, make, now)
+    def bus_request(
+        self, token: int, node_id: int, make: Callable[[int], BusRequest], now: float
+    ) -> None:
+        """Ask something of a device: ends in one BusRequestFinished. node_id 0: the chosen one."""
+        self._desk.bus_request(token, node_id, make, now)
         self._drive(now)
 
     def set_parameter(
@@ -230,9 +232,9 @@ class UpfLink:
         self._drive(now)
 
     def disturb(
-        self, token: int, node_id: int, force: bool, make: Callable[[int], Errand], now: float
+        self, token: int, node_id: int, force: bool, make: Callable[[int], BusRequest], now: float
     ) -> None:
-        """An errand that takes the device away for a while: refused in the air unless forced."""
+        """The same for what takes the device away for a while: in the air it needs force."""
         self._desk.disturb(token, node_id, force, make, now)
         self._drive(now)
 

@@ -13,7 +13,7 @@ import enum
 from chute_ros.model import ParachuteState
 
 
-class Stimulus(enum.Enum):
+class Event(enum.Enum):
     """Event that moves a controller."""
 
     SELF_TEST_PASSED = "self test passed"
@@ -29,9 +29,9 @@ class Stimulus(enum.Enum):
     RESTART = "restart"
 
 
-_S, _E = ParachuteState, Stimulus
+_S, _E = ParachuteState, Event
 
-TRANSITIONS: dict[tuple[ParachuteState, Stimulus], ParachuteState] = {
+TRANSITIONS: dict[tuple[ParachuteState, Event], ParachuteState] = {
     (_S.NOT_READY, _E.SELF_TEST_PASSED): _S.READY,
     (_S.NOT_READY, _E.SELF_TEST_FAILED): _S.ABNORMAL,
     (_S.READY, _E.TAKEOFF): _S.TAKEOFF,
@@ -68,12 +68,12 @@ BLOCKING = frozenset(state for state, name in ENTRY_REQUESTS.items() if name.end
 #: The parachute is out.
 DEPLOYED = frozenset({_S.LAUNCHED, _S.TOUCHDOWN})
 
-_CAUSES: dict[tuple[ParachuteState, ParachuteState], list[Stimulus]] = {}
+_CAUSES: dict[tuple[ParachuteState, ParachuteState], list[Event]] = {}
 for (_before, _stimulus), _after in TRANSITIONS.items():
     _CAUSES.setdefault((_before, _after), []).append(_stimulus)
 
 
-def causes(before: ParachuteState, after: ParachuteState) -> list[Stimulus]:
+def causes(before: ParachuteState, after: ParachuteState) -> list[Event]:
     """What can have moved a controller from before to after; empty: nothing in the table.
 
     The first state that is heard needs no cause.

@@ -12,7 +12,7 @@ from typing import Any
 from chute_ros.errors import MessageError
 from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.protocol.definitions import VEHICLE_STATUS, Definitions
-from chute_ros.links.upf.protocol.roster import UpfDevices
+from chute_ros.links.upf.protocol.device_table import DeviceTable
 from chute_ros.model import NAN, Armed, LandedState, LinkState, ParachuteState, VehicleState
 from chute_ros.protocol.dronecan.endpoint import Endpoint
 from chute_ros.protocol.events import Severity
@@ -25,7 +25,7 @@ _FLYING = (ParachuteState.TAKEOFF, ParachuteState.ARMED)
 class Vehicle:
     """Keeps what the vehicle says of itself, and tells it to the controllers."""
 
-    def __init__(self, config: UpfConfig, devices: UpfDevices, endpoint: Endpoint) -> None:
+    def __init__(self, config: UpfConfig, devices: DeviceTable, endpoint: Endpoint) -> None:
         self._config, self._devices, self._endpoint = config, devices, endpoint
         self._definitions = devices.definitions
         self._state, self._received = VehicleState(), -math.inf

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.machine import Stimulus
+from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.model import ParachuteState
 from chute_ros.sim.motion import Motion
 
@@ -57,22 +57,22 @@ class AutomaticFunctions:
 
     def wish(
         self, state: ParachuteState, motion: Motion, switch: Callable[[str], bool], now: float
-    ) -> Stimulus | None:
+    ) -> Event | None:
         """What an enabled function wants in this state; None: nothing."""
         height = motion.height
         if state is _S.READY and switch(p.AUTO_TAKEOFF):
             if height >= _TAKEOFF_HEIGHT:
-                return Stimulus.TAKEOFF
+                return Event.TAKEOFF
         elif state is _S.TAKEOFF:
             if height >= _ARM_HEIGHT and switch(p.AUTO_ARM):
-                return Stimulus.ARM
+                return Event.ARM
             rests = self._flown and self.at_rest_for(now) >= _LAND_TIME
             if rests and height < _GROUND and switch(p.AUTO_LAND):
-                return Stimulus.LAND
+                return Event.LAND
         elif state is _S.ARMED and switch(p.AUTO_DISARM):
             calm = motion.vertical_speed > -_CALM_SINK_SPEED
             if self._was_high and height < _DISARM_HEIGHT and calm:
-                return Stimulus.DISARM
+                return Event.DISARM
         return None
 
 

@@ -15,7 +15,7 @@ from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import machine
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.protocol.machine import Stimulus
+from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.links.upf.simulator.automatic import (
     ApsLimits,
     AutomaticDeployment,
@@ -39,10 +39,10 @@ _STEP = 0.02  # s
 _S = ParachuteState
 #: The state that a request asks for.
 _ASKED_FOR = {
-    Stimulus.TAKEOFF: _S.TAKEOFF,
-    Stimulus.ARM: _S.ARMED,
-    Stimulus.DISARM: _S.TAKEOFF,
-    Stimulus.LAND: _S.READY,
+    Event.TAKEOFF: _S.TAKEOFF,
+    Event.ARM: _S.ARMED,
+    Event.DISARM: _S.TAKEOFF,
+    Event.LAND: _S.READY,
 }
 
 
@@ -116,14 +116,14 @@ class UpfController(UpfNode):
         self._step_at = now + _STEP
         if self.state is _S.NOT_READY and now >= self._ready_at:
             passed = not self.errors
-            self._move(Stimulus.SELF_TEST_PASSED if passed else Stimulus.SELF_TEST_FAILED)
+            self._move(Event.SELF_TEST_PASSED if passed else Event.SELF_TEST_FAILED)
         self._automatic.feel(self.motion, now)
         wish = self._automatic.wish(self.state, self.motion, self.switch, now)
         if wish is not None:
             self._move(wish)
         at_rest = self._automatic.at_rest_for(now) >= machine.REST_TIME
         if self.state is _S.LAUNCHED and at_rest:
-            self._move(Stimulus.AT_REST)
+            self._move(Event.AT_REST)
         if self.state is _S.ARMED and self.switch(p.ENABLE_APS):
             accident = self._aps.accident(self.motion, now)
             if accident:
@@ -187,8 +187,8 @@ class UpfController(UpfNode):
 
     # -- states ----------------------------------------------------------------------------------
 
-    def _move(self, stimulus: Stimulus) -> None:
-        self._enter(after(machine.TRANSITIONS, self.state, stimulus))
+    def _move(self, event: Event) -> None:
+        self._enter(after(machine.TRANSITIONS, self.state, event))
 
     def _enter(self, state: ParachuteState) -> None:
         if state is not self.state or state is _S.NOT_READY:
@@ -202,15 +202,15 @@ class UpfController(UpfNode):
         wanted = machine.ENTRY_REQUESTS.get(state)
         self._entry_call = 0 if wanted is None else self._ask_vehicle(wanted)
 
-    def _possible(self, stimulus: Stimulus) -> bool:
-        return (self.state, stimulus) in machine.TRANSITIONS
+    def _possible(self, event: Event) -> bool:
+        return (self.state, event) in machine.TRANSITIONS
 
     def _set_errors(self, errors: set[str]) -> None:
         self.errors = errors
         self.send_soon(names.PARACHUTE_STATUS)
-        stimulus = Stimulus.FAULT if errors else Stimulus.FAULT_CLEARED
-        if self._possible(stimulus):
-            self._move(stimulus)
+        event = Event.FAULT if errors else Event.FAULT_CLEARED
+        if self._possible(event):
+            self._move(event)
 
     # -- launching -------------------------------------------------------------------------------
 
@@ -264,8 +264,8 @@ class UpfController(UpfNode):
         self._peers.triggers[source] = self.now
         name = self.definitions.state_name(names.TRIGGER_STATUS, values)
         fired = bool(values.get("is_launched")) or name == "LAUNCHED"
-        if fired and self._possible(Stimulus.TRIGGER_FIRED):
-            self._move(Stimulus.TRIGGER_FIRED)
+        if fired and self._possible(Event.TRIGGER_FIRED):
+            self._move(Event.TRIGGER_FIRED)
 
     def _parachute_service(self, request: Heard) -> dict[str, Any]:
         service = names.PARACHUTE_SERVICE
@@ -281,13 +281,13 @@ class UpfController(UpfNode):
         if switch is not None:
             if self.switch(switch):
                 return "REJECTED"
-            stimulus = Stimulus[name.removeprefix("TYPE_")]
-            if self.state is _ASKED_FOR[stimulus]:
+            event = Event[name.removeprefix("TYPE_")]
+            if self.state is _ASKED_FOR[event]:
                 # Asked once more, because the first answer was lost.
                 return "SUCCESS"
-            if not self._possible(stimulus):
+            if not self._possible(event):
                 return "FAILED"
-            self._move(stimulus)
+            self._move(event)
             return "SUCCESS"
         if name not in ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE"):
             return "REJECTED"

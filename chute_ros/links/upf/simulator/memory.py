@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID
 
@@ -81,9 +81,9 @@ class ParameterMemory:
 
     def execute(self, opcode: int) -> bool:
         """Save what is in use, or go back to what was delivered; other codes are none."""
-        if opcode == errands.OPCODE_ERASE:
+        if opcode == bus_requests.OPCODE_ERASE:
             self.values = dict(self._delivered)
-        elif opcode != errands.OPCODE_SAVE:
+        elif opcode != bus_requests.OPCODE_SAVE:
             return False
         self.saved = dict(self.values)
         return True

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
-from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.simulator.clock import BusClock
@@ -65,11 +65,11 @@ class UpfNode(Actor):
         self.messages: dict[str, Callable[[int, Mapping[str, Any]], None]] = {}
         #: Service type -> what it answers to a request.
         self.services: dict[str, Callable[[Heard], dict[str, Any] | None]] = {
-            errands.GET_NODE_INFO: self._get_node_info,
-            errands.GET_SET: self._get_set,
-            errands.EXECUTE_OPCODE: self._execute_opcode,
-            errands.TRANSPORT_STATS: self._transport_stats,
-            errands.RESTART_NODE: self._restart_node,
+            bus_requests.GET_NODE_INFO: self._get_node_info,
+            bus_requests.GET_SET: self._get_set,
+            bus_requests.EXECUTE_OPCODE: self._execute_opcode,
+            bus_requests.TRANSPORT_STATS: self._transport_stats,
+            bus_requests.RESTART_NODE: self._restart_node,
         }
         #: What is broadcast: message type -> (interval in s, what makes it).
         self.broadcasts: dict[str, tuple[Callable[[], float], Callable[[], dict[str, Any]]]] = {
@@ -232,7 +232,7 @@ class UpfNode(Actor):
         answer = None if handler is None else handler(request)
         if answer is not None:
             self.endpoint.respond(request, answer)
-            if request.name == errands.RESTART_NODE and answer["ok"]:
+            if request.name == bus_requests.RESTART_NODE and answer["ok"]:
                 self._last_words += self.endpoint.take_output()
                 self.reboot()
 
@@ -259,7 +259,7 @@ class UpfNode(Actor):
         }
 
     def _restart_node(self, request: Heard) -> dict[str, Any]:
-        return {"ok": request.values["magic_number"] == errands.RESTART_MAGIC}
+        return {"ok": request.values["magic_number"] == bus_requests.RESTART_MAGIC}
 
     def _get_set(self, request: Heard) -> dict[str, Any]:
         name = self.memory.name_of(request.values)

@@ -8,8 +8,8 @@ from upf_link_bench import BY_REQUEST, Bench, layout_of
 from chute_ros.errors import ParameterError
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import UpfConfig
+from chute_ros.links.upf.protocol.device_table import MOST_DEVICES
 from chute_ros.links.upf.protocol.events import TriggerChanged
-from chute_ros.links.upf.protocol.roster import MOST_DEVICES
 from chute_ros.model import LinkState, ParachuteState, SafetyFlags, TriggerFlags
 from chute_ros.protocol.events import DeviceLinkChanged
 

@@ -17,10 +17,10 @@ from upf_link_bench import (
     layout_of,
 )
 
-from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import UpfConfig
-from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.events import BusRequestFinished
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.protocol.dronecan.can_frame import CanFrame, pack
 from chute_ros.protocol.dronecan.transfer import Kind, Transfer, frames_of
@@ -41,8 +41,8 @@ NAMES = [
     "uavcan.protocol.GetTransportStats",
     "uavcan.protocol.GlobalTimeSync",
     "uavcan.protocol.dynamic_node_id.Allocation",
-    errands.GET_SET,
-    errands.EXECUTE_OPCODE,
+    bus_requests.GET_SET,
+    bus_requests.EXECUTE_OPCODE,
 ]
 #: Texts of a parameter, from good to absurd.
 TEXTS = st.sampled_from(["true", "false", "50", "-1", "nan", "9" * 40, "", "x" * 200])
@@ -55,10 +55,12 @@ ASKS = st.sampled_from(
         lambda link, token, now, text: link.service(token, "TYPE_TAKEOFF", 0, now),
         lambda link, token, now, text: link.service(token, "TYPE_LAND", 33, now),
         lambda link, token, now, text: link.service(token, "TYPE_DEPLOY", 0, now),
-        lambda link, token, now, text: link.errand(token, 0, errands.list_parameters, now),
-        lambda link, token, now, text: link.errand(token, 34, errands.node_info, now),
-        lambda link, token, now, text: link.disturb(token, 0, True, errands.restart, now),
-        lambda link, token, now, text: link.disturb(token, 0, False, errands.restart, now),
+        lambda link, token, now, text: link.bus_request(
+            token, 0, bus_requests.list_parameters, now
+        ),
+        lambda link, token, now, text: link.bus_request(token, 34, bus_requests.node_info, now),
+        lambda link, token, now, text: link.disturb(token, 0, True, bus_requests.restart, now),
+        lambda link, token, now, text: link.disturb(token, 0, False, bus_requests.restart, now),
         lambda link, token, now, text: link.set_parameter(token, 0, p.LIGHT, text, False, now),
         lambda link, token, now, text: link.set_parameter(
             token, 33, p.ENABLE_APS, text, False, now
@@ -88,7 +90,7 @@ def transfers(draw, layout):
 def finished(events):
     """The tokens of all ends."""
     ends = [one.finished.token for one in events if isinstance(one, RequestFinished)]
-    return ends + [one.token for one in events if isinstance(one, ErrandFinished)]
+    return ends + [one.token for one in events if isinstance(one, BusRequestFinished)]
 
 
 @settings(max_examples=150)

@@ -6,29 +6,29 @@ import pytest
 
 from chute_ros.errors import TransitionError
 from chute_ros.links.upf.protocol import machine
-from chute_ros.links.upf.protocol.machine import Stimulus as E
+from chute_ros.links.upf.protocol.machine import Event
 from chute_ros.model import ParachuteState as S
 from chute_ros.transitions import after
 
 NAMED = [state for state in S if state is not S.UNKNOWN]
-RESTARTS = {(state, E.RESTART): S.NOT_READY for state in NAMED}
+RESTARTS = {(state, Event.RESTART): S.NOT_READY for state in NAMED}
 WANTED = {
-    (S.NOT_READY, E.SELF_TEST_PASSED): S.READY,
-    (S.NOT_READY, E.SELF_TEST_FAILED): S.ABNORMAL,
-    (S.NOT_READY, E.TRIGGER_FIRED): S.LAUNCHED,
-    (S.READY, E.TAKEOFF): S.TAKEOFF,
-    (S.READY, E.TRIGGER_FIRED): S.LAUNCHED,
-    (S.READY, E.FAULT): S.ABNORMAL,
-    (S.TAKEOFF, E.ARM): S.ARMED,
-    (S.TAKEOFF, E.LAND): S.READY,
-    (S.TAKEOFF, E.TRIGGER_FIRED): S.LAUNCHED,
-    (S.TAKEOFF, E.FAULT): S.ABNORMAL,
-    (S.ARMED, E.DISARM): S.TAKEOFF,
-    (S.ARMED, E.TRIGGER_FIRED): S.LAUNCHED,
-    (S.ARMED, E.FAULT): S.ABNORMAL,
-    (S.LAUNCHED, E.AT_REST): S.TOUCHDOWN,
-    (S.ABNORMAL, E.FAULT_CLEARED): S.READY,
-    (S.ABNORMAL, E.TRIGGER_FIRED): S.LAUNCHED,
+    (S.NOT_READY, Event.SELF_TEST_PASSED): S.READY,
+    (S.NOT_READY, Event.SELF_TEST_FAILED): S.ABNORMAL,
+    (S.NOT_READY, Event.TRIGGER_FIRED): S.LAUNCHED,
+    (S.READY, Event.TAKEOFF): S.TAKEOFF,
+    (S.READY, Event.TRIGGER_FIRED): S.LAUNCHED,
+    (S.READY, Event.FAULT): S.ABNORMAL,
+    (S.TAKEOFF, Event.ARM): S.ARMED,
+    (S.TAKEOFF, Event.LAND): S.READY,
+    (S.TAKEOFF, Event.TRIGGER_FIRED): S.LAUNCHED,
+    (S.TAKEOFF, Event.FAULT): S.ABNORMAL,
+    (S.ARMED, Event.DISARM): S.TAKEOFF,
+    (S.ARMED, Event.TRIGGER_FIRED): S.LAUNCHED,
+    (S.ARMED, Event.FAULT): S.ABNORMAL,
+    (S.LAUNCHED, Event.AT_REST): S.TOUCHDOWN,
+    (S.ABNORMAL, Event.FAULT_CLEARED): S.READY,
+    (S.ABNORMAL, Event.TRIGGER_FIRED): S.LAUNCHED,
     **RESTARTS,
 }
 JUMPS = {(before, after) for (before, _), after in WANTED.items()}
@@ -42,13 +42,13 @@ def test_states_are_numbered_as_in_the_document():
 
 
 def test_pair_of_state_and_stimulus_moves_or_raises():
-    for state, stimulus in itertools.product(S, E):
-        if (state, stimulus) in WANTED:
-            moved = after(machine.TRANSITIONS, state, stimulus)
-            assert moved is WANTED[state, stimulus], (state, stimulus)
+    for state, event in itertools.product(S, Event):
+        if (state, event) in WANTED:
+            moved = after(machine.TRANSITIONS, state, event)
+            assert moved is WANTED[state, event], (state, event)
         else:
             with pytest.raises(TransitionError, match=state.name):
-                after(machine.TRANSITIONS, state, stimulus)
+                after(machine.TRANSITIONS, state, event)
 
 
 def test_jump_is_known_if_the_table_has_a_cause_for_it():
@@ -58,9 +58,9 @@ def test_jump_is_known_if_the_table_has_a_cause_for_it():
         assert machine.is_known_jump(before, now) is known, (before, now)
         moved = before not in (now, S.UNKNOWN)
         assert bool(machine.causes(before, now)) is (moved and listed), (before, now)
-    assert machine.causes(S.READY, S.TAKEOFF) == [E.TAKEOFF]
-    assert set(machine.causes(S.ABNORMAL, S.READY)) == {E.FAULT_CLEARED}
-    assert machine.causes(S.TOUCHDOWN, S.NOT_READY) == [E.RESTART]
+    assert machine.causes(S.READY, S.TAKEOFF) == [Event.TAKEOFF]
+    assert set(machine.causes(S.ABNORMAL, S.READY)) == {Event.FAULT_CLEARED}
+    assert machine.causes(S.TOUCHDOWN, S.NOT_READY) == [Event.RESTART]
 
 
 def test_requests_on_entering_a_state_are_those_of_the_document():

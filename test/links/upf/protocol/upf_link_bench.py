@@ -15,7 +15,7 @@ from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.config import NODE_ID, UpfConfig
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.protocol.devices import SAYINGS, SAYINGS_ORDERED
-from chute_ros.links.upf.protocol.events import ErrandFinished
+from chute_ros.links.upf.protocol.events import BusRequestFinished
 from chute_ros.links.upf.protocol.link import UpfLink
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import (
@@ -307,12 +307,12 @@ class Bench:
         (end,) = self.ends(token)
         return end
 
-    def errand(self, token):
-        """How the errand ended; exactly once."""
+    def bus_request(self, token):
+        """How the bus request ended; exactly once."""
         (done,) = [
             one.done
             for one in self.events
-            if isinstance(one, ErrandFinished) and one.token == token
+            if isinstance(one, BusRequestFinished) and one.token == token
         ]
         return done
 

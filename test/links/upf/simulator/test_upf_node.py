@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from upf_device_bench import CONTROLLER, NODE_STATUS, TRIGGER, Story, Vehicle, ready
 
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
-from chute_ros.links.upf.protocol import errands
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.simulator.trigger import TRIGGER_PARAMETERS
 from chute_ros.protocol.dronecan import time_sync
@@ -32,13 +32,13 @@ def test_it_has_the_twelve_parameters_of_the_document():
     story = ready()
     listed = []
     for index in range(20):
-        answer = story.call(errands.GET_SET, {"index": index})
+        answer = story.call(bus_requests.GET_SET, {"index": index})
         if not answer["name"]:
             break
         listed.append(answer["name"].decode())
     assert sorted(listed) == sorted(one.name for one in p.PARAMETERS)
     assert len(listed) == 12
-    beyond = story.call(errands.GET_SET, {"index": 12})
+    beyond = story.call(bus_requests.GET_SET, {"index": 12})
     assert p.kind_of(beyond["value"]) == ""
 
 
@@ -94,11 +94,11 @@ def test_an_unknown_name_is_answered_with_nothing():
         assert answer["name"] == b"", name
         assert p.kind_of(answer["value"]) == ""
         assert story.set(name, True) is None
-    assert ready().call(errands.GET_SET, {"name": b"\xff\xfe"})["name"] == b""
+    assert ready().call(bus_requests.GET_SET, {"name": b"\xff\xfe"})["name"] == b""
 
 
 def test_a_name_counts_more_than_an_index():
-    answer = ready().call(errands.GET_SET, {"index": 3, "name": p.LIGHT.encode()})
+    answer = ready().call(bus_requests.GET_SET, {"index": 3, "name": p.LIGHT.encode()})
     assert answer["name"].decode() == p.LIGHT
 
 
@@ -172,7 +172,7 @@ def test_a_change_survives_a_restart_with_auto_save_or_once_it_is_saved():
     for auto_save, opcode, later, kept in (
         (True, None, None, True),
         (False, None, None, False),
-        (False, errands.OPCODE_SAVE, None, True),
+        (False, bus_requests.OPCODE_SAVE, None, True),
         (False, None, True, True),
     ):
         story = ready()
@@ -193,7 +193,7 @@ def test_erase_brings_back_what_was_delivered():
     story.set(p.ENABLE_APS, False)
     story.set(p.PARACHUTE_STATUS_INTERVAL, 1000)
     story.set(p.STATIC_NODE_ID, 77)
-    assert story.opcode(errands.OPCODE_ERASE)
+    assert story.opcode(bus_requests.OPCODE_ERASE)
     assert p.value_of(story.get(p.ENABLE_APS)["value"]) is True
     story.forget()
     story.run(1.0)
@@ -208,7 +208,7 @@ def test_erase_brings_back_what_was_delivered():
 def test_it_says_who_it_is():
     story, units = ready(), set()
     for server, name in ((CONTROLLER, b"upf.controller"), (TRIGGER, b"upf.trigger")):
-        answer = story.call(errands.GET_NODE_INFO, {}, server)
+        answer = story.call(bus_requests.GET_NODE_INFO, {}, server)
         assert answer["name"] == name
         unit = bytes(answer["hardware_version"]["unique_id"])
         assert len(unit) == 16
@@ -232,10 +232,10 @@ def test_node_status_comes_at_its_interval_with_uptime_and_health():
 
 def test_transport_stats_count_transfers_and_errors():
     story = ready()
-    first = story.call(errands.TRANSPORT_STATS, {})
+    first = story.call(bus_requests.TRANSPORT_STATS, {})
     story.run(1.0)
     story.bus.receive(b"\x00" * 15, story.now)
-    second = story.call(errands.TRANSPORT_STATS, {})
+    second = story.call(bus_requests.TRANSPORT_STATS, {})
     assert second["transfers_tx"] - first["transfers_tx"] >= 10
     assert second["transfers_rx"] - first["transfers_rx"] >= 10
     assert second["transfer_errors"] - first["transfer_errors"] == 1
@@ -249,13 +249,13 @@ def test_a_restart_is_answered_and_then_done_unless_its_magic_number_is_another(
         story = ready()
         story.restart(server)
         story.run(0.5)
-        answer = story.call(errands.GET_NODE_INFO, {}, server)
+        answer = story.call(bus_requests.GET_NODE_INFO, {}, server)
         assert (answer["status"]["uptime_sec"], answer["name"]) == (0, name)
-    for magic in (0, errands.RESTART_MAGIC - 1, 2**40 - 1):
+    for magic in (0, bus_requests.RESTART_MAGIC - 1, 2**40 - 1):
         story = ready()
-        assert story.call(errands.RESTART_NODE, {"magic_number": magic}) == {"ok": False}
+        assert story.call(bus_requests.RESTART_NODE, {"magic_number": magic}) == {"ok": False}
         story.run(0.5)
-        assert story.call(errands.GET_NODE_INFO, {})["status"]["uptime_sec"] == 1, magic
+        assert story.call(bus_requests.GET_NODE_INFO, {})["status"]["uptime_sec"] == 1, magic
 
 
 def test_services_that_it_does_not_have_are_not_answered():
@@ -273,7 +273,7 @@ def test_a_mute_one_speaks_but_neither_obeys_nor_answers():
     story.bus.act("mute")
     story.forget()
     assert story.ask("TAKEOFF") is None
-    assert story.call(errands.GET_NODE_INFO, {}) is None
+    assert story.call(bus_requests.GET_NODE_INFO, {}) is None
     story.run(1.0)
     assert len(story.heard(STATUS)) >= 9
     assert story.states() == [story.state]
@@ -285,7 +285,7 @@ def test_a_silent_one_says_nothing_until_it_speaks_again():
     story = ready()
     story.bus.act("silent")
     story.forget()
-    assert story.call(errands.GET_NODE_INFO, {}) is None
+    assert story.call(bus_requests.GET_NODE_INFO, {}) is None
     story.run(3.0)
     assert story.vehicle.messages == {}
     story.bus.act("speak")
@@ -336,8 +336,8 @@ KNOWN = [
     *((Kind.MESSAGE, name) for name in (names.VEHICLE_STATUS, names.TRIGGER_STATUS)),
     *((Kind.MESSAGE, name) for name in (names.TRIGGER_LAUNCH, time_sync.MESSAGE)),
     *((Kind.REQUEST, name) for name in (names.PARACHUTE_SERVICE, names.TRIGGER_SERVICE)),
-    *((Kind.REQUEST, name) for name in (errands.GET_SET, errands.EXECUTE_OPCODE)),
-    *((Kind.REQUEST, name) for name in (errands.RESTART_NODE, errands.GET_NODE_INFO)),
+    *((Kind.REQUEST, name) for name in (bus_requests.GET_SET, bus_requests.EXECUTE_OPCODE)),
+    *((Kind.REQUEST, name) for name in (bus_requests.RESTART_NODE, bus_requests.GET_NODE_INFO)),
     (Kind.RESPONSE, names.VEHICLE_SERVICE),
     (Kind.MESSAGE, "uavcan.protocol.dynamic_node_id.Allocation"),
 ]

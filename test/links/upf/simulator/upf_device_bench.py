@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
-from chute_ros.links.upf.protocol import errands
 from chute_ros.links.upf.protocol import parameters as p
 from chute_ros.links.upf.protocol.definitions import Definitions
 from chute_ros.links.upf.simulator.bus import UpfBus
@@ -183,26 +183,28 @@ class Story:
 
     def get(self, name, server=CONTROLLER):
         """GetSet without a value."""
-        answer = self.call(errands.GET_SET, {"name": name.encode()}, server)
+        answer = self.call(bus_requests.GET_SET, {"name": name.encode()}, server)
         assert answer is not None
         return answer
 
     def set(self, name, value, server=CONTROLLER):
         """GetSet with a value; the value after it."""
         request = {"name": name.encode(), "value": p.union_of(value)}
-        answer = self.call(errands.GET_SET, request, server)
+        answer = self.call(bus_requests.GET_SET, request, server)
         assert answer is not None
         return p.value_of(answer["value"])
 
     def opcode(self, opcode):
         """ExecuteOpcode; whether it was done."""
-        answer = self.call(errands.EXECUTE_OPCODE, {"opcode": opcode})
+        answer = self.call(bus_requests.EXECUTE_OPCODE, {"opcode": opcode})
         assert answer is not None
         return bool(answer["ok"])
 
     def restart(self, server=CONTROLLER):
         """RestartNode."""
-        answer = self.call(errands.RESTART_NODE, {"magic_number": errands.RESTART_MAGIC}, server)
+        answer = self.call(
+            bus_requests.RESTART_NODE, {"magic_number": bus_requests.RESTART_MAGIC}, server
+        )
         assert answer == {"ok": True}
 
     # -- what is seen ---------------------------------------------------------------------------

@@ -38,8 +38,8 @@ class DeviceParameter:
 
 
 @dataclass(frozen=True)
-class ErrandDone:
-    """The end of an errand. node_id: of the device; values: of the response asked for last."""
+class BusRequestDone:
+    """The end of a bus request. node_id: of the device; values: of the response asked for last."""
 
     success: bool
     message: str
@@ -48,50 +48,50 @@ class ErrandDone:
     values: Mapping[str, Any] = field(default_factory=dict)
 
 
-Errand = Generator[Call, CallFinished, ErrandDone]
+BusRequest = Generator[Call, CallFinished, BusRequestDone]
 
 
-def get_parameter(node_id: int, name: str) -> Errand:
+def get_parameter(node_id: int, name: str) -> BusRequest:
     """Read one by name."""
     found = yield from _find(node_id, name)
-    if isinstance(found, ErrandDone):
+    if isinstance(found, BusRequestDone):
         return found
     text = f"{name} is {p.words(found.value)}{_range(found)}"
-    return ErrandDone(True, text, node_id, (found,))
+    return BusRequestDone(True, text, node_id, (found,))
 
 
 def set_parameter(
     node_id: int, name: str, text: str, auto_save: Callable[[], bool | None] = lambda: None
-) -> Errand:
+) -> BusRequest:
     """Read one for its type and range, set it, and read it back. auto_save: whether the device
     keeps a change by itself; None: not known."""
     before = yield from _find(node_id, name)
-    if isinstance(before, ErrandDone):
+    if isinstance(before, BusRequestDone):
         return before
     try:
         wanted = p.parse(text, before.kind, name)
     except ParameterError as error:
-        return ErrandDone(False, f"{error}; nothing was sent", node_id, (before,))
+        return BusRequestDone(False, f"{error}; nothing was sent", node_id, (before,))
     low, high = _limits(before)
     number = isinstance(wanted, (int, float)) and not isinstance(wanted, bool)
     if number and (_below(wanted, low) or _below(high, wanted)):
         why = f"{name} cannot be {text}: need {p.words(low)} to {p.words(high)}; nothing was sent"
-        return ErrandDone(False, why, node_id, (before,))
+        return BusRequestDone(False, why, node_id, (before,))
     values = {"name": _encoded(name), "value": p.union_of(wanted)}
     answer = yield Call(node_id, GET_SET, values)
     unknown = replace(before, value=None)
     if answer.values is None:
-        return ErrandDone(
+        return BusRequestDone(
             False, f"{name} may or may not be set: {answer.text()}", node_id, (unknown,)
         )
     answer = yield _get(node_id, name)
     after = _read(answer)
     if after is None or after.name != name:
         why = f"{name} was sent, but not read back: {answer.text()}"
-        return ErrandDone(False, why, node_id, (unknown,))
+        return BusRequestDone(False, why, node_id, (unknown,))
     if not _same(after.value, wanted):
         why = f"{name} was not accepted: it is still {p.words(after.value)}"
-        return ErrandDone(False, why, node_id, (after,))
+        return BusRequestDone(False, why, node_id, (after,))
     keeps = p.as_switch(after.value) if name == p.AUTO_SAVE else auto_save()
     text = f"{name} is {p.words(after.value)}"
     if name == p.STATIC_NODE_ID:
@@ -100,10 +100,10 @@ def set_parameter(
     if keeps is not None:
         lost = f"lost at a restart until ~/save_params: {p.AUTO_SAVE} is off"
         text += "; kept" if keeps else f"; {lost}"
-    return ErrandDone(True, text, node_id, (after,))
+    return BusRequestDone(True, text, node_id, (after,))
 
 
-def list_parameters(node_id: int) -> Errand:
+def list_parameters(node_id: int) -> BusRequest:
     """Read all, by index until the device names none."""
     found: list[DeviceParameter] = []
     for index in range(MOST_PARAMETERS):
@@ -111,55 +111,57 @@ def list_parameters(node_id: int) -> Errand:
         one = _read(answer)
         if one is None:
             why = f"stopped after {len(found)} parameters: {answer.text()}"
-            return ErrandDone(False, why, node_id, tuple(found))
+            return BusRequestDone(False, why, node_id, tuple(found))
         if not one.name:
-            return ErrandDone(True, f"{len(found)} parameters", node_id, tuple(found))
+            return BusRequestDone(True, f"{len(found)} parameters", node_id, tuple(found))
         found.append(one)
     why = f"stopped after {MOST_PARAMETERS} parameters: the device does not end its list"
-    return ErrandDone(False, why, node_id, tuple(found))
+    return BusRequestDone(False, why, node_id, tuple(found))
 
 
-def execute_opcode(node_id: int, opcode: int) -> Errand:
+def execute_opcode(node_id: int, opcode: int) -> BusRequest:
     """Save all parameters, or erase what was saved."""
     name = "save" if opcode == OPCODE_SAVE else "erase"
     texts = f"{name}: done", f"{name}: the device answered: not done"
     return (yield from _ask(Call(node_id, EXECUTE_OPCODE, {"opcode": opcode}), name, *texts))
 
 
-def restart(node_id: int) -> Errand:
+def restart(node_id: int) -> BusRequest:
     """RestartNode with its magic number."""
     will = "restart: the device answered that it will"
     call = Call(node_id, RESTART_NODE, {"magic_number": RESTART_MAGIC})
     return (yield from _ask(call, "restart", will, f"{will} not"))
 
 
-def transport_stats(node_id: int) -> Errand:
+def transport_stats(node_id: int) -> BusRequest:
     """GetTransportStats."""
     what = "transport statistics"
     return (yield from _ask(Call(node_id, TRANSPORT_STATS, {}), what, what))
 
 
-def node_info(node_id: int) -> Errand:
+def node_info(node_id: int) -> BusRequest:
     """GetNodeInfo."""
     what = "node information"
     return (yield from _ask(Call(node_id, GET_NODE_INFO, {}), what, what))
 
 
-def _ask(call: Call, what: str, done: str, not_done: str = "") -> Errand:
+def _ask(call: Call, what: str, done: str, not_done: str = "") -> BusRequest:
     """One call; the response's ok, where it has one, tells whether it was done."""
     answer = yield call
     if answer.values is None:
-        return ErrandDone(False, f"{what}: {answer.text()}", call.server)
+        return BusRequestDone(False, f"{what}: {answer.text()}", call.server)
     ok = bool(answer.values.get("ok", True))
-    return ErrandDone(ok, done if ok else not_done, call.server, values=answer.values)
+    return BusRequestDone(ok, done if ok else not_done, call.server, values=answer.values)
 
 
-def _find(node_id: int, name: str) -> Generator[Call, CallFinished, DeviceParameter | ErrandDone]:
-    """The parameter of this name as it is; ErrandDone: there is none."""
+def _find(
+    node_id: int, name: str
+) -> Generator[Call, CallFinished, DeviceParameter | BusRequestDone]:
+    """The parameter of this name as it is; BusRequestDone: there is none."""
     # An empty name would be a question by index, and set whatever has index 0.
     if not 1 <= len(_encoded(name)) <= p.MOST_NAME_BYTES:
         why = f"{name!r} is no parameter's name: need 1 to {p.MOST_NAME_BYTES} bytes"
-        return ErrandDone(False, why, node_id)
+        return BusRequestDone(False, why, node_id)
     answer = yield _get(node_id, name)
     found = _read(answer)
     if found is not None and found.kind and found.name == name:
@@ -168,7 +170,7 @@ def _find(node_id: int, name: str) -> Generator[Call, CallFinished, DeviceParame
     if found is not None:
         known = ", ".join(one.name for one in p.PARAMETERS)
         why = f"the device has no parameter {name!r}; the document lists {known}"
-    return ErrandDone(False, why, node_id)
+    return BusRequestDone(False, why, node_id)
 
 
 def _get(node_id: int, name: str) -> Call:

@@ -30,7 +30,7 @@ DeviceT = TypeVar("DeviceT", bound=Device)
 MOST_DEVICES = 8
 
 
-class UpfDevices(EventLog):
+class DeviceTable(EventLog):
     """Follows the controllers and triggers that are ours."""
 
     def __init__(self, config: UpfConfig, definitions: Definitions) -> None:

@@ -1,4 +1,4 @@
-"""The errands of one link: begun, refused where they would endanger a flight, ended.
+"""The bus requests of one link: begun, refused where they would endanger a flight, ended.
 
 Source: Flyfire UPF UAVCAN protocol V1.0, "standard UAVCAN protocols" and "parameters".
 """
@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from chute_ros.links.upf.protocol import errands
+from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import parameters as p
-from chute_ros.links.upf.protocol.errands import Errand, ErrandDone
-from chute_ros.links.upf.protocol.events import ErrandFinished
-from chute_ros.links.upf.protocol.roster import UpfDevices
+from chute_ros.links.upf.protocol.bus_requests import BusRequest, BusRequestDone
+from chute_ros.links.upf.protocol.device_table import DeviceTable
+from chute_ros.links.upf.protocol.events import BusRequestFinished
 from chute_ros.protocol.dronecan.bus_node import BusNode
 from chute_ros.protocol.events import Severity
 
@@ -20,18 +20,22 @@ from chute_ros.protocol.events import Severity
 READ_AGAIN = 10.0
 
 
-class ErrandDesk:
-    """Every errand ends in one ErrandFinished with its token."""
+class BusRequestTracker:
+    """Every bus request ends in one BusRequestFinished with its token."""
 
-    def __init__(self, bus: BusNode, devices: UpfDevices, in_air: Callable[[float], bool]) -> None:
+    def __init__(
+        self, bus: BusNode, devices: DeviceTable, in_air: Callable[[float], bool]
+    ) -> None:
         self._bus, self._devices, self._in_air = bus, devices, in_air
         #: Controller -> when its parameters are to be read again.
         self._read_again: dict[int, float] = {}
         #: Controllers whose parameters are being read.
         self._reading: set[int] = set()
-        self._finished: list[ErrandFinished] = []
+        self._finished: list[BusRequestFinished] = []
 
-    def errand(self, token: int, node_id: int, make: Callable[[int], Errand], now: float) -> None:
+    def bus_request(
+        self, token: int, node_id: int, make: Callable[[int], BusRequest], now: float
+    ) -> None:
         """Ask something of a device. node_id 0: the chosen one."""
         target = self._target(node_id)
         if target:
@@ -54,20 +58,20 @@ class ErrandDesk:
                 return
             self._devices.notice(Severity.WARNING, f"{name} is being switched off")
 
-        def make(target: int) -> Errand:
-            return errands.set_parameter(target, name, text, lambda: self._keeps(target))
+        def make(target: int) -> BusRequest:
+            return bus_requests.set_parameter(target, name, text, lambda: self._keeps(target))
 
-        self.errand(token, node_id, make, now)
+        self.bus_request(token, node_id, make, now)
 
     def disturb(
-        self, token: int, node_id: int, force: bool, make: Callable[[int], Errand], now: float
+        self, token: int, node_id: int, force: bool, make: Callable[[int], BusRequest], now: float
     ) -> None:
-        """An errand that takes the device away for a while: refused in the air unless forced."""
+        """The same for what takes the device away for a while: in the air it needs force."""
         if self._in_air(now) and not force:
             why = "refused while the vehicle is in the air; force does it all the same"
             self._refuse(token, node_id, why)
         else:
-            self.errand(token, node_id, make, now)
+            self.bus_request(token, node_id, make, now)
 
     def update(self, now: float) -> None:
         """Read the parameters of new controllers, and end what has ended."""
@@ -84,17 +88,17 @@ class ErrandDesk:
             self._read_again.pop(controller.node_id, None)
             self._reading.add(controller.node_id)
             token = ("parameters", controller.node_id)
-            self._bus.begin(token, errands.list_parameters(controller.node_id), now)
+            self._bus.begin(token, bus_requests.list_parameters(controller.node_id), now)
         self._devices.to_read.clear()
         for ended, result in self._bus.take_ended():
-            assert isinstance(result, ErrandDone)
+            assert isinstance(result, BusRequestDone)
             self._end(ended, result, now)
 
     def next_deadline(self) -> float:
         """When update has something to do by itself; infinity: never."""
         return min(self._read_again.values(), default=math.inf)
 
-    def take_finished(self) -> list[ErrandFinished]:
+    def take_finished(self) -> list[BusRequestFinished]:
         """What has ended; each is handed out once."""
         finished, self._finished = self._finished, []
         return finished
@@ -112,16 +116,16 @@ class ErrandDesk:
         return None if controller is None else controller.switch(p.AUTO_SAVE)
 
     def _refuse(self, token: int, node_id: int, why: str) -> None:
-        self._finished.append(ErrandFinished(token, ErrandDone(False, why, node_id)))
+        self._finished.append(BusRequestFinished(token, BusRequestDone(False, why, node_id)))
 
-    def _end(self, token: object, done: ErrandDone, now: float) -> None:
+    def _end(self, token: object, done: BusRequestDone, now: float) -> None:
         controller = self._devices.controllers.get(done.node_id)
         if controller is not None:
             controller.parameters |= {one.name: one.value for one in done.parameters}
         if isinstance(token, int):
-            self._finished.append(ErrandFinished(token, done))
+            self._finished.append(BusRequestFinished(token, done))
             return
         self._reading.discard(done.node_id)
         # A list that never ends is not begun again.
-        if done.success or len(done.parameters) < errands.MOST_PARAMETERS:
+        if done.success or len(done.parameters) < bus_requests.MOST_PARAMETERS:
             self._read_again[done.node_id] = now + READ_AGAIN
