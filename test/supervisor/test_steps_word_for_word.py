@@ -119,8 +119,9 @@ def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device() -> None:
     assert one.state.killing.kill == Pending(decision, BOTH, 100.0, 100.0)
 
 
-def test_no_kill_leaves_from_one_that_follows() -> None:
-    one = steps(leading=False)
+@pytest.mark.parametrize("known", [{"leading": False}, {"mode": i.Mode.INHIBITED}])
+def test_no_kill_leaves_from_one_that_follows_or_is_inhibited(known: dict[str, Any]) -> None:
+    one = steps(**known)
     fire(one, K, "tested", ("why",))
     assert one.outputs == []
 
