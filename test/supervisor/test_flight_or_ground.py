@@ -38,7 +38,7 @@ def known(
     """A state with these measurements, just made, and this word of the autopilot."""
     said = VehicleState(armed=armed, armed_age=0.0, landed_state=landed, landed_state_age=0.0)
     measurements = {name: Measured(value, NOW, NOW, 1) for name, value in told.items()}
-    return changed(State(7, 0.0), vehicle=said, vehicle_received=NOW, measurements=measured)
+    return changed(State(7, 0.0), vehicle=said, vehicle_received=NOW, measurements=measurements)
 
 
 @pytest.mark.parametrize(
