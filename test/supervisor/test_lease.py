@@ -10,14 +10,7 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
-from chute_ros.supervisor.lease import (
-    TRANSITIONS,
-    Claim,
-    Event,
-    Lease,
-    LeaseConfig,
-    Role,
-)
+from chute_ros.supervisor.lease import TRANSITIONS, Claim, Event, Lease, LeaseConfig, Role
 from chute_ros.transitions import after
 
 FIRST = LeaseConfig("a", 0, standby=True, timeout=0.5, listen=4.0)

@@ -96,12 +96,7 @@ def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
 
 @pytest.mark.parametrize(
     "known",
-    [
-        {"leading": False},
-        {"mode": i.Mode.INHIBITED},
-        {"stage": Stage.KILLING},
-        {"kill": None},
-    ],
+    [{"leading": False}, {"mode": i.Mode.INHIBITED}, {"stage": Stage.KILLING}, {"kill": None}],
 )
 def test_no_deploy_leaves_without_its_kill_its_stage_its_mode_and_the_lead(
     known: dict[str, Any],
