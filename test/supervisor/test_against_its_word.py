@@ -68,10 +68,7 @@ def test_one_that_says_so_high_above_its_take_off_must_say_it_for_longer(
 
 @pytest.mark.parametrize(
     "said",
-    [
-        {"landed_state": GROUND},
-        {"landed_state": LandedState.IN_AIR, "armed": Armed.DISARMED},
-    ],
+    [{"landed_state": GROUND}, {"landed_state": LandedState.IN_AIR, "armed": Armed.DISARMED}],
 )
 def test_a_supervisor_that_starts_in_the_middle_of_a_fall_sees_it(said: dict[str, Any]) -> None:
     story = Story(shipped("multirotor"))

@@ -317,8 +317,7 @@ def test_all_that_are_abnormal_are_told_each_within_the_limits_of_its_link() -> 
 def test_a_speed_that_is_told_by_the_heights_has_their_samples() -> None:
     height = Measured(value=30.0, measured_at=NOW, same_since=NOW, count=7)
     known = state(
-        measurements=MappingProxyType({"height": height}),
-        heights=((NOW - 1.0, 50.0), (NOW, 30.0)),
+        measurements=MappingProxyType({"height": height}), heights=((NOW - 1.0, 50.0), (NOW, 30.0))
     )
     found = told(CONFIG, known, MeasurementCondition("vertical_speed", below=-12.0), NOW)
     assert (found.holds, found.samples) == (True, 7)

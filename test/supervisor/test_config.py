@@ -1,37 +1,76 @@
-"""Settings that contradict themselves stop the start; a vehicle's place without a landed state."""
+"""Settings at their very limits, and what is said past them, in full."""
 
 from typing import Any
 
 import pytest
-from story import LINK, START, Story
 
 from chute_ros.errors import ParameterError
-from chute_ros.model import Action, Armed, VehicleState
-from chute_ros.supervisor import flight
-from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.supervisor.sending import fire
-from chute_ros.supervisor.turn import Turn
+from chute_ros.supervisor.config import TRIGGER, Rung, SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkLimits
+
+#: With the smallest that is allowed.
+TIMES = {
+    "deploy_timeout": 0.1,
+    "kill_timeout": 0.1,
+    "resend_interval": 0.02,
+    "vehicle_state_age": 0.1,
+    "ladder_step_timeout": 0.1,
+    "alarm_interval": 0.1,
+    "late_after": 0.02,
+}
+
+
+def refusal(**settings: Any) -> str:
+    with pytest.raises(ParameterError) as caught:
+        SupervisorConfig(**settings)
+    return str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"kill_to_deploy_delay": 61.0}, "kill_to_deploy_delay is 61.0"),
-        (
-            {"deploy_timeout": 0.0},
-            "^parameter deploy_timeout is 0.0: need a number .* from 0.1 to 60 s",
-        ),
-        ({"resend_interval": float("nan")}, "resend_interval is nan"),
-        ({"required_links": ()}, "required_links is \\[\\]: need at least one"),
-        ({"deploy_links": ("",)}, "deploy_links is \\[''\\]"),
-    ],
+    ("name", "least"),
+    [*TIMES.items(), ("kill_to_deploy_delay", 0.0), ("low_kill_to_deploy_delay", 0.0)],
 )
-def test_a_wrong_setting_names_itself_and_what_is_allowed(
-    settings: dict[str, Any], words: str
+def test_every_time_may_reach_its_limits_and_is_told_past_them_in_full(
+    name: str, least: float
 ) -> None:
-    with pytest.raises(ParameterError, match=words):
-        SupervisorConfig(**settings)
+    for good in (least, 60.0):
+        assert getattr(SupervisorConfig(**{name: good}), name) == good
+    for wrong in (least - 0.001, -0.1, 60.1, float("nan"), *([0.0] if least else [])):
+        need = f"need a number (1.0, not 1) from {least:g} to 60 s ("
+        assert refusal(**{name: wrong}).startswith(f"parameter {name} is {wrong}: {need}")
+
+
+@pytest.mark.parametrize("name", ["required_links", "kill_links", "deploy_links"])
+def test_no_list_of_links_is_empty_or_has_an_empty_name(name: str) -> None:
+    assert refusal(**{name: ()}) == f"parameter {name} is []: need at least one link's name"
+    said = f"parameter {name} is ['a', '']: need at least one link's name"
+    assert refusal(**{name: ("a", "")}) == said
+
+
+def test_a_step_of_the_ladder_on_another_link_is_told_with_those_that_may_be() -> None:
+    said = "parameter deploy_ladder names c:1/162: need a link of deploy_links (a, b)"
+    assert refusal(deploy_links=("a", "b"), deploy_ladder=(Rung("a"), Rung("c", "1/162"))) == said
+
+
+def test_without_a_ladder_every_link_that_deploys_is_a_step() -> None:
+    config = SupervisorConfig(deploy_links=("a", "b"))
+    assert config.ladder == (Rung("a"), Rung("b"))
+    steps = (Rung("b", TRIGGER), Rung("a"))
+    assert SupervisorConfig(deploy_links=("a", "b"), deploy_ladder=steps).ladder == steps
+
+
+def test_a_step_is_written_as_it_is_read() -> None:
+    for text in ("upf_can", "upf_can:trigger", "mavlink_parachute:1/162"):
+        assert str(Rung.parse(text)) == text
+    assert Rung.parse("upf_can:trigger") == Rung("upf_can", TRIGGER)
+    assert Rung.parse("mavlink_parachute:1/162") == Rung("mavlink_parachute", "1/162")
+    for wrong in ("", ":", ":33", "upf_can:"):
+        with pytest.raises(ParameterError) as caught:
+            Rung.parse(wrong)
+        assert str(caught.value) == (
+            f"parameter deploy_ladder has {wrong!r}: need LINK or LINK:DEVICE, for example "
+            "mavlink_parachute, mavlink_parachute:1/162, upf_can:trigger"
+        )
 
 
 def test_every_link_is_followed_once() -> None:
@@ -39,41 +78,8 @@ def test_every_link_is_followed_once() -> None:
     assert config.links == ("a", "b", "c")
 
 
-@pytest.mark.parametrize(
-    ("armed", "height", "in_air"),
-    [
-        (Armed.ARMED, 2.1, True),
-        (Armed.ARMED, 1.9, False),
-        (Armed.DISARMED, 50.0, False),
-        (Armed.UNKNOWN, 50.0, None),
-    ],
-)
-def test_without_a_landed_state_armed_and_high_is_in_the_air(
-    armed: Armed, height: float, in_air: bool | None
-) -> None:
-    vehicle = VehicleState(armed=armed, armed_age=0.0, height=height, height_age=0.1)
-    story = Story()
-    story.at(0.0, i.VehicleReport(vehicle))
-    assert flight.in_air(story.config, story.state, START + 0.1) is in_air
-
-
-def test_an_unknown_height_says_nothing() -> None:
-    vehicle = VehicleState(armed=Armed.ARMED, armed_age=0.0)
-    story = Story()
-    story.at(0.0, i.VehicleReport(vehicle))
-    assert flight.in_air(story.config, story.state, START) is None
-
-
-def test_a_deploy_does_not_leave_before_its_kill_whoever_asks() -> None:
-    story = Story().flying()
-    turn = Turn(story.config, story.state, START)
-    fire(turn, Action.DEPLOY, "mistake", ())
-    assert turn.outputs == []
-
-
-def test_nothing_fires_in_another_mode() -> None:
-    story = Story(mode=i.Mode.INHIBITED).flying()
-    turn = Turn(story.config, story.state, START)
-    fire(turn, Action.KILL, "mistake", ())
-    assert turn.outputs == []
-    assert LINK in story.config.kill_links
+def test_a_link_has_its_own_limits_or_the_standard_ones() -> None:
+    slow = LinkLimits(2.0, 4.0)
+    config = SupervisorConfig(("a", "b"), link_limits={"a": slow})
+    assert config.limits("a") == slow
+    assert config.limits("b") == LinkLimits()

@@ -1,13 +1,15 @@
 """The leaky counter: up while it holds, down while not, never reset by one good sample."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from story import SINKS, TILTS, Story, rule, shipped, with_rules
 
-from chute_ros.supervisor.counter import Look, RuleEvidence
+from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
+from chute_ros.supervisor.counter import UNKNOWN_STANDS, Look, RuleEvidence
 from chute_ros.supervisor.rules import Rule
 
 #: Full after 1 s, empty again after 2 s, and three samples must have shown it.
@@ -31,9 +33,29 @@ def fulfilled(pattern: str, one: Rule = RULE) -> list[int]:
     return [n for n, evidence in enumerate(counted(pattern, one)) if evidence.fulfilled(one)]
 
 
-def test_it_is_full_when_it_has_held_for_so_long_and_not_before() -> None:
-    assert fulfilled("xxxxxxxxxx") == []
-    assert fulfilled("xxxxxxxxxxx") == [10]
+@pytest.mark.parametrize(
+    ("pattern", "at"),
+    [
+        # When it has held for so long, and not before.
+        ("xxxxxxxxxx", []),
+        ("xxxxxxxxxxx", [10]),
+        # Full alone is not enough: it must hold now.
+        ("x" * 11 + ".", [10]),
+        # One sample told for long is not three.
+        ("x" + "-" * 30, []),
+        ("x" + "-" * 30 + "x-x", [33]),
+    ],
+)
+def test_it_is_fulfilled_when_it_is_full_of_enough_samples(pattern: str, at: list[int]) -> None:
+    assert fulfilled(pattern) == at
+
+
+def test_without_a_hold_it_is_fulfilled_at_once_and_without_measurements_without_samples() -> None:
+    assert fulfilled("x", rule(SINKS)) == [0]
+    evidence = RuleEvidence()
+    for _ in range(12):
+        evidence = evidence.counted(RULE, 0.1).seeing(RULE, [Look(True, -1)])
+    assert evidence.fulfilled(RULE)
 
 
 def test_a_good_sample_does_not_reset_it() -> None:
@@ -54,15 +76,6 @@ def test_it_leaks_to_nothing_and_not_below() -> None:
 def test_it_does_not_count_beyond_full_so_that_it_leaks_at_once() -> None:
     assert counted("x" * 100)[-1].level == 1.0
     assert counted("x" * 100 + "..")[-1].level == pytest.approx(0.95)
-
-
-def test_full_alone_is_not_enough_it_must_hold_now() -> None:
-    assert fulfilled("x" * 11 + ".") == [10]
-
-
-def test_one_sample_told_for_long_is_not_three() -> None:
-    assert fulfilled("x" + "-" * 30) == []
-    assert fulfilled("x" + "-" * 30 + "x-x") == [33]
 
 
 def test_a_sample_that_denies_it_takes_the_leak_of_one_away() -> None:
@@ -111,17 +124,6 @@ def test_a_rule_of_the_same_name_with_other_conditions_begins_anew() -> None:
     before = counted("x" * 20)[-1]
     other = rule(SINKS, TILTS, hold=1.0, samples=3)
     assert before.seeing(other, [Look(True, 50), Look(True, 50)]).shown == (1.0, 1.0)
-
-
-def test_what_rests_on_no_measurement_needs_no_samples() -> None:
-    evidence = RuleEvidence()
-    for _ in range(12):
-        evidence = evidence.counted(RULE, 0.1).seeing(RULE, [Look(True, -1)])
-    assert evidence.fulfilled(RULE)
-
-
-def test_without_a_hold_it_is_fulfilled_at_once() -> None:
-    assert fulfilled("x", rule(SINKS)) == [0]
 
 
 def test_it_has_cleared_once_it_is_empty_and_does_not_hold() -> None:
@@ -214,3 +216,149 @@ def test_what_cannot_be_said_keeps_what_it_has_shown() -> None:
 def test_what_cannot_be_said_and_had_shown_nothing_keeps_nothing() -> None:
     """Else the few bad ones of a sensor that is noise add up beside one that is silent."""
     assert max(noisy([False] * 10 + [None] * 200)) <= 0.02 + 1e-9
+
+
+#: Full after 2 s.
+SLOW = rule(SINKS, hold=2.0, leak=0.5, samples=3)
+LIGHT, HEAVY = replace(SINKS, weight=1.0), replace(SINKS, weight=2.0)
+LOST = AutopilotCondition(AutopilotFact.LOST, counted=False)
+BOTH = rule(TILTS, SINKS)
+UNKNOWN = RuleEvidence(level=1.0, holds=None, shown=(2.0,), seen=(5,))
+
+
+def test_how_long_nothing_can_be_said_adds_up_and_ends_with_a_word() -> None:
+    once = UNKNOWN.counted(SLOW, 1.0)
+    assert (once.unknown, once.level, once.shown) == (1.0, 1.0, (2.0,))
+    assert once.counted(SLOW, 0.5).unknown == 1.5
+    assert RuleEvidence(holds=False, unknown=0.5).counted(BOTH, 0.1).unknown == 0.0
+    for holds in (True, False):
+        assert once.seeing(SLOW, [Look(holds, 6)]).counted(SLOW, 0.5).unknown == 0.0
+
+
+def test_past_its_stand_it_leaks_for_as_long_as_it_is_past() -> None:
+    nearly = RuleEvidence(level=1.0, holds=None, unknown=UNKNOWN_STANDS - 0.5)
+    assert nearly.counted(SLOW, 1.0).level == 0.75
+    past = RuleEvidence(level=1.0, holds=None, unknown=UNKNOWN_STANDS + 1.0)
+    assert past.counted(SLOW, 1.0).level == 0.5
+
+
+def test_what_cannot_be_said_shows_nothing_and_denies_nothing() -> None:
+    assert UNKNOWN.seeing(SLOW, [Look(None, 6)]).shown == (2.0,)
+    assert UNKNOWN.seeing(SLOW, [Look(None, 6)]).holds is None
+
+
+def test_a_sample_counts_once_also_where_none_has_come_so_far() -> None:
+    first = RuleEvidence().seeing(SLOW, [Look(True, 0)])
+    assert (first.shown, first.seen) == ((1.0,), (0,))
+    assert first.seeing(SLOW, [Look(True, 0)]).shown == (1.0,)
+
+
+@pytest.mark.parametrize(("seen", "enough"), [(-1, True), (0, False), (1, False)])
+def test_only_what_has_no_samples_needs_none(seen: int, enough: bool) -> None:
+    full = RuleEvidence(level=2.0, shown=(1.0,), seen=(0,)).seeing(SLOW, [Look(True, seen)])
+    assert full.holds
+    assert full.fulfilled(SLOW) is enough
+
+
+@pytest.mark.parametrize(
+    ("one", "looks", "holds"),
+    [
+        (rule(LIGHT, HEAVY, needed=2.0), [Look(True), Look(False)], False),
+        (rule(LIGHT, HEAVY, needed=2.0), [Look(False), Look(True)], True),
+        (rule(LIGHT, HEAVY, needed=2.0), [Look(True), Look(None)], None),
+        (rule(LIGHT, HEAVY, needed=2.0), [Look(None), Look(False)], False),
+        (rule(LIGHT, HEAVY, needed=2.0), [Look(None), Look(True)], True),
+        (rule(LIGHT, HEAVY, needed=2.0), [Look(False), Look(None)], None),
+        # What is in doubt counts for its part.
+        (rule(SINKS, doubted=0.5), [Look(True, 1)], True),
+        (rule(SINKS, doubted=0.5), [Look(True, 1, True)], False),
+        (rule(HEAVY, needed=1.0, doubted=0.5), [Look(True, 1, True)], True),
+        # What no sample ever told keeps nothing; what rests on none may be so.
+        (rule(SINKS), [Look(None, 0)], False),
+        (rule(AutopilotCondition(AutopilotFact.LOST)), [Look(None)], None),
+        (rule(LOST), [Look(None)], True),
+        # A weight that misses by the rounding is enough.
+        (rule(replace(SINKS, weight=2.0 - 1e-9), needed=2.0), [Look(True, 1)], True),
+    ],
+)
+def test_it_holds_with_enough_weight_and_cannot_be_said_where_the_rest_could_be(
+    one: Rule, looks: list[Look], holds: bool | None
+) -> None:
+    evidence = RuleEvidence().seeing(one, looks)
+    assert evidence.holds is holds
+
+
+def test_only_the_weight_that_was_shown_by_enough_samples_makes_it_sure() -> None:
+    one = rule(LIGHT, HEAVY, needed=2.0, samples=2)
+    evidence = RuleEvidence().seeing(one, [Look(True, 1), Look(True, 1)])
+    assert not evidence.seeing(one, [Look(True, 2), Look(True, 1)]).fulfilled(one)
+    assert evidence.seeing(one, [Look(True, 1), Look(True, 2)]).fulfilled(one)
+    assert not evidence.seeing(one, [Look(True, 2), Look(False, 2)]).fulfilled(one)
+
+
+def test_weights_that_miss_by_the_rounding_are_sure_as_well() -> None:
+    one = rule(SINKS, needed=1.0 + 1e-9)
+    assert RuleEvidence().seeing(one, [Look(True, -1)]).fulfilled(one)
+
+
+def test_the_rounding_itself_is_full_and_empty() -> None:
+    shortest = rule(SINKS, hold=1e-6, samples=0)
+    assert RuleEvidence(level=0.0, sure=True).fulfilled(shortest)
+    assert RuleEvidence(level=1e-6).cleared()
+    assert not RuleEvidence(level=2e-6).cleared()
+
+
+@pytest.mark.parametrize(("unknown", "stands"), [(1.0, 2.0), (4.0, 0.0)])
+def test_while_nothing_can_be_said_it_is_empty_after_its_stand(
+    unknown: float, stands: float
+) -> None:
+    waiting = RuleEvidence(level=1.0, holds=None, latched=True, unknown=unknown)
+    assert waiting.deadline(SLOW, 10.0) == 12.0 + stands
+    known = RuleEvidence(level=1.0, holds=False, latched=True, unknown=unknown)
+    assert known.deadline(SLOW, 10.0) == 12.0
+    assert RuleEvidence(level=1.0, holds=None).deadline(SLOW, 10.0) == math.inf
+
+
+def test_what_is_in_doubt_is_not_sure() -> None:
+    for doubted in (False, True):
+        evidence = RuleEvidence().seeing(rule(SINKS, doubted=0.5), [Look(True, 1, doubted)])
+        assert evidence.sure is not doubted
+
+
+@pytest.mark.parametrize("lost", [None, False])
+def test_what_is_not_counted_is_waited_for_and_must_be_so_at_the_end(lost: bool | None) -> None:
+    one = rule(LOST, SINKS)
+    evidence = RuleEvidence().seeing(one, [Look(lost), Look(True, 1)])
+    assert (evidence.holds, evidence.sure) == (True, False)
+    assert evidence.seeing(one, [Look(True), Look(True, 1)]).sure
+
+
+def test_one_sample_that_showed_it_is_enough_to_stand() -> None:
+    shown = RuleEvidence().seeing(rule(SINKS, samples=3), [Look(True, 1)])
+    assert shown.shown == (1.0,)
+    assert shown.seeing(rule(SINKS, samples=3), [Look(None, 1)]).holds is None
+
+
+def test_what_was_shown_stands_while_nothing_can_be_said_and_adds_up_with_what_is_so() -> None:
+    evidence = RuleEvidence().seeing(BOTH, [Look(True, 1), Look(True, 1)])
+    looks = [Look(True, 2), Look(None, 1)]
+    for seen in (looks, looks[::-1]):
+        assert evidence.seeing(BOTH, seen).holds is None
+    almost = rule(replace(SINKS, weight=2.0 - 1e-9), needed=2.0)
+    shown = RuleEvidence(shown=(1.0,), seen=(0,))
+    assert shown.seeing(almost, [Look(None, 0)]).holds is None
+
+
+def test_a_look_that_shows_nothing_new_changes_nothing() -> None:
+    """Most of them: nothing is made anew for it."""
+    evidence = RuleEvidence().seeing(BOTH, [Look(True, 1), Look(True, 1)])
+    assert evidence.seeing(BOTH, [Look(True, 1), Look(True, 1)]) is evidence
+    for looks in ([Look(True, 2), Look(True, 1)], [Look(True, 1), Look(True, 1, True)]):
+        assert evidence.seeing(rule(TILTS, SINKS, doubted=0.5), looks) is not evidence
+
+
+def test_a_sample_more_of_what_is_shown_enough_is_still_seen() -> None:
+    one = rule(SINKS, samples=1)
+    evidence = RuleEvidence().seeing(one, [Look(True, 1)])
+    later = evidence.seeing(one, [Look(True, 2)])
+    assert (later.shown, later.seen) == ((1.0,), (2,))

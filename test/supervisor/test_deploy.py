@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 from story import DOWN, FLYING, LINK, SINKS, STANDING, Story, parachute, rule, with_rules
 
-from chute_ros.errors import ParameterError
 from chute_ros.model import Action, Outcome
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import Rung, SupervisorConfig
@@ -451,23 +450,6 @@ def test_each_link_may_be_silent_for_its_own_time_and_its_step_ends_all_the_same
     assert story.newest(D).reasons[-1] == (
         "step 1 of 2, mavlink_parachute: not confirmed: no device node reported (2.00 s)"
     )
-
-
-def test_a_step_is_read_as_it_is_written_and_must_be_on_a_link_that_deploys() -> None:
-    for text, rung in (
-        ("upf_can", Rung("upf_can")),
-        ("upf_can:trigger", Rung("upf_can", "trigger")),
-        ("mavlink_parachute:1/162", Rung("mavlink_parachute", "1/162")),
-    ):
-        assert Rung.parse(text) == rung
-        assert str(rung) == text
-    for text in ("", ":", ":trigger", "upf_can:"):
-        with pytest.raises(ParameterError, match="need LINK or LINK:DEVICE, for example"):
-            Rung.parse(text)
-    with pytest.raises(ParameterError, match=r"deploy_ladder names upf_can:trigger: need a link"):
-        SupervisorConfig(deploy_ladder=(Rung(UPF, "trigger"),))
-    default = SupervisorConfig(deploy_links=BOTH)
-    assert default.ladder == (Rung(LINK), Rung(UPF)), "without a ladder the deploy links"
 
 
 # -- its end without a parachute -----------------------------------------------------------------

@@ -186,8 +186,7 @@ def test_after_a_kill_in_flight_a_rule_still_deploys_although_the_motors_are_off
 
 
 @pytest.mark.parametrize(
-    "silence",
-    [LinkCondition(ANY, (LinkJudgement.LOST,)), AutopilotCondition(AutopilotFact.LOST)],
+    "silence", [LinkCondition(ANY, (LinkJudgement.LOST,)), AutopilotCondition(AutopilotFact.LOST)]
 )
 def test_silence_alone_never_deploys_whatever_the_profile_says(silence: Any) -> None:
     story = wants(conditions=(silence,)).flying()

@@ -10,14 +10,7 @@ from hypothesis import strategies as st
 
 from chute_ros.errors import ParameterError, TransitionError
 from chute_ros.supervisor.epochs import LARGEST_EPOCH, RANKS, epoch_above
-from chute_ros.supervisor.lease import (
-    TRANSITIONS,
-    Claim,
-    Event,
-    Lease,
-    LeaseConfig,
-    Role,
-)
+from chute_ros.supervisor.lease import TRANSITIONS, Claim, Event, Lease, LeaseConfig, Role
 from chute_ros.transitions import after
 
 FIRST = LeaseConfig("a", 0, standby=True, timeout=0.5, listen=4.0)
@@ -27,6 +20,14 @@ T = 1000.0
 
 def claim(name: str, rank: int, epoch: int, leading: bool = True, empty: bool = False) -> Claim:
     return Claim(name, rank, epoch, leading, empty)
+
+
+def hears(name: str, rank: int, links_heard: int, leading: bool = True) -> Claim:
+    return knows(name, rank, False, links_heard, leading)
+
+
+def knows(name: str, rank: int, empty: bool, links_heard: int, leading: bool) -> Claim:
+    return Claim(name, rank, epoch_above(7, rank), leading, empty, links_heard)
 
 
 def leading(config: LeaseConfig, since: float = T) -> Lease:
@@ -51,6 +52,7 @@ def test_one_that_is_alone_leads_at_once_however_long_it_slept() -> None:
     lease = Lease.begin(alone, T)
     assert lease.role is Role.LEADING
     assert lease.deadline(alone) == math.inf
+    assert lease.waiting_since == T
     lease, event = lease.looked(alone, T)
     lease, event = lease.looked(alone, T + 60.0)
     assert (lease.role, event) == (Role.LEADING, None)
@@ -93,9 +95,11 @@ def test_silence_of_the_leader_is_a_takeover_the_first_in_rank_first(
 
 
 def test_a_follower_that_was_deaf_itself_does_not_take_its_deafness_for_silence() -> None:
-    lease = following(SECOND)
+    lease = replace(following(SECOND), leader="a")
     lease, event = lease.looked(SECOND, T + 3.0)
-    assert event is None
+    assert (event, lease.role, lease.leader) == (None, Role.FOLLOWING, "a")
+    assert (lease.waiting_since, lease.deadline(SECOND)) == (T + 3.0, T + 4.0)
+    assert math.isnan(lease.leader_heard)
     # What the leader said meanwhile is read now.
     lease, event = lease.heard(
         SECOND, claim("b", 1, 8, leading=False), claim("a", 0, 8), T + 3.001
@@ -121,8 +125,9 @@ def test_a_leader_that_was_stopped_has_lost_its_lease() -> None:
 
 
 def test_of_two_that_lead_the_one_that_came_later_goes_on() -> None:
-    lease, event = leading(FIRST).heard(FIRST, claim("a", 0, 8), claim("b", 1, 9), T)
+    lease, event = leading(FIRST).heard(FIRST, claim("a", 0, 8), claim("b", 1, 9), T + 1.0)
     assert (lease.role, event, lease.leader) == (Role.FOLLOWING, Event.OUTRANKED, "b")
+    assert (lease.waiting_since, lease.leader_heard) == (T + 1.0, T + 1.0)
     lease, event = leading(SECOND).heard(SECOND, claim("b", 1, 9), claim("a", 0, 8), T)
     assert (lease.role, event) == (Role.LEADING, None)
 
@@ -169,6 +174,8 @@ def test_a_follower_is_no_rival() -> None:
 def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -> None:
     lease, event = leading(FIRST).refused(9, T)
     assert (lease.role, event) == (Role.FOLLOWING, Event.REFUSED)
+    assert (lease.highest, lease.leader) == (9, "")
+    assert math.isnan(lease.leader_heard)
     for tenth in range(1, 50):
         lease, event = lease.looked(FIRST, T + tenth * 0.1)
         assert event is None
@@ -177,9 +184,14 @@ def test_whom_a_device_refuses_as_older_stands_back_although_nobody_is_heard() -
     assert lease.next_epoch(FIRST, 8) == 12
 
 
-def hears(name: str, rank: int, links_heard: int, leading: bool = True) -> Claim:
-    epoch = epoch_above(7, rank)
-    return Claim(name, rank, epoch, leading, empty=False, links_heard=links_heard)
+def test_one_that_was_refused_stands_back_all_the_same_and_then_leads_from_then_on() -> None:
+    refused, _ = leading(FIRST).refused(12, T)
+    own, other = knows("a", 0, False, 2, leading=False), knows("b", 1, True, 2, leading=True)
+    lease, event = refused.heard(FIRST, own, other, T + 1.0)
+    assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
+    now = refused.stand_back_until
+    lease, event = refused.heard(FIRST, own, other, now)
+    assert (lease.role, event, lease.waiting_since) == (Role.LEADING, Event.KNOWS_MORE, now)
 
 
 def claims(lease: Lease, leader: int, own: int, tenths: range) -> tuple[Lease, Event | None]:
@@ -207,10 +219,6 @@ def test_a_leader_that_hears_less_than_a_follower_loses_the_lease() -> None:
     later = replace(hears("b", 1, 2), epoch=lease.next_epoch(SECOND, 8))
     first, event = leading(FIRST).heard(FIRST, hears("a", 0, 0), later, T + 9.0)
     assert (first.role, event) == (Role.FOLLOWING, Event.OUTRANKED)
-
-
-def knows(name: str, rank: int, empty: bool, links_heard: int, leading: bool) -> Claim:
-    return Claim(name, rank, epoch_above(7, rank), leading, empty, links_heard)
 
 
 @pytest.mark.parametrize(
@@ -249,21 +257,6 @@ def test_until_it_hears_as_many_it_waits_for_as_long_as_it_listens() -> None:
     assert (later.role, event) == (Role.LEADING, Event.KNOWS_MORE)
     lease, event = lease.heard(FIRST, deaf, other, T + 4.0)
     assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
-
-
-def test_one_that_was_refused_stands_back_all_the_same() -> None:
-    lease, _ = leading(FIRST).refused(12, T)
-    own, other = knows("a", 0, False, 2, leading=False), knows("b", 1, True, 2, leading=True)
-    lease, event = lease.heard(FIRST, own, other, T + 1.0)
-    assert (lease.role, lease.leader, event) == (Role.FOLLOWING, "b", None)
-
-
-def test_until_it_has_stood_back_and_then_it_leads_from_now_on() -> None:
-    lease, _ = leading(FIRST).refused(12, T)
-    own, other = knows("a", 0, False, 2, leading=False), knows("b", 1, True, 2, leading=True)
-    now = lease.stand_back_until
-    lease, event = lease.heard(FIRST, own, other, now)
-    assert (lease.role, event, lease.waiting_since) == (Role.LEADING, Event.KNOWS_MORE, now)
 
 
 def test_a_leader_that_is_reset_keeps_its_lease() -> None:
@@ -358,29 +351,35 @@ def test_each_rank_has_its_own_epochs_each_above_the_last(seen: int, rank: int) 
         ({"rank": 4}, "rank is 4: need a whole number from 0 to 3"),
         ({"rank": -1}, "rank is -1"),
         ({"timeout": 0.1}, "lease_timeout is 0.1: need a number .* from 0.15 to 60 s"),
+        ({"timeout": 60.5}, "lease_timeout is 60.5"),
     ],
 )
 def test_a_wrong_setting_says_what_is_allowed(settings: dict[str, float], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         replace(FIRST, **settings)
+    for timeout in (0.15, 60.0):
+        assert LeaseConfig("a", timeout=timeout).timeout == timeout
 
 
-@pytest.mark.parametrize(
-    ("other", "words"),
-    [
-        (claim("x", 9, 4), "rank 9 (0 to 3)"),
-        (claim("x", 1, 4), "epoch 4, which is none of rank 1"),
-        (claim("x", 3, LARGEST_EPOCH), "above which there is none"),
-        (claim("x", 3, LARGEST_EPOCH, leading=False), "above which there is none"),
-        (claim("x", 3, LARGEST_EPOCH - RANKS), ""),
-        (claim("x", 1, 5), ""),
-        (claim("x", 1, 4, leading=False), ""),
-    ],
-)
-def test_a_claim_that_no_supervisor_makes_is_known_for_it(other: Claim, words: str) -> None:
-    wrong = other.implausible(0)
-    assert words in wrong
-    assert bool(wrong) == bool(words)
+def test_a_claim_that_no_supervisor_makes_is_known_for_it() -> None:
+    nothing_above = "above which there is none"
+    for other, hearer, why in (
+        (claim("x", 9, 4), 0, "rank 9 (0 to 3)"),
+        (claim("x", 4, 4), 0, "rank 4 (0 to 3)"),
+        (claim("x", -1, 3), 0, "rank -1 (0 to 3)"),
+        (claim("x", 1, 4), 0, "epoch 4, which is none of rank 1"),
+        (claim("x", 1, 6), 0, "epoch 6, which is none of rank 1"),
+        (claim("x", 0, 4), 0, ""),
+        (claim("x", 1, 5), 0, ""),
+        (claim("x", 1, 4, leading=False), 0, ""),
+        (claim("x", 3, LARGEST_EPOCH - RANKS), 0, ""),
+        (claim("x", 3, LARGEST_EPOCH), 0, f"epoch 4294967295, {nothing_above}"),
+        (claim("x", 3, LARGEST_EPOCH, leading=False), 0, f"epoch 4294967295, {nothing_above}"),
+        # It may leave the very last number, for whom that is one, and no less.
+        (claim("x", 2, LARGEST_EPOCH - 1), 3, ""),
+        (claim("x", 2, LARGEST_EPOCH - 1), 2, f"epoch 4294967294, {nothing_above}"),
+    ):
+        assert other.implausible(hearer) == why, (other, hearer)
 
 
 @given(st.integers(0, RANKS - 1), st.integers(0, LARGEST_EPOCH), st.integers(0, RANKS - 1))
@@ -392,3 +391,65 @@ def test_whom_one_listens_to_leaves_a_number_for_the_takeover(
     if not other.implausible(rank):
         lease, _ = following(config).heard(config, claim("a", rank, 0, leading=False), other, T)
         assert lease.next_epoch(config, 0) <= LARGEST_EPOCH
+
+
+def test_one_that_was_deaf_while_it_listened_after_its_start_listens_on() -> None:
+    lease, _ = Lease.begin(FIRST, T).looked(FIRST, T)
+    lease, event = lease.looked(FIRST, T + 0.6)
+    assert (event, lease.waiting_since) == (None, T + 4.0)
+
+
+def test_one_that_takes_over_has_no_leader_any_more() -> None:
+    lease = Lease(Role.FOLLOWING, T - 10.0, looked_at=T, leader="b", leader_heard=T)
+    lease, event = lease.looked(FIRST, T + 0.5)
+    assert (event, lease.role, lease.leader) == (Event.SILENCE, Role.LEADING, "")
+    assert lease.waiting_since == T + 0.5
+    assert math.isnan(lease.leader_heard)
+
+
+def test_of_two_with_the_same_claim_neither_yields() -> None:
+    lease = Lease(Role.LEADING, T, looked_at=T)
+    lease, event = lease.heard(FIRST, claim("a", 0, 4), claim("b", 0, 4), T + 1.0)
+    assert (event, lease.role, lease.same_rank) == (None, Role.LEADING, "b")
+
+
+@pytest.mark.parametrize(("later", "deadline"), [(0.0, 1.25), (0.125, 1.625)])
+def test_one_that_heard_a_link_just_so_long_ago_is_not_deaf(later: float, deadline: float) -> None:
+    lease = Lease(Role.FOLLOWING, T - 10.0, looked_at=T + 0.75, leader="b", leader_heard=T + 0.75)
+    lease, event = lease.looked(FIRST, T + 1.0 + later, link_heard=T)
+    assert (event, lease.deadline(FIRST)) == (None, T + deadline)
+
+
+def test_one_that_took_over_as_it_hears_more_forgets_that_with_the_lease() -> None:
+    lease = Lease(
+        Role.FOLLOWING, T, looked_at=T, leader="b", leader_heard=T, hears_more_since=T - 0.25
+    )
+    lease, event = lease.looked(FIRST, T + 0.25)
+    assert (event, lease.role, lease.leader) == (Event.HEARS_MORE, Role.LEADING, "")
+    assert lease.waiting_since == T + 0.25
+    lease, event = lease.looked(FIRST, T + 1.0)
+    assert event is Event.OVERSLEPT
+    assert lease.deadline(FIRST) == T + 1.5, "it has to hear less anew"
+
+
+def test_the_table_once_more() -> None:
+    told = {f"{role.name} {event.name} {to.name}" for (role, event), to in TRANSITIONS.items()}
+    assert told == {
+        "FOLLOWING SILENCE LEADING",
+        "FOLLOWING HEARS_MORE LEADING",
+        "FOLLOWING KNOWS_MORE LEADING",
+        "LEADING OUTRANKED FOLLOWING",
+        "LEADING OVERSLEPT FOLLOWING",
+        "LEADING REFUSED FOLLOWING",
+        "LEADING OVERTAKES LEADING",
+    }
+
+
+def test_one_that_is_told_nothing_else_is_alone_and_begins_with_the_first_number() -> None:
+    alone = LeaseConfig("a")
+    assert (alone.rank, alone.standby) == (0, False)
+    assert (alone.timeout, alone.listen, alone.deaf_after) == (0.5, 4.0, 1.0)
+    second = LeaseConfig("b", 1)
+    lease = Lease.begin(second, T)
+    assert (lease.leader, lease.same_rank) == ("", "")
+    assert lease.next_epoch(second, 0) == 1

@@ -204,9 +204,7 @@ def test_inhibited_a_rule_only_counts() -> None:
 
 
 @pytest.mark.parametrize("follows", [False, True])
-def test_a_rule_of_one_that_is_inhibited_or_follows_is_acted_on_once_it_may(
-    follows: bool,
-) -> None:
+def test_a_rule_of_one_that_is_inhibited_or_follows_is_acted_on_once_it_may(follows: bool) -> None:
     story = flying(rule(TILTS, action=ALARM))
     if follows:
         story.follows()

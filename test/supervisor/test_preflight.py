@@ -34,10 +34,7 @@ GOOD = ParachuteStatus(
     packed_date="2026-06-01",
 )
 STRICT = PreflightLimits(
-    require_pack_date=True,
-    require_self_arm=True,
-    min_battery_voltage=21.0,
-    min_backup_voltage=3.5,
+    require_pack_date=True, require_self_arm=True, min_battery_voltage=21.0, min_backup_voltage=3.5
 )
 
 

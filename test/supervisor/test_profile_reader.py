@@ -526,16 +526,8 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
             "zzz: 9000",
             f"7: measurement height has no 'zzz': it may have {LIMIT_KEYS}",
         ),
-        (
-            "landed_hold: 1.5",
-            "zzz: 1.5",
-            f"5: a profile has no 'zzz': it may have {PROFILE_KEYS}",
-        ),
-        (
-            "source: ours",
-            "zzz: ours",
-            f"12: rule 'falls' has no 'zzz': it may have {RULE_KEYS}",
-        ),
+        ("landed_hold: 1.5", "zzz: 1.5", f"5: a profile has no 'zzz': it may have {PROFILE_KEYS}"),
+        ("source: ours", "zzz: ours", f"12: rule 'falls' has no 'zzz': it may have {RULE_KEYS}"),
         (
             "{autopilot: rebooted}",
             "{autopilot: rebooted, zzz: 1}",

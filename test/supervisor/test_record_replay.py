@@ -19,10 +19,7 @@ NAMES = ("height", "vertical_speed", "tilt", "acceleration", "latitude")
 FIELDS = st.one_of(st.floats(), st.floats(-20.0, 20.0))
 VEHICLES = st.builds(
     lambda parts: Story().told(**parts),
-    st.fixed_dictionaries(
-        {},
-        optional=dict.fromkeys(NAMES, FIELDS),
-    ),
+    st.fixed_dictionaries({}, optional=dict.fromkeys(NAMES, FIELDS)),
 )
 SEQUENCES = st.lists(
     st.tuples(

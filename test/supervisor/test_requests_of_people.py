@@ -84,11 +84,7 @@ NOT_SENT = "mode is SHADOW; nothing is sent"
     ("given", "asked", "why"),
     [
         (flying, i.ArmRequest(1, False, 0), "the vehicle is IN_FLIGHT: not disarmed in flight"),
-        (
-            on_trial,
-            i.ArmRequest(1, False, 0),
-            "the vehicle is KILLING: not disarmed in flight",
-        ),
+        (on_trial, i.ArmRequest(1, False, 0), "the vehicle is KILLING: not disarmed in flight"),
         (in_shadow, STOP, NOT_SENT),
         (in_shadow, FALLS, NOT_SENT),
         (inhibited, STOP, "mode is INHIBITED; nothing is sent"),

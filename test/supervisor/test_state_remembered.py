@@ -40,10 +40,7 @@ def pending(action: Action = Action.KILL, **outcomes: set[Outcome]) -> Pending:
         ({"a": {Outcome.SENT}}, [Outcome.SENT]),
         ({"a": {Outcome.SENT, Outcome.FAILED}}, [Outcome.SENT]),
         ({"a": {Outcome.FAILED}, "b": {Outcome.ACCEPTED}}, [Outcome.SENT, Outcome.ACCEPTED]),
-        (
-            {"a": {Outcome.CONFIRMED}, "b": {Outcome.FAILED}},
-            [*STEPS],
-        ),
+        ({"a": {Outcome.CONFIRMED}, "b": {Outcome.FAILED}}, [*STEPS]),
     ],
 )
 def test_a_decision_has_got_as_far_as_the_best_link(

@@ -96,12 +96,7 @@ def test_a_step_of_the_deploy_goes_to_its_link_and_device_alone() -> None:
 
 @pytest.mark.parametrize(
     "known",
-    [
-        {"leading": False},
-        {"mode": i.Mode.INHIBITED},
-        {"stage": Stage.KILLING},
-        {"kill": None},
-    ],
+    [{"leading": False}, {"mode": i.Mode.INHIBITED}, {"stage": Stage.KILLING}, {"kill": None}],
 )
 def test_no_deploy_leaves_without_its_kill_its_stage_its_mode_and_the_lead(
     known: dict[str, Any],
@@ -119,8 +114,9 @@ def test_a_kill_goes_to_every_link_that_stops_motors_and_to_no_device() -> None:
     assert one.state.killing.kill == Pending(decision, BOTH, 100.0, 100.0)
 
 
-def test_no_kill_leaves_from_one_that_follows() -> None:
-    one = steps(leading=False)
+@pytest.mark.parametrize("known", [{"leading": False}, {"mode": i.Mode.INHIBITED}])
+def test_no_kill_leaves_from_one_that_follows_or_is_inhibited(known: dict[str, Any]) -> None:
+    one = steps(**known)
     fire(one, K, "tested", ("why",))
     assert one.outputs == []
 
