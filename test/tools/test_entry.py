@@ -44,7 +44,7 @@ def interrupted(tool):
     return tool.returncode, err
 
 
-@pytest.mark.parametrize("tool", ["demo", "replay", "report", "campaign", "explore"])
+@pytest.mark.parametrize("tool", ["demo", "replay", "report", "campaign", "explore", "chute"])
 def test_while_it_imports(tool, tmp_path):
     (tmp_path / "sitecustomize.py").write_text(SLOW)
     path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
