@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from chute_ros.supervisor.record import CODEC
 from chute_ros.tools.flight_story import Decided, FlightStory
 from chute_ros.tools.recording import Recording, utc
-from chute_ros.tools.releases import Release
+from chute_ros.tools.release_orders import Release
 from chute_ros.tools.report_parts import answer_of, cell, listing, number, section, table, words
 from chute_ros.tools.report_release import calls_of, parachutes_of, release_of
 from chute_ros.tools.state_rows import RuleTold

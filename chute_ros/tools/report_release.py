@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 from chute_ros.model import ParachuteStatus
 from chute_ros.tools.flight_story import FlightStory
-from chute_ros.tools.releases import Motion, Release, trigger_name
+from chute_ros.tools.release_orders import MotionThen, Release
+from chute_ros.tools.releases import trigger_name
 from chute_ros.tools.report_parts import answer_of, cell, listing, number, table, words
 from chute_ros.tools.timeline import escaped
 
@@ -97,7 +98,7 @@ def _deployed(status: ParachuteStatus) -> str:
     return f'<b class="act">deployed</b>, {trigger}'
 
 
-def _motion(motion: Motion) -> str:
+def _motion(motion: MotionThen) -> str:
     height = _measured("height", motion.height, motion.height_age, "m")
     speed = _measured("speed", motion.vertical_speed, motion.vertical_speed_age, "m/s")
     return f"{height}<br>{speed}"

@@ -5,9 +5,11 @@ import pytest
 from chute_ros.model import Action, Decision, LinkState, Outcome, ParachuteStatus, VehicleState
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.flight_story import Asked, Decided, FlightStory
-from chute_ros.tools.releases import Motion, releases
+from chute_ros.tools.release_orders import MotionThen
+from chute_ros.tools.releases import releases
 
 LINK, END = "mavlink_parachute", 30.0
+NO_ORDER = "no order is in this recording: the device itself, by hand, or past the nodes"
 
 
 class Story:
@@ -69,7 +71,7 @@ def test_a_decision_that_is_carried_out_has_every_step_and_lacks_nothing():
     assert one.parachute == "mavlink_parachute 1/161"
     assert one.order == "rule 'free fall', decision 1 of epoch 7"
     assert one.reasons == ("it falls",)
-    assert one.motion == Motion(40.0, pytest.approx(0.15), -12.0, pytest.approx(0.15))
+    assert one.motion == MotionThen(40.0, pytest.approx(0.15), -12.0, pytest.approx(0.15))
     assert lines(one) == [
         "0.05 mavlink_parachute SENT on the wire",
         "0.10 mavlink_parachute ACCEPTED",
@@ -113,7 +115,10 @@ def test_a_shadow_decision_was_not_sent_and_explains_no_release():
     shadow, release = story.status(11.0, True, deployment_trigger=2).told()
     assert shadow.missing == ["not sent: the decision is marked SHADOW"]
     assert release.at == 11.0
-    assert release.order == "no order is in this recording: the device itself, or by hand"
+    assert (
+        release.order
+        == "no order is in this recording: the device itself, by hand, or past the nodes"
+    )
     assert lines(release) == [
         "0.00 own status deployed 1/161, trigger ATS; not deployed 1.1 s before"
     ]
@@ -199,7 +204,7 @@ def test_the_same_number_on_another_link_is_another_parachute():
     order, release = story.status(10.5, True, link="upf_can").told()
     assert "deployed" not in [one.what for one in order.steps]
     assert release.parachute == "upf_can 1/161"
-    assert release.order.startswith("no order is in this recording")
+    assert release.order == NO_ORDER
 
 
 def test_a_deploy_past_the_controller_is_shown_by_its_status():
@@ -240,9 +245,17 @@ def test_an_order_for_another_device_explains_nothing():
 def test_a_parachute_that_was_out_before_the_order_is_said_to_be():
     story = Story().status(8.0, False).status(9.0, True).decision(10.0).status(11.0, True)
     first, order = story.told()
-    assert first.order.startswith("no order is in this recording")
+    assert first.order == NO_ORDER
     assert lines(order) == ["0.00 own status deployed already 1/161 reported it before the order"]
     assert "own status" not in " ".join(order.missing)
+
+
+def test_where_calls_were_not_recorded_nobody_is_said_to_have_ordered_nothing():
+    """Given a recording of a version before safety/person."""
+    story = Story().status(1.0, False).status(2.0, True)
+    story.story.has_calls = False
+    (one,) = story.told()
+    assert one.order == "no order is in this recording"
 
 
 def test_a_parachute_that_is_out_from_the_first_report_on_is_no_release_of_this_flight():

@@ -19,7 +19,7 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.tools import report_command as report
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.recording import read
-from chute_ros.tools.releases import Motion, Release
+from chute_ros.tools.release_orders import MotionThen, Release
 from chute_ros.tools.report_command import replayed_states
 from chute_ros.tools.report_release import release_of
 from chute_ros.tools.state_rows import rules_of, state_rows
@@ -246,7 +246,7 @@ def test_an_old_recording_is_read_and_says_that_it_lacks_the_calls(tmp_path, mon
     ],
 )
 def test_a_height_that_is_old_or_missing_is_not_known(age, told):
-    one = Release(1.0, "upf_can 33", "rule 'free fall'", motion=Motion(32.1, age, -4.0, age))
+    one = Release(1.0, "upf_can 33", "rule 'free fall'", motion=MotionThen(32.1, age, -4.0, age))
     assert text_of(release_of([one], FlightStory()))[-3] == told
 
 
