@@ -104,7 +104,7 @@ def test_a_link_that_comes_back_releases_flight_again() -> None:
     story = Story().ready()
     story.at(2.0)
     story.at(2.1, story.heartbeat(), i.VehicleReport(STANDING))
-    assert "REGAINED, received again for 0.00 s (need 1 s)" in reasons(story)
+    assert reasons(story) == f"{LINK}: REGAINED, received again for 0.00 s (need 1 s)"
     story.alive(3.05)
     assert story.state.stage is Stage.BLOCKED
     story.alive(3.25)
