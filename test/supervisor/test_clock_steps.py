@@ -82,10 +82,43 @@ def test_nothing_seems_to_come_from_the_future(
         assert clocks.age(clock + way) >= -MARGIN - 1e-6
 
 
-def test_a_first_heartbeat_that_is_old_is_old() -> None:
+@pytest.mark.parametrize("first", [49.4, 3600.0, 7.0, -MARGIN])
+def test_clocks_that_differ_from_the_start_are_no_step(first: float) -> None:
+    """Decisions are refused, and pre-flight says why: a way may take so long."""
     clocks = ClockSteps(MARGIN)
-    assert clocks.heard(49.4, 5.0) == 0.0
-    assert clocks.age(49.4) == 49.4, "a way may take so long: nothing is put right"
+    assert clocks.age(0.4) == 0.4, "before the first heartbeat the wall clock counts"
+    assert clocks.heard(first, 5.0) == 0.0
+    assert clocks.offset == 0.0
+    assert clocks.age(first) == first
+
+
+def test_an_answer_within_the_margin_or_overtaken_by_heartbeats_shows_nothing() -> None:
+    fresh, (clocks, now) = ClockSteps(MARGIN), heard_so_far()
+    assert fresh.answered(0.1 + MARGIN, 0.1, 5.0) == 0.0
+    assert clocks.answered(1.5, 1.6, now + 0.01) == 0.0
+    assert clocks.heard(0.002, now + BEAT) == 0.0
+    assert fresh.offset == clocks.offset == 0.0
+
+
+@pytest.mark.parametrize(
+    ("told", "age"),
+    [
+        # It is set back again.
+        ([(3600.002, BEAT, 3600.0), (0.002, 2 * BEAT, -3600.0)], 0.002),
+        # It is seen after a gap as well.
+        ([(3600.0, 5.0, 3599.998)], 0.002),
+        # Nonsense.
+        ([(math.nan, BEAT, 0.0), (0.002, 2 * BEAT, 0.0)], 0.002),
+        # A node that hung for 9 s reads what came meanwhile within a millisecond: it is old.
+        ([(9.0 - n / 10, 9.0 + n * 1e-4, 0.0) for n in range(90)], 9.0),
+    ],
+)
+def test_what_heartbeats_show(told: list[tuple[float, float, float]], age: float) -> None:
+    """Each: its difference, how long after the last of five good ones, the step that it shows."""
+    clocks, now = heard_so_far()
+    for difference, later, step in told:
+        assert clocks.heard(difference, now + later) == pytest.approx(step)
+    assert clocks.age(age + clocks.offset) == pytest.approx(age)
 
 
 @pytest.mark.parametrize("behind", [0.6, 49.4, 18809.379])
@@ -109,19 +142,6 @@ def test_an_answer_that_was_long_on_its_way_makes_nothing_younger() -> None:
     assert clocks.answered(3600.0, 3.0, 5.1) == pytest.approx(3597.0)
     assert clocks.age(3600.0) == pytest.approx(3.0), "it may be that old"
     assert clocks.answered(3600.0, 0.1, 5.2) == pytest.approx(2.9), "a quicker one tells more"
-
-
-def test_an_answer_within_the_margin_shows_nothing() -> None:
-    clocks = ClockSteps(MARGIN)
-    assert clocks.answered(0.1 + MARGIN, 0.1, 5.0) == 0.0
-    assert clocks.offset == 0.0
-
-
-def test_an_answer_that_heartbeats_have_overtaken_shows_nothing() -> None:
-    clocks, now = heard_so_far()
-    assert clocks.answered(1.5, 1.6, now + 0.01) == 0.0
-    assert clocks.heard(0.002, now + BEAT) == 0.0
-    assert clocks.offset == 0.0
 
 
 @given(
@@ -154,50 +174,6 @@ def test_a_step_counts_once_whichever_message_shows_it(step: float, answer_first
     for number, show in enumerate(shows if answer_first else reversed(shows)):
         show(now + 0.05 + number * 0.05)
     assert clocks.age(0.002 + step) == pytest.approx(0.002, abs=0.01)
-
-
-def test_clocks_that_differ_by_the_margin_are_left_as_they_are() -> None:
-    assert ClockSteps(MARGIN).heard(-MARGIN, 5.0) == 0.0
-
-
-def test_one_that_is_set_back_again_is_as_before() -> None:
-    clocks, now = heard_so_far()
-    clocks.heard(3600.002, now + BEAT)
-    clocks.heard(0.002, now + 2 * BEAT)
-    assert clocks.age(0.002) == pytest.approx(0.002)
-
-
-def test_it_is_seen_after_a_gap_as_well() -> None:
-    clocks, now = heard_so_far()
-    assert clocks.heard(3600.0, now + 5.0) == pytest.approx(3599.998)
-
-
-def test_clocks_that_differ_from_the_start_are_no_step() -> None:
-    clocks, _ = heard_so_far(difference=7.0)
-    assert clocks.offset == 0.0
-    assert clocks.age(7.0) == 7.0, "decisions are refused, and pre-flight says why"
-
-
-def test_before_the_first_heartbeat_the_wall_clock_counts() -> None:
-    assert ClockSteps(MARGIN).age(0.4) == 0.4
-    assert ClockSteps(MARGIN).heard(3600.0, 1.0) == 0.0
-
-
-def test_a_node_that_hung_hears_old_heartbeats_and_old_decisions() -> None:
-    """Stopped for 9 s; what came meanwhile is read within a millisecond."""
-    clocks, now = heard_so_far()
-    now += 9.0
-    for late in (9.0, 8.9, 8.8, 0.1):
-        now += 0.0001
-        assert clocks.heard(late, now) == 0.0
-    assert clocks.age(9.0) == 9.0
-
-
-def test_an_answer_to_nonsense_is_a_number_again() -> None:
-    clocks, now = heard_so_far()
-    assert clocks.heard(math.nan, now + BEAT) == 0.0
-    assert clocks.heard(0.002, now + 2 * BEAT) == 0.0
-    assert clocks.age(0.002) == 0.002
 
 
 @pytest.mark.parametrize(

@@ -1,17 +1,18 @@
 """Each condition holds, does not hold, or cannot be said, with its value and limit in words."""
 
 import math
+from dataclasses import fields, is_dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from story import LINK, SINKS, START, Story, changed, parachute, rule, vehicle, with_rules
-from told import Told, told
 
 from chute_ros.model import Armed, LinkState, ParachuteState, ParachuteStatus
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.conditions import CONDITIONS
 from chute_ros.supervisor.conditions.autopilot import AutopilotCondition, AutopilotFact
-from chute_ros.supervisor.conditions.base import Condition
+from chute_ros.supervisor.conditions.base import JUST_AFTER, Condition, Finding
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.conditions.link import LinkCondition
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
@@ -20,8 +21,24 @@ from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, Link
 from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.pending import ASK_LASTS
 from chute_ros.supervisor.profile_lines import ALL, ANY
+from chute_ros.supervisor.record import CODEC
 from chute_ros.supervisor.rules import Profile
 from chute_ros.supervisor.state import HeardHere, State
+
+
+class Told(NamedTuple):
+    """As a Finding."""
+
+    holds: bool | None
+    text: str
+    samples: int = -1
+
+
+def told(config: SupervisorConfig, state: State, condition: Condition, now: float) -> Told:
+    """Look at a condition, and ask for the words."""
+    found = condition.find(config, state, now)
+    return Told(found.holds, found.text, found.samples)
+
 
 LINKS = ("a", "b")
 TWO = SupervisorConfig((LINK, "upf_can"), deploy_links=(LINK, "upf_can"))
@@ -348,3 +365,58 @@ def test_a_kill_aloft_is_told_with_what_is_left_of_the_height(
     )
     found = told(config, known, AutopilotCondition(AutopilotFact.KILLED_ALOFT), NOW)
     assert found == Told(holds, f"killed aloft 2.00 s ago, at least 50.0 m are left {words}")
+
+
+#: What a kind of condition says of itself, written once more.
+OWN: dict[str, Any] = {
+    "weight": 1.0,
+    "is_silence": False,
+    "parse": classmethod(lambda cls, *_: cls()),
+    "find": lambda *_: Finding(True, str),
+    "deadlines": lambda *_: (),
+}
+
+
+def test_one_that_says_all_of_itself_can_be_made() -> None:
+    made = type("Whole", (Condition,), OWN)()
+    assert made.counted
+    assert [made.measured, made.rests_on_the_vehicle, made.goes_on] == [(), False, False]
+
+
+@pytest.mark.parametrize("missing", OWN)
+def test_one_that_forgets_something_cannot_be_made(missing: str) -> None:
+    kind = type("Half", (Condition,), {key: OWN[key] for key in OWN if key != missing})
+    with pytest.raises(TypeError, match=missing):
+        kind()
+
+
+@pytest.mark.parametrize(("key", "kind"), CONDITIONS.items())
+def test_every_kind_is_read_under_its_key_and_kept_in_the_black_box(
+    key: str, kind: type[Condition]
+) -> None:
+    assert kind.key == key
+    assert is_dataclass(kind)
+    assert {"weight"} <= {one.name for one in fields(kind)}
+    assert CODEC._classes[kind.__name__] is kind
+
+
+@pytest.mark.parametrize("fact", AutopilotFact)
+def test_every_fact_of_the_autopilot_is_found_and_waited_for(fact: AutopilotFact) -> None:
+    story, one = Story().flying(), AutopilotCondition(fact)
+    now = START + story.t
+    assert one.find(story.config, story.state, now).text
+    received = story.state.heard.vehicle_received + story.config.vehicle_state_age + JUST_AFTER
+    assert received in one.deadlines(story.config, story.state, None, False, now)
+
+
+def test_the_end_of_a_wish_is_waited_for_by_the_rule_that_looks_at_it() -> None:
+    asked = DeviceCondition(DeviceFact.ASKS_FOR_KILL)
+    story = Story(with_rules()).flying()
+    story.at(1.0, i.KillRequest(0, "upf_can 33", "smoke"))
+    (ask,) = story.state.asks.values()
+    assert ask.ends_at == START + 2.0
+    deadlines = asked.deadlines(story.config, story.state, True, False, START + 1.0)
+    assert list(deadlines) == [START + 2.0]
+    for fact in (DeviceFact.DEPLOYED, DeviceFact.ABNORMAL):
+        other = replace(asked, fact=fact)
+        assert not list(other.deadlines(story.config, story.state, True, False, START + 1.0))

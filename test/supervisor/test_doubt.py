@@ -1,18 +1,19 @@
-"""A sign in doubt counts half where one would decide alone."""
+"""A sign in doubt counts half where one would decide alone; a doubt belongs to its source."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import MappingProxyType
 
 import pytest
 from story import START, Story, shipped, vehicle
 
-from chute_ros.model import Action, LinkState, VehicleState
-from chute_ros.supervisor import inputs as i
+from chute_ros.model import Action, LinkState
 from chute_ros.supervisor import readings
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.measured import JUMP_DOUBTED, REJECTION_DOUBTED
+from chute_ros.supervisor.measured import JUMP_DOUBTED, REJECTION_DOUBTED, Measured, Sample
+from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
 
 LOST = {"link_state": LinkState.LOST}
 
@@ -53,7 +54,9 @@ def test_one_that_tips_over_as_bodies_do_is_not_in_doubt() -> None:
     assert story.fired()[0] == "KILL"
 
 
-def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last() -> None:
+def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last_and_one_not_taken_a_second() -> (
+    None
+):
     story = flying().fly(1.0, 0.02)
     story.fly(1.02, 0.02, tilt=179.0)
     assert story.state.measured("tilt_deg").rejected
@@ -62,13 +65,9 @@ def test_what_has_jumped_is_doubted_as_long_as_a_fall_may_last() -> None:
     known = story.state.measured("tilt_deg")
     assert known.doubt("tilt_deg", jumped + JUMP_DOUBTED - 0.1) == "it jumped 9.9 s ago"
     assert known.doubt("tilt_deg", jumped + JUMP_DOUBTED) == ""
-
-
-def test_after_one_that_was_not_taken_it_is_doubted_for_a_second() -> None:
-    """Noise leaves some that could be."""
+    # Noise leaves some that could be.
     story = flying().fly(1.0, 0.02)
-    story.fly(1.02, 0.02, tilt=179.0)
-    story.fly(1.04, 0.02, tilt=3.0)
+    story.fly(1.02, 0.02, tilt=179.0).fly(1.04, 0.02, tilt=3.0)
     known = story.state.measured("tilt_deg")
     assert known.rejected == ""
     assert "another was not taken" in known.doubt("tilt_deg", known.measured_at)
@@ -106,10 +105,6 @@ def test_what_another_source_contradicts_is_doubted() -> None:
     assert doubt(story, "acceleration") == ""
     story.fly(story.t + 1.0, **LOST, tilt=90.0)
     assert story.fired()[0] == "KILL"
-
-
-def test_a_report_says_nothing_of_disputes_unless_told() -> None:
-    assert i.VehicleReport(VehicleState()).disputed == frozenset()
 
 
 # -- a sink needs the heights, where they are told ------------------------------------------------
@@ -233,3 +228,167 @@ def test_a_supervisor_that_stalls_shortly_goes_on_counting() -> None:
     assert "silence meanwhile does not count" in story.said()
     story.fly(story.t + 0.3, tilt=80.0, **LOST)
     assert story.fired()[0] == "KILL"
+
+
+#: A height that may change by 60 m/s and by 10 m besides.
+HEIGHT = Limits(-500.0, 500.0, rate=60.0, jump=10.0, max_age=1.0, stuck_after=5.0)
+
+
+def heights(*samples: tuple[float, float]) -> Measured:
+    """What is known after these (m, time of measurement)."""
+    known = Measured()
+    for value, at in samples:
+        known = known.with_sample(Sample(value, at), HEIGHT)
+    return known
+
+
+JUMPED = heights((100.0, 0.0), (60.0, 0.1), (60.1, 0.15), (60.2, 0.2))
+
+
+def told_by_another(*samples: tuple[float, float]) -> Measured:
+    """After the jump another source tells these."""
+    known = JUMPED.told_by("odometry")
+    for value, at in samples:
+        known = known.with_sample(Sample(value, at), HEIGHT)
+    return known
+
+
+# -- doubt belongs to a source --------------------------------------------------------------------
+
+
+def test_what_one_source_put_in_doubt_says_nothing_of_another_and_counts_when_it_is_back() -> None:
+    assert JUMPED.has_jumped(0.3)
+    assert JUMPED.told_by("") is JUMPED
+    other = JUMPED.told_by("imu")
+    assert (other.source, other.value, other.count) == ("imu", 60.2, 2)
+    assert math.isnan(other.doubted_at)
+    assert math.isnan(other.jumped_at)
+    assert other.doubt("height", 0.3) == ""
+    on = other.with_sample(Sample(60.3, 0.3), HEIGHT)
+    assert on.source == "imu"
+    back = on.told_by("")
+    assert (back.jumped_at, back.before_jump, back.doubted_at) == (0.2, 100.0, 0.15)
+    assert back.doubt("height", 0.3) == "it jumped 0.1 s ago"
+    assert back.told_by("imu").doubt("height", 0.3) == ""
+    third = back.told_by("odometry")
+    assert third.doubt("height", 0.3) == ""
+    assert {one.source for one in third.others} == {"", "imu"}
+
+
+@pytest.mark.parametrize(
+    ("samples", "jumped_at", "before_jump"),
+    [
+        # Who tells what was told before a jump has not jumped; who tells something else has.
+        ([(99.7, 0.3), (99.65, 0.35), (99.6, 0.4)], math.nan, math.nan),
+        ([(119.7, 0.3), (119.65, 0.35), (119.6, 0.4)], 0.4, 60.2),
+        # What another told before its jump counts for the change alone.
+        ([(61.0, 0.3), (99.6, 0.4), (99.55, 0.45), (99.5, 0.5)], 0.5, 61.0),
+    ],
+)
+def test_another_source_has_jumped_from_what_was_told_last_but_not_back(
+    samples: list[tuple[float, float]], jumped_at: float, before_jump: float
+) -> None:
+    known = told_by_another(*samples)
+    assert known.value == samples[-1][0]
+    told = (known.jumped_at, known.before_jump)
+    assert told == pytest.approx((jumped_at, before_jump), nan_ok=True)
+    assert known.has_jumped(samples[-1][1]) is not math.isnan(jumped_at)
+
+
+def test_a_jump_from_one_source_to_the_other_is_the_others() -> None:
+    other = heights((100.0, 0.0)).told_by("imu")
+    for at in (0.1, 0.15, 0.2):
+        other = other.with_sample(Sample(60.0 - at, at), HEIGHT)
+    assert other.has_jumped(0.3)
+    assert not other.told_by("").has_jumped(0.3)
+
+
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [
+        ("attitude", "tilt_deg"),
+        ("vertical_speed", "vertical_speed"),
+        ("acceleration", "acceleration"),
+        ("height", "height"),
+    ],
+)
+def test_a_report_names_who_tells_a_part(part: str, name: str) -> None:
+    story = Story(shipped("multirotor")).ready().fly(0.3)
+    assert story.state.measured(name).source == ""
+    told = replace(story.told(), told_by=MappingProxyType({part: "imu"}))
+    story.at(story.t + 0.05, story.heartbeat(), told)
+    sources = {one: story.state.measured(one).source for one in STANDARD_LIMITS}
+    assert sources == {one: "imu" if one == name else "" for one in STANDARD_LIMITS}
+
+
+# -- a speed that lies denies no height -----------------------------------------------------------
+
+
+def told_beside_a_lie(
+    profile: str, speed: float, every: float, gap: float = 0.0, falls: bool = False
+) -> Story:
+    """Heights that are true, and a speed that has jumped so long ago that nothing doubts it any
+    more; then a gap, and a vehicle that leans over and sinks with a part of its thrust."""
+    story = Story(shipped(profile)).ready().fly(3.0, every, height=150.0)
+    story.fly(15.0, every, height=150.0, vertical_speed=speed)
+    for _ in range(round(gap / every)):
+        story.at(story.t + every, story.heartbeat())
+    height, sinking = 150.0, 0.0
+    for step in range(round(4.0 / every)):
+        told = {"height": height, "vertical_speed": speed}
+        if falls:
+            sinking = min(sinking + 4.0 * every, 18.0)
+            height -= sinking * every
+            told |= {"tilt": min(5.0 + 75.0 * step * every, 80.0), "acceleration": 6.0}
+        story.at(story.t + every, story.heartbeat(), story.told(**told))
+    return story
+
+
+LIES = [
+    ("multirotor", 140.0, 0.1, 0.0),
+    ("multirotor", 90.0, 0.2, 0.0),
+    ("multirotor", 50.0, 0.1, 0.9),
+    ("multirotor", 29.0, 0.1, 0.9),
+    ("fixed_wing", 110.0, 0.2, 0.0),
+]
+
+
+@pytest.mark.parametrize(("profile", "speed", "every", "gap"), LIES)
+def test_by_a_speed_that_lies_downwards_one_that_flies_well_is_not_ended(
+    profile: str, speed: float, every: float, gap: float
+) -> None:
+    """Its heights alone deny the sink: were they not believed, nothing would."""
+    story = told_beside_a_lie(profile, -speed, every, gap)
+    assert story.state.measured("vertical_speed").value == pytest.approx(-speed, abs=0.1)
+    assert story.fired() == []
+    assert story.state.measured("height").rejected == ""
+
+
+@pytest.mark.parametrize(("profile", "speed", "every", "gap"), LIES)
+def test_by_a_speed_that_lies_upwards_a_fall_is_not_hidden(
+    profile: str, speed: float, every: float, gap: float
+) -> None:
+    story = told_beside_a_lie(profile, speed, every, gap, falls=True)
+    assert story.fired()[:1] == ["KILL"]
+    assert story.newest(Action.KILL).rule == "excess tilt"
+
+
+# -- who tells nothing ----------------------------------------------------------------------------
+
+
+def test_a_doubt_stands_while_nobody_tells_the_part() -> None:
+    """Given an IMU whose tilt has jumped, of which three of four words cannot be read: the part is
+    told by nobody then, and its last value is still young."""
+    story = Story(shipped("multirotor")).ready().fly(1.0)
+    gone = {"attitude_age": math.nan, "tilt": math.nan}
+    for step in range(150):
+        tilt = 0.0 if step < 25 else 143.0
+        told = story.told(tilt=tilt, **LOST, vertical_speed=math.nan, height=math.nan)
+        if step > 30 and step % 4:
+            told = replace(told, state=replace(told.state, **gone))
+        else:
+            told = replace(told, told_by=MappingProxyType({"attitude": "imu"}))
+        story.at(story.t + 0.02, story.heartbeat(), told)
+    assert story.state.measured("tilt_deg").source == "imu"
+    assert "it jumped" in story.state.measured("tilt_deg").doubt("tilt_deg", START + story.t)
+    assert story.fired() == []

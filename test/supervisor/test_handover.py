@@ -2,19 +2,38 @@
 
 import json
 import math
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from types import MappingProxyType
+from typing import Any, get_args, get_type_hints
 
 import pytest
-from story import FLYING, LINK, START, Story, parachute
+from hypothesis import given
+from hypothesis import strategies as st
+from story import FLYING, LINK, START, Story, changed, parachute, vehicle
 
 from chute_ros.errors import RecordError
-from chute_ros.model import Action, Outcome
-from chute_ros.supervisor import handover
+from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.codec import INLINE
+from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.core import update
+from chute_ros.supervisor.counter import RuleEvidence
+from chute_ros.supervisor.handover import followed, told
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
-from chute_ros.supervisor.record import CODEC
-from chute_ros.supervisor.state import Own, State
+from chute_ros.supervisor.measured import Measured
+from chute_ros.supervisor.pending import Ask, Pending, Time
+from chute_ros.supervisor.state import (
+    Alarms,
+    DeployUnderWay,
+    HeardHere,
+    Killing,
+    Own,
+    State,
+    ThisFlight,
+)
 
 K, D = Action.KILL, Action.DEPLOY
 CONFIG = SupervisorConfig(standby=True)
@@ -29,7 +48,7 @@ def follower(now: float = START) -> State:
 def handed(story: Story, to: State | None = None) -> State:
     """The follower's state after the leader's newest claim."""
     now = START + story.t
-    return handover.followed(to or follower(), handover.told(story.state, now), now + AHEAD)
+    return followed(to or follower(), told(story.state, now), now + AHEAD)
 
 
 def take_over(state: State, t: float) -> tuple[State, tuple[i.Output, ...]]:
@@ -45,28 +64,6 @@ def falling() -> Story:
     story = Story(CONFIG).flying()
     story.at(1.0, story.heartbeat(), i.DeployRequest(5, False, "it falls"))
     return story
-
-
-def test_times_are_told_as_ages_and_come_back_in_the_other_hosts_clock() -> None:
-    story = falling()
-    story.at(1.2)
-    state = handed(story)
-    assert state.stage is Stage.KILLING
-    assert state.deploying.deploy_due == pytest.approx(START + AHEAD + 1.5)
-    assert state.killing.kill is not None
-    assert state.killing.kill.decided_at == pytest.approx(START + AHEAD + 1.0)
-    assert state.stage_since == pytest.approx(START + AHEAD + 1.0)
-    assert math.isnan(state.alarming.alarm_at)
-
-
-def test_what_each_hears_itself_is_not_taken_over() -> None:
-    story = falling()
-    own = follower()
-    own, _ = update(CONFIG, own, (story.heartbeat(), i.VehicleReport(FLYING)), START + AHEAD)
-    state = handed(story, own)
-    assert state.heard.links == own.heard.links
-    assert state.heard.vehicle == own.heard.vehicle
-    assert not state.own.leading
 
 
 def test_one_that_follows_decides_and_answers_nothing() -> None:
@@ -136,29 +133,6 @@ def test_a_parachute_that_is_out_stays_out_for_the_next_leader() -> None:
     assert decided(outputs, K) == decided(outputs, D) == []
 
 
-def test_whoever_waits_at_one_that_steps_down_is_told() -> None:
-    story = falling()
-    state, outputs = update(CONFIG, story.state, (i.StepDown("it was stopped"),), START + 1.1)
-    (answer,) = (o for o in outputs if isinstance(o, i.Finish))
-    assert answer.token == 5
-    assert "another supervisor decides, call again: it was stopped" in answer.message
-    assert not state.own.leading
-
-
-def test_what_another_version_wrote_is_refused_in_words() -> None:
-    with pytest.raises(RecordError, match="class Stat is not known"):
-        handover.followed(follower(), '{"is":"Stat"}', START)
-    with pytest.raises(RecordError, match="not a state"):
-        handover.followed(follower(), "[]", START)
-
-
-def test_two_that_hear_the_same_are_in_the_same_state() -> None:
-    story = falling()
-    own = handed(story)
-    again = handed(story, own)
-    assert CODEC.to_json(own) == CODEC.to_json(again)
-
-
 def test_a_parachute_that_the_follower_has_heard_to_be_out_is_not_ordered_once_more() -> None:
     """The leader has not, as nothing reaches it any more."""
     story = falling()
@@ -176,8 +150,7 @@ def test_a_parachute_that_the_follower_has_heard_to_be_out_is_not_ordered_once_m
 
 def spoilt(**fields: object) -> str:
     """What a leader in flight tells, with other values in these fields."""
-    told = json.loads(handover.told(falling().state, START))
-    return json.dumps(told | fields)
+    return json.dumps(json.loads(told(falling().state, START)) | fields)
 
 
 @pytest.mark.parametrize(
@@ -195,13 +168,234 @@ def spoilt(**fields: object) -> str:
     ids=str,
 )
 def test_what_cannot_be_decided_nor_told_is_not_followed(fields: dict[str, object]) -> None:
-    assert handover.followed(follower(), spoilt(), START).stage is Stage.KILLING
+    assert followed(follower(), spoilt(), START).stage is Stage.KILLING
     with pytest.raises(RecordError):
-        handover.followed(follower(), spoilt(**fields), START)
+        followed(follower(), spoilt(**fields), START)
 
 
 def test_a_decision_under_way_whose_number_no_message_holds_is_not_followed() -> None:
     kill = json.loads(spoilt())["kill"]
     kill["decision"]["id"] = 2**64
     with pytest.raises(RecordError, match="there is no decision"):
-        handover.followed(follower(), spoilt(kill=kill), START)
+        followed(follower(), spoilt(kill=kill), START)
+
+
+#: When it is told, by the clock of each host, s.
+THERE, HERE = 1024.0, 512.0
+
+
+def frozen(**parts: Any) -> Mapping[str, Any]:
+    return MappingProxyType(parts)
+
+
+def pending(action: Action, clock: float) -> Pending:
+    """Decided 8 s ago, sent again 4 s ago, not all well."""
+    return Pending(
+        Decision(9, 5, action, "rule", ("why",), (LINK,), device="1/161"),
+        (LINK, "upf_can"),
+        clock - 8.0,
+        clock - 4.0,
+        MappingProxyType({LINK: frozenset({Outcome.SENT})}),
+        ("sent",),
+        frozenset({(9, 4)}),
+        given_up=True,
+    )
+
+
+def every_field(state: State) -> dict[str, str]:
+    """Each field, as it is written, under its name; a group's one by one."""
+    told: dict[str, str] = {}
+    for field in fields(state):
+        value = getattr(state, field.name)
+        told |= every_field(value) if field.metadata == INLINE else {field.name: repr(value)}
+    return told
+
+
+def leader(clock: float) -> State:
+    """Nothing is as at the start. clock: that host's, to which all times belong."""
+    return State(
+        epoch=9,
+        started_at=clock - 100.0,
+        stage=Stage.KILLING,
+        stage_since=clock - 8.0,
+        mode=Mode.SHADOW,
+        next_id=6,
+        rules=frozen(tested=RuleEvidence(level=0.5, shown=(3.0,))),
+        asks=MappingProxyType({"upf_can 33": Ask(clock - 0.5, "upf_can", "launching")}),
+        block=pending(Action.FLIGHT_BLOCK, clock),
+        newest=pending(Action.KILL, clock).decision,
+        device_blocks=MappingProxyType({"upf_can 33": "it burns"}),
+        block_refused=True,
+        own=Own(
+            leading=True,
+            updated_at=clock - 0.5,
+            late_count=2,
+            vehicle_rests_until=clock + 0.125,
+            kill_tokens=(5,),
+            deploy_tokens=(6,),
+        ),
+        heard=HeardHere(
+            links=frozen(umbilical=LinkEvidence(heard=clock)),
+            vehicle=replace(FLYING, source="the leader's"),
+            vehicle_received=clock - 0.25,
+            disputed=frozenset({"attitude"}),
+            measurements=frozen(height=Measured(30.0, clock, clock, 9)),
+            heights=((clock - 0.25, 30.0),),
+            pressure_heights=((clock - 0.25, 520.0),),
+            pressure_before=(clock - 0.75, 522.0),
+            motion=((clock - 0.25, 1.0, 9.8, 1.0),),
+            denied=frozen(acceleration="why"),
+            denied_since=frozen(acceleration=clock - 0.5),
+            commanded=frozen(tilt_deg="why"),
+            unfit=frozen(acceleration="0"),
+            fitness_since=clock - 0.25,
+            at_ground_since=clock - 0.5,
+            still_since=clock - 0.5,
+            faults_told=("slow",),
+        ),
+        released_since_reset=frozenset({("upf_can", "34")}),
+        flight=ThisFlight(
+            home_altitude=480.0,
+            ground_pressure_altitude=490.0,
+            up_for=1.0,
+            armed_by_us=True,
+            flown=True,
+            airborne=True,
+            down_since=clock - 3.0,
+            landed_at=clock - 64.0,
+            was_high=True,
+            airborne_since=clock - 32.0,
+            rebooted=True,
+            reboots_before=3,
+            armed_height=2.0,
+            took_off_height=3.0,
+            home=(48.0, 11.0),
+            released_before=frozenset({("upf_can", "33")}),
+        ),
+        killing=Killing(
+            kill_only=True,
+            kill=pending(Action.KILL, clock),
+            killed_in_flight=True,
+            killed_at=clock - 4.0,
+            killed_height=80.0,
+            killed_sinking=1.5,
+            killed_standing=True,
+        ),
+        alarming=Alarms(canopy_fails=True, alarms=("beware",), alarm_at=clock + 2.0),
+        deploying=DeployUnderWay(
+            deploys=(pending(Action.DEPLOY, clock), pending(Action.DEPLOY, clock)),
+            deploy_rule="rule",
+            deploy_reasons=("why",),
+            deploy_ladder=(Rung(LINK, "1/161"),),
+            deploy_due=clock + 0.5,
+        ),
+    )
+
+
+#: What the one that follows has heard and counted itself.
+OWN: dict[str, Any] = {
+    "updated_at": HERE - 0.125,
+    "late_count": 1,
+    "links": frozen(mavlink_parachute=LinkEvidence(heard=HERE)),
+    "vehicle": replace(FLYING, source="its own"),
+    "vehicle_received": HERE - 0.125,
+    "disputed": frozenset({"height"}),
+    "measurements": frozen(height=Measured(31.0, HERE, HERE, 8)),
+    "heights": ((HERE - 0.125, 31.0),),
+    "pressure_heights": ((HERE - 0.125, 521.0),),
+    "pressure_before": (HERE - 0.5, 523.0),
+    "motion": ((HERE - 0.125, 0.5, 9.8, 1.0),),
+    "denied": frozen(vertical_speed="why"),
+    "denied_since": frozen(vertical_speed=HERE - 0.5),
+    "commanded": frozen(vertical_speed="why"),
+    "unfit": frozen(acceleration="99"),
+    "fitness_since": HERE - 0.125,
+    "still_since": HERE - 1.0,
+    "at_ground_since": HERE - 1.0,
+    "faults_told": ("other",),
+    "vehicle_rests_until": -math.inf,
+}
+#: Nobody waits at the one that follows, which does not decide.
+NOBODY: dict[str, Any] = {"leading": False, "kill_tokens": (), "deploy_tokens": ()}
+
+
+def test_every_field_is_told_in_the_time_of_the_other_host_or_is_heard_there() -> None:
+    follower = changed(State(epoch=1, started_at=HERE), **OWN, leading=False)
+    state = followed(follower, told(leader(THERE), THERE), HERE)
+    expected = changed(leader(HERE), **OWN, **NOBODY)
+    assert every_field(state) == every_field(expected)
+
+
+def test_in_the_test_above_no_field_is_as_at_the_start() -> None:
+    start = State(epoch=0, started_at=math.nan)
+    one = replace(leader(THERE), own=replace(leader(THERE).own, leading=False))
+    first = every_field(start)
+    assert [name for name, value in every_field(one).items() if value == first[name]] == []
+
+
+#: Numbers of a state that others share, and of what it holds, that are no times.
+NO_TIMES = {
+    *("killed_height", "killed_sinking", "took_off_height", "armed_height", "home_altitude"),
+    *("ground_pressure_altitude", "up_for", "level", "unknown"),
+}
+
+
+def numbers(hint: Any) -> Iterator[tuple[str, bool]]:
+    """Each float that is held somewhere in this type: its field, and whether it is a Time."""
+    if is_dataclass(hint):
+        for name, one in get_type_hints(hint, include_extras=True).items():
+            if one == Time or one is float:
+                yield name, one == Time
+            elif not (hint is State and name in ("heard", "own")):
+                yield from numbers(one)
+    for argument in get_args(hint):
+        yield from numbers(argument)
+
+
+def test_every_number_that_is_shared_is_a_time_that_is_moved_or_none() -> None:
+    plain = {name for name, is_time in numbers(State) if not is_time}
+    assert plain >= NO_TIMES, "gone"
+    assert plain <= NO_TIMES, "add them here, or make them a Time"
+
+
+@given(st.integers(-(2**20), 2**20), st.integers(-(2**20), 2**20))
+def test_what_is_told_is_what_is_followed_with_every_time_moved(there: int, here: int) -> None:
+    """Whatever the clocks of the two hosts tell; in parts of a second that add up exactly."""
+    state = followed(State(1, 0.0), told(leader(there / 8.0), there / 8.0), here / 8.0)
+    expected = replace(leader(here / 8.0), heard=HeardHere(), own=Own(leading=False))
+    assert every_field(state) == every_field(expected)
+    # What never happened has not happened for the other host either.
+    nothing = followed(State(1, here / 8.0), told(State(9, there / 8.0), there / 8.0), here / 8.0)
+    assert every_field(nothing) == every_field(State(9, here / 8.0, own=Own(leading=False)))
+
+
+def test_one_that_follows_goes_on_knowing_the_sink_from_the_heights() -> None:
+    """Of a source without a vertical speed: it would have to begin anew at every takeover."""
+    story = Story(SupervisorConfig(standby=True))
+    for tick in range(9):
+        story.at(tick / 8, vehicle(height=90.0 - tick))
+    heights = story.state.heard.heights
+    assert len(heights) == 9
+    assert followed(story.state, told(leader(THERE), THERE), THERE).heard.heights == heights
+
+
+NO_STATE = "[" + "1," * 50 + "1]"
+ASK = '{"is":"Ask","at":1,"link":"a","reason":"b"}'
+AN_ASK = json.loads(ASK)
+STATE = '{"is":"State","epoch":1,"started_at":'
+ASK_AS_DEPLOY, ASK_AS_TIME = f'{STATE}0,"deploys":[{ASK}]}}', f"{STATE}{ASK}}}"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[]", "not a state: '[]'"),
+        (NO_STATE, f"not a state: {NO_STATE[:80]!r}"),
+        (ASK_AS_DEPLOY, f"cannot be read: {AN_ASK} is no Pending in {ASK_AS_DEPLOY[:80]!r}"),
+        (ASK_AS_TIME, f"cannot be read: {AN_ASK} is no float in {ASK_AS_TIME[:80]!r}"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_these_words(text: str, words: str) -> None:
+    with pytest.raises(RecordError) as refused:
+        followed(State(1, HERE), text, HERE)
+    assert str(refused.value) == words

@@ -3,26 +3,43 @@
 import datetime
 import math
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import DOWN, LINK, SINKS, STANDING, START, Story, rule, shipped, vehicle, with_rules
+from story import (
+    DOWN,
+    LINK,
+    SINKS,
+    STANDING,
+    START,
+    Story,
+    changed,
+    rule,
+    shipped,
+    vehicle,
+    with_rules,
+)
 
 from chute_ros.model import (
     Action,
+    Armed,
     ErrorFlags,
     LinkState,
     ParachuteState,
     ParachuteStatus,
     SafetyFlags,
     TriggerFlags,
+    VehicleState,
 )
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
+from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.preflight import arm_reasons, block_reasons
 from chute_ros.supervisor.rules import Clears
+from chute_ros.supervisor.state import State
 
 TODAY = (datetime.date(2026, 7, 1) - datetime.date(1970, 1, 1)).days
 GOOD = ParachuteStatus(
@@ -167,11 +184,6 @@ def test_where_today_is_not_known_the_age_of_the_pack_is_not_held_against_it() -
     assert reasons(with_device(packed_date="1999-01-01"), day=-1) == ()
 
 
-def test_a_wall_clock_that_was_never_set_is_named() -> None:
-    told = reasons(standing(), day=0)
-    assert "the wall clock shows 1970-01-01 (need 2024-01-01 or later)" in told
-
-
 def test_flags_in_which_its_node_finds_no_fault_are_not_held_against_it() -> None:
     """Given a parachute of which a flag does not apply (ignored_error_flags of its node)."""
     assert reasons(with_device(error_flags=ErrorFlags.LOW_POWER, faults=())) == ()
@@ -209,13 +221,6 @@ def test_a_clock_that_differs_is_said_with_its_limit(difference: float) -> None:
     assert reasons(story) == ()
 
 
-@pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
-def test_the_mode_is_named(mode: i.Mode) -> None:
-    story = standing()
-    story.at(0.0, i.ModeRequest(1, mode, force=False))
-    assert f"supervisor mode is {mode.name} (need ACTIVE)" in reasons(story)
-
-
 def test_a_vehicle_that_moves_is_not_armed() -> None:
     story = standing(vertical_speed=-3.0, vertical_speed_age=0.0)
     (told,) = reasons(story)
@@ -241,20 +246,6 @@ def test_every_reason_is_told_at_once() -> None:
         "1/161: errors GPS_ERROR",
     ):
         assert words in message
-
-
-def test_a_regained_link_is_not_yet_good_enough_to_arm() -> None:
-    story = standing()
-    story.at(5.0, story.heartbeat(), i.VehicleReport(STANDING))
-    assert f"{LINK}: REGAINED, received again for 0.00 s (need 1 s)" in reasons(story)
-
-
-def test_disarming_needs_only_the_ground() -> None:
-    story = standing()
-    story.at(5.0)
-    assert story.state.stage is Stage.BLOCKED
-    outputs = story.at(5.1, i.ArmRequest(1, False, 0))
-    assert i.ArmDevices(1, False, 0, (LINK,)) in outputs
 
 
 # -- rules that block flight ---------------------------------------------------------------------
@@ -348,3 +339,130 @@ def test_in_flight_a_fault_whose_figure_changes_is_one_alarm_and_another_fault_a
     story.fly(story.t + 1.0)
     story.fly(story.t + 0.1, faults=("answers after 0.9 s (limit 0.5 s): it is late",))
     assert len(story.alarms()) == 3
+
+
+NOW = 100.0
+CONFIG = SupervisorConfig(required_links=("a",), kill_links=("a",), deploy_links=("a",))
+READY = ParachuteStatus("1", LinkState.OK, ParachuteState.READY, packed_date="2026-06-01")
+
+
+def day(text: str) -> int:
+    """Days since 1970-01-01."""
+    return (datetime.date.fromisoformat(text) - datetime.date(1970, 1, 1)).days
+
+
+def link(
+    *devices: ParachuteStatus, healthy: bool = True, state: LinkState = LinkState.OK
+) -> LinkEvidence:
+    told = MappingProxyType({one.device: one for one in devices})
+    return LinkEvidence(NOW, state, healthy, devices=told)
+
+
+def known(vehicle_received: float = NOW, **links: LinkEvidence) -> State:
+    """Disarmed on the ground; these links are known."""
+    vehicle = VehicleState(armed=Armed.DISARMED, armed_age=0.0)
+    state = State(epoch=7, started_at=0.0, stage=Stage.READY)
+    return changed(state, links=links, vehicle=vehicle, vehicle_received=vehicle_received)
+
+
+@pytest.mark.parametrize(
+    ("faults", "deployed", "more"),
+    [
+        ((), False, ""),
+        (("hot",), False, " (1 hot)"),
+        (("hot", "wet"), True, " (1 hot; 1 wet; 1 is released)"),
+    ],
+)
+def test_an_unhealthy_device_is_told_with_its_faults_if_it_has_any(
+    faults: tuple[str, ...], deployed: bool, more: str
+) -> None:
+    device = replace(READY, faults=faults, deployed=deployed)
+    state = known(a=link(device, healthy=False))
+    assert block_reasons(CONFIG, state, NOW) == (f"a: its device is not healthy{more}",)
+
+
+@pytest.mark.parametrize(
+    ("told", "words"),
+    [
+        (LinkState.NEVER_SEEN, "a: nothing received from its device"),
+        (LinkState.LOST, "a: its device is LOST (1 hot)"),
+    ],
+)
+def test_a_node_that_does_not_hear_its_device_is_told_of_by_the_device(
+    told: LinkState, words: str
+) -> None:
+    state = known(a=link(replace(READY, faults=("hot",)), state=told))
+    assert block_reasons(CONFIG, state, NOW) == (words,)
+
+
+def test_each_link_is_told_by_its_own_limits() -> None:
+    patient = MappingProxyType({"a": LinkLimits(stale_after=2.0, lost_after=4.0)})
+    config = replace(CONFIG, link_limits=patient)
+    silent = known(a=replace(link(), heard=NOW - 1.75))
+    assert block_reasons(config, silent, NOW) == ()
+    silent = known(a=replace(link(), heard=NOW - 2.0))
+    assert block_reasons(config, silent, NOW) == (
+        "a: STALE, heartbeat of its node 2.00 s old (limit 2 s)",
+    )
+
+
+@pytest.mark.parametrize("stage", [Stage.KILLING, Stage.DEPLOYED, Stage.FAULT])
+def test_after_a_kill_or_a_deploy_only_a_reset_unblocks(stage: Stage) -> None:
+    state = replace(known(a=link()), stage=stage)
+    words = f"the vehicle is {stage.name}: needs a reset on the ground"
+    assert block_reasons(CONFIG, state, NOW) == (words,)
+
+
+def test_that_nobody_can_stop_the_motors_does_not_hide_a_required_link() -> None:
+    config = SupervisorConfig(required_links=("a",), kill_links=("b",), deploy_links=("c",))
+    assert block_reasons(config, known(c=link()), NOW) == (
+        "a: nothing received from its node",
+        "b: nothing received from its node",
+    )
+    assert block_reasons(config, known(a=link(), b=link(), c=link()), NOW) == ()
+
+
+def test_a_vehicle_that_never_told_of_its_motors_blocks_flight() -> None:
+    state = changed(known(a=link()), vehicle=VehicleState())
+    assert block_reasons(CONFIG, state, NOW) == (
+        "vehicle/state: armed or disarmed was never reported",
+    )
+
+
+@pytest.mark.parametrize(
+    ("age", "told"),
+    [(2.5, ()), (2.75, ("vehicle/state: armed or not is 2.8 s old (limit 2.5 s)",))],
+)
+def test_what_the_vehicle_says_of_its_motors_counts_up_to_its_age(
+    age: float, told: tuple[str, ...]
+) -> None:
+    assert block_reasons(CONFIG, known(NOW - age, a=link()), NOW) == told
+
+
+@pytest.mark.parametrize(
+    ("today", "told"),
+    [
+        ("2023-12-31", ("the wall clock shows 2023-12-31 (need 2024-01-01 or later)",)),
+        ("2024-01-01", ()),
+    ],
+)
+def test_a_wall_clock_may_say_the_first_day_and_none_before(
+    today: str, told: tuple[str, ...]
+) -> None:
+    assert arm_reasons(CONFIG, known(a=link()), day(today), NOW) == told
+
+
+def test_a_wall_clock_that_was_never_set_makes_a_pack_look_like_one_from_the_future() -> None:
+    assert arm_reasons(CONFIG, known(a=link(READY)), 0, NOW) == (
+        "the wall clock shows 1970-01-01 (need 2024-01-01 or later)",
+        "a 1: packed on 2026-06-01, 20605 days from now",
+    )
+
+
+def test_a_pack_may_be_allowed_a_single_day() -> None:
+    config = replace(CONFIG, preflight=PreflightLimits(max_pack_age=1))
+    state = known(a=link(READY))
+    assert arm_reasons(config, state, day("2026-06-02"), NOW) == ()
+    assert arm_reasons(config, state, day("2026-06-03"), NOW) == (
+        "a 1: packed on 2026-06-01, 2 days ago (limit 1)",
+    )

@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import pytest
-from story import LINK, parachute
+from story import LINK, changed, parachute
 
 from chute_ros.model import Action, Decision, LinkState, Outcome
 from chute_ros.supervisor.config import Rung, SupervisorConfig
@@ -13,10 +13,11 @@ from chute_ros.supervisor.counter import RuleEvidence
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
 from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.pending import Pending
-from chute_ros.supervisor.state import DeployUnderWay, HeardHere, State
+from chute_ros.supervisor.state import State
 
 UPF = "upf_can"
 BOTH = (LINK, UPF)
+NEW = State(epoch=7, started_at=0.0)
 STEPS = (Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED)
 TWO = SupervisorConfig(deploy_links=BOTH, resend_interval=0.25)
 
@@ -47,9 +48,7 @@ def test_a_decision_has_got_as_far_as_the_best_link(
     outcomes: dict[str, set[Outcome]], reached: list[Outcome]
 ) -> None:
     one = pending(**outcomes)
-    assert [
-        o for o in (Outcome.SENT, Outcome.ACCEPTED, Outcome.CONFIRMED) if one.reached(o)
-    ] == reached
+    assert [step for step in STEPS if one.reached(step)] == reached
     assert one.confirmed is (Outcome.CONFIRMED in reached)
 
 
@@ -108,24 +107,16 @@ def test_a_decision_is_known_by_epoch_and_number() -> None:
 
 
 def test_what_was_never_told_is_nothing() -> None:
-    state = State(epoch=7, started_at=0.0)
-    assert repr(state.measured("height")) == repr(Measured())
-    assert repr(state.evidence(LINK)) == repr(LinkEvidence())
-    assert state.rule("tested") == RuleEvidence()
-    assert state.deploy is None
+    assert repr(NEW.measured("height")) == repr(Measured())
+    assert repr(NEW.evidence(LINK)) == repr(LinkEvidence())
+    assert NEW.rule("tested") == RuleEvidence()
+    assert NEW.deploy is None
 
 
 def test_what_was_told_is_that() -> None:
     height, rule = Measured(value=5.0, measured_at=1.0), RuleEvidence(level=1.0)
-    state = State(
-        epoch=7,
-        started_at=0.0,
-        rules=MappingProxyType({"tested": rule}),
-        heard=HeardHere(
-            measurements=MappingProxyType({"height": height}),
-            links=MappingProxyType({LINK: LinkEvidence(heard=1.0)}),
-        ),
-    )
+    links = {LINK: LinkEvidence(heard=1.0)}
+    state = changed(NEW, rules={"tested": rule}, measurements={"height": height}, links=links)
     assert state.measured("height") is height
     assert state.evidence(LINK).heard == 1.0
     assert state.rule("tested") is rule
@@ -135,7 +126,7 @@ def test_a_link_is_heard_as_long_as_its_own_limits_say() -> None:
     limits = MappingProxyType({UPF: LinkLimits(lost_after=4.0)})
     config = SupervisorConfig(deploy_links=(*BOTH, "umbilical"), link_limits=limits)
     heard = {LINK: LinkEvidence(heard=10.0), UPF: LinkEvidence(heard=10.0)}
-    state = State(epoch=7, started_at=0.0, heard=HeardHere(links=MappingProxyType(heard)))
+    state = changed(NEW, links=heard)
     counts = [state.links_heard(config, now) for now in (10.9, 11.0, 13.9, 14.0)]
     assert counts == [2, 1, 1, 0]
 
@@ -146,30 +137,25 @@ def test_a_link_is_heard_as_long_as_its_own_limits_say() -> None:
 def test_a_vehicle_that_is_heard_counts_as_one_more(passed: float, count: int) -> None:
     config = SupervisorConfig(vehicle_state_age=2.5)
     now = 10.0 + passed
-    links = MappingProxyType({LINK: LinkEvidence(heard=now)})
-    state = State(epoch=7, started_at=0.0, heard=HeardHere(links=links, vehicle_received=10.0))
+    state = changed(NEW, links={LINK: LinkEvidence(heard=now)}, vehicle_received=10.0)
     assert state.links_heard(config, now) == count
 
 
 def test_the_newest_heartbeat_is_that_of_any_link() -> None:
-    assert math.isnan(State(epoch=7, started_at=0.0).newest_heartbeat())
+    assert math.isnan(NEW.newest_heartbeat())
     heard = {"a": LinkEvidence(), "b": LinkEvidence(heard=12.0), "c": LinkEvidence(heard=11.0)}
-    state = State(epoch=7, started_at=0.0, heard=HeardHere(links=MappingProxyType(heard)))
+    state = changed(NEW, links=heard)
     assert state.newest_heartbeat() == 12.0
 
 
 def test_the_newest_step_of_the_ladder_is_the_last() -> None:
     first, second = pending(Action.DEPLOY), replace(pending(Action.DEPLOY), decided_at=12.0)
-    state = State(epoch=7, started_at=0.0, deploying=DeployUnderWay(deploys=(first, second)))
-    assert state.deploy is second
+    assert changed(NEW, deploys=(first, second)).deploy is second
 
 
 def test_the_ladder_is_that_of_the_order_and_without_one_that_of_the_settings() -> None:
-    state = State(epoch=7, started_at=0.0)
-    assert state.ladder(TWO) == (Rung(LINK), Rung(UPF))
-    assert replace(state, deploying=replace(state.deploying, deploy_ladder=(Rung(UPF),))).ladder(
-        TWO
-    ) == (Rung(UPF),)
+    assert NEW.ladder(TWO) == (Rung(LINK), Rung(UPF))
+    assert changed(NEW, deploy_ladder=(Rung(UPF),)).ladder(TWO) == (Rung(UPF),)
 
 
 # -- parachutes that are out ---------------------------------------------------------------------
@@ -179,12 +165,9 @@ def out(heard: float, released_at: float) -> State:
     """Device 33 of the second link is out; its node was heard, and said so, at these times."""
     status = parachute(UPF, "33", True).status
     evidence = LinkEvidence(
-        heard=heard,
-        reported=LinkState.OK,
-        released_at=released_at,
-        devices=MappingProxyType({"33": status}),
+        heard, LinkState.OK, released_at=released_at, devices=MappingProxyType({"33": status})
     )
-    return State(epoch=7, started_at=0.0, heard=HeardHere(links=MappingProxyType({UPF: evidence})))
+    return changed(NEW, links={UPF: evidence})
 
 
 @pytest.mark.parametrize(
@@ -199,7 +182,7 @@ def test_a_parachute_counts_while_its_node_is_heard_or_has_just_told_it(
     state = out(heard, released_at)
     assert state.released(config) == {(UPF, "33")}
     assert bool(state.newly_released(config, 10.0)) is counts
-    before = replace(state, flight=replace(state.flight, released_before=frozenset({(UPF, "33")})))
+    before = changed(state, released_before=frozenset({(UPF, "33")}))
     assert not before.newly_released(config, 10.0)
 
 

@@ -1,11 +1,12 @@
 """The single steps, word for word and at their limits."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import FLYING, LINK, STANDING, START, Story, changed, parachute
+from story import FLYING, LINK, STANDING, Story, changed, parachute
 
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.supervisor import inputs as i
@@ -176,11 +177,13 @@ def test_a_kill_that_is_done_or_not_wanted_is_not_decided_anew(known: dict[str, 
     assert one.outputs == []
 
 
-def test_a_flight_block_is_decided_anew_also_when_it_was_confirmed() -> None:
-    block = decided(1, BLOCK, outcomes=reports(a=Outcome.CONFIRMED, b=Outcome.CONFIRMED))
-    one = steps(stage=Stage.BLOCKED, block=block)
-    renew(one, "block", "it restarted")
-    assert len(one.outputs) == 1
+def test_a_flight_block_is_decided_anew_also_when_it_was_begun_or_confirmed() -> None:
+    for outcome in (Outcome.CONFIRMED, Outcome.SENT):
+        block = decided(1, BLOCK, outcomes=reports(a=outcome, b=outcome))
+        restarted, taken = (steps(stage=Stage.BLOCKED, block=block) for _ in range(2))
+        renew(restarted, "block", "it restarted")
+        renew_not_begun(taken, "another took over")
+        assert len(restarted.outputs) == len(taken.outputs) == 1, outcome
 
 
 def test_of_the_deploy_only_what_was_not_begun_is_decided_anew() -> None:
@@ -197,13 +200,6 @@ def test_of_the_deploy_only_what_was_not_begun_is_decided_anew() -> None:
     )
     assert one.state.deploying.deploys[0] == deploys[0]
     assert one.state.deploying.deploys[1].decision == output.decision
-
-
-def test_a_flight_block_is_decided_anew_also_where_it_was_begun() -> None:
-    begun = decided(1, BLOCK, outcomes=reports(a=Outcome.SENT, b=Outcome.SENT))
-    one = steps(stage=Stage.BLOCKED, block=begun)
-    renew_not_begun(one, "another took over")
-    assert len(one.outputs) == 1
 
 
 def test_those_that_have_not_reported_get_a_new_number_and_the_rest_stays() -> None:
@@ -300,27 +296,27 @@ def test_everyone_who_waits_hears_how_the_kill_went_and_that_it_failed_is_said_o
     assert one.state.own.kill_tokens == ()
 
 
-def test_a_kill_that_is_confirmed_answers_with_the_words_of_the_links() -> None:
-    told = reports(a=Outcome.CONFIRMED)
-    one = steps(kill=decided(1, K, outcomes=told, details=("a: off",)), kill_tokens=(5,))
+@pytest.mark.parametrize(
+    ("now", "outcomes", "answers"),
+    [
+        # It was taken and failed; it is confirmed; it is under way.
+        (96.0, {"a": Outcome.ACCEPTED}, [i.Finish(5, False, True, "a: ok")]),
+        (91.0, {"a": Outcome.CONFIRMED}, [i.Finish(5, True, True, "a: ok")]),
+        (91.0, {}, []),
+    ],
+)
+def test_a_kill_is_answered_with_the_words_of_the_links_once_it_has_ended(
+    now: float, outcomes: dict[str, Outcome], answers: list[i.Finish]
+) -> None:
+    kill = decided(1, K, outcomes=reports(**outcomes), details=("a: ok",))
+    one = steps(now=now, kill=kill, kill_tokens=(5,))
     end_kill(one)
-    assert one.outputs == [i.Finish(5, True, True, "a: off")]
-    assert one.state.own.kill_tokens == ()
-
-
-def test_a_kill_that_was_taken_and_failed_says_that_it_was_taken() -> None:
-    told = MappingProxyType({LINK: frozenset({Outcome.ACCEPTED})})
-    one = steps(now=96.0, kill=decided(1, K, outcomes=told, details=("a: ok",)), kill_tokens=(5,))
-    end_kill(one)
-    assert one.outputs[0] == i.Finish(5, False, True, "a: ok")
-
-
-def test_a_kill_that_is_under_way_is_not_answered() -> None:
-    one = steps(now=91.0, kill=decided(1, K), kill_tokens=(5,))
-    end_kill(one)
-    end_kill(steps())
-    assert one.outputs == []
-    assert one.state.own.kill_tokens == (5,)
+    assert [output for output in one.outputs if isinstance(output, i.Finish)] == answers
+    assert len(one.outputs) == (2 if now == 96.0 else len(answers))
+    assert one.state.own.kill_tokens == (() if answers else (5,))
+    nobody = steps()
+    end_kill(nobody)
+    assert nobody.outputs == []
 
 
 # -- nobody waits any more -----------------------------------------------------------------------
@@ -333,31 +329,18 @@ WAITING: dict[str, Any] = {
 }
 
 
-def test_one_that_steps_down_answers_and_what_was_ordered_stays() -> None:
+@pytest.mark.parametrize(
+    ("end", "rule", "reasons"), [(answer_all, "tested", ("why",)), (give_up_waiting, "", ())]
+)
+def test_whoever_waits_is_answered_and_what_was_ordered_stays_unless_it_is_given_up(
+    end: Callable[[Turn, str], None], rule: str, reasons: tuple[str, ...]
+) -> None:
     one = steps(**WAITING)
-    answer_all(one, "another decides")
+    end(one, "another decides")
     assert one.outputs == [i.Finish(n, False, False, "another decides") for n in (5, 6)]
     assert (one.state.own.kill_tokens, one.state.own.deploy_tokens) == ((), ())
-    assert (one.state.deploying.deploy_rule, one.state.deploying.deploy_reasons) == (
-        "tested",
-        ("why",),
-    )
-
-
-def test_one_that_gives_up_answers_and_pursues_nothing() -> None:
-    one = steps(**WAITING)
-    give_up_waiting(one, "reset")
-    assert one.outputs == [i.Finish(n, False, False, "reset") for n in (5, 6)]
-    assert (one.state.own.kill_tokens, one.state.own.deploy_tokens) == ((), ())
-    assert (one.state.deploying.deploy_rule, one.state.deploying.deploy_reasons) == ("", ())
-
-
-def test_a_link_that_is_heard_leaves_the_others_as_they_are() -> None:
-    story = Story(TWO)
-    story.at(0.1, story.heartbeat(), story.heartbeat(UPF))
-    story.at(0.2, story.heartbeat())
-    assert story.state.evidence(LINK).heard == START + 0.2
-    assert story.state.evidence(UPF).heard == START + 0.1
+    deploying = one.state.deploying
+    assert (deploying.deploy_rule, deploying.deploy_reasons) == (rule, reasons)
 
 
 def test_what_is_out_on_the_ground_adds_to_what_was() -> None:

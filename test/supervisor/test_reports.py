@@ -1,12 +1,24 @@
-"""Reports in every word and at their limits."""
+"""Reports of nodes, parachutes and the vehicle: what they block, and in which words."""
 
+import itertools
 import math
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
 import pytest
-from story import FLYING, LINK, STANDING, START, Story, parachute, vehicle, with_rules
+from story import (
+    DOWN,
+    FLYING,
+    IDLING,
+    LINK,
+    STANDING,
+    START,
+    Story,
+    parachute,
+    vehicle,
+    with_rules,
+)
 
 from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, VehicleState
 from chute_ros.supervisor import inputs as i
@@ -14,12 +26,176 @@ from chute_ros.supervisor.config import PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.core import update
 from chute_ros.supervisor.link_evidence import LinkLimits
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.state import State
 
 K, D = Action.KILL, Action.DEPLOY
 BLOCK, RELEASE = Action.FLIGHT_BLOCK, Action.FLIGHT_BLOCK_RELEASE
 UPF = "upf_can"
 BOTH = SupervisorConfig(kill_links=(LINK, UPF), deploy_links=(LINK, UPF))
+
+
+def reasons(story: Story) -> str:
+    return "; ".join(block_reasons(story.config, story.state, 1000.0 + story.t))
+
+
+def test_flight_is_blocked_from_the_first_moment_until_links_are_healthy() -> None:
+    story = Story()
+    story.at(0.0)
+    assert [d.action for d in story.decisions()] == [BLOCK]
+    assert "nothing received from its node" in reasons(story)
+    story.at(0.05, story.heartbeat())
+    assert story.state.stage is Stage.STARTUP
+    assert "armed or disarmed was never reported" in reasons(story)
+    story.at(0.1, i.VehicleReport(STANDING))
+    assert [d.action for d in story.decisions()] == [BLOCK, RELEASE]
+    assert story.state.stage is Stage.READY
+    story = Story(SupervisorConfig(require_vehicle_state=False))
+    story.at(0.0, story.heartbeat())
+    assert story.state.stage is Stage.READY, "the vehicle state can be done without"
+
+
+@pytest.mark.parametrize("links", [{"deploy_links": ("mistyped",)}, {"kill_links": ("mistyped",)}])
+def test_a_link_that_does_not_exist_blocks_flight_and_is_named(links: dict[str, Any]) -> None:
+    story = Story(SupervisorConfig(**links))
+    story.at(0.0, story.heartbeat(), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.STARTUP
+    assert reasons(story) == "mistyped: nothing received from its node"
+
+
+@pytest.mark.parametrize(
+    ("heartbeat", "words"),
+    [
+        ((False, LinkState.OK), "its device is not healthy"),
+        ((False, LinkState.NEVER_SEEN), "nothing received from its device"),
+        ((False, LinkState.STALE), "its device is STALE"),
+        ((False, LinkState.LOST), "its device is LOST"),
+    ],
+)
+def test_missing_stale_lost_and_unhealthy_are_different(
+    heartbeat: tuple[bool, LinkState], words: str
+) -> None:
+    story = Story().ready()
+    story.at(0.1, story.heartbeat(healthy=heartbeat[0], state=heartbeat[1]))
+    assert story.state.stage is Stage.BLOCKED
+    assert words in reasons(story)
+    assert words in "; ".join(story.newest(BLOCK).reasons)
+
+
+def test_the_faults_of_the_device_are_named() -> None:
+    story = Story().ready()
+    story.at(0.1, parachute(LINK, "1/161", False, ("LOW_POWER",)))
+    story.at(0.1, story.heartbeat(healthy=False))
+    assert "1/161 LOW_POWER" in reasons(story)
+
+
+def test_a_silent_node_is_stale_and_then_lost_each_at_its_limit() -> None:
+    story = Story().ready()
+    story.at(0.49)
+    assert story.state.stage is Stage.READY
+    story.at(0.5)
+    assert story.state.stage is Stage.BLOCKED
+    assert "STALE, heartbeat of its node 0.50 s old (limit 0.5 s)" in reasons(story)
+    story.at(1.0)
+    assert "LOST, heartbeat of its node 1.00 s old" in reasons(story)
+
+
+def test_a_link_that_comes_back_releases_flight_again() -> None:
+    story = Story().ready()
+    story.at(2.0)
+    story.at(2.1, story.heartbeat(), i.VehicleReport(STANDING))
+    assert reasons(story) == f"{LINK}: REGAINED, received again for 0.00 s (need 1 s)"
+    story.alive(3.05)
+    assert story.state.stage is Stage.BLOCKED
+    story.alive(3.25)
+    assert story.state.stage is Stage.READY
+    assert story.decisions()[-1].action is RELEASE
+
+
+def test_a_link_that_is_not_required_does_not_block() -> None:
+    story = Story(SupervisorConfig(deploy_links=(LINK, "upf_can"))).ready()
+    assert story.state.stage is Stage.READY
+
+
+def test_a_link_that_is_not_ours_is_not_followed() -> None:
+    story = Story().ready()
+    story.at(0.0, story.heartbeat("stranger"), parachute("stranger", "9", True, ()))
+    assert set(story.state.heard.links) == {LINK}
+
+
+def test_a_node_that_restarts_before_its_second_heartbeat_is_noticed_too() -> None:
+    story = Story()
+    story.at(0.0, parachute(LINK, "1/161", False, ()))
+    story.at(0.1, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
+    assert len(story.decisions()) == 1
+    story.at(0.2, i.LinkHeartbeat(LINK, LinkState.OK, False, 0))
+    assert len(story.decisions()) == 2
+
+
+def test_a_node_that_never_reports_is_asked_ever_more_rarely_but_once_a_second() -> None:
+    story = Story()
+    story.at(0.0, story.heartbeat(healthy=False))
+    for tick in range(1, 3000):
+        story.at(tick * 0.1, story.heartbeat(healthy=False))
+    times = [t for t, o in story.outputs if isinstance(o, i.Decide) and o.again]
+    gaps = [b - a for a, b in itertools.pairwise(times)]
+    assert gaps[0] == pytest.approx(0.1)
+    assert max(gaps) <= 1.1
+    assert len(times) < 320
+
+
+def test_a_block_is_sent_again_until_reported_but_only_to_a_node_that_lives() -> None:
+    story = Story()
+    story.at(5.0)
+    assert not [o for _, o in story.outputs if isinstance(o, i.Decide) and o.again]
+    story.at(5.1, story.heartbeat(healthy=False))
+    again = [o for _, o in story.outputs if isinstance(o, i.Decide) and o.again]
+    assert [o.decision.action for o in again] == [BLOCK]
+    story.at(5.2, story.report(BLOCK, Outcome.CONFIRMED))
+    count = len(story.outputs)
+    story.alive(5.3)
+    assert not [o for _, o in story.outputs[count:] if isinstance(o, i.Decide) and o.again]
+
+
+def test_a_lost_link_in_flight_neither_blocks_nor_fires() -> None:
+    story = Story().flying()
+    before = len(story.decisions())
+    story.at(60.0)
+    assert story.state.stage is Stage.IN_FLIGHT
+    assert len(story.decisions()) == before
+
+
+def test_after_landing_it_is_ready_again_once_it_is_disarmed_and_its_links_are_healthy() -> None:
+    """By its parachute or by its autopilot, without a reset."""
+    for disarmed in (i.ArmDone(0, False, True, "done"), i.VehicleReport(STANDING)):
+        story = Story().flying()
+        story.at(0.1, story.heartbeat(), i.VehicleReport(IDLING))
+        assert story.state.stage is Stage.LANDED
+        story.at(0.2, disarmed)
+        assert story.state.stage is Stage.READY
+        story.at(0.3, i.VehicleReport(FLYING))
+        assert story.state.stage is Stage.IN_FLIGHT
+    story = Story().flying()
+    story.at(0.1, story.heartbeat(healthy=False), i.VehicleReport(STANDING))
+    assert story.state.stage is Stage.BLOCKED
+    assert story.decisions()[-1].action is BLOCK
+
+
+def test_a_report_on_the_decision_of_another_supervisor_moves_no_epoch() -> None:
+    # Two that overtook each other at every report would never end.
+    story = Story().ready()
+    story.at(0.1, i.ActionReport(900, 1, LINK, Outcome.SENT, "told", newest_epoch=900))
+    assert story.state.epoch == 7
+
+
+def test_a_vehicle_state_that_stops_blocks_flight_at_its_limit() -> None:
+    story = Story().ready()
+    story.alive(2.4)
+    assert story.state.stage is Stage.READY
+    story.alive(2.6)
+    assert story.state.stage is Stage.BLOCKED
+    assert "armed or not is 2.6 s old (limit 2.5 s)" in reasons(story)
+
 
 # -- heartbeats ----------------------------------------------------------------------------------
 
@@ -199,13 +375,7 @@ def test_the_height_at_which_it_was_armed_is_kept(
     story.at(0.0, vehicle(armed=before))
     story.at(0.1, vehicle(armed=now, height=7.0))
     assert story.state.flight.armed_height == height
-
-
-def test_armed_without_a_height_it_is_taken_for_0() -> None:
-    story = Story()
-    story.at(0.0, vehicle(armed=Armed.DISARMED, height=7.0))
-    story.at(0.1, vehicle(armed=Armed.ARMED, height=7.0))
-    assert story.state.flight.armed_height == 7.0
+    # Armed without a height it is taken for 0.
     story.at(0.2, vehicle(armed=Armed.DISARMED))
     story.at(9.0, vehicle(armed=Armed.ARMED, height=math.nan))
     assert story.state.flight.armed_height == 0.0
@@ -227,14 +397,27 @@ def heights(*told: tuple[float, float]) -> list[tuple[float, float]]:
     return [(at - START, height) for at, height in story.state.heard.heights]
 
 
-def test_the_heights_of_the_last_second_are_kept() -> None:
-    told = [(tick / 8, float(tick)) for tick in range(20)]
-    assert heights(*told) == told[-9:], "the oldest is just a second old"
+EIGHTHS = [(tick / 8, float(tick)) for tick in range(20)]
+FAST = [(tick / 64, float(tick)) for tick in range(65)]
+TWO_HEIGHTS = [(0.125, 1.0), (0.25, 2.0)]
 
 
-def test_of_heights_that_come_fast_ten_a_second_are_kept() -> None:
-    told = [(tick / 64, float(tick)) for tick in range(65)]
-    assert heights(*told) == told[::7]
+@pytest.mark.parametrize(
+    ("told", "kept"),
+    [
+        # The oldest is just a second old.
+        (EIGHTHS, EIGHTHS[-9:]),
+        # Of heights that come fast ten a second.
+        (FAST, FAST[::7]),
+        # Without a height the last ones as they are.
+        ([*TWO_HEIGHTS, (0.375, math.nan)], TWO_HEIGHTS),
+        ([(0.125, math.nan)], []),
+    ],
+)
+def test_the_heights_of_the_last_second_are_kept(
+    told: list[tuple[float, float]], kept: list[tuple[float, float]]
+) -> None:
+    assert heights(*told) == kept
 
 
 def test_a_height_just_a_tenth_of_a_second_after_the_last_is_kept() -> None:
@@ -242,12 +425,6 @@ def test_a_height_just_a_tenth_of_a_second_after_the_last_is_kept() -> None:
     for now in (0.0, 0.1):
         state, _ = update(SupervisorConfig(), state, (vehicle(height=now),), now)
     assert state.heard.heights == ((0.0, 0.0), (0.1, 0.1))
-
-
-def test_without_a_height_the_last_ones_are_kept_as_they_are() -> None:
-    told = [(0.125, 1.0), (0.25, 2.0)]
-    assert heights(*told, (0.375, math.nan)) == told
-    assert heights((0.125, math.nan)) == []
 
 
 def test_heights_from_before_a_clock_was_set_back_are_not_kept() -> None:
@@ -268,7 +445,6 @@ def reboots(*told: tuple[dict[str, Any], int, bool]) -> Story:
     return story
 
 
-DOWN: dict[str, Any] = {"armed": Armed.DISARMED, "landed_state": LandedState.ON_GROUND}
 UP: dict[str, Any] = {"armed": Armed.ARMED, "landed_state": LandedState.IN_AIR}
 ANEW = ["the autopilot started anew in flight"]
 
@@ -302,24 +478,13 @@ def test_a_restart_of_the_autopilot_counts_in_flight(
 # -- how decisions fare --------------------------------------------------------------------------
 
 
-def killing(config: SupervisorConfig | None = None) -> Story:
-    """In flight; a person asks for a kill at 0.1."""
-    story = Story(config or SupervisorConfig()).flying()
-    story.at(0.1, i.KillRequest(5, "operator", "stop"))
-    return story
-
-
-def test_the_answer_tells_the_last_two_details_each_with_its_link() -> None:
-    story = killing()
-    for outcome, detail in ((Outcome.SENT, "sent"), (Outcome.ACCEPTED, "taken")):
-        story.at(story.t + 0.1, story.report(K, outcome, detail=detail))
-    story.at(0.5, story.report(K, Outcome.CONFIRMED, detail="off"))
-    text = "mavlink_parachute: taken; mavlink_parachute: off"
-    assert story.answers(5) == [i.Finish(5, True, True, text)]
+def older(story: Story, action: Action, link: str = LINK, detail: str = "older") -> i.ActionReport:
+    return story.report(action, Outcome.FAILED, link, detail)
 
 
 def test_the_newest_details_are_kept_each_once() -> None:
-    story = killing()
+    story = Story().flying()
+    story.at(0.1, i.KillRequest(5, "operator", "stop"))
     for number in (*range(10), 5, 9):
         story.at(story.t + 0.1, story.report(K, Outcome.SENT, detail=f"try {number}"))
     assert story.state.killing.kill is not None
@@ -344,12 +509,6 @@ def test_a_report_reaches_the_decision_that_it_is_about_behind_others_that_it_is
     assert story.state.killing.kill.of(UPF) == frozenset()
 
 
-def refused(
-    story: Story, action: Action, link: str = LINK, detail: str = "older"
-) -> i.ActionReport:
-    return story.report(action, Outcome.FAILED, link, detail)
-
-
 def test_a_deploy_that_a_later_kill_overtook_leaves_again_under_a_new_number_and_says_why() -> (
     None
 ):
@@ -358,13 +517,13 @@ def test_a_deploy_that_a_later_kill_overtook_leaves_again_under_a_new_number_and
     story.at(0.2, story.report(K, Outcome.CONFIRMED))
     story.at(0.3, i.KillRequest(6, "operator", "stop"))
     old = story.newest(D)
-    story.at(0.4, refused(story, D))
+    story.at(0.4, older(story, D))
     new = story.newest(D)
     assert new.id > story.newest(K).id > old.id
     assert new.reasons == (*old.reasons, "mavlink_parachute saw a newer decision first")
     assert story.state.deploy is not None
     assert story.state.deploy.of(LINK) == frozenset(), "it was refused, not tried"
-    story.at(0.5, refused(story, D, detail="broken"))
+    story.at(0.5, older(story, D, detail="broken"))
     assert story.state.stage is Stage.FAULT, "nothing is newer any more"
 
 
@@ -374,7 +533,7 @@ def test_a_kill_that_its_deploy_overtook_leaves_again_although_a_parachute_is_ou
     story.at(0.1, i.DeployRequest(5, False, "it falls"))
     story.at(0.7, parachute(deployed=True))
     assert story.state.stage is Stage.DEPLOYED
-    story.at(0.8, refused(story, K))
+    story.at(0.8, older(story, K))
     assert len(story.decisions(K)) == 2
     assert story.newest(K).reasons[-1] == "mavlink_parachute saw a newer decision first"
 
@@ -385,7 +544,7 @@ def test_a_kill_that_was_overtaken_is_not_tried_again_once_all_is_given_up() -> 
         story.at(0.1, i.DeployRequest(5, False, "it falls"))
         story.at(2.0)
         assert story.state.stage is Stage.FAULT
-        story.at(at, refused(story, K))
+        story.at(at, older(story, K))
         assert len(story.decisions(K)) == decided
 
 
@@ -393,7 +552,7 @@ def test_a_kill_that_was_sent_and_failed_then_was_not_overtaken() -> None:
     story = Story().flying()
     story.at(0.1, i.DeployRequest(5, False, "it falls"))
     story.at(0.2, story.report(K, Outcome.SENT))
-    story.at(0.7, refused(story, K, detail="no acknowledgement"))
+    story.at(0.7, older(story, K, detail="no acknowledgement"))
     assert story.newest(D).id > story.newest(K).id
     assert len(story.decisions(K)) == 1
 
@@ -405,7 +564,7 @@ def test_a_newer_decision_for_another_link_overtakes_nothing() -> None:
     story.flying().at(0.1, i.DeployRequest(5, False, "it falls"))
     story.at(0.7)
     assert story.newest(D).id > story.newest(K).id
-    story.at(0.8, refused(story, K))
+    story.at(0.8, older(story, K))
     assert len(story.decisions(K)) == 1
     assert story.state.killing.kill is not None
     assert story.state.killing.kill.all_failed()
@@ -417,7 +576,7 @@ def test_an_older_number_that_failed_on_a_link_that_was_asked_again_says_nothing
     story.at(0.2, story.report(K, Outcome.SENT, UPF))
     story.at(0.7)
     first = story.newest(K)
-    story.at(0.8, refused(story, K))
+    story.at(0.8, older(story, K))
     second = story.newest(K)
     assert (second.id > first.id, second.targets) == (True, (LINK,))
 
@@ -452,9 +611,10 @@ def test_a_newer_epoch_is_overtaken_in_these_words() -> None:
     assert story.alarms() == []
 
 
-def test_the_largest_epoch_is_an_alarm_in_these_words() -> None:
+def test_the_largest_epoch_cannot_be_overtaken_and_is_an_alarm_in_these_words() -> None:
     story = Story().ready()
     story.at(0.1, seen(2**32 - 1))
+    assert story.state.epoch == 7
     assert story.alarms() == [
         "mavlink_parachute has seen epoch 4294967295, the largest: restart it"
     ]
@@ -484,29 +644,26 @@ def test_under_our_epoch_a_number_that_we_never_gave_is_anothers(
     assert story.state.next_id == 2
     story.at(0.1, seen(epoch, number, Outcome.CONFIRMED))
     assert story.state.epoch == (8 if foreign else 7)
+    assert story.newest(RELEASE).epoch == story.state.epoch
     assert story.state.block is not None
     assert story.state.block.confirmed is not foreign
 
 
-def test_one_that_follows_leaves_epochs_alone() -> None:
-    story = Story().ready()
-    story.state = replace(story.state, own=replace(story.state.own, leading=False))
-    story.at(0.1, seen(900))
-    assert story.state.epoch == 7
-
-
-@pytest.mark.parametrize(("epoch", "yields"), [(9, True), (900, False)])
+@pytest.mark.parametrize(
+    ("standby", "epoch", "yields", "then"),
+    [(True, 9, True, 7), (True, 900, False, 904), (False, 9, False, 12)],
+)
 def test_a_standby_yields_to_another_but_not_to_itself_before_its_restart(
-    epoch: int, yields: bool
+    standby: bool, epoch: int, yields: bool, then: int
 ) -> None:
-    story = Story(SupervisorConfig(standby=True)).ready()
+    """One that is alone goes on above whoever was there."""
+    story = Story(SupervisorConfig(standby=standby)).ready()
     outputs = story.at(0.1, seen(epoch))
     assert (i.Refused(epoch) in outputs) is yields
-    assert story.state.epoch == (7 if yields else 904)
+    assert story.state.epoch == then
 
 
-def test_one_that_is_alone_goes_on_above_whoever_was_there() -> None:
-    story = Story().ready()
-    outputs = story.at(0.1, seen(9))
-    assert i.Refused(9) not in outputs
-    assert story.state.epoch == 12
+def test_one_that_follows_leaves_epochs_alone() -> None:
+    story = Story().ready().follows()
+    story.at(0.1, seen(900))
+    assert story.state.epoch == 7

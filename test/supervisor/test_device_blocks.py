@@ -45,14 +45,6 @@ def test_a_device_blocks_flight_and_lets_it_go_again() -> None:
     assert dict(story.state.device_blocks) == {}
 
 
-def test_an_armed_vehicle_on_the_ground_is_blocked_too() -> None:
-    story = Story().ready()
-    story.at(0.1, i.ArmDone(0, True, True, ""))
-    story.at(0.2, ask())
-    assert story.state.stage is Stage.BLOCKED
-    assert story.decisions()[-1].action is BLOCK
-
-
 def test_arming_is_refused_with_the_devices_reason() -> None:
     story = Story().ready()
     story.at(0.1, ask(), i.ArmRequest(1, True, 0))
@@ -61,6 +53,16 @@ def test_arming_is_refused_with_the_devices_reason() -> None:
     story.at(0.2, let_go())
     story.at(0.3, i.ArmRequest(2, True, 0))
     assert [o for _, o in story.outputs if isinstance(o, i.ArmDevices)]
+
+
+def test_an_armed_vehicle_on_the_ground_is_blocked_too_and_in_shadow_it_is_only_said() -> None:
+    for mode in (i.Mode.ACTIVE, i.Mode.SHADOW):
+        story = Story(mode=mode).ready()
+        story.at(0.1, i.ArmDone(0, True, True, ""))
+        story.at(0.2, ask())
+        assert story.state.stage is Stage.BLOCKED
+        block = story.decisions()[-1]
+        assert (block.action, block.shadow) == (BLOCK, mode is i.Mode.SHADOW)
 
 
 def test_a_device_that_asks_while_it_is_being_armed_is_not_outrun_by_the_arming() -> None:
@@ -74,8 +76,8 @@ def test_every_device_that_asks_is_named_and_the_last_one_to_let_go_releases() -
     story = Story().ready()
     story.at(0.1, ask(), ask("NOT_READY", "34"))
     assert reasons(story) == (WORDS, "upf_can 34 asks to block flight: NOT_READY")
-    story.at(0.2, let_go())
-    assert story.state.stage is Stage.BLOCKED
+    story.at(0.2, let_go(), i.BlockRequest(LINK, "34", False, "READY"))
+    assert story.state.stage is Stage.BLOCKED, "a device speaks only for itself"
     story.at(0.3, let_go("34"))
     assert story.state.stage is Stage.READY
 
@@ -87,13 +89,6 @@ def test_a_device_that_lets_go_does_not_outvote_an_unhealthy_link() -> None:
     assert story.state.stage is Stage.BLOCKED
     story.at(0.3, story.heartbeat())
     assert story.state.stage is Stage.READY
-
-
-def test_a_device_speaks_only_for_itself() -> None:
-    story = Story().ready()
-    story.at(0.1, ask())
-    story.at(0.2, let_go("34"), i.BlockRequest(LINK, "33", False, "READY"))
-    assert story.state.stage is Stage.BLOCKED
 
 
 @pytest.mark.parametrize(
@@ -112,13 +107,14 @@ def test_what_a_device_leaves_out_is_said_in_words(one: i.BlockRequest, words: s
 # Repeating
 
 
-def test_asking_again_for_the_same_reason_changes_nothing() -> None:
-    story = Story().ready()
-    story.at(0.1, ask())
-    before, count = story.state, len(story.outputs)
-    story.at(0.1, ask())
-    assert story.state == before
-    assert len(story.outputs) == count
+def test_asking_for_the_same_or_letting_go_of_what_was_never_asked_changes_nothing() -> None:
+    for first, again in ((ask(), ask()), (let_go("34"), let_go())):
+        story = Story().ready()
+        story.at(0.1, first, story.report(RELEASE, Outcome.CONFIRMED))
+        before, count = story.state, len(story.outputs)
+        story.at(0.1, again)
+        assert story.state == before
+        assert len(story.outputs) == count
 
 
 def test_another_reason_takes_the_place_of_the_first_without_a_new_decision() -> None:
@@ -127,15 +123,6 @@ def test_another_reason_takes_the_place_of_the_first_without_a_new_decision() ->
     story.at(0.2, ask("NOT_READY"))
     assert reasons(story) == ("upf_can 33 asks to block flight: NOT_READY",)
     assert len(story.decisions(BLOCK)) == 1
-
-
-def test_letting_go_of_what_was_never_asked_changes_nothing() -> None:
-    story = Story().ready()
-    story.at(0.1, story.report(RELEASE, Outcome.CONFIRMED))
-    before, count = story.state, len(story.outputs)
-    story.at(0.1, let_go())
-    assert story.state == before
-    assert len(story.outputs) == count
 
 
 # While starting
@@ -150,13 +137,10 @@ def test_while_starting_it_blocks_as_an_unhealthy_link_does() -> None:
         story.at(tick * 0.1, story.heartbeat(), i.VehicleReport(STANDING))
     assert story.state.stage is Stage.BLOCKED
     assert [d.action for d in story.decisions()] == [BLOCK]
-
-
-def test_a_device_that_lets_go_while_starting_was_never_a_fault() -> None:
     story = Story()
     story.at(0.0, ask(), story.heartbeat(), i.VehicleReport(STANDING))
     story.at(0.1, let_go())
-    assert story.state.stage is Stage.READY
+    assert story.state.stage is Stage.READY, "let go while starting it was never a fault"
 
 
 # In the air
@@ -167,14 +151,15 @@ def test_in_the_air_nothing_is_undone_and_it_counts_once_on_the_ground() -> None
     count = len(story.decisions())
     story.at(0.1, ask())
     story.alive(2.0)
+    story.at(2.05, i.ResetRequest(1))
+    assert not story.answer(1).success
+    assert "upf_can 33" in story.state.device_blocks, "a refused reset forgets nothing"
     assert story.state.stage is Stage.IN_FLIGHT
     assert len(story.decisions()) == count
     story.at(2.1, story.heartbeat(), i.VehicleReport(STANDING))
     assert story.state.stage is Stage.BLOCKED
     assert WORDS in story.newest(BLOCK).reasons
-
-
-def test_what_was_let_go_in_the_air_does_not_count_on_the_ground() -> None:
+    # What was let go in the air does not count on the ground.
     story = Story().flying()
     story.at(0.1, ask())
     story.at(0.2, let_go())
@@ -213,21 +198,6 @@ def test_a_reset_forgets_a_unit_that_was_exchanged_and_one_that_still_asks_is_he
     assert dict(story.state.device_blocks) == {}
     story.at(0.3, ask())
     assert story.state.stage is Stage.BLOCKED
-
-
-def test_a_refused_reset_forgets_nothing() -> None:
-    story = Story().flying()
-    story.at(0.1, ask())
-    story.at(0.2, i.ResetRequest(1))
-    assert not story.answer(1).success
-    assert "upf_can 33" in story.state.device_blocks
-
-
-def test_in_shadow_the_block_is_only_said() -> None:
-    story = Story(mode=i.Mode.SHADOW).ready()
-    story.at(0.1, ask())
-    assert story.state.stage is Stage.BLOCKED
-    assert story.newest(BLOCK).shadow
 
 
 def test_inhibited_it_is_remembered_and_blocks_once_active() -> None:
