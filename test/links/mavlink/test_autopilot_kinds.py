@@ -167,7 +167,7 @@ def test_a_setting_that_makes_the_kill_impossible_forbids_take_off(bench):
 @pytest.mark.parametrize(
     ("settings", "expect", "reason"),
     [
-        (None, True, "no parachute was received"),
+        (None, True, "no parachute was received: check its power"),
         (None, False, "no autopilot was received to send a kill to"),
         (ParachuteSettings(errors=8), True, "1/161 LOW_POWER"),
         (ParachuteSettings(system_status=1), True, "1/161 is NOT_READY"),
