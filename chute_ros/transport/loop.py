@@ -137,6 +137,10 @@ class WireLoop(Generic[LinkT]):
             self._wake_out.send(b"w")
         except BlockingIOError:
             pass  # enough wake-ups are on their way
+        except OSError:
+            if not self._stopping:
+                raise
+            # Another thread calls one that has ended: nobody is there to be woken.
 
     def _run(self) -> None:
         while not self._stopping:

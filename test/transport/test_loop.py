@@ -365,3 +365,12 @@ def test_two_hundred_times_open_and_closed_leak_nothing():
             assert node.wire.is_open
     assert descriptors() == before
     assert loop_threads() == []
+
+
+def test_a_call_after_the_end_is_made_by_nobody_and_harms_nobody():
+    with running(f"udpin:{LOCAL}:0") as node:
+        loop = node.loop
+    called = []
+    loop.call(lambda link, now: called.append(now))
+    loop.call_at_turns_end(lambda link, now: called.append(now))
+    assert called == []
