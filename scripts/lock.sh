@@ -15,11 +15,11 @@ pin() {
 }
 
 pin_distro() {
-    sed -e "s/@DISTRO@/$1/" -e "/^ros-$2-/d" ros-wheels.in | pin "$1.lock" - runtime.in dev.in
+    sed -e "s/@DISTRO@/$1/" -e "/^ros-$2-/d" ros-wheels.in | pin "$1.lock" - runtime.in extra.in dev.in
 }
 pin_distro jazzy kilted
 pin_distro kilted jazzy
-pin sourced.lock runtime.in dev.in
+pin sourced.lock runtime.in extra.in dev.in
 pin installer.lock installer.in
 pin mutate.lock mutate.in
 pin fuzz.lock fuzz.in
