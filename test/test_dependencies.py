@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-#: Module -> what package.xml, or requirements/runtime.in where rosdep has no key, calls it.
+#: Module -> what package.xml, or requirements/*.in where rosdep has no key, calls it.
 NAMES = {
     "serial": "python3-serial",
     "yaml": "python3-yaml",
@@ -42,7 +42,8 @@ def in_package_xml() -> set[str]:
 
 
 def in_requirements() -> set[str]:
-    lines = (ROOT / "requirements/runtime.in").read_text().splitlines()
+    files = [ROOT / f"requirements/{name}.in" for name in ("runtime", "extra")]
+    lines = [line for file in files for line in file.read_text().splitlines()]
     named = [line.split("#")[0].strip() for line in lines]
     return {line.split("=")[0].rstrip(">=<") for line in named if line}
 
