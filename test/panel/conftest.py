@@ -7,9 +7,9 @@ from panel_bench import LAPTOP, Panel, browser_path
 from playwright.sync_api import sync_playwright
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser():
-    """Chromium without a screen."""
+    """Chromium without a screen. While it lives its thread has an event loop that runs."""
     with sync_playwright() as playwright:
         # Root, as in containers, has no sandbox.
         one = playwright.chromium.launch(executable_path=browser_path(), args=["--no-sandbox"])

@@ -37,8 +37,8 @@ def test_orders_need_a_password(ros):
     code, told = started_with(allow_commands="true")
     assert code == 2
     assert told == (
-        "panel: parameter allow_commands is True and password_file is : need a password: set "
-        "password_file, or leave allow_commands false",
+        "panel: parameter allow_commands is True and password_file is '': need a password: set "
+        "password_file, or leave allow_commands false"
     )
 
 
