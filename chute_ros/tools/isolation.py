@@ -31,6 +31,13 @@ def isolated_ros() -> Iterator[str]:
         yield f"/sim_{secrets.token_hex(4)}"
 
 
+def free_tcp_port() -> int:
+    """A port of 127.0.0.1 that nobody uses at this moment."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
 def free_udp_ports(count: int) -> list[int]:
     """Ports of 127.0.0.1 that nobody uses at this moment."""
     ports = []

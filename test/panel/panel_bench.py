@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 
 from playwright.sync_api import expect
 
+from chute_ros.tools.isolation import free_tcp_port
 from chute_ros.tools.processes import Processes, ros_arguments
 
 #: How long anything that must happen may take on a busy machine, ms.
@@ -36,19 +36,12 @@ def browser_path():
     return found
 
 
-def free_port():
-    """A TCP port of 127.0.0.1 that nobody uses at this moment."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
-
-
 class Panel:
     """One panel. parameters: of its node."""
 
     def __init__(self, folder, **parameters):
         self.processes = Processes(folder)
-        self.port = parameters.setdefault("port", free_port())
+        self.port = parameters.setdefault("port", free_tcp_port())
         self.address = f"http://127.0.0.1:{self.port}"
         # NiceGUI would take it for a test of its own.
         name = "PYTEST_CURRENT_TEST"

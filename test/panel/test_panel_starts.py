@@ -12,7 +12,7 @@ import sys
 from urllib.parse import urlencode
 
 import pytest
-from panel_bench import PASSWORD, free_port, password_file
+from panel_bench import PASSWORD, password_file
 
 from chute_ros.tools.processes import ros_arguments
 
@@ -194,7 +194,3 @@ def test_ctrl_c_ends_it_at_once_with_pages_open(panel, open_page):
     panel.processes.send_signal("panel", signal.SIGINT)
     panel.processes.end()
     assert "Traceback" not in panel.log()
-
-
-def test_free_ports_are_free():
-    assert free_port() != free_port()
