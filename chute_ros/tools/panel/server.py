@@ -1,0 +1,126 @@
+"""The web server of the panel: NiceGUI in a thread of its own."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nicegui import app, core, ui
+from nicegui.server import Server
+
+from chute_ros.errors import ParameterError
+from chute_ros.tools.panel import fleet_page, login_page, vehicle_page
+from chute_ros.tools.panel.border import Border, own_names
+
+if TYPE_CHECKING:
+    from chute_ros.tools.panel.node import PanelNode
+
+#: A browser that is away for so long is looked after no more, s: its vehicle costs nothing then.
+_RECONNECT = 5.0
+_END = 5.0
+_ANY = ("0.0.0.0", "::")
+
+
+class PanelServer:
+    """Of this node. One in a process, as NiceGUI has it."""
+
+    def __init__(self, node: PanelNode) -> None:
+        self._node = node
+        settings = node.settings
+        self.secure = bool(settings.certificate_file)
+        for name in ("certificate_file", "key_file"):
+            file = getattr(settings, name)
+            if file and not os.access(file, os.R_OK):
+                raise ParameterError(f"parameter {name}: {file} cannot be read")
+        self._check_port()
+        self._thread = threading.Thread(target=self._run, name="web server", daemon=True)
+
+    @property
+    def address(self) -> str:
+        """For the browser of this computer, or of others where they are let in."""
+        settings = self._node.settings
+        host = socket.gethostname() if settings.host in _ANY else settings.host
+        host = f"[{host}]" if ":" in host else host
+        return f"{'https' if self.secure else 'http'}://{host}:{settings.port}/"
+
+    def start(self) -> None:
+        """Serve until stop."""
+        names = own_names([*self._node.settings.host_names, self._node.settings.host])
+        app.add_middleware(Border, names=names)
+        folder = Path(__file__).parent
+        for tag, name in (("style", "panel.css"), ("script", "panel.js")):
+            ui.add_head_html(f"<{tag}>{(folder / name).read_text()}</{tag}>", shared=True)
+        login_page.register(self._node, self.secure)
+        fleet_page.register(self._node)
+        vehicle_page.register(self._node)
+        app.on_startup(self._tell)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End it, with every page that is open."""
+        if (server := getattr(Server, "instance", None)) is not None:
+            server.should_exit = True
+            server.force_exit = True
+        self._thread.join(_END)
+
+    def _check_port(self) -> None:
+        settings = self._node.settings
+        try:
+            family = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
+            with socket.socket(*family[:2]) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind(family[4])
+        except OSError as error:
+            raise ParameterError(
+                f"parameters host and port are {settings.host} and {settings.port}: "
+                f"{error.strerror}; name others, or end what listens there"
+            ) from None
+
+    def _run(self) -> None:
+        settings = self._node.settings
+        # Whoever starts it from a test: NiceGUI would listen elsewhere.
+        os.environ.pop("PYTEST_CURRENT_TEST", None)
+        more = {}
+        if self.secure:
+            more = {
+                "ssl_certfile": settings.certificate_file,
+                "ssl_keyfile": settings.key_file,
+            }
+        try:
+            ui.run(
+                host=settings.host,
+                port=settings.port,
+                title="chute_ros",
+                favicon=str(Path(__file__).parent / "panel.svg"),
+                dark=None,
+                reload=False,
+                show=False,
+                show_welcome_message=False,
+                tailwind=False,
+                binding_refresh_interval=None,
+                reconnect_timeout=_RECONNECT,
+                **more,
+            )
+        except SystemExit:
+            self._node.get_logger().fatal(f"the web server at {self.address} could not start")
+
+    def _tell(self) -> None:
+        node = self._node
+        log = node.get_logger()
+        log.info(f"panel at {self.address}")
+        settings = node.settings
+        if settings.allow_commands and not self.secure and settings.host != "127.0.0.1":
+            log.warning(
+                "passwords and orders are sent in clear text: set certificate_file and key_file, "
+                "or keep strangers from this network"
+            )
+
+
+def in_loop(function: object) -> None:
+    """Have function called in the web server's thread."""
+    loop = core.loop
+    if loop is not None and not loop.is_closed():
+        loop.call_soon_threadsafe(function)  # type: ignore[arg-type]
