@@ -4,7 +4,7 @@
   const HOLD = 1500, LOST = 3000;
   let held = null, timer = null;
   const begin = (button) => {
-    if (!button || button.hasAttribute("disabled") || held) return;
+    if (!button || held) return;
     held = button;
     button.classList.add("holding");
     timer = setTimeout(() => {

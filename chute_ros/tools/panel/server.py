@@ -8,7 +8,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nicegui import app, core, ui
+from nicegui import app, ui
 from nicegui.server import Server
 
 from chute_ros.errors import ParameterError
@@ -63,7 +63,6 @@ class PanelServer:
         """End it, with every page that is open."""
         if (server := getattr(Server, "instance", None)) is not None:
             server.should_exit = True
-            server.force_exit = True
         self._thread.join(_END)
 
     def _check_port(self) -> None:
@@ -83,12 +82,6 @@ class PanelServer:
         settings = self._node.settings
         # Whoever starts it from a test: NiceGUI would listen elsewhere.
         os.environ.pop("PYTEST_CURRENT_TEST", None)
-        more = {}
-        if self.secure:
-            more = {
-                "ssl_certfile": settings.certificate_file,
-                "ssl_keyfile": settings.key_file,
-            }
         try:
             ui.run(
                 host=settings.host,
@@ -102,7 +95,9 @@ class PanelServer:
                 tailwind=False,
                 binding_refresh_interval=None,
                 reconnect_timeout=_RECONNECT,
-                **more,
+                timeout_graceful_shutdown=1,
+                ssl_certfile=settings.certificate_file or None,
+                ssl_keyfile=settings.key_file or None,
             )
         except SystemExit:
             self._node.get_logger().fatal(f"the web server at {self.address} could not start")
@@ -117,10 +112,3 @@ class PanelServer:
                 "passwords and orders are sent in clear text: set certificate_file and key_file, "
                 "or keep strangers from this network"
             )
-
-
-def in_loop(function: object) -> None:
-    """Have function called in the web server's thread."""
-    loop = core.loop
-    if loop is not None and not loop.is_closed():
-        loop.call_soon_threadsafe(function)  # type: ignore[arg-type]

@@ -24,7 +24,7 @@ _SLOWLY = 8
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 #: Parts of the page, in their order on a phone; wide screens have two columns.
 _LEFT = ("blocks", "parachutes", "vehicle")
-_RIGHT = ("rocket", "links", "rules", "decisions", "diagnostics")
+_RIGHT = ("rocket", "links", "decisions", "rules", "diagnostics")
 
 
 def register(node: PanelNode) -> None:
