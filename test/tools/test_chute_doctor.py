@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from test_chute_picture import Heard, heartbeat, stamped
+from heard_vehicle import Heard, heartbeat, stamped
 
 from chute_ros.tools.chute import doctor_computer as computer
 from chute_ros.tools.chute import doctor_ports as ports

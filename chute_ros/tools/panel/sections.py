@@ -35,6 +35,7 @@ MEANINGS = {
     "FAULT": "What was ordered could not be done.",
 }
 _HISTORY = 8
+_DIAGNOSTIC_TONE = {"WARN": "warn", "STALE": "quiet", "ERROR": "bad"}
 
 
 def banner(picture: VehiclePicture) -> str:
