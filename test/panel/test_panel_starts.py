@@ -62,6 +62,16 @@ def test_a_password_file_that_is_none(ros, tmp_path, text, mode, told):
     assert told in said
 
 
+def test_without_nicegui_it_says_what_to_install(ros, tmp_path, monkeypatch):
+    # Given a computer on which it cannot be imported,
+    (tmp_path / "nicegui.py").write_text("raise ModuleNotFoundError('none', name='nicegui')\n")
+    paths = f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"
+    monkeypatch.setenv("PYTHONPATH", paths)
+    assert started_with() == (
+        1, "nicegui is not installed: `pip install -r requirements/extra.in` brings it"
+    )  # fmt: skip
+
+
 def test_a_port_that_somebody_else_has(ros):
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
