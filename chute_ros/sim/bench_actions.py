@@ -1,5 +1,5 @@
-"""What a person can do to a simulated vehicle while it runs: one table for the panel's buttons, the
-services of sim_bench and docs/guide/simulation.md."""
+"""What a person can do to a simulated vehicle while it runs: one table for the buttons of the
+panel, the services of sim_bench and docs/guide/simulation.md."""
 
 from __future__ import annotations
 
@@ -63,6 +63,18 @@ ACTIONS: tuple[BenchAction, ...] = (
         ((AUTOPILOT, "restore"),),
     ),
     BenchAction(
+        "silence_autopilot",
+        "Telemetry falls silent",
+        "The autopilot sends nothing, but obeys. The supervisor reports its link STALE, then LOST.",
+        ((AUTOPILOT, "silent"),),
+    ),
+    BenchAction(
+        "let_autopilot_speak",
+        "Telemetry comes back",
+        "The autopilot sends as before.",
+        ((AUTOPILOT, "speak"),),
+    ),
+    BenchAction(
         "restart_autopilot",
         "Restart the autopilot",
         "The autopilot starts again, disarmed. In the air nothing holds the vehicle any more: it "
@@ -92,7 +104,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "wind",
         "Wind",
-        "Gusts of a wind of 8 m/s lift, drop and tilt the vehicle. The supervisor must not deploy.",
+        "Gusts of a wind of 8 m/s lift, drop and tilt the vehicle in the air. The supervisor must "
+        "not deploy.",
         ((AUTOPILOT, "wind=8"),),
     ),
     BenchAction("calm", "Calm", "The gusts end.", ((AUTOPILOT, "wind=0"),)),
