@@ -65,7 +65,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "silence_autopilot",
         "Telemetry falls silent",
-        "The autopilot sends nothing, but obeys. The supervisor reports its link STALE, then LOST.",
+        "The autopilot sends nothing, but obeys. The supervisor reports its link STALE, then "
+        "LOST.",
         ((AUTOPILOT, "silent"),),
     ),
     BenchAction(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -12,21 +11,26 @@ from std_srvs.srv import Trigger
 from chute_ros.links.registered import vehicles
 from chute_ros.ros import qos
 from chute_ros.ros.suite_node import SuiteNode
-from chute_ros.settings import Settings, parameter, parameters_of
+from chute_ros.settings import Parameter
 from chute_ros.sim.bench_actions import BenchAction, actions_of
 from chute_ros.sim.control import DONE, order
 from chute_ros.tools.simulated_vehicle import control_path, simulators_of
 
 
-@dataclass(frozen=True)
-class BenchParameters(Settings):
+def parameters() -> tuple[Parameter, ...]:
     """All parameters of the node."""
-
-    vehicle: str = parameter(
-        "mavlink", "the simulated vehicle, as parachute:= names it", choices=tuple(vehicles())
-    )
-    folder: str = parameter(
-        "", "folder with the control sockets of the vehicle's simulators, each SIMULATOR.sock"
+    return (
+        Parameter(
+            "vehicle",
+            "mavlink",
+            "the simulated vehicle, as parachute:= names it",
+            choices=tuple(vehicles()),
+        ),
+        Parameter(
+            "folder",
+            "",
+            "folder with the control sockets of the vehicle's simulators, each SIMULATOR.sock",
+        ),
     )
 
 
@@ -34,7 +38,7 @@ class BenchNode(SuiteNode):
     """Passes each action on to the simulators of its vehicle."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__("sim_bench", parameters_of(BenchParameters), **options)
+        super().__init__("sim_bench", parameters(), **options)
         self._safety = SafetyState()
         self.create_subscription(SafetyState, "safety/state", self._see, qos.LATCHED)
         for action in actions_of(simulators_of(self.values["vehicle"])):
@@ -58,7 +62,7 @@ class BenchNode(SuiteNode):
         """Why the vehicle must not take off."""
         if not self._safety.flight_blocked:
             return []
-        return [f"the supervisor blocks flight: {one}" for one in self._safety.block_reasons]
+        return [f"the supervisor blocks flight: {'; '.join(self._safety.block_reasons)}"]
 
     def _order(self, action: BenchAction) -> list[str]:
         """Tell each simulator. Returns why it was not done."""

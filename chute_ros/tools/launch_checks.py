@@ -25,7 +25,7 @@ from chute_ros.sim.bench_actions import AUTOPILOT, FLIGHT_COMPUTER, Order, actio
 T = TypeVar("T")
 #: When a simulated vehicle arms and takes off, s after its start: the supervisor is READY by then.
 _ARMS_AT, _TAKES_OFF_AT = 10.0, 11.0
-#: What can fail in a simulated flight, in the words of fail:= -> its action in the table of actions.
+#: What can fail in a simulated flight, as fail:= names it -> its action in the table of actions.
 FAILURES = {
     "motor": "fail_motor",
     "autopilot": "restart_autopilot",
@@ -90,37 +90,34 @@ class Flight:
     def options(self, simulators: Sequence[str]) -> dict[str, list[str]]:
         """Simulator -> what its command line has besides. ParameterError: this cannot be, or not
         of a vehicle with these simulators."""
-        script: list[tuple[float, Order]] = []
-        begins = math.nan
-        if self.fly:
-            height = _within("fly", self.fly, 1.0, 500.0, "a height", "m", "60")
-            _needs("fly", self.fly, AUTOPILOT, simulators)
-            begins = _TAKES_OFF_AT
-            script += [(_ARMS_AT, (AUTOPILOT, "arm"))]
-            script += [(_TAKES_OFF_AT, (AUTOPILOT, f"takeoff={height:g}"))]
-        if self.launch:
-            begins = _within(
-                "launch", self.launch, 0.0, 3600.0, "a time after the start", "s", "12"
-            )
-            _needs("launch", self.launch, FLIGHT_COMPUTER, simulators)
-            script += [(begins, (FLIGHT_COMPUTER, "launch"))]
+        begins, script = self._begin(simulators)
         if self.wind:
-            speed = _within("wind", self.wind, 0.0, 30.0, "a speed", "m/s", "5")
+            speed = _within("wind", self.wind, 30.0, "a speed", "m/s", "5")
             _needs("wind", self.wind, AUTOPILOT, simulators)
-            script += [(0.0, (AUTOPILOT, f"wind={speed:g}"))]
-        if self.fail:
-            if math.isnan(begins):
-                flight = "launch" if FLIGHT_COMPUTER in simulators else "fly"
-                raise ParameterError(
-                    f"fail is {self.fail!r}: need {flight} as well, as it counts from there"
-                )
-            for one in self.fail.split(","):
-                after, orders = _failure(one, simulators)
-                script += [(begins + after, order) for order in orders]
+            script.append((0.0, (AUTOPILOT, f"wind={speed:g}")))
+        for one in filter(None, self.fail.split(",")):
+            after, orders = _failure(one, simulators)
+            script += [(begins + after, order) for order in orders]
+        if self.fail and math.isnan(begins):
+            need = "launch" if FLIGHT_COMPUTER in simulators else "fly"
+            raise ParameterError(f"fail is {self.fail!r}: need {need} too, which it counts from")
         options: dict[str, list[str]] = {}
         for at, (simulator, action) in script:
             options.setdefault(simulator, []).extend(("--at", f"{at:g}:{action}"))
         return options
+
+    def _begin(self, simulators: Sequence[str]) -> tuple[float, list[tuple[float, Order]]]:
+        """When the vehicle leaves the ground, s after its start, NaN: never; and its orders."""
+        if self.launch:
+            _needs("launch", self.launch, FLIGHT_COMPUTER, simulators)
+            begins = _within("launch", self.launch, 3600.0, "a time after the start", "s", "12")
+            return begins, [(begins, (FLIGHT_COMPUTER, "launch"))]
+        if self.fly:
+            _needs("fly", self.fly, AUTOPILOT, simulators)
+            height = _within("fly", self.fly, 500.0, "a height", "m", "60", lowest=1.0)
+            takes_off = (AUTOPILOT, f"takeoff={height:g}")
+            return _TAKES_OFF_AT, [(_ARMS_AT, (AUTOPILOT, "arm")), (_TAKES_OFF_AT, takes_off)]
+        return math.nan, []
 
 
 def _failure(text: str, simulators: Sequence[str]) -> tuple[float, tuple[Order, ...]]:
@@ -131,14 +128,14 @@ def _failure(text: str, simulators: Sequence[str]) -> tuple[float, tuple[Order, 
     seconds = _number(after)
     if what not in known or not 0.0 <= seconds <= 3600.0:
         raise ParameterError(
-            f"fail is {text!r}: need one of {', '.join(known)}, @ and seconds after the take-off or "
-            f"launch from 0 to 3600, for example {known[0]}@15"
+            f"fail is {text!r}: need one of {', '.join(known)}, @ and seconds after the take-off "
+            f"or launch from 0 to 3600, for example {known[0]}@15"
         )
     return seconds, orders[FAILURES[what]]
 
 
 def _within(
-    name: str, text: str, lowest: float, highest: float, what: str, unit: str, example: str
+    name: str, text: str, highest: float, what: str, unit: str, example: str, lowest: float = 0.0
 ) -> float:
     if not lowest <= (value := _number(text)) <= highest:
         raise ParameterError(
