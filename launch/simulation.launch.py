@@ -139,7 +139,7 @@ def _arguments() -> list:
         DeclareLaunchArgument(
             "wind",
             default_value="",
-            description="m/s, whose gusts move the vehicle; empty: calm",
+            description="m/s, whose gusts move the vehicle; empty: light air",
         ),
     ]
 

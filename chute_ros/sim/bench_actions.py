@@ -12,6 +12,10 @@ UPF = "sim_upf"
 RELAY = "sim_relay"
 FLIGHT_COMPUTER = "sim_flight_computer"
 
+#: The wind of a simulated vehicle from the start, m/s: in none at all its sensors would repeat the
+#: same value, and count as stuck.
+LIGHT_AIR = 0.5
+
 #: Executable of a simulator, and what it is told to do.
 Order = tuple[str, str]
 
@@ -40,7 +44,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "land",
         "Land",
-        "The vehicle sinks at 2 m/s, and disarms at touchdown. The supervisor goes to LANDED.",
+        "The vehicle sinks at 2 m/s, and disarms at touchdown. The supervisor goes to LANDED, "
+        "then READY.",
         ((AUTOPILOT, "land"),),
     ),
     BenchAction(
@@ -109,13 +114,18 @@ ACTIONS: tuple[BenchAction, ...] = (
         "not deploy.",
         ((AUTOPILOT, "wind=8"),),
     ),
-    BenchAction("calm", "Calm", "The gusts end.", ((AUTOPILOT, "wind=0"),)),
+    BenchAction(
+        "calm",
+        "Calm",
+        "The wind falls to 0.5 m/s, as at the start.",
+        ((AUTOPILOT, f"wind={LIGHT_AIR:g}"),),
+    ),
     BenchAction(
         "low_battery",
         "Vehicle's battery is low",
-        "The autopilot's battery drains to 14.0 V. On the ground the supervisor then blocks "
-        "flight; in the air nothing happens.",
-        ((AUTOPILOT, "battery=14"),),
+        "The autopilot's battery drains to 13.4 V and 3 %. On the ground safety/arm is refused; "
+        "in the air the supervisor raises the alarm 'battery dead' after 10 s.",
+        ((AUTOPILOT, "battery=13.4"),),
     ),
     BenchAction(
         "fresh_battery",

@@ -22,6 +22,7 @@ from chute_ros.plain_text import plain
 from chute_ros.sim.acting import Argument
 from chute_ros.transport.loop import ProtocolLink, WireLoop
 
+#: The answer to an action that is done.
 DONE = "ok"
 #: More than any action has, bytes.
 _LARGEST = 1024

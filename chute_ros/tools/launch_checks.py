@@ -20,7 +20,13 @@ from chute_ros.ros.parameter_file import given_in
 from chute_ros.ros.parameters import MISSPELT, nearest
 from chute_ros.ros.supervisor_parameters import SupervisorParameters
 from chute_ros.settings import Settings, parameters_of, settings_from
-from chute_ros.sim.bench_actions import AUTOPILOT, FLIGHT_COMPUTER, Order, actions_of
+from chute_ros.sim.bench_actions import (
+    AUTOPILOT,
+    FLIGHT_COMPUTER,
+    LIGHT_AIR,
+    Order,
+    actions_of,
+)
 
 T = TypeVar("T")
 #: When a simulated vehicle arms and takes off, s after its start: the supervisor is READY by then.
@@ -79,7 +85,7 @@ class Flight:
 
     fly: height to which it takes off, m; launch: how long after the start a rocket launches, s;
     fail: what fails, each with @ and how long after the take-off or the launch, s, with commas
-    between them; wind: m/s.
+    between them; wind: m/s; empty: light air.
     """
 
     fly: str = ""
@@ -92,8 +98,10 @@ class Flight:
         of a vehicle with these simulators."""
         begins, script = self._begin(simulators)
         if self.wind:
-            speed = _within("wind", self.wind, 30.0, "a speed", "m/s", "5")
             _needs("wind", self.wind, AUTOPILOT, simulators)
+        if AUTOPILOT in simulators:
+            wind = self.wind or f"{LIGHT_AIR:g}"
+            speed = _within("wind", wind, 30.0, "a speed", "m/s", "5")
             script.append((0.0, (AUTOPILOT, f"wind={speed:g}")))
         for one in filter(None, self.fail.split(",")):
             after, orders = _failure(one, simulators)

@@ -11,24 +11,26 @@ import contextlib
 import json
 import math
 import os
+import re
 import shlex
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
 from importlib.metadata import entry_points
 from pathlib import Path
-
-from std_srvs.srv import Trigger
 
 from chute_ros.errors import ChuteError
 from chute_ros.links.api import SUPERVISOR, Sockets
 from chute_ros.links.registered import module_of, vehicles
+from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import RANGE
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.demo_director import Director, StepFailedError
+from chute_ros.tools.bench_call import call_action
+from chute_ros.tools.demo_director import Director
 from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
+from chute_ros.tools.launch_checks import Flight
 from chute_ros.tools.processes import Processes, ros_arguments
 from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
 
@@ -36,24 +38,33 @@ from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
 DRONES, ROCKET = ("mavlink", "upf", "both", "relay"), "umbilical"
 #: How long the supervisor may take until it is READY, s.
 _READY_WITHIN = 60.0
-#: How long a service may take to be offered and to answer, s.
-_ANSWERS_WITHIN = 10.0
+#: How long ROS may take to find who else is there, s.
+_OTHERS_WITHIN = 1.0
+
+
+class RunsAlreadyError(ChuteError):
+    """A vehicle runs in this namespace."""
 
 
 def main() -> None:
     """Run it; exit code 2 on a user's mistake, 1 if something ends by itself."""
     chosen = _options().parse_args()
     stay_on_this_host()
+    if chosen.do:
+        try:
+            print(call_action(chosen.namespace, chosen.do))
+        except ChuteError as error:
+            sys.exit(f"sim: {chosen.do}: {error}")
+        return
     with tempfile.TemporaryDirectory(prefix="chute_ros_sim_") as scratch:
         processes = Processes(Path(scratch))
+        # As a Ctrl-C does.
+        signal.signal(signal.SIGTERM, _end)
         try:
             with contextlib.closing(Director(chosen.namespace, processes)) as director:
-                if chosen.do:
-                    _do(director, chosen.do)
-                    return
-                with _ends_on_termination():
-                    _start(processes, chosen, Path(scratch))
-                    _play(director, chosen)
+                _check_alone(director, chosen.namespace)
+                _start(processes, chosen, Path(scratch))
+                _play(director, chosen)
         except ChuteError as error:
             sys.exit(f"sim: {error}")
         finally:
@@ -77,7 +88,9 @@ def _options() -> argparse.ArgumentParser:
         default="mavlink",
         help="parachute of the drone (default: mavlink)",
     )
-    options.add_argument("--namespace", default="/sim", help="of the vehicle (default: /sim)")
+    options.add_argument(
+        "--namespace", type=_namespace, default="/sim", help="of the vehicle (default: /sim)"
+    )
     options.add_argument("--panel", action="store_true", help="start the panel as well")
     options.add_argument("--port", type=_port, default=8080, help="of the panel (default: 8080)")
     options.add_argument(
@@ -95,27 +108,17 @@ def _port(text: str) -> int:
     return int(text)
 
 
-@contextlib.contextmanager
-def _ends_on_termination() -> Iterator[None]:
-    """A SIGTERM ends it as a Ctrl-C does."""
-
-    def end(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+def _namespace(text: str) -> str:
+    if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", text):
+        raise argparse.ArgumentTypeError(
+            f"namespace {plain(text)[:80]!r}: need / and a name of letters, digits and _, for "
+            "example /sim"
+        )
+    return text
 
 
-def _do(director: Director, action: str) -> None:
-    """Call the service of an action. StepFailedError: it is not offered, or was not done."""
-    answer = director.ask(Trigger, f"sim/{action}")
-    director.until(f"sim/{action} is answered", _ANSWERS_WITHIN, answer.done)
-    if not answer.result().success:
-        raise StepFailedError(answer.result().message)
-    print(answer.result().message)
+def _end(*_: object) -> None:
+    raise KeyboardInterrupt
 
 
 def _environment() -> str:
@@ -126,6 +129,16 @@ def _environment() -> str:
     command = "export " + " ".join(f"{name}={value}" for name, value in around.items())
     script = Path(os.environ.get("VIRTUAL_ENV", "")) / "env.sh"
     return f". {shlex.quote(str(script))}; {command}" if script.is_file() else command
+
+
+def _check_alone(director: Director, namespace: str) -> None:
+    """RunsAlreadyError: a vehicle is there already, which this one would disturb."""
+    end = time.monotonic() + _OTHERS_WITHIN
+    director.until("nobody answers", 60.0, lambda: time.monotonic() >= end)
+    if director.node.count_publishers("safety/state"):
+        raise RunsAlreadyError(
+            f"a vehicle runs in {namespace} already: end it, or give this one another --namespace"
+        )
 
 
 def _vehicle(chosen: argparse.Namespace) -> str:
@@ -149,8 +162,9 @@ def _start(processes: Processes, chosen: argparse.Namespace, folder: Path) -> No
         told = {name: json.dumps(value) for name, value in given.items()}
         processes.start(node, module_of(node), *ros_arguments(chosen.namespace, **told))
     modules = {one.name: one.module for one in entry_points(group="console_scripts")}
+    flight = Flight().options(simulators_of(vehicle.name))
     for _, (simulator, *arguments) in vehicle.simulators():
-        processes.start(simulator, modules[simulator], *arguments)
+        processes.start(simulator, modules[simulator], *arguments, *flight.get(simulator, ()))
     bench = ros_arguments(chosen.namespace, vehicle=vehicle.name, folder=folder)
     processes.start("sim_bench", "chute_ros.tools.sim_bench", *bench)
     if chosen.panel:
