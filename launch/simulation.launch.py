@@ -48,9 +48,11 @@ def _vehicle(context: LaunchContext) -> list:
     namespace = LaunchConfiguration("namespace").perform(context)
     text = LaunchConfiguration("port").perform(context)
     port = checked("simulation.launch.py", lambda: check_port(text))
+    parachute = LaunchConfiguration("parachute").perform(context)
+    flight = _flight(context, parachute)
     folder = Path(tempfile.gettempdir()) / f"chute_ros_sim_{os.getuid()}_{port}"
     vehicle = SimulatedVehicle(
-        LaunchConfiguration("parachute").perform(context),
+        parachute,
         Sockets(
             network=f"127.0.0.1:{port}",
             air=f"127.0.0.1:{port + 1}",
@@ -59,14 +61,13 @@ def _vehicle(context: LaunchContext) -> list:
         ),
         checked("simulation.launch.py", lambda: own_folder(folder)),
     )
-    flight = _flight(context, vehicle.name)
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
             launch_arguments={
                 "namespace": namespace,
                 "range": "LOCALHOST",
-                "parachute": vehicle.name,
+                "parachute": parachute,
                 **{links()[one].argument.name: at for one, at in vehicle.connections().items()},
             }.items(),
         ),
@@ -78,7 +79,7 @@ def _vehicle(context: LaunchContext) -> list:
             package="chute_ros",
             executable="sim_bench",
             namespace=namespace,
-            parameters=[{"vehicle": vehicle.name, "folder": str(folder)}],
+            parameters=[{"vehicle": parachute, "folder": str(folder)}],
             output="screen",
         ),
     ]

@@ -167,7 +167,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "refuse_to_open",
         "Refuse to open",
-        "The parachute does not open. Let a motor fail, and see what the supervisor reports.",
+        "The parachute does not open if it is ordered to. The supervisor orders it again and "
+        "again, then goes to FAULT.",
         (
             (MAVLINK_PARACHUTE, "refuse"),
             (UPF, "refuse"),
@@ -196,8 +197,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "fail_drogue",
         "No drogue at the apogee",
-        "The flight computer does not fire the drogue by itself. The rocket falls until a person "
-        "orders the deploy.",
+        "At the apogee nothing comes out. The supervisor orders the drogue after the rocket sank "
+        "faster than 30 m/s for 2 s.",
         ((FLIGHT_COMPUTER, "drogue-fails"),),
     ),
     BenchAction(
@@ -229,7 +230,7 @@ ACTIONS: tuple[BenchAction, ...] = (
         "start_over",
         "Start over",
         "The vehicle stands whole on the ground, with its parachute packed. Then reset the "
-        "supervisor (safety/reset).",
+        "supervisor (safety/reset), which refuses for as long as it sees the vehicle in the air.",
         (
             (MAVLINK_PARACHUTE, "repack"),
             (UPF, "repack"),
