@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,12 @@ from chute_ros.links.registered import module_of
 from chute_ros.ros.parameter_file import files_of, given_in, taken
 
 ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch) -> None:
+    """Where simulation.launch.py makes the folder of the control sockets."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 def start(node: str, *arguments: str) -> tuple[int, list[str]]:
@@ -221,8 +228,8 @@ def flown(monkeypatch, **arguments: str) -> list[str]:
 
 @pytest.mark.parametrize("parachute", ["mavlink", "upf", "relay"])
 def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch) -> None:
-    assert flown(monkeypatch, parachute=parachute) == []
-    start = ["10:arm", "11:takeoff=60"]
+    assert flown(monkeypatch, parachute=parachute) == ["0:wind=0.5"]
+    start = ["10:arm", "11:takeoff=60", "0:wind=0.5"]
     assert flown(monkeypatch, parachute=parachute, fly="60") == start
     told = flown(monkeypatch, parachute=parachute, fly="60", fail="motor@15.5")
     assert told == [*start, "26.5:fail-motor"]
@@ -235,8 +242,8 @@ def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch)
         ("0.5", "", "fly is '0.5': need a height"),
         ("501", "", "fly is '501': need a height"),
         ("nan", "", "fly is 'nan': need a height"),
-        ("", "motor@15", "fly is '': need a height"),
-        ("60", "motor", "fail is 'motor': need one of motor, autopilot, telemetry, @ and seconds"),
+        ("", "motor@15", "fail is 'motor@15': need fly too"),
+        ("60", "motor", "fail is 'motor': need one of motor, autopilot, telemetry, link, "),
         ("60", "wing@15", "fail is 'wing@15': need one of"),
         ("60", "motor@-1", "fail is 'motor@-1': need one of"),
         ("60", "motor@nan", "fail is 'motor@nan': need one of"),
@@ -251,4 +258,5 @@ def test_a_flight_that_cannot_be_flown_is_told(
 
 def test_a_rocket_is_flown_by_its_flight_computer(monkeypatch, capsys) -> None:
     line = refused(monkeypatch, capsys, SIMULATION, parachute="umbilical", fly="60")
-    assert line == "fly and fail need an autopilot, which this vehicle has not"
+    words = "need a vehicle with sim_autopilot; this one has sim_flight_computer"
+    assert line == f"fly is '60': {words}"

@@ -74,7 +74,7 @@ def test_all_actions_and_their_arguments_are_known():
     bus = UpfBus([UpfController(definitions()), UpfTrigger(definitions())])
     assert set(bus.actions) == {
         *("mute", "unmute", "silent", "speak", "reboot", "error", "clear-errors", "deploy"),
-        *("trigger-error", "trigger-stuck"),
+        *("trigger-error", "trigger-stuck", "trigger-free", "refuse", "accept", "repack"),
     }
     bus.arguments["error"].convert("IMU")
     with pytest.raises(KeyError):
