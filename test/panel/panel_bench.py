@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from pathlib import Path
 
 from playwright.sync_api import expect
 
@@ -76,9 +77,14 @@ def password_file(folder):
 
 def log_in(page, name="Anna"):
     """Through the form, from a vehicle's page."""
+    log_in_with(page, name, PASSWORD)
+
+
+def log_in_with(page, name, password):
+    """The same, with another password."""
     page.get_by_role("link", name="log in").click()
     page.get_by_label("Your name").fill(name)
-    page.get_by_label("Password").fill(PASSWORD)
+    page.get_by_label("Password").fill(password)
     page.get_by_role("button", name="Log in").click()
 
 
@@ -94,11 +100,18 @@ def watch_words(page):
 
 def hold(page, name, seconds=1.8):
     """Press a button for so long, as a finger would."""
-    box = page.get_by_role("button", name=name).bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    # Once it stays where it is.
+    page.get_by_role("button", name=name, exact=True).hover(timeout=PATIENCE)
     page.mouse.down()
     page.wait_for_timeout(seconds * 1000)
     page.mouse.up()
+
+
+def picture(page, name):
+    """Keep what is seen, where make pictures wants it for the docs."""
+    if folder := os.environ.get("CHUTE_PICTURES"):
+        file = Path(folder) / name
+        page.screenshot(path=file, type="jpeg", quality=70, animations="disabled")
 
 
 def fits(page):

@@ -7,7 +7,7 @@ import re
 import pytest
 from chute_msgs.msg import SafetyState, SafetySummary
 from heard_vehicle import state
-from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, word
+from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, picture, word
 from playwright.sync_api import expect
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -98,6 +98,7 @@ def test_twenty_vehicles_on_a_phone_the_worst_first(fly, namespace, start_panel,
     rest = [name for name in stages if name not in ("drone07", "drone13", "drone19")]
     assert names == ["drone07", "drone13", "drone19", *rest]
     assert fits(page)
+    picture(page, "fleet.jpg")
 
 
 def test_one_who_logged_out_elsewhere_orders_nothing(

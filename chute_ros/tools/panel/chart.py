@@ -80,7 +80,7 @@ def _options() -> dict[str, Any]:
         ],
         "xAxis": [
             {"type": "time", "gridIndex": 0, "show": False},
-            {"type": "time", "gridIndex": 1},
+            {"type": "time", "gridIndex": 1, "axisLabel": {"hideOverlap": True}},
         ],
         "yAxis": [axis(0), axis(1)],
         "series": [{**line(0), "markLine": marks}, line(1)],

@@ -169,7 +169,7 @@ def diagnostics(tasks: Sequence[Task]) -> str:
 def _why(picture: VehiclePicture) -> str:
     if picture.state_text and picture.state_text != picture.state:
         return picture.state_text
-    if picture.flight_blocked and picture.block_reasons:
+    if picture.state in ("STARTUP", "BLOCKED") and picture.block_reasons:
         return picture.block_reasons[0]
     return MEANINGS.get(picture.state, "")
 

@@ -47,7 +47,8 @@ class Watched:
         self._tasks = DiagnosticTasks(namespace)
         self._telem: tuple[Any, float] | None = None
         self._trace = Trace()
-        self._marked: tuple[int, int] | None = None
+        #: Epoch and id of the newest decision on the curves.
+        self._marked = (0, 0)
         self._identities: dict[str, str] = {}
         self._asked: dict[str, float] = {}
         self._clients: dict[tuple[str, Any], Any] = {}
@@ -144,11 +145,10 @@ class Watched:
         vehicle = picture.vehicle
         if vehicle is not None and vehicle.height_age < 2.0:
             self._trace.add(Point(wall, vehicle.height, vehicle.vertical_speed))
-        if picture.decisions:
-            newest = picture.decisions[-1]
-            if (newest.epoch, newest.id) != self._marked:
-                self._marked = (newest.epoch, newest.id)
-                self._trace.mark(wall - newest.age, newest.action)
+        for one in picture.decisions:
+            if (one.epoch, one.id) > self._marked:
+                self._marked = (one.epoch, one.id)
+                self._trace.mark(wall - one.age, one.action)
 
     def _ask_identity(self, link: str, device: str) -> None:
         base = f"{self.namespace.rstrip('/')}/{link}"
