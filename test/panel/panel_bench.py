@@ -111,6 +111,7 @@ def picture(page, name):
     """Keep what is seen, where make pictures wants it for the docs."""
     if folder := os.environ.get("CHUTE_PICTURES"):
         file = Path(folder) / name
+        page.evaluate("window.scrollTo(0, 0)")
         page.screenshot(path=file, type="jpeg", quality=70, animations="disabled")
 
 
