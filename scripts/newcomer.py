@@ -32,7 +32,7 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _PATIENCE, _SET_UP = 60_000, 1800.0
 _HOLD = 1800  # ms
 #: What this environment has set, and a newcomer has not.
-_OURS = re.compile(r"(ROS|AMENT|COLCON|CHUTE|CMAKE|PYTHON|LD_LIBRARY|VIRTUAL|RMW|MAKE|MFLAGS).*")
+_OURS = re.compile(r"_?(ROS|AMENT|COLCON|CHUTE|CMAKE|PYTHON|LD_LIBRARY|VIRTUAL|RMW|MAKE|MFLAGS).*")
 
 
 def main() -> None:
@@ -89,7 +89,8 @@ def main() -> None:
     PAGE.write_text(
         "# From the clone to a released parachute\n\n"
         "Written by `make newcomer`, which does what [the tutorial](../guide/tutorial.md)\n"
-        "says in a fresh clone with an empty HOME, as fast as a program can; a person reads, too.\n"
+        "says in a fresh clone with an empty HOME, as fast as a program can.\n"
+        "A person also reads.\n"
         f"{machine()}.\n\n{table(head, rows)}\n"
     )
 
