@@ -52,6 +52,7 @@ setup(
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",
+            "to_rosbag2 = chute_ros.tools.to_rosbag2:main",
             "campaign = chute_ros.tools.campaign:main",
         ],
     },
