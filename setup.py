@@ -48,6 +48,7 @@ setup(
             *(f"{node} = {NAME}.links.{link}.__main__:main" for node, link in LINKS.items()),
             *map(simulator, sorted(glob(f"{NAME}/**/sim_*.py", recursive=True))),
             "safety_supervisor = chute_ros.ros.safety_supervisor:main",
+            "deploy_action = chute_ros.ros.deploy_action:main",
             "chute = chute_ros.tools.chute.__main__:main",
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",

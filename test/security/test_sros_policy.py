@@ -9,11 +9,14 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 from node_bench import LOCAL
+from rclpy.action import graph as actions
+from rclpy.node import Node
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.relay.node import RelayNode
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
+from chute_ros.ros.deploy_action_node import DeployActionNode
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.tools.isolation import free_udp_ports
 
@@ -25,7 +28,10 @@ NODES = {
     "umbilical": (UmbilicalNode, lambda: "serial:/nowhere/ttyACM0"),
     "relay": (RelayNode, lambda: "serial:/nowhere/ttyUSB0"),
     "safety_supervisor": (SafetySupervisorNode, None),
+    "deploy_action": (DeployActionNode, None),
 }
+#: Nodes without a parameter.
+PLAIN = {"deploy_action"}
 #: What ROS itself gives every node.
 OF_ROS = ("rcl_interfaces/", "type_description_interfaces/")
 EVERY_NODE = {"/rosout", "/parameter_events"}
@@ -42,13 +48,17 @@ COMMAND_LINE = {
         "set_parameters_atomically",
     )
 }
-#: (in the policy, in the graph)
+#: Right in the policy -> what has it in the graph, asked of (node that asks, name, namespace).
 RIGHTS = {
-    "publish": "publisher",
-    "subscribe": "subscriber",
-    "reply": "service",
-    "request": "client",
+    "publish": Node.get_publisher_names_and_types_by_node,
+    "subscribe": Node.get_subscriber_names_and_types_by_node,
+    "reply": Node.get_service_names_and_types_by_node,
+    "request": Node.get_client_names_and_types_by_node,
+    "execute": actions.get_action_server_names_and_types_by_node,
+    "call": actions.get_action_client_names_and_types_by_node,
 }
+#: In the names of the topics and services that an action is made of.
+OF_ACTION = "/_action/"
 
 
 def allowed():
@@ -74,16 +84,19 @@ def in_graph(bench, name):
     """Right -> name -> type of what this node does now, as the policy writes it."""
     prefix = f"{bench.namespace}/"
     found = {}
-    for right, what in RIGHTS.items():
-        ask = getattr(bench.client, f"get_{what}_names_and_types_by_node")
+    for right, ask in RIGHTS.items():
         found[right] = {
-            one.removeprefix(prefix): kinds[0] for one, kinds in ask(name, bench.namespace)
+            one.removeprefix(prefix): kinds[0]
+            for one, kinds in ask(bench.client, name, bench.namespace)
+            if OF_ACTION not in one
         }
     return found
 
 
 def shipped_parameters(name):
     """Of every parameter file that is shipped with this node in it."""
+    if name in PLAIN:
+        return [{}]
     every = (yaml.safe_load(path.read_text()) for path in sorted(CONFIG.glob("*.yaml")))
     mine = [one[f"/**/{name}"]["ros__parameters"] for one in every if f"/**/{name}" in one]
     assert mine
@@ -142,6 +155,7 @@ def test_a_console_may_ask_for_everything_and_say_nothing(everything):
     console = allowed()["console"]
     asked = {name for name, kind in everything["reply"].items() if not kind.startswith(OF_ROS)}
     assert console["request"] == asked
+    assert console["call"] == set(everything["execute"])
     assert console["publish"] == EVERY_NODE
     assert console["subscribe"] == set(everything["publish"]) - {"/parameter_events"}
     assert console["reply"] == COMMAND_LINE
@@ -152,7 +166,7 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
     assert recorder["subscribe"] == set(everything["publish"]) - {"/parameter_events"}
     assert recorder["publish"] == EVERY_NODE
     assert recorder["reply"] == COMMAND_LINE
-    assert recorder["request"] == set()
+    assert recorder["request"] == recorder["call"] == set()
 
 
 @pytest.mark.parametrize(
