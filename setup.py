@@ -34,6 +34,7 @@ setup(
         ("share/" + NAME + "/launch", glob("launch/*.py")),
         ("share/" + NAME + "/config", glob("config/*.yaml")),
         ("share/" + NAME + "/config", glob("config/*.xml")),
+        ("share/" + NAME + "/config/layouts", glob("config/layouts/*")),
         ("share/" + NAME + "/config/profiles", glob("config/profiles/*.yaml")),
         ("share/" + NAME + "/config/security", glob("config/security/*.xml")),
     ],

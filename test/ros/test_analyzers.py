@@ -4,18 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
-import upf_bench
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from mavlink_bench import Autopilot, Module, Network
-
-from chute_ros.links.relay.node import RelayNode
-from chute_ros.links.umbilical.node import UmbilicalNode
-from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
+from whole_vehicle import NODES, start_whole_vehicle
 
 FILE = Path(__file__).parents[2] / "config" / "analyzers.yaml"
 #: What diagnostic_aggregator names its node, and so the parameters.
-NODE = "analyzers"
+AGGREGATOR = "analyzers"
 #: Tasks that come last: all devices are received by then.
 LAST = {"parachute 1/161", "autopilot", "controller 33", "trigger 34"}
 
@@ -25,18 +20,12 @@ def names(bench):
     """Of every status of a vehicle with everything on it, with its namespace and without."""
     found = set()
     heard = bench.follow(DiagnosticArray, "/diagnostics")
-    network = Network(bench)
-    network.plug(Module())
-    network.plug(Autopilot())
-    upf_bench.Devices(upf_bench.Network(bench))
-    bench.add(UmbilicalNode, connection="serial:/nowhere/ttyACM0")
-    bench.add(RelayNode, connection="serial:/nowhere/ttyUSB0")
-    bench.add(SafetySupervisorNode, black_box_folder=str(bench.folder / "box"))
+    start_whole_vehicle(bench)
 
     def all_there():
         found.update(one.name for array in heard for one in array.status)
         nodes = {name.partition(":")[0] for name in found}
-        return len(nodes) == 5 and {name.partition(": ")[2] for name in found} >= LAST
+        return len(nodes) == len(NODES) and {name.partition(": ")[2] for name in found} >= LAST
 
     bench.until(all_there, "every node and every device is reported")
     prefix = bench.namespace.lstrip("/") + "/"
@@ -46,7 +35,7 @@ def names(bench):
 
 def groups():
     """Path of each analyzer -> its patterns."""
-    vehicle = yaml.safe_load(FILE.read_text())[NODE]["ros__parameters"]["vehicle"]
+    vehicle = yaml.safe_load(FILE.read_text())[AGGREGATOR]["ros__parameters"]["vehicle"]
     assert vehicle["type"] == "diagnostic_aggregator/AnalyzerGroup"
     found = {}
     for one in vehicle["analyzers"].values():
