@@ -8,9 +8,13 @@ SHELL := /bin/bash
 PYTHON ?= python3
 DISTRO ?=
 DEMO_ARGS ?=
-# The vehicle of the demo: drone or rocket; and what a drone carries: mavlink, upf or both.
+# The vehicle of the demo and of make sim: drone or rocket; and what a drone carries: mavlink, upf or
+# both, or with make sim relay.
 VEHICLE ?= drone
 PARACHUTE ?= mavlink
+# The port of the panel of make sim, and what else its command takes.
+PORT ?= 8080
+SIM_ARGS ?=
 # Steps of each story that make explore tries.
 DEPTH ?= 2
 # Modules of the supervisor that make mutate changes; empty: all.
@@ -53,7 +57,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo test test-long bench campaign without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
+.PHONY: help demo sim test test-long pictures bench campaign without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -61,6 +65,10 @@ help: ## say what each target does
 demo: build ## fly one simulated flight (PARACHUTE=mavlink, upf or both; VEHICLE=rocket)
 	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.demo --vehicle $(VEHICLE) \
 	    --parachute $(PARACHUTE) $(DEMO_ARGS)
+
+sim: build ## play with a simulated vehicle until Ctrl-C (VEHICLE=rocket; PARACHUTE=mavlink, upf, both or relay)
+	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.sim --vehicle $(VEHICLE) \
+	    --parachute $(PARACHUTE) --port $(PORT) $(SIM_ARGS)
 
 test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
@@ -70,6 +78,10 @@ test-long: build ## run the tests that are long by nature, write docs/evidence/l
 
 bench: build ## measure against bare scripts, write docs/evidence/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
+
+pictures: build ## fly the tutorial in a browser, keep its pictures in docs/guide/pictures
+	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && CHUTE_PICTURES=docs/guide/pictures exec python3 -m pytest \
+	    -q -p no:cacheprovider test/panel/test_tutorial.py test/panel/test_panel_orders.py -k "tutorial or twenty"
 
 campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/evidence/campaign.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \

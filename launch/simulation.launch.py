@@ -1,10 +1,19 @@
 """One simulated vehicle: the nodes of vehicle.launch.py and what they speak to.
 
 ros2 launch chute_ros simulation.launch.py namespace:=drone1 port:=14600 parachute:=upf
+ros2 launch chute_ros simulation.launch.py fly:=60 wind:=5 fail:=refuse@0,motor@15
+ros2 launch chute_ros simulation.launch.py parachute:=umbilical launch:=12 fail:=drogue@0
+
+While it runs sim_bench offers what can be done to the vehicle as services, sim/NAME
+(docs/guide/simulation.md).
 
 Only on this host: the simulators speak over loopback. Two vehicles need two namespaces and two
 ports; port + 1 and port + 2 are used as well.
 """
+
+import os
+import tempfile
+from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import (
@@ -17,16 +26,21 @@ from launch.actions import (
 )
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
 from launch_ros.substitutions import ExecutableInPackage
 
-from chute_ros.errors import ParameterError
 from chute_ros.links.api import Sockets
 from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE
-from chute_ros.tools.launch_checks import check_arguments, check_port, checked, flight_script
+from chute_ros.tools.launch_checks import (
+    FAILURES,
+    Flight,
+    check_arguments,
+    check_port,
+    checked,
+)
+from chute_ros.tools.simulated_vehicle import SimulatedVehicle, own_folder, simulators_of
 from launch import LaunchContext, LaunchDescription
-
-AUTOPILOT = "sim_autopilot"
 
 
 def _vehicle(context: LaunchContext) -> list:
@@ -34,19 +48,19 @@ def _vehicle(context: LaunchContext) -> list:
     namespace = LaunchConfiguration("namespace").perform(context)
     text = LaunchConfiguration("port").perform(context)
     port = checked("simulation.launch.py", lambda: check_port(text))
-    sockets = Sockets(
-        network=f"127.0.0.1:{port}",
-        air=f"127.0.0.1:{port + 1}",
-        bus=f"mcast:0:{port + 2}",
-        terminal=f"/tmp/chute_ros_terminal_{port}",
-    )
     parachute = LaunchConfiguration("parachute").perform(context)
-    vehicle = vehicles()[parachute]
-    kinds = [links()[name] for name in vehicle.links]
-    commands = [
-        (kind.package, command) for kind in kinds for command in kind.simulators(vehicle, sockets)
-    ]
-    flight = checked("simulation.launch.py", lambda: _flight(context, commands))
+    flight = _flight(context, parachute)
+    folder = Path(tempfile.gettempdir()) / f"chute_ros_sim_{os.getuid()}_{port}"
+    vehicle = SimulatedVehicle(
+        parachute,
+        Sockets(
+            network=f"127.0.0.1:{port}",
+            air=f"127.0.0.1:{port + 1}",
+            bus=f"mcast:0:{port + 2}",
+            terminal=f"/tmp/chute_ros_terminal_{port}",
+        ),
+        checked("simulation.launch.py", lambda: own_folder(folder)),
+    )
     return [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(f"{share}/launch/vehicle.launch.py"),
@@ -54,23 +68,32 @@ def _vehicle(context: LaunchContext) -> list:
                 "namespace": namespace,
                 "range": "LOCALHOST",
                 "parachute": parachute,
-                **{kind.argument.name: kind.connection(sockets) for kind in kinds},
+                **{links()[one].argument.name: at for one, at in vehicle.connections().items()},
             }.items(),
         ),
         *(
-            _simulator(package, *command, *(flight if command[0] == AUTOPILOT else ()))
-            for package, command in commands
+            _simulator(package, *command, *flight.get(command[0], ()))
+            for package, command in vehicle.simulators()
+        ),
+        Node(
+            package="chute_ros",
+            executable="sim_bench",
+            namespace=namespace,
+            parameters=[{"vehicle": parachute, "folder": str(folder)}],
+            output="screen",
         ),
     ]
 
 
-def _flight(context: LaunchContext, commands: list) -> list:
-    """What the autopilot is told to do."""
-    fly = LaunchConfiguration("fly").perform(context)
-    fail = LaunchConfiguration("fail").perform(context)
-    if (fly or fail) and all(command[0] != AUTOPILOT for _, command in commands):
-        raise ParameterError("fly and fail need an autopilot, which this vehicle has not")
-    return flight_script(fly, fail)
+def _flight(context: LaunchContext, vehicle: str) -> dict:
+    """What its simulators are told to do: each one's options."""
+    flight = Flight(
+        fly=LaunchConfiguration("fly").perform(context),
+        launch=LaunchConfiguration("launch").perform(context),
+        fail=LaunchConfiguration("fail").perform(context),
+        wind=LaunchConfiguration("wind").perform(context),
+    )
+    return checked("simulation.launch.py", lambda: flight.options(simulators_of(vehicle)))
 
 
 def _simulator(package: str, executable: str, *arguments: str) -> ExecuteProcess:
@@ -102,12 +125,22 @@ def _arguments() -> list:
             description="height to which it takes off after 11 s, m; empty: it stands",
         ),
         DeclareLaunchArgument(
+            "launch",
+            default_value="",
+            description="how long after its start a rocket launches, s; empty: it stands",
+        ),
+        DeclareLaunchArgument(
             "fail",
             default_value="",
             description=(
-                "what fails, and how long after the take-off, s: motor@15, autopilot@15 (it "
-                "starts again) or telemetry@15 (it falls silent); empty: nothing"
+                "what fails, each with @ and how long after the take-off or launch, s, for "
+                f"example refuse@0,motor@15; empty: nothing; one of {', '.join(FAILURES)}"
             ),
+        ),
+        DeclareLaunchArgument(
+            "wind",
+            default_value="",
+            description="m/s, whose gusts move the vehicle; empty: light air",
         ),
     ]
 

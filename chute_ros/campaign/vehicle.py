@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from chute_ros.campaign.estimator import Estimator
@@ -15,40 +14,29 @@ from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.sim.autopilot_device import STEP, AutopilotDevice
 from chute_ros.sim.autopilot_kinds import AutopilotKind, Termination
 from chute_ros.sim.flight import GRAVITY, FlightModel
+from chute_ros.sim.gusts import GustyModel
 
-#: Gusts change within about this time, s.
-_GUST_TIME = 1.0
 #: It is carried up to where the flight begins, by more than any vehicle climbs, and by less than a
 #: height jumps, m/s.
 _LIFT = 80.0
 
 
 @dataclass
-class WindyModel(FlightModel):
-    """gusts: their usual strength, m/s^2 up and down; they tilt the vehicle as well."""
+class WindyModel(GustyModel):
+    """In gusts, and it may fly a manoeuvre, in which they do not push it."""
 
-    gusts: float = 0.0
-    chance: random.Random = field(default_factory=random.Random)
     #: What it flies now, and since when, s.
     manoeuvre: Manoeuvre | None = None
     flown_for: float = 0.0
-    _gust: float = 0.0
-    _sway: float = 0.0
 
     def step(self, dt: float) -> None:
-        """Move on; the wind pushes whatever is in the air and does not fly a manoeuvre."""
+        """Move on."""
         flown = self._manoeuvre(dt)
         if flown is not None:
             self.vertical_speed, self.roll, self.acceleration = flown
             self.height += self.vertical_speed * dt
             self.target_height = self.height
             return
-        if self.gusts and not self.on_ground:
-            share = dt / _GUST_TIME
-            push = self.chance.gauss(0.0, self.gusts * math.sqrt(2.0 * share))
-            self._gust += push - self._gust * share
-            self.vertical_speed += self._gust * dt
-            self._sway = math.radians(3.0) * self._gust
         super().step(dt)
 
     def _manoeuvre(self, dt: float) -> Motion | None:
@@ -61,11 +49,6 @@ class WindyModel(FlightModel):
         if flown is None:
             self.manoeuvre = None
         return flown
-
-    def _turn(self, dt: float) -> None:
-        super()._turn(dt)
-        if self.armed and not self.motors_failed and not self.on_ground:
-            self.roll = self._sway
 
 
 class Nature:
@@ -100,7 +83,7 @@ class Nature:
 class CampaignAutopilot(AutopilotDevice):
     """Tells what its estimator and its sensors say; nature moves the vehicle."""
 
-    def __init__(self, model: FlightModel, sensors: Sensors, kind: AutopilotKind) -> None:
+    def __init__(self, model: WindyModel, sensors: Sensors, kind: AutopilotKind) -> None:
         super().__init__(1, [], model, kind)
         self._sensors = sensors
         self.estimator = Estimator()

@@ -7,8 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.errors import ChuteError
+
 #: Name -> what it does; what follows "=" comes as the argument.
 ActionTable = dict[str, Callable[[str], None]]
+
+
+class NotNowError(ChuteError):
+    """A device cannot do an action as it is now; the text says why and what would help."""
 
 
 @dataclass(frozen=True)
@@ -46,11 +52,21 @@ class Actor:
         self._prefix = f"{name}: " if name else ""
         self._said: list[str] = []
 
-    def act(self, action: str) -> None:
-        """Do what --at says: "name" or "name=argument"."""
+    def act(self, action: str) -> str:
+        """Do what --at says: "name" or "name=argument". Returns why it cannot be done now; empty:
+        it is done."""
         name, _, argument = action.partition("=")
         self.say(f"action {action}")
-        self.actions[name](argument)
+        try:
+            self.actions[name](argument)
+        except NotNowError as error:
+            self.say(f"{name} is not done: {error}")
+            return str(error)
+        return ""
+
+    def add_action(self, name: str, function: Callable[[str], None]) -> None:
+        """One more, of what is around the device."""
+        self.actions[name] = function
 
     def say(self, text: str) -> None:
         """One line for whoever watches."""

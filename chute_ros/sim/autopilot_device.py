@@ -6,35 +6,48 @@ Source: MAVLink common.xml; refuses a plain disarm in the air as PX4 and ArduPil
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import FORCE_DISARM, dialect
 from chute_ros.protocol.mavlink.frames import Frame
-from chute_ros.sim.acting import number_of
+from chute_ros.sim.acting import NotNowError, number_of, one_of
 from chute_ros.sim.arm_authorization import ArmAuthorization
 from chute_ros.sim.autopilot_kinds import GENERIC, AutopilotKind, Termination
 from chute_ros.sim.autopilot_parameters import ParameterServer
 from chute_ros.sim.autopilot_telemetry import HOME_LATITUDE, HOME_LONGITUDE, AutopilotTelemetry
-from chute_ros.sim.flight import GRAVITY, FlightModel
+from chute_ros.sim.battery import Battery
+from chute_ros.sim.flight import GRAVITY
+from chute_ros.sim.gusts import GustyModel
+from chute_ros.sim.lies import LIES, TRUTH, LyingEstimator
 from chute_ros.sim.mavlink_device import Params
 
 STEP = 0.02  # s
+#: From arming to the take-off of action fly, s: as long as autopilots spool up.
+_SPOOLS_UP = 1.0
+#: Usual strength of the gusts of each m/s of wind, m/s^2.
+_GUSTS = 0.15
 _MOTOR, _OFF = float(dialect.FAILURE_UNIT_SYSTEM_MOTOR), float(dialect.FAILURE_TYPE_OFF)
 
 
 class AutopilotDevice(AutopilotTelemetry):
     """One vehicle."""
 
+    model: GustyModel
+
     def __init__(
         self,
         system_id: int,
         script: list[tuple[float, str]],
-        model: FlightModel | None = None,
+        model: GustyModel | None = None,
         kind: AutopilotKind = GENERIC,
     ) -> None:
-        super().__init__(system_id, script, model or FlightModel())
+        model = model or GustyModel(chance=random.Random(system_id))
+        super().__init__(system_id, script, model)
         self.kind = kind
+        self.battery = Battery()
+        self.lying = LyingEstimator()
         self.parameters = ParameterServer(kind)
         self._authorization = ArmAuthorization()
         #: What was ordered and takes its time: (when, what).
@@ -66,13 +79,26 @@ class AutopilotDevice(AutopilotTelemetry):
         self.actions |= {
             "arm": lambda _: self._set_armed(True),
             "takeoff": lambda height: setattr(self.model, "target_height", float(height)),
+            "fly": lambda height: self._arm_and_leave(float(height)),
+            "land": lambda _: self._come_down(),
             "fail-motor": lambda _: self._fail_motor(),
+            "battery": lambda volts: self.battery.drain_to(float(volts), self.now),
+            "lie": lambda kind: self.lying.lie(kind, self.model, self.now),
+            "wind": lambda speed: self._blow(float(speed)),
+            "mend": lambda _: self._mend(),
         }
-        self.arguments |= {"takeoff": number_of("m", 10_000.0)}
+        self.arguments |= {
+            "takeoff": number_of("m", 10_000.0),
+            "fly": number_of("m", 10_000.0),
+            "battery": number_of("V", 30.0),
+            "lie": one_of(dict.fromkeys(LIES)),
+            "wind": number_of("m/s", 30.0),
+        }
 
     def reboot(self) -> None:
         """Start anew: an autopilot that restarts in the air does not hold the vehicle any more."""
         super().reboot()
+        self.lying.lie(TRUTH, self.model, self.now)
         self.terminated = False
         self.model.armed = False
         self._in_air_from = math.inf
@@ -134,6 +160,38 @@ class AutopilotDevice(AutopilotTelemetry):
     def _fail_motor(self) -> None:
         self.model.motors_failed = True
         self.say(f"MOTOR FAILURE at {self.model.height:.1f} m")
+
+    def _arm_and_leave(self, height: float) -> None:
+        if self.model.motors_failed or not math.isnan(self.model.released_for):
+            raise NotNowError("the vehicle is broken or its canopy is out: start over (mend)")
+        if not self.model.on_ground:
+            raise NotNowError(f"the vehicle is in the air, at {self.model.height:.1f} m")
+        if self.terminated:
+            raise NotNowError("flight termination holds until the autopilot restarts (reboot)")
+        self._set_armed(True)
+        self._after(_SPOOLS_UP, lambda: self._leave(height))
+
+    def _leave(self, height: float) -> None:
+        if self.model.armed:
+            self._climb_to(height)
+        else:
+            self.say("NO TAKE-OFF: it was disarmed")
+
+    def _climb_to(self, height: float) -> None:
+        self.model.target_height = height
+        self._in_air_from = self.now + self.kind.early_in_air
+
+    def _come_down(self) -> None:
+        self.model.target_height = 0.0
+
+    def _blow(self, speed: float) -> None:
+        self.model.calm()
+        self.model.gusts = _GUSTS * speed
+
+    def _mend(self) -> None:
+        self.model.mend()
+        self.battery = Battery()
+        self.reboot()
 
     def _arm_disarm(self, params: Params) -> int:
         arm, force = params[0] != 0.0, params[1] == FORCE_DISARM
@@ -214,12 +272,11 @@ class AutopilotDevice(AutopilotTelemetry):
     def _takeoff(self, params: Params) -> int:
         if not self.model.armed or not params[6] > 0.0:
             return int(dialect.MAV_RESULT_DENIED)
-        self.model.target_height = params[6]
-        self._in_air_from = self.now + self.kind.early_in_air
+        self._climb_to(params[6])
         return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _land(self, params: Params) -> int:
-        self.model.target_height = 0.0
+        self._come_down()
         return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _inject_failure(self, params: Params) -> int:
@@ -247,10 +304,14 @@ class AutopilotDevice(AutopilotTelemetry):
         return dialect.MAVLink_extended_sys_state_message(0, landed)
 
     def _sys_status(self) -> object:
-        return dialect.MAVLink_sys_status_message(0, 0, 0, 100, 15800, -1, 87, 0, 0, 0, 0, 0, 0)
+        millivolts = round(self.battery.voltage(self.now) * 1000.0)
+        percent = round(self.battery.remaining(self.now) * 100.0)
+        return dialect.MAVLink_sys_status_message(
+            0, 0, 0, 100, millivolts, -1, percent, 0, 0, 0, 0, 0, 0
+        )
 
     def _global_position_int(self) -> object:
-        home, height = self.home, self.model.height
+        home, (height, speed, _) = self.home, self.lying.belief(self.model, self.now)
         home.follow(self.model, self.now)
         return dialect.MAVLink_global_position_int_message(
             self.boot_ms(),
@@ -260,14 +321,17 @@ class AutopilotDevice(AutopilotTelemetry):
             int((height - home.offset) * 1000.0),
             0,
             0,
-            int(-self.model.vertical_speed * 100.0),
+            int(-speed * 100.0),
             0xFFFF,
         )
 
+    def _height_error(self) -> float:
+        # Whatever the estimator makes up, the controller holds what it was told to.
+        return self.model.height - self._told_height()[0]
+
     def _attitude(self) -> object:
-        return dialect.MAVLink_attitude_message(
-            self.boot_ms(), self.model.roll, 0.0, 0.0, 0.0, 0.0, 0.0
-        )
+        roll = self.lying.belief(self.model, self.now).roll
+        return dialect.MAVLink_attitude_message(self.boot_ms(), roll, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def _scaled_imu(self) -> object:
         milli_g = int(self.model.acceleration / GRAVITY * 1000.0)

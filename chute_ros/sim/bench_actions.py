@@ -1,5 +1,5 @@
-"""What a person can do to a simulated vehicle while it runs: one table for the panel's buttons, the
-services of sim_bench and docs/guide/simulation.md."""
+"""What a person can do to a simulated vehicle while it runs: one table for the buttons of the
+panel, the services of sim_bench and docs/guide/simulation.md."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ MAVLINK_PARACHUTE = "sim_mavlink_parachute"
 UPF = "sim_upf"
 RELAY = "sim_relay"
 FLIGHT_COMPUTER = "sim_flight_computer"
+
+#: The wind of a simulated vehicle from the start, m/s: in none at all its sensors would repeat the
+#: same value, and count as stuck.
+LIGHT_AIR = 0.5
 
 #: Executable of a simulator, and what it is told to do.
 Order = tuple[str, str]
@@ -40,7 +44,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "land",
         "Land",
-        "The vehicle sinks at 2 m/s, and disarms at touchdown. The supervisor goes to LANDED.",
+        "The vehicle sinks at 2 m/s, and disarms at touchdown. The supervisor goes to LANDED, "
+        "then READY.",
         ((AUTOPILOT, "land"),),
     ),
     BenchAction(
@@ -61,6 +66,19 @@ ACTIONS: tuple[BenchAction, ...] = (
         "Restore the vehicle's link",
         "The autopilot is received again.",
         ((AUTOPILOT, "restore"),),
+    ),
+    BenchAction(
+        "silence_autopilot",
+        "Telemetry falls silent",
+        "The autopilot sends nothing, but obeys. The supervisor reports its link STALE, then "
+        "LOST.",
+        ((AUTOPILOT, "silent"),),
+    ),
+    BenchAction(
+        "let_autopilot_speak",
+        "Telemetry comes back",
+        "The autopilot sends as before.",
+        ((AUTOPILOT, "speak"),),
     ),
     BenchAction(
         "restart_autopilot",
@@ -92,16 +110,22 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "wind",
         "Wind",
-        "Gusts of a wind of 8 m/s lift, drop and tilt the vehicle. The supervisor must not deploy.",
+        "Gusts of a wind of 8 m/s lift, drop and tilt the vehicle in the air. The supervisor must "
+        "not deploy.",
         ((AUTOPILOT, "wind=8"),),
     ),
-    BenchAction("calm", "Calm", "The gusts end.", ((AUTOPILOT, "wind=0"),)),
+    BenchAction(
+        "calm",
+        "Calm",
+        "The wind falls to 0.5 m/s, as at the start.",
+        ((AUTOPILOT, f"wind={LIGHT_AIR:g}"),),
+    ),
     BenchAction(
         "low_battery",
         "Vehicle's battery is low",
-        "The autopilot's battery drains to 14.0 V. On the ground the supervisor then blocks "
-        "flight; in the air nothing happens.",
-        ((AUTOPILOT, "battery=14"),),
+        "The autopilot's battery drains to 13.4 V and 3 %. On the ground safety/arm is refused; "
+        "in the air the supervisor raises the alarm 'battery dead' after 10 s.",
+        ((AUTOPILOT, "battery=13.4"),),
     ),
     BenchAction(
         "fresh_battery",
@@ -143,7 +167,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "refuse_to_open",
         "Refuse to open",
-        "The parachute does not open. Let a motor fail, and see what the supervisor reports.",
+        "The parachute does not open if it is ordered to. The supervisor orders it again and "
+        "again, then goes to FAULT.",
         (
             (MAVLINK_PARACHUTE, "refuse"),
             (UPF, "refuse"),
@@ -172,8 +197,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "fail_drogue",
         "No drogue at the apogee",
-        "The flight computer does not fire the drogue by itself. The rocket falls until a person "
-        "orders the deploy.",
+        "At the apogee nothing comes out. The supervisor orders the drogue after the rocket sank "
+        "faster than 30 m/s for 2 s.",
         ((FLIGHT_COMPUTER, "drogue-fails"),),
     ),
     BenchAction(
@@ -205,7 +230,7 @@ ACTIONS: tuple[BenchAction, ...] = (
         "start_over",
         "Start over",
         "The vehicle stands whole on the ground, with its parachute packed. Then reset the "
-        "supervisor (safety/reset).",
+        "supervisor (safety/reset), which refuses for as long as it sees the vehicle in the air.",
         (
             (MAVLINK_PARACHUTE, "repack"),
             (UPF, "repack"),

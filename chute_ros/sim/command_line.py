@@ -8,17 +8,18 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from chute_ros.errors import ChuteError, ParameterError
 from chute_ros.plain_text import plain
-from chute_ros.sim.acting import Argument
 from chute_ros.sim.bundle import WireBundle
 from chute_ros.sim.can_faults import CanFaultKnobs, CanFaultyLink
+from chute_ros.sim.control import Acting, check_action, controlled
 from chute_ros.sim.faults import FaultKnobs, FaultyLink
 from chute_ros.sim.pty_wire import PtyWire
+from chute_ros.sim.switched_wire import SwitchedWire
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.loop import ProtocolLink, WireLoop
@@ -94,7 +95,19 @@ def _add_script(options: argparse.ArgumentParser, actions: str) -> None:
         action="append",
         default=[],
         metavar="SECONDS:ACTION",
-        help=f"do this so long after the start; ACTION is one of {actions}",
+        help=(
+            f"do this so long after the start; ACTION is one of {actions}; cut (nothing passes on "
+            "the first connection), restore"
+        ),
+    )
+    options.add_argument(
+        "--control",
+        default="",
+        metavar="PATH",
+        help=(
+            "a Unix datagram socket for this user alone: one datagram is one ACTION, done at once "
+            'and answered with "ok" or why it is not done'
+        ),
     )
 
 
@@ -144,34 +157,12 @@ def _converter(
     return convert
 
 
-class Acting(ProtocolLink, Protocol):
-    """A simulated device with actions: see MavlinkDevice and UpfBus."""
-
-    @property
-    def actions(self) -> Mapping[str, Callable[[str], None]]:
-        """What --at can have it do."""
-
-    @property
-    def arguments(self) -> Mapping[str, Argument]:
-        """What its actions take."""
-
-
 def _check_script(device: Acting, options: argparse.Namespace) -> None:
     for _, action in script_of(options.at):
-        name, equals, argument = action.partition("=")
-        if name not in device.actions:
-            known = ", ".join(sorted(device.actions))
-            raise ParameterError(f"--at: action {name!r} is not known: need one of {known}")
-        taken = device.arguments.get(name)
-        if taken is None and equals:
-            raise ParameterError(f"--at: action {action!r}: {name} takes no argument")
-        if taken is None:
-            continue
         try:
-            taken.convert(argument)
-        except (KeyError, ValueError):
-            text = f"--at: action {action!r}: {argument!r} is no argument of {name}"
-            raise ParameterError(f"{text}: need {name}={taken.need}") from None
+            check_action(device, action)
+        except ParameterError as error:
+            raise ParameterError(f"--at: {error}") from None
 
 
 def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
@@ -179,7 +170,7 @@ def run(device: MavlinkDevice, options: argparse.Namespace) -> None:
     if options.signing_key_file:
         device.sign(*signing_from_file(options.signing_key_file, 0, "--signing-key-file"))
     link = FaultyLink(device, _knobs(FaultKnobs, options), options.seed)
-    wires = [make_wire(parse_address(text)) for text in _connections(options)]
+    wires = _made(device, [make_wire(parse_address(text)) for text in _connections(options)])
     _hold_signals()
     _run_link(device, link, wires, options)
 
@@ -194,9 +185,8 @@ def run_on_can(
     from chute_ros.transport.can_wire import make_can_wire
 
     link = CanFaultyLink(device, _knobs(CanFaultKnobs, options), options.seed)
-    wires: list[Wire] = [
-        make_can_wire(parse_can_address(text, options.bitrate)) for text in _connections(options)
-    ]
+    addresses = [parse_can_address(text, options.bitrate) for text in _connections(options)]
+    wires = _made(device, [make_can_wire(address) for address in addresses])
     _hold_signals()
     with beside:
         _run_link(device, link, wires, options)
@@ -209,10 +199,11 @@ def run_on_pty(
 ) -> None:
     """The same on a pseudo terminal, whose path is the first line that is printed."""
     # First, so that a mistake in it leaves no link behind.
+    wire = PtyWire(options.link)
+    first = _first_wire(device, wire, pulled=True)
     _check_script(device, options)
     # Whoever sees the link may end it at once.
     _hold_signals()
-    wire = PtyWire(options.link)
     try:
         wire.open()
     except OSError as error:
@@ -220,7 +211,7 @@ def run_on_pty(
     if not options.quiet:
         print(wire.path + (f" linked from {options.link}" if options.link else ""), flush=True)
     with beside or contextlib.nullcontext():
-        _run_link(device, device, [wire], options)
+        _run_link(device, device, [first], options)
 
 
 def _knobs(kind: type[KnobsT], options: argparse.Namespace) -> KnobsT:
@@ -229,6 +220,19 @@ def _knobs(kind: type[KnobsT], options: argparse.Namespace) -> KnobsT:
 
 def _connections(options: argparse.Namespace) -> list[str]:
     return options.connection or [options.default_connection]
+
+
+def _first_wire(device: Acting, wire: Wire, pulled: bool = False) -> Wire:
+    """The wire to the nodes, which the device's actions cut and restore."""
+    first = SwitchedWire(wire, pulled)
+    device.add_action("cut", lambda _: first.cut())
+    device.add_action("restore", lambda _: first.restore())
+    return first
+
+
+def _made(device: Acting, wires: Sequence[Wire]) -> list[Wire]:
+    """Only the first can be cut: on others the simulators of one vehicle feel its motion."""
+    return [_first_wire(device, wires[0]), *wires[1:]]
 
 
 def _hold_signals() -> None:
@@ -253,8 +257,9 @@ def _run_link(
                 print(f"{time.monotonic() - started:8.3f} {plain(text)}", flush=True)
 
     loop = WireLoop(link, WireBundle(wires), show)
-    loop.start()
-    signal.sigwait(_ENDS)
+    with controlled(options.control, device, loop):
+        loop.start()
+        signal.sigwait(_ENDS)
     loop.stop()
 
 

@@ -99,6 +99,13 @@ class FlightModel:
         """A second parachute leaves its pod; m/s under its canopy."""
         self.canopy_speed, self.released_for = canopy_speed, 0.0
 
+    def mend(self) -> None:
+        """Put it whole on the ground, disarmed, with its parachute packed."""
+        self.height, self.vertical_speed, self.roll = self.ground, 0.0, 0.0
+        self.armed = self.motors_failed = False
+        self.target_height, self.released_for = 0.0, math.nan
+        self.acceleration = GRAVITY
+
     def step(self, dt: float) -> None:
         """Move on by dt, 0 to 0.1 s."""
         if not math.isnan(self.released_for):

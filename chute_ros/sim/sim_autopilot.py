@@ -15,7 +15,10 @@ def _run() -> None:
         "A MAVLink autopilot: arms, takes off, fails and falls; a PARACHUTE_STATUS with "
         "deployed opens its canopy.",
         "udpout:127.0.0.1:14550",
-        "mute, unmute, silent, speak, reboot, arm, takeoff=HEIGHT, fail-motor",
+        "mute, unmute, silent, speak, reboot, arm, takeoff=HEIGHT, fly=HEIGHT (it arms, and takes "
+        "off after 1 s), land, fail-motor, battery=VOLTS (it drains to them), wind=SPEED (m/s; "
+        "its gusts move the vehicle), lie=KIND (of its estimator: climb and fall, which do not "
+        "happen, stuck, or truth), mend (whole on the ground again, parachute packed)",
     )
     options.add_argument("--system-id", type=number("id", 1, 255), default=1)
     options.add_argument(

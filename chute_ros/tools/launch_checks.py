@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
@@ -19,12 +20,33 @@ from chute_ros.ros.parameter_file import given_in
 from chute_ros.ros.parameters import MISSPELT, nearest
 from chute_ros.ros.supervisor_parameters import SupervisorParameters
 from chute_ros.settings import Settings, parameters_of, settings_from
+from chute_ros.sim.bench_actions import (
+    AUTOPILOT,
+    FLIGHT_COMPUTER,
+    LIGHT_AIR,
+    Order,
+    actions_of,
+)
 
 T = TypeVar("T")
 #: When a simulated vehicle arms and takes off, s after its start: the supervisor is READY by then.
 _ARMS_AT, _TAKES_OFF_AT = 10.0, 11.0
-#: What can fail in a simulated flight -> the action of sim_autopilot.
-_FAILURES = {"motor": "fail-motor", "autopilot": "reboot", "telemetry": "silent"}
+#: What can fail in a simulated flight, as fail:= names it -> its action in the table of actions.
+FAILURES = {
+    "motor": "fail_motor",
+    "autopilot": "restart_autopilot",
+    "telemetry": "silence_autopilot",
+    "link": "cut_vehicle_link",
+    "lie": "make_height_lie",
+    "stuck": "freeze_estimator",
+    "battery": "low_battery",
+    "parachute": "restart_parachute",
+    "parachute_link": "cut_parachute_link",
+    "drogue": "fail_drogue",
+    "computer": "restart_flight_computer",
+    "umbilical": "cut_umbilical",
+    "refuse": "refuse_to_open",
+}
 #: Two more follow it, and there is none above 65535.
 _LAST_PORT = 65533
 
@@ -57,26 +79,86 @@ def check_port(text: str) -> int:
     return int(text)
 
 
-def flight_script(fly: str, fail: str) -> list[str]:
-    """Options of sim_autopilot for a flight. fly: its height, m; empty: it stands. fail: what
-    fails and, after @, how long after the take-off, s; empty: nothing. ParameterError: they are
-    none."""
-    if not fly and not fail:
-        return []
-    height, (what, _, after) = _number(fly), fail.partition("@")
-    if not 1.0 <= height <= 500.0:
-        raise ParameterError(f"fly is {fly!r}: need a height from 1 to 500 (m), for example 60")
-    script = {_ARMS_AT: "arm", _TAKES_OFF_AT: f"takeoff={height:g}"}
-    if fail:
-        seconds = _number(after)
-        if what not in _FAILURES or not 0.0 <= seconds <= 3600.0:
-            known = ", ".join(_FAILURES)
-            raise ParameterError(
-                f"fail is {fail!r}: need one of {known}, @ and seconds after the take-off from 0 "
-                "to 3600, for example motor@15"
-            )
-        script[_TAKES_OFF_AT + seconds] = _FAILURES[what]
-    return [word for at, action in script.items() for word in ("--at", f"{at:g}:{action}")]
+@dataclass(frozen=True)
+class Flight:
+    """What a simulated vehicle is to do by itself, as given; empty: nothing of the kind.
+
+    fly: height to which it takes off, m; launch: how long after the start a rocket launches, s;
+    fail: what fails, each with @ and how long after the take-off or the launch, s, with commas
+    between them; wind: m/s; empty: light air.
+    """
+
+    fly: str = ""
+    launch: str = ""
+    fail: str = ""
+    wind: str = ""
+
+    def options(self, simulators: Sequence[str]) -> dict[str, list[str]]:
+        """Simulator -> what its command line has besides. ParameterError: this cannot be, or not
+        of a vehicle with these simulators."""
+        begins, script = self._begin(simulators)
+        if self.wind:
+            _needs("wind", self.wind, AUTOPILOT, simulators)
+        if AUTOPILOT in simulators:
+            wind = self.wind or f"{LIGHT_AIR:g}"
+            speed = _within("wind", wind, 30.0, "a speed", "m/s", "5")
+            script.append((0.0, (AUTOPILOT, f"wind={speed:g}")))
+        for one in filter(None, self.fail.split(",")):
+            after, orders = _failure(one, simulators)
+            script += [(begins + after, order) for order in orders]
+        if self.fail and math.isnan(begins):
+            need = "launch" if FLIGHT_COMPUTER in simulators else "fly"
+            raise ParameterError(f"fail is {self.fail!r}: need {need} too, which it counts from")
+        options: dict[str, list[str]] = {}
+        for at, (simulator, action) in script:
+            options.setdefault(simulator, []).extend(("--at", f"{at:g}:{action}"))
+        return options
+
+    def _begin(self, simulators: Sequence[str]) -> tuple[float, list[tuple[float, Order]]]:
+        """When the vehicle leaves the ground, s after its start, NaN: never; and its orders."""
+        if self.launch:
+            _needs("launch", self.launch, FLIGHT_COMPUTER, simulators)
+            begins = _within("launch", self.launch, 3600.0, "a time after the start", "s", "12")
+            return begins, [(begins, (FLIGHT_COMPUTER, "launch"))]
+        if self.fly:
+            _needs("fly", self.fly, AUTOPILOT, simulators)
+            height = _within("fly", self.fly, 500.0, "a height", "m", "60", lowest=1.0)
+            takes_off = (AUTOPILOT, f"takeoff={height:g}")
+            return _TAKES_OFF_AT, [(_ARMS_AT, (AUTOPILOT, "arm")), (_TAKES_OFF_AT, takes_off)]
+        return math.nan, []
+
+
+def _failure(text: str, simulators: Sequence[str]) -> tuple[float, tuple[Order, ...]]:
+    """How long after the take-off, s, which orders."""
+    what, _, after = text.strip().partition("@")
+    orders = {one.name: one.orders for one in actions_of(simulators)}
+    known = [word for word, name in FAILURES.items() if name in orders]
+    seconds = _number(after)
+    if what not in known or not 0.0 <= seconds <= 3600.0:
+        raise ParameterError(
+            f"fail is {text!r}: need one of {', '.join(known)}, @ and seconds after the take-off "
+            f"or launch from 0 to 3600, for example {known[0]}@15"
+        )
+    return seconds, orders[FAILURES[what]]
+
+
+def _within(
+    name: str, text: str, highest: float, what: str, unit: str, example: str, lowest: float = 0.0
+) -> float:
+    if not lowest <= (value := _number(text)) <= highest:
+        raise ParameterError(
+            f"{name} is {text!r}: need {what} from {lowest:g} to {highest:g} ({unit}), "
+            f"for example {example}"
+        )
+    return value
+
+
+def _needs(name: str, text: str, simulator: str, simulators: Sequence[str]) -> None:
+    if simulator not in simulators:
+        raise ParameterError(
+            f"{name} is {text!r}: need a vehicle with {simulator}; "
+            f"this one has {', '.join(simulators)}"
+        )
 
 
 def _number(text: str) -> float:
@@ -86,12 +168,26 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def check_file(path: Path, namespace: str, nodes: Iterable[str]) -> None:
-    """The parameter file of these nodes. ParameterError: it cannot be read, or has nothing for
-    one of them, or what it has cannot be."""
+def check_connections(given: Mapping[str, str]) -> None:
+    """Launch arguments: device node -> its connection. ParameterError: the node refuses it."""
+    for node, text in given.items():
+        try:
+            settings_from(_settings_of(node), {"connection": text})
+        except ParameterError as error:
+            argument = links()[node].argument.name
+            raise ParameterError(f"launch argument {argument}: {error}") from None
+
+
+def check_file(
+    path: Path, namespace: str, nodes: Iterable[str], connections: Mapping[str, str]
+) -> None:
+    """The parameter file of these nodes. connections: node -> what overrides the file's.
+    ParameterError: it cannot be read, or has nothing for one of them, or what it has cannot be."""
     for name in nodes:
         kind = _settings_of(name)
         given = given_in(path, f"{namespace}/{name}")
+        if name in connections:
+            given = {**given, "connection": connections[name]}
         known = [one.name for one in parameters_of(kind)]
         for other in given.keys() - set(known):
             if near := nearest(other, known, MISSPELT):

@@ -5,6 +5,7 @@ import importlib.util
 import itertools
 import subprocess
 import sys
+import tempfile
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -21,6 +22,13 @@ from chute_ros.ros.middleware import LEADS_ELSEWHERE
 ROOT = Path(__file__).resolve().parents[2]
 FILES = sorted(LAUNCH.glob("*.launch.py"))
 EVERY = pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Where simulation.launch.py makes the folder of the control sockets."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
 
 
 def calls(file, name):
@@ -106,13 +114,13 @@ def test_the_vehicle_gives_its_nodes_the_namespace_and_the_file():
 
 #: Parachute -> what vehicle.launch.py starts for it, and simulation.launch.py beside that.
 STARTED = {
-    "mavlink": ({"mavlink_parachute"}, {"sim_autopilot", "sim_mavlink_parachute"}),
-    "upf": ({"mavlink_parachute", "upf_can"}, {"sim_autopilot", "sim_upf"}),
+    "mavlink": ({"mavlink_parachute"}, {"sim_autopilot", "sim_mavlink_parachute", "sim_bench"}),
+    "upf": ({"mavlink_parachute", "upf_can"}, {"sim_autopilot", "sim_upf", "sim_bench"}),
     "both": (
         {"mavlink_parachute", "upf_can"},
-        {"sim_autopilot", "sim_mavlink_parachute", "sim_upf"},
+        {"sim_autopilot", "sim_mavlink_parachute", "sim_upf", "sim_bench"},
     ),
-    "umbilical": ({"umbilical"}, {"sim_flight_computer"}),
+    "umbilical": ({"umbilical"}, {"sim_flight_computer", "sim_bench"}),
 }
 
 
@@ -180,6 +188,35 @@ def test_a_simulated_upf_can_be_armed_by_command(parachute, monkeypatch):
     given = [after for before, after in itertools.pairwise(upf) if before == "--parameter"]
     values = {**CONTROLLER_PARAMETERS, **_parameters(given)}
     assert [name for name in EXCLUDES.values() if values[name]] == []
+
+
+def test_each_simulator_is_reached_by_sim_bench_and_told_its_part_of_the_flight(
+    folder, monkeypatch
+):
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    given = {"parachute": "mavlink", "fly": "60", "fail": "refuse@0,motor@15", "wind": "5"}
+    made = made_by(simulation, monkeypatch, **given)
+    commands = {one.options["name"]: one.options["cmd"] for one in made if "cmd" in one.options}
+    (bench,) = [one for one in made if one.options.get("executable") == "sim_bench"]
+    (parameters,) = bench.options["parameters"]
+    assert parameters["vehicle"] == "mavlink"
+    assert parameters["folder"].startswith(str(folder))
+    for name, command in commands.items():
+        at = command.index("--control")
+        assert command[at + 1] == f"{parameters['folder']}/{name}.sock"
+    assert "26:fail-motor" in commands["sim_autopilot"]
+    assert "0:wind=5" in commands["sim_autopilot"]
+    assert "11:refuse" in commands["sim_mavlink_parachute"]
+
+
+def test_a_flight_that_cannot_be_ends_the_launch_in_one_line(monkeypatch, capsys):
+    (simulation,) = [file for file in FILES if file.name.startswith("simulation")]
+    with pytest.raises(SystemExit) as ended:
+        made_by(simulation, monkeypatch, parachute="umbilical", fly="60")
+    assert ended.value.code == 2
+    told = capsys.readouterr().err
+    assert told.startswith("simulation.launch.py: fly is '60': need a vehicle with sim_autopilot")
+    assert told.count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,12 @@ from chute_ros.links.registered import module_of
 from chute_ros.ros.parameter_file import files_of, given_in, taken
 
 ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch) -> None:
+    """Where simulation.launch.py makes the folder of the control sockets."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
 
 def start(node: str, *arguments: str) -> tuple[int, list[str]]:
@@ -141,6 +148,38 @@ def test_a_vehicle_does_not_start_with_a_file_that_is_not_all_for_it(
     assert words in line
 
 
+@pytest.mark.parametrize(
+    ("parachute", "argument", "value", "words"),
+    [
+        ("mavlink", "connection", "x", "connection 'x' is not understood: need udpin:HOST:PORT"),
+        ("mavlink", "connection", "udpin:0.0.0.0:99999", "port '99999' is no number from 0 to"),
+        ("mavlink", "connection", "/dev/ttyUSB0", "did you mean 'serial:/dev/ttyUSB0'?"),
+        ("upf", "bus", "can0", "connection 'can0' is not understood: need mcast:BUS[:PORT]"),
+        ("upf", "bus", "mcast:256", "bus '256' is no number from 0 to 255"),
+        ("umbilical", "cable", "udpin:0.0.0.0:1", "is no serial port: need serial:PATH[:BAUD]"),
+        ("relay", "output", "gpio17", "connection 'gpio17' is no output: need file:PATH"),
+    ],
+)
+def test_a_connection_that_no_node_would_take_is_told_by_the_launch_file(
+    parachute: str, argument: str, value: str, words: str, monkeypatch, capsys
+) -> None:
+    line = refused(monkeypatch, capsys, VEHICLE, parachute=parachute, **{argument: value})
+    assert line.startswith(f"launch argument {argument}: ")
+    assert words in line
+
+
+def test_a_connection_in_a_file_is_looked_at_unless_an_argument_overrides_it(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(GOOD.format("connection: to be filled in"))
+    given = {"parachute": "mavlink", "config": str(path)}
+    line = refused(monkeypatch, capsys, VEHICLE, **given)
+    assert line.startswith(f"{path}: mavlink_parachute: connection 'to be filled in' is not")
+    made = made_by(LAUNCH / VEHICLE, monkeypatch, **given, connection="udpin:0.0.0.0:1")
+    assert len([one for one in made if "executable" in one.options]) == 2
+
+
 def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "settings.yaml"
     path.write_text(GOOD.format("connection: udpin:0.0.0.0:1"))
@@ -189,8 +228,8 @@ def flown(monkeypatch, **arguments: str) -> list[str]:
 
 @pytest.mark.parametrize("parachute", ["mavlink", "upf", "relay"])
 def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch) -> None:
-    assert flown(monkeypatch, parachute=parachute) == []
-    start = ["10:arm", "11:takeoff=60"]
+    assert flown(monkeypatch, parachute=parachute) == ["0:wind=0.5"]
+    start = ["10:arm", "11:takeoff=60", "0:wind=0.5"]
     assert flown(monkeypatch, parachute=parachute, fly="60") == start
     told = flown(monkeypatch, parachute=parachute, fly="60", fail="motor@15.5")
     assert told == [*start, "26.5:fail-motor"]
@@ -203,8 +242,8 @@ def test_a_simulation_flies_and_fails_as_it_is_told(parachute: str, monkeypatch)
         ("0.5", "", "fly is '0.5': need a height"),
         ("501", "", "fly is '501': need a height"),
         ("nan", "", "fly is 'nan': need a height"),
-        ("", "motor@15", "fly is '': need a height"),
-        ("60", "motor", "fail is 'motor': need one of motor, autopilot, telemetry, @ and seconds"),
+        ("", "motor@15", "fail is 'motor@15': need fly too"),
+        ("60", "motor", "fail is 'motor': need one of motor, autopilot, telemetry, link, "),
         ("60", "wing@15", "fail is 'wing@15': need one of"),
         ("60", "motor@-1", "fail is 'motor@-1': need one of"),
         ("60", "motor@nan", "fail is 'motor@nan': need one of"),
@@ -219,4 +258,5 @@ def test_a_flight_that_cannot_be_flown_is_told(
 
 def test_a_rocket_is_flown_by_its_flight_computer(monkeypatch, capsys) -> None:
     line = refused(monkeypatch, capsys, SIMULATION, parachute="umbilical", fly="60")
-    assert line == "fly and fail need an autopilot, which this vehicle has not"
+    words = "need a vehicle with sim_autopilot; this one has sim_flight_computer"
+    assert line == f"fly is '60': {words}"

@@ -102,9 +102,7 @@ class Access:
             until = max(until, self._tries[0] + TRIES_WITHIN)
         if now < until:
             # Also with the right password: the answer must tell nothing of it.
-            raise AccessRefusedError(
-                f"too many wrong passwords: try again in {until - now:.0f} s"
-            )
+            raise AccessRefusedError(f"too many wrong passwords: try again in {until - now:.0f} s")
 
     def _remember_mistake(self, key: str, now: float) -> None:
         mistakes = self._mistakes.pop(key, (0, 0.0))[0] + 1

@@ -1,8 +1,8 @@
 """What may come in from a browser, and what a browser is told about the page.
 
-A page of somebody else that is open in the operator's browser must neither order anything nor read
-anything: its requests bear its own origin, and a name of its own that it lets lead to this computer
-is none of ours.
+A page of somebody else that is open in the operator's browser must neither order nor read
+anything: its requests bear its own origin, and a name of its own that it lets lead to this
+computer is none of ours.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _HEADERS = (
     (b"x-frame-options", b"DENY"),
     (b"content-security-policy", b"frame-ancestors 'none'; form-action 'self'; base-uri 'self'"),
     (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"no-referrer"),
+    (b"referrer-policy", b"same-origin"),
 )
 
 

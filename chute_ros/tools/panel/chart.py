@@ -78,7 +78,10 @@ def _options() -> dict[str, Any]:
             {"left": 50, "right": 12, "top": 30, "height": 120},
             {"left": 50, "right": 12, "top": 200, "height": 90},
         ],
-        "xAxis": [{"type": "time", "gridIndex": 0, "show": False}, {"type": "time", "gridIndex": 1}],
+        "xAxis": [
+            {"type": "time", "gridIndex": 0, "show": False},
+            {"type": "time", "gridIndex": 1, "axisLabel": {"hideOverlap": True}},
+        ],
         "yAxis": [axis(0), axis(1)],
         "series": [{**line(0), "markLine": marks}, line(1)],
         "tooltip": {"trigger": "axis"},

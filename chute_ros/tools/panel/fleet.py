@@ -37,7 +37,9 @@ def fleet(those: Iterable[tuple[str, Heard | None]], now: float) -> str:
     told = [(name, heard.message if heard else None, age_of(heard, now)) for name, heard in those]
     told.sort(key=lambda one: (_rank(one[1], one[2]), one[0]))
     cards = "".join(_card(*one) for one in told)
-    return f'<div class="fleet">{cards}</div>' if cards else '<p class="none">No vehicle found.</p>'
+    return (
+        f'<div class="fleet">{cards}</div>' if cards else '<p class="none">No vehicle found.</p>'
+    )
 
 
 def link_to(namespace: str) -> str:
@@ -56,11 +58,11 @@ def _rank(summary: Any, age: float) -> float:
 def _card(namespace: str, summary: Any, age: float) -> str:
     old = is_old(age)
     if summary is None:
-        word, tone, lines = "NOTHING RECEIVED", "quiet", []
+        word, tone, lines = "NOTHING RECEIVED", "quiet", list[str]()
     else:
         word = "NOT KNOWN NOW" if old else summary.state_name.replace("_", " ")
         tone = "quiet" if old else STAGE_TONE.get(summary.state_name, "quiet")
-        lines = _lines(summary, age)
+        lines = list(_lines(summary, age))
     told = "".join(f"<div>{escape(line)}</div>" for line in lines)
     return (
         f'<a class="card vehicle{" old" if old else ""}" href="{link_to(namespace)}">'

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from chute_ros.tools.panel.node import PanelNode
 
 _EVERY = 0.5  # s
+#: One vehicle that was found is the only one if no other is in so many turns.
+_ALONE = 4
 
 
 def register(node: PanelNode) -> None:
@@ -25,17 +27,28 @@ def register(node: PanelNode) -> None:
         there = node.vehicles()
         if len(there) == 1:
             return RedirectResponse(link_to(there[0]))
-        return show()
+        return _show(node, goes_on=not there)
 
     @ui.page("/fleet")
     def show() -> None:
-        node.look_at_all()
-        ui.context.client.on_delete(node.leave_all)
-        pulse = Pulse()
-        cards = ui.html("", sanitize=False).classes("all")
+        _show(node, goes_on=False)
 
-        def refresh() -> None:
-            pulse.beat()
-            cards.set_content(fleet(node.fleet(), time.monotonic()))
 
-        ui.timer(_EVERY, refresh)
+def _show(node: PanelNode, goes_on: bool) -> None:
+    """goes_on: to the first vehicle, if it is the only one."""
+    node.look_at_all()
+    ui.context.client.on_delete(node.leave_all)
+    pulse = Pulse()
+    cards = ui.html("", sanitize=False).classes("all")
+    alone = 0
+
+    def refresh() -> None:
+        nonlocal alone
+        pulse.beat()
+        those = node.fleet()
+        cards.set_content(fleet(those, time.monotonic()))
+        alone = alone + 1 if len(those) == 1 else 0
+        if goes_on and alone == _ALONE:
+            ui.navigate.to(link_to(those[0][0]))
+
+    ui.timer(_EVERY, refresh)

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -65,7 +66,7 @@ class PanelNode(Node):
         self._fleet_viewers = 0
         self._summaries: dict[str, tuple[Any, Heard | None]] = {}
         #: Full name of a service or topic -> what is used for it.
-        self._clients: dict[str, Any] = {}
+        self._callers: dict[str, Any] = {}
         self._recorders: dict[str, Any] = {}
         self.server = PanelServer(self)
         self.server.start()
@@ -114,8 +115,8 @@ class PanelNode(Node):
             if not self._fleet_viewers:
                 held = [subscription for subscription, _ in self._summaries.values()]
                 self._summaries.clear()
-                for one in held:
-                    self._want(lambda one=one: self.destroy_subscription(one))
+                for one in filter(None, held):
+                    self._want(partial(self.destroy_subscription, one))
 
     def fleet(self) -> list[tuple[str, Heard | None]]:
         """Each vehicle with its newest summary. Somebody looks at all."""
@@ -123,7 +124,7 @@ class PanelNode(Node):
             with self._lock:
                 if self._fleet_viewers and namespace not in self._summaries:
                     self._summaries[namespace] = (None, None)
-                    self._want(lambda namespace=namespace: self._follow(namespace))
+                    self._want(partial(self._follow, namespace))
         with self._lock:
             return [(name, heard) for name, (_, heard) in self._summaries.items()]
 
@@ -184,9 +185,9 @@ class PanelNode(Node):
         answer: Future[Answer],
     ) -> None:
         name = f"{namespace.rstrip('/')}/{service}"
-        if name not in self._clients:
-            self._clients[name] = self.create_client(kind, name)
-        client, request = self._clients[name], kind.Request(**fields)
+        if name not in self._callers:
+            self._callers[name] = self.create_client(kind, name)
+        client, request = self._callers[name], kind.Request(**fields)
         if not client.service_is_ready():
             answer.set_result(Answer(False, f"nothing was sent: {service} is not offered", None))
             return

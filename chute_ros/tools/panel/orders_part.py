@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -28,36 +29,35 @@ class OrdersPart:
 
     def __init__(self, node: PanelNode, namespace: str, token: str) -> None:
         self._node, self._namespace, self._token = node, namespace, token
-        self._reason: Any = None
-        self._buttons: list[Any] = []
+        self._text = ""
         if not node.settings.allow_commands:
             return
         with ui.element("section").classes("card orders"):
             self._note = ui.label("").classes("note")
-            with ui.element("div").classes("buttons"):
-                self._button("DEPLOY", "act", lambda reason: orders.deploy(reason))
-                self._button("KILL motors", "bad", lambda reason: orders.kill(reason))
-                self._button("Arm parachutes", "good", lambda _: orders.arm(True))
-                self._button("Disarm", "warn", lambda _: orders.arm(False))
-                self._button("Reset", "quiet", lambda _: orders.reset())
-                for mode in Mode:
-                    self._button(
-                        f"Mode {mode.name}",
-                        "quiet",
-                        lambda reason, mode=mode: orders.mode(mode, reason),
-                    )
-            self._reason = ui.element("input").props(
-                f'placeholder="reason, for the record" maxlength="{_LONGEST_REASON}" '
-                'aria-label="reason, for the record"'
-            )
-            self._reason.on("input", self._take_reason, js_handler="(e) => emit(e.target.value)")
+            self._all = ui.element("div")
+            with self._all:
+                with ui.element("div").classes("buttons"):
+                    self._button("DEPLOY", "act", orders.deploy)
+                    self._button("KILL motors", "bad", orders.kill)
+                    self._button("Arm parachutes", "good", lambda _: orders.arm(True))
+                    self._button("Disarm", "warn", lambda _: orders.arm(False))
+                with ui.element("details"):
+                    ui.html("more orders", sanitize=False, tag="summary")
+                    with ui.element("div").classes("buttons"):
+                        self._button("Reset", "quiet", lambda _: orders.reset())
+                        for mode in Mode:
+                            self._button(f"Mode {mode.name}", "quiet", partial(orders.mode, mode))
+                reason = ui.element("input").props(
+                    f'placeholder="reason, for the record" maxlength="{_LONGEST_REASON}" '
+                    'aria-label="reason, for the record"'
+                )
+                reason.on("input", self._take_reason, js_handler="(e) => emit(e.target.value)")
             self._answers = ui.element("div").classes("answers").props('aria-live="polite"')
-        self._text = ""
         self.refresh()
 
     def refresh(self) -> None:
         """Whether the session still lasts."""
-        if not self._buttons:
+        if not self._node.settings.allow_commands:
             return
         person = self._person()
         self._note.set_text(
@@ -65,8 +65,7 @@ class OrdersPart:
             if person
             else "Log in to give orders."
         )
-        for button in self._buttons:
-            button.props(add="disabled" if person is None else "", remove="" if person is None else "disabled")
+        self._all.set_visibility(person is not None)
 
     def _button(self, text: str, tone: str, make: Callable[[str], Order]) -> None:
         async def held() -> None:
@@ -77,7 +76,6 @@ class OrdersPart:
             ui.html(f"<span>{text}</span><i></i>", sanitize=False)
         # Sent by panel.js once it was held for long enough.
         button.on("held", held, args=[])
-        self._buttons.append(button)
 
     def _take_reason(self, event: Any) -> None:
         self._text = str(event.args)[:_LONGEST_REASON]

@@ -1,10 +1,10 @@
 // A button of class "hold" sends "held" once it was held for HOLD ms; the page turns grey when its
 // pulse stops for LOST ms.
 (() => {
-  const HOLD = 1500, LOST = 3000;
-  let held = null, timer = null;
+  const HOLD = 1500, LOST = 3000, SLIDE = 40;  // ms, ms, CSS pixels
+  let held = null, timer = null, from = null;
   const begin = (button) => {
-    if (!button || button.hasAttribute("disabled") || held) return;
+    if (!button || held) return;
     held = button;
     button.classList.add("holding");
     timer = setTimeout(() => {
@@ -16,17 +16,19 @@
   const end = () => {
     clearTimeout(timer);
     if (held) held.classList.remove("holding");
-    held = timer = null;
+    held = timer = from = null;
   };
   const buttonOf = (event) => event.target.closest && event.target.closest("button.hold");
   document.addEventListener("pointerdown", (event) => {
-    if (event.button === 0 && event.isPrimary) begin(buttonOf(event));
+    if (event.button !== 0 || !event.isPrimary) return;
+    from = event;
+    begin(buttonOf(event));
   });
   for (const kind of ["pointerup", "pointercancel", "keyup"])
     document.addEventListener(kind, end);
   document.addEventListener("pointermove", (event) => {
-    // A finger that slides off has changed its mind.
-    if (held && document.elementFromPoint(event.clientX, event.clientY)?.closest("button.hold") !== held)
+    // A finger that slides off has changed its mind; a page that moves under it has no mind.
+    if (held && from && Math.hypot(event.clientX - from.clientX, event.clientY - from.clientY) > SLIDE)
       end();
   });
   document.addEventListener("keydown", (event) => {

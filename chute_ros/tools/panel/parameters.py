@@ -52,9 +52,7 @@ class PanelSettings(Settings):
                 *("allow_commands", "password_file"),
             )
         if bool(self.certificate_file) is not bool(self.key_file):
-            raise self.contradiction(
-                "need both or neither", "certificate_file", "key_file"
-            )
+            raise self.contradiction("need both or neither", "certificate_file", "key_file")
 
 
 PARAMETERS = parameters_of(PanelSettings)

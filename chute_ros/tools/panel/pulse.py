@@ -13,7 +13,7 @@ class Pulse:
         self._element = ui.html("", sanitize=False).classes("pulse").props("aria-hidden=true")
         ui.html(
             '<div class="banner tone-quiet"><span class="sign" aria-hidden="true">○</span> NO '
-            'CONNECTION TO THE PANEL</div><p>What is below is old.</p>',
+            "CONNECTION TO THE PANEL</div><p>What is below is old.</p>",
             sanitize=False,
         ).classes("lost-note").props('role="alert"')
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 
 from chute_ros.supervisor.inputs import Mode
@@ -35,6 +35,7 @@ MEANINGS = {
     "FAULT": "What was ordered could not be done.",
 }
 _HISTORY = 8
+_DIAGNOSTIC_TONE = {"WARN": "warn", "STALE": "quiet", "ERROR": "bad"}
 
 
 def banner(picture: VehiclePicture) -> str:
@@ -85,14 +86,13 @@ def blocks(picture: VehiclePicture) -> str:
 
 def parachutes(
     those: Sequence[ParachuteView],
-    tasks: Sequence[Task],
     identities: Mapping[str, str],
     today: datetime.date,
 ) -> str:
     """A card each. identities: by link and device, as their devices tell."""
     if not those:
         return _card("Parachutes", _row("", "never received", "warn"), True)
-    return "".join(_parachute(one, tasks, identities, today) for one in those)
+    return "".join(_parachute(one, identities, today) for one in those)
 
 
 def links(those: Sequence[LinkView]) -> str:
@@ -130,9 +130,12 @@ def vehicle(one: VehicleView | None) -> str:
 
 
 def rules(those: Sequence[RuleView]) -> str:
-    """A bar each, which fills as its conditions hold; those that count first."""
-    order = sorted(those, key=lambda one: (not one.counts, not one.active))
-    rows = "".join(_rule(one) for one in order)
+    """A bar for each that is active, which fills as its conditions hold; those that count
+    first."""
+    shown = [one for one in those if one.active or one.counts]
+    rows = "".join(_rule(one) for one in sorted(shown, key=lambda one: not one.counts))
+    if others := [one.name for one in those if one not in shown]:
+        rows += _row("not active now", ", ".join(others), "quiet")
     return _card("Rules", rows or _row("", "none", ""), False)
 
 
@@ -152,7 +155,11 @@ def diagnostics(tasks: Sequence[Task]) -> str:
     """What is not OK, worst first; how many are."""
     bad = [one for one in tasks if one.level != "OK"]
     rows = "".join(
-        _row(f"{one.level} {one.name}", one.message, "warn" if one.level == "WARN" else "bad")
+        _row(
+            f"{one.level} {one.node}: {one.task}",
+            one.message,
+            "warn" if one.level == "WARN" else "bad",
+        )
         for one in bad
     )
     rows += _row("", f"{len(tasks) - len(bad)} of {len(tasks)} OK", "")
@@ -162,17 +169,12 @@ def diagnostics(tasks: Sequence[Task]) -> str:
 def _why(picture: VehiclePicture) -> str:
     if picture.state_text and picture.state_text != picture.state:
         return picture.state_text
-    if picture.flight_blocked and picture.block_reasons:
+    if picture.state in ("STARTUP", "BLOCKED") and picture.block_reasons:
         return picture.block_reasons[0]
     return MEANINGS.get(picture.state, "")
 
 
-def _parachute(
-    one: ParachuteView,
-    tasks: Iterable[Task],
-    identities: Mapping[str, str],
-    today: datetime.date,
-) -> str:
+def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetime.date) -> str:
     rows = [
         _row("armed", _armed(one), "act" if one.armed else ""),
         _row("released", _released(one), "act" if one.deployed else ""),
@@ -185,11 +187,6 @@ def _parachute(
     identity = identities.get(f"{one.link} {one.device}", "not told")
     rows.append(_row("identity", identity, ""))
     rows += [_row("fault", fault, "bad") for fault in one.faults]
-    rows += [
-        _row(task.task, task.message, "warn" if task.level == "WARN" else "bad")
-        for task in tasks
-        if task.node == one.link and task.level in ("WARN", "ERROR")
-    ]
     rows.append(_row("last word", age_text(one.age), "quiet" if is_old(one.age) else ""))
     return _card(f"Parachute {one.link} {one.device}", "".join(rows), is_old(one.age))
 
@@ -231,7 +228,9 @@ def _link(one: LinkView) -> str:
 
 def _measured(name: str, value: str, age: float) -> str:
     # A value that was never received is none.
-    told = f"{value} <small>{escape(age_text(age))}</small>" if age == age else age_text(age)
+    told = escape(age_text(age))
+    if age == age:
+        told = f"{escape(value)} <small>{told}</small>"
     old = " old" if is_old(age) else ""
     return f'<div class="row{old}"><span>{escape(name)}</span><span>{told}</span></div>'
 
@@ -246,16 +245,13 @@ def _rule(one: RuleView) -> str:
         else "fulfilled"
         if one.fulfilled
         else f"{one.level:.1f} of {one.hold:.1f} s"
-        if one.active
-        else "not active"
     )
-    shown = "" if one.active or one.counts else " old"
     lines = "".join(f"<li>{escape(line)}</li>" for line in one.conditions if one.counts)
     if one.denied:
         lines += f"<li>not acted on: {escape(one.denied)}</li>"
     percent = f"{filled * 100.0:.0f}"
     return (
-        f'<div class="rule{shown}"><div class="row"><span>{escape(one.name)}</span>'
+        f'<div class="rule"><div class="row"><span>{escape(one.name)}</span>'
         f"<span>{escape(one.action)}, {escape(state)}</span></div>"
         f'<div class="bar" role="progressbar" aria-label="{escape(one.name)}" aria-valuemin="0" '
         f'aria-valuemax="100" aria-valuenow="{percent}"><i style="width:{percent}%"></i></div>'
@@ -265,10 +261,8 @@ def _rule(one: RuleView) -> str:
 
 def _row(name: str, text: str, tone: str) -> str:
     sign = f"{_sign(tone)} " if tone else ""
-    kind = f" is-{tone}" if tone else ""
-    return (
-        f'<div class="row{kind}"><span>{escape(name)}</span><span>{sign}{escape(text)}</span></div>'
-    )
+    told = f"<span>{escape(name)}</span><span>{sign}{escape(text)}</span>"
+    return f'<div class="row{f" is-{tone}" if tone else ""}">{told}</div>'
 
 
 def _card(title: str, rows: str, old: bool) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import socket
+import ssl
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nicegui import app, core, ui
+from nicegui import app, ui
 from nicegui.server import Server
 
 from chute_ros.errors import ParameterError
@@ -31,11 +32,10 @@ class PanelServer:
         self._node = node
         settings = node.settings
         self.secure = bool(settings.certificate_file)
-        for name in ("certificate_file", "key_file"):
-            file = getattr(settings, name)
-            if file and not os.access(file, os.R_OK):
-                raise ParameterError(f"parameter {name}: {file} cannot be read")
-        self._check_port()
+        if self.secure:
+            _check_certificate(settings.certificate_file, settings.key_file)
+        #: From now on browsers are queued, until the server takes them.
+        self._socket = _listening(settings.host, settings.port)
         self._thread = threading.Thread(target=self._run, name="web server", daemon=True)
 
     @property
@@ -63,36 +63,16 @@ class PanelServer:
         """End it, with every page that is open."""
         if (server := getattr(Server, "instance", None)) is not None:
             server.should_exit = True
-            server.force_exit = True
         self._thread.join(_END)
-
-    def _check_port(self) -> None:
-        settings = self._node.settings
-        try:
-            family = socket.getaddrinfo(settings.host, settings.port, type=socket.SOCK_STREAM)[0]
-            with socket.socket(*family[:2]) as probe:
-                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                probe.bind(family[4])
-        except OSError as error:
-            raise ParameterError(
-                f"parameters host and port are {settings.host} and {settings.port}: "
-                f"{error.strerror}; name others, or end what listens there"
-            ) from None
+        self._socket.close()
 
     def _run(self) -> None:
         settings = self._node.settings
-        # Whoever starts it from a test: NiceGUI would listen elsewhere.
-        os.environ.pop("PYTEST_CURRENT_TEST", None)
-        more = {}
-        if self.secure:
-            more = {
-                "ssl_certfile": settings.certificate_file,
-                "ssl_keyfile": settings.key_file,
-            }
         try:
             ui.run(
                 host=settings.host,
                 port=settings.port,
+                fd=self._socket.fileno(),
                 title="chute_ros",
                 favicon=str(Path(__file__).parent / "panel.svg"),
                 dark=None,
@@ -102,7 +82,9 @@ class PanelServer:
                 tailwind=False,
                 binding_refresh_interval=None,
                 reconnect_timeout=_RECONNECT,
-                **more,
+                timeout_graceful_shutdown=1,
+                ssl_certfile=settings.certificate_file or None,
+                ssl_keyfile=settings.key_file or None,
             )
         except SystemExit:
             self._node.get_logger().fatal(f"the web server at {self.address} could not start")
@@ -119,8 +101,21 @@ class PanelServer:
             )
 
 
-def in_loop(function: object) -> None:
-    """Have function called in the web server's thread."""
-    loop = core.loop
-    if loop is not None and not loop.is_closed():
-        loop.call_soon_threadsafe(function)  # type: ignore[arg-type]
+def _listening(host: str, port: int) -> socket.socket:
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(address[:2], family=family)
+    except OSError as error:
+        raise ParameterError(
+            f"parameters host and port are {host} and {port}: {os.strerror(error.errno or 0)}; "
+            "name others, or end what listens there"
+        ) from None
+
+
+def _check_certificate(certificate_file: str, key_file: str) -> None:
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate_file, key_file)
+    except OSError as error:
+        raise ParameterError(
+            f"parameters certificate_file and key_file: {error} ({certificate_file}, {key_file})"
+        ) from None

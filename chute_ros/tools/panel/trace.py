@@ -54,8 +54,8 @@ class Trace:
         self.marks.append(Mark(at, text))
 
     def drawn(self) -> list[Point]:
-        """At most MOST_DRAWN; of those between, the one that is furthest from its neighbours stays,
-        so that no peak is lost."""
+        """At most MOST_DRAWN: of each part of the time the lowest and the highest, so that no peak
+        is lost."""
         points = list(self.points)
         size = -(-len(points) // (MOST_DRAWN // 2))
         if size <= 2:

@@ -19,12 +19,14 @@ if TYPE_CHECKING:
     from chute_ros.tools.panel.node import PanelNode
 
 _EVERY = 0.25  # s
+#: A vehicle that is not found is looked for so often, s.
+_LOOKS = 1.0
 #: Of so many turns one draws the curves, and looks what the bench offers.
 _SLOWLY = 8
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 #: Parts of the page, in their order on a phone; wide screens have two columns.
 _LEFT = ("blocks", "parachutes", "vehicle")
-_RIGHT = ("rocket", "links", "rules", "decisions", "diagnostics")
+_RIGHT = ("rocket", "links", "decisions", "rules", "diagnostics")
 
 
 def register(node: PanelNode) -> None:
@@ -46,9 +48,9 @@ def register(node: PanelNode) -> None:
         with ui.element("main").classes("columns"):
             with ui.element("div"):
                 shown |= {one: _part(one) for one in _LEFT}
+                bench = BenchPart(node, namespace) if node.settings.bench else None
             with ui.element("div"):
                 curves = Curves()
-                bench = BenchPart(node, namespace) if node.settings.bench else None
                 shown |= {one: _part(one) for one in _RIGHT}
         turns = 0
 
@@ -90,3 +92,9 @@ def _none(node: PanelNode, namespace: str) -> None:
     found = ", ".join(node.vehicles()) or "none"
     ui.label(f"No supervisor is found in {namespace[:200]}. Vehicles found: {found}.")
     ui.link("all vehicles", "/fleet")
+
+    def look() -> None:
+        if namespace in node.vehicles():
+            ui.navigate.reload()
+
+    ui.timer(_LOOKS, look)

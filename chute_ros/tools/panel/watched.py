@@ -9,6 +9,7 @@ import datetime
 import math
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -28,6 +29,8 @@ from chute_ros.tools.panel.trace import Mark, Point, Trace
 
 #: The parts are made at most so often, however many look, s.
 _SOONEST = 0.2
+#: The curves are drawn on so often, s.
+_FOLLOWS = 0.25
 #: A device that did not answer who it is is asked again after so long, s.
 _ASK_AGAIN = 30.0
 
@@ -44,10 +47,12 @@ class Watched:
         self._tasks = DiagnosticTasks(namespace)
         self._telem: tuple[Any, float] | None = None
         self._trace = Trace()
-        self._marked: tuple[int, int] | None = None
+        #: Epoch and id of the newest decision on the curves.
+        self._marked = (0, 0)
         self._identities: dict[str, str] = {}
         self._asked: dict[str, float] = {}
-        self._entities: list[Callable[[], Any]] = []
+        self._clients: dict[tuple[str, Any], Any] = {}
+        self._ends: list[Callable[[], Any]] = []
         self._began = time.monotonic()
         self._made = (-math.inf, dict[str, str]())
 
@@ -61,15 +66,15 @@ class Watched:
         ):
             profile = qos.newest(qos.STATUS)
             held.append(node.create_subscription(kind, f"{base}/{topic}", hear, profile))
-        self._entities = [lambda one=one: node.destroy_subscription(one) for one in held]
-        timer = node.create_timer(0.25, self._follow)
-        self._entities.append(lambda: node.destroy_timer(timer))
+        timer = node.create_timer(_FOLLOWS, self._follow)
+        self._ends = [partial(node.destroy_subscription, one) for one in held]
+        self._ends.append(partial(node.destroy_timer, timer))
 
     def end(self) -> None:
         """Listen no more."""
-        for destroy in self._entities:
+        for destroy in self._ends:
             destroy()
-        self._entities.clear()
+        self._ends.clear()
 
     def parts(self) -> Mapping[str, str]:
         """Name -> HTML."""
@@ -95,7 +100,7 @@ class Watched:
             "banner": sections.banner(picture),
             "blocks": sections.blocks(picture),
             "parachutes": sections.parachutes(
-                picture.parachutes, tasks, self._identities, datetime.date.today()
+                picture.parachutes, self._identities, datetime.date.today()
             ),
             "vehicle": sections.vehicle(picture.vehicle),
             "links": sections.links(picture.links),
@@ -140,11 +145,10 @@ class Watched:
         vehicle = picture.vehicle
         if vehicle is not None and vehicle.height_age < 2.0:
             self._trace.add(Point(wall, vehicle.height, vehicle.vertical_speed))
-        if picture.decisions:
-            newest = picture.decisions[-1]
-            if (newest.epoch, newest.id) != self._marked:
-                self._marked = (newest.epoch, newest.id)
-                self._trace.mark(wall - newest.age, newest.action)
+        for one in picture.decisions:
+            if (one.epoch, one.id) > self._marked:
+                self._marked = (one.epoch, one.id)
+                self._trace.mark(wall - one.age, one.action)
 
     def _ask_identity(self, link: str, device: str) -> None:
         base = f"{self.namespace.rstrip('/')}/{link}"
@@ -153,20 +157,18 @@ class Watched:
             (GetNodeInfo, "get_node_info", {"node_id": int(device) if device.isdigit() else 0}),
         )
         for kind, name, fields in asks:
-            client = self._node.create_client(kind, f"{base}/{name}")
-            if not client.service_is_ready():
-                self._node.destroy_client(client)
-                continue
+            if (link, kind) not in self._clients:
+                client = self._node.create_client(kind, f"{base}/{name}")
+                self._clients[link, kind] = client
+                self._ends.append(partial(self._node.destroy_client, client))
+            client = self._clients[link, kind]
+            if client.service_is_ready():
+                future = client.call_async(kind.Request(**fields))
+                future.add_done_callback(partial(self._take_identity, f"{link} {device}"))
 
-            def answered(future: Any, client: Any = client) -> None:
-                self._node.destroy_client(client)
-                if answer := future.result():
-                    self._take_identity(f"{link} {device}", with_plain_texts(answer))
-
-            client.call_async(kind.Request(**fields)).add_done_callback(answered)
-
-    def _take_identity(self, key: str, answer: Any) -> None:
-        if not answer.success:
+    def _take_identity(self, key: str, future: Any) -> None:
+        answer = with_plain_texts(future.result())
+        if answer is None or not answer.success:
             return
         named = (
             ("", getattr(answer, "vendor_name", "")),

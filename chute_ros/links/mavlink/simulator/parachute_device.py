@@ -52,6 +52,8 @@ class ParachuteDevice(MavlinkDevice):
         self.armed = TriggerFlags(0)
         self.deployment = DeploymentTrigger.NONE
         self.errors = ErrorFlags(0)
+        #: It answers FAILED to a release.
+        self.refuses = False
         self.height = math.nan
         self._height_at = -math.inf
         #: Altitude that heights count from, m: a module's own sensor knows nothing of a home that
@@ -76,6 +78,9 @@ class ParachuteDevice(MavlinkDevice):
             "error": lambda name: setattr(self, "errors", self.errors | ErrorFlags[name]),
             "clear-errors": lambda _: setattr(self, "errors", ErrorFlags(0)),
             "deploy": lambda name: self._deploy(DeploymentTrigger[name]),
+            "refuse": lambda _: setattr(self, "refuses", True),
+            "accept": lambda _: setattr(self, "refuses", False),
+            "repack": lambda _: self._repack(),
         }
         self.arguments |= {
             "error": one_of(ErrorFlags.__members__),
@@ -90,6 +95,10 @@ class ParachuteDevice(MavlinkDevice):
         self.errors = ErrorFlags(self.settings.errors)
         if self.deployment is DeploymentTrigger.NONE:
             self.deployment = DeploymentTrigger(self.settings.deployment)
+
+    def _repack(self) -> None:
+        self.deployment, self.refuses = DeploymentTrigger.NONE, False
+        self.reboot()
 
     def heard(self, frame: Frame) -> None:
         """The vehicle's own autopilot tells height and sink speed, as on a real network."""
@@ -158,7 +167,7 @@ class ParachuteDevice(MavlinkDevice):
     def _release(self) -> int:
         if self.deployment is not DeploymentTrigger.NONE:
             return int(dialect.MAV_RESULT_ACCEPTED)
-        if not self.armed & (TriggerFlags.FC | TriggerFlags.OFFBOARD):
+        if self.refuses or not self.armed & (TriggerFlags.FC | TriggerFlags.OFFBOARD):
             return int(dialect.MAV_RESULT_FAILED)
         if not self.safety() & SafetyFlags.GROUND_CLEARED:
             return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)

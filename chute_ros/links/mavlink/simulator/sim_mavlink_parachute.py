@@ -22,7 +22,9 @@ def _run() -> None:
         "sends to 14541.",
         "udppair:127.0.0.1:14540:127.0.0.1:14541",
         "mute, unmute, silent, speak, reboot, error=NAME, clear-errors, deploy=TRIGGER "
-        "(names of PARACHUTE_ERROR_FLAGS and PARACHUTE_DEPLOYMENT_TRIGGER without their prefix)",
+        "(names of PARACHUTE_ERROR_FLAGS and PARACHUTE_DEPLOYMENT_TRIGGER without their prefix), "
+        "refuse (a release is answered with FAILED), accept, repack (the canopy is in its pod "
+        "again)",
     )
     options.add_argument("--system-id", type=number("id", 1, 255), default=start.system_id)
     options.add_argument("--component-id", type=number("id", 1, 255), default=start.component_id)

@@ -9,7 +9,8 @@ from chute_ros.sim.acting import Actor, Script
 
 
 class RelayBoard(Actor):
-    """on_fire: called when the channel closes for the first time. Actions: stuck, free."""
+    """on_fire: called when the channel closes for the first time. Actions: stuck, free, reboot,
+    repack."""
 
     def __init__(
         self,
@@ -25,10 +26,19 @@ class RelayBoard(Actor):
         self._heard = b""
         self._script = Script(script or [])
         self._bytes = RelayConfig()
-        self.actions = {"stuck": lambda _: self._hold(True), "free": lambda _: self._hold(False)}
+        self.actions = {
+            "stuck": lambda _: self._hold(True),
+            "free": lambda _: self._hold(False),
+            "reboot": lambda _: self.reboot(),
+            "repack": lambda _: self._repack(),
+        }
 
     def _hold(self, stuck: bool) -> None:
         self._stuck = stuck
+
+    def _repack(self) -> None:
+        self._stuck = self.fired = False
+        self.reboot()
 
     def reboot(self) -> None:
         """Its power was gone: the channel is open."""

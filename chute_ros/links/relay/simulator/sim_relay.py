@@ -12,7 +12,8 @@ def _run() -> None:
         "sim_relay",
         "A serial relay board of one channel (LCUS-1): it makes a pseudo terminal, prints its "
         "path, and says when its channel closes and opens.",
-        "stuck, free",
+        "stuck (the channel stays as it is), free, reboot, repack (the canopy is in its pod "
+        "again)",
     )
     options.add_argument(
         "--vehicle",

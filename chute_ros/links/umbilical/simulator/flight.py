@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from chute_ros.links.umbilical.simulator.commands import target_of
 from chute_ros.links.umbilical.simulator.settings import FlightComputerSettings, Mode
+from chute_ros.sim.acting import NotNowError
 from chute_ros.sim.rocket import Rocket
 
 #: The flight is looked at this often, simulated s.
@@ -34,6 +35,8 @@ class FlightProgram:
         self.rocket = Rocket()
         #: Neither drogue nor main come out any more, whoever wants it.
         self.is_stuck = False
+        #: At the apogee nothing comes out; by command it still does.
+        self.drogue_fails = settings.drogue_fails
         self.armed_altitude = 0.0
         self.handlers: dict[str, Callable[[], None]] = {
             "<L>": self._launch,
@@ -99,6 +102,24 @@ class FlightProgram:
         """Go to Fault: nothing is automatic any more."""
         self._enter(Mode.Fault)
 
+    def arm_and_launch(self) -> None:
+        """What a crew does: turn the key, and launch. NotNowError: it cannot."""
+        if self.mode not in (Mode.Startup, Mode.Standby):
+            raise NotNowError(f"it is in {self.mode.name}: need Startup or Standby")
+        if not self.rocket.on_ground or not math.isnan(self.rocket.burned_for):
+            raise NotNowError("its motor is spent: start over (mend)")
+        if self._settings.interlock and not self.may_arm:
+            raise NotNowError("arming is blocked: wipe the flash first")
+        self._key = True
+        self.turn_key()
+        self._launch()
+
+    def mend(self) -> None:
+        """Put the rocket on its pad, with a new motor and its canopies packed."""
+        self.rocket = Rocket()
+        self._drogue_out_for = math.inf
+        self.is_stuck, self.drogue_fails = False, self._settings.drogue_fails
+
     def jump(self, mode: Mode) -> None:
         """Put the rocket where it plausibly is in this mode."""
         if mode is Mode.Fault:
@@ -127,7 +148,7 @@ class FlightProgram:
 
     def _watch(self) -> None:
         rocket = self.rocket
-        falls = rocket.vertical_speed < 0.0 and not self._settings.drogue_fails
+        falls = rocket.vertical_speed < 0.0 and not self.drogue_fails
         is_low = rocket.height < MAIN_HEIGHT and self._drogue_out_for >= MAIN_DELAY
         if self.mode is Mode.Ascent and not rocket.burning:
             self._set("mav_open", 0)

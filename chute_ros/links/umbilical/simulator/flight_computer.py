@@ -65,6 +65,10 @@ class FlightComputer(Actor):
             "silent": lambda _: setattr(self, "silent", True),
             "speak": lambda _: setattr(self, "silent", False),
             "stuck": lambda _: setattr(self.flight, "is_stuck", True),
+            "free": lambda _: setattr(self.flight, "is_stuck", False),
+            "launch": lambda _: self.flight.arm_and_launch(),
+            "drogue-fails": lambda _: setattr(self.flight, "drogue_fails", True),
+            "mend": lambda _: self._mend(),
             "fault": lambda _: self.flight.fail(),
             "reboot": lambda _: self.reboot(),
             "jump": lambda name: self.flight.jump(Mode[name]),
@@ -216,6 +220,10 @@ class FlightComputer(Actor):
             self.commands_apart[token]()
         else:
             self.flight.command(token)
+
+    def _mend(self) -> None:
+        self.flight.mend()
+        self.reboot()
 
     def _wipe_fram_and_reboot(self) -> None:
         self.memory.reset_snapshots()

@@ -35,9 +35,10 @@ def _run() -> None:
         "sim_flight_computer",
         "A rocket's flight computer on its serial umbilical: it makes a pseudo terminal, prints "
         "its path, sends $TELEM lines there and takes the commands of the Umbilical Reference.",
-        "mute, unmute, silent, speak, stuck, fault, reboot, jump=MODE, land, wipe-fails, "
-        "wipe-hangs, lose-dump-end, dump-stalls (MODE: Startup, Standby, Ascent, Coast, "
-        "DrogueDeployed, MainDeployed, Fault)",
+        "mute, unmute, silent, speak, launch (the key is turned first), stuck (neither drogue nor "
+        "main comes out), free, drogue-fails (not by itself), fault, reboot, jump=MODE, land, "
+        "mend (on its pad again, canopies packed), wipe-fails, wipe-hangs, lose-dump-end, "
+        "dump-stalls (MODE: Startup, Standby, Ascent, Coast, DrogueDeployed, MainDeployed, Fault)",
     )
     options.add_argument(
         "--layout",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from chute_ros.links.upf.simulator.node import UpfNode
-from chute_ros.sim.acting import Argument, Script
+from chute_ros.sim.acting import Actor, Argument, Script
 
 
 class UpfBus:
@@ -16,13 +16,15 @@ class UpfBus:
     ) -> None:
         self.nodes = nodes
         self._script = Script(script or [])
+        #: Has the actions of what is around the nodes.
+        self._around = Actor()
         self._is_started = False
         self._output: list[bytes] = []
 
     @property
     def actions(self) -> dict[str, Callable[[str], None]]:
-        """Actions of all nodes by name."""
-        return {name: action for node in self.nodes for name, action in node.actions.items()}
+        """Actions of all nodes by name, and those of what is around them."""
+        return {name: action for one in self._actors for name, action in one.actions.items()}
 
     @property
     def arguments(self) -> dict[str, Argument]:
@@ -56,14 +58,21 @@ class UpfBus:
         return output
 
     def take_events(self) -> list[str]:
-        return [event for node in self.nodes for event in node.take_events()]
+        return [event for one in self._actors for event in one.take_events()]
 
-    def act(self, action: str) -> None:
-        """Have every node that knows the action do it."""
+    def act(self, action: str) -> str:
+        """Have every node that knows the action do it. Returns why it cannot be done now."""
         name = action.partition("=")[0]
-        for node in self.nodes:
-            if name in node.actions:
-                node.act(action)
+        reasons = [one.act(action) for one in self._actors if name in one.actions]
+        return "; ".join(filter(None, reasons))
+
+    def add_action(self, name: str, function: Callable[[str], None]) -> None:
+        """One more, of what is around the nodes."""
+        self._around.add_action(name, function)
+
+    @property
+    def _actors(self) -> list[Actor]:
+        return [self._around, *self.nodes]
 
     def _exchange(self, now: float) -> None:
         """Each node hears the others on this side of the connection, until all is said."""

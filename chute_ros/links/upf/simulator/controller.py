@@ -293,6 +293,8 @@ class UpfController(UpfNode):
             return "REJECTED"
         if self.state in machine.DEPLOYED:
             return "SUCCESS"
+        if self.refuses:
+            return "FAILED"
         if not self.switch(p.ENABLE_PARACHUTE):
             return "REJECTED"
         if name == "TYPE_DEPLOY":

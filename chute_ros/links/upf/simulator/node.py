@@ -57,6 +57,8 @@ class UpfNode(Actor):
         self.mute = False
         #: Sends nothing at all.
         self.silent = False
+        #: Answers FAILED to what would release the canopy.
+        self.refuses = False
         self.health = settings.health
         #: NodeStatus.mode is MODE_INITIALIZATION.
         self.initializing = False
@@ -81,6 +83,9 @@ class UpfNode(Actor):
             "silent": lambda _: setattr(self, "silent", True),
             "speak": lambda _: setattr(self, "silent", False),
             "reboot": lambda _: self.reboot(),
+            "refuse": lambda _: setattr(self, "refuses", True),
+            "accept": lambda _: setattr(self, "refuses", False),
+            "repack": lambda _: self.repack(),
         }
         self.calls = ServiceCalls(_CALLS)
         self.endpoint = Endpoint(definitions.types, 0)
@@ -193,6 +198,11 @@ class UpfNode(Actor):
         if node_id == 0:
             self._dna.start(self.now)
         self.say(f"started as node {node_id}" if node_id else "started without a node id")
+
+    def repack(self) -> None:
+        """Start anew with the canopy packed."""
+        self.refuses = False
+        self.reboot()
 
     def broadcast(self, name: str, values: Mapping[str, Any], priority: int = 16) -> None:
         """Send a message, of which the types in use may lack some fields; only with a node id."""

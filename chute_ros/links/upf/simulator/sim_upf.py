@@ -16,7 +16,9 @@ def _run() -> None:
         "functions of the document.",
         "mcast:0",
         "mute, unmute, silent, speak, reboot, error=NAME, clear-errors, deploy, trigger-error, "
-        "trigger-stuck (NAME: of an ERROR_ constant of ParachuteStatus)",
+        "trigger-stuck (it says yes, and nothing comes out), trigger-free, refuse (a release is "
+        "answered with FAILED), accept, repack (the canopy is in its pod again) (NAME: of an "
+        "ERROR_ constant of ParachuteStatus)",
         can=True,
     )
     for which, default in (("controller", CONTROLLER_NODE_ID), ("trigger", TRIGGER_NODE_ID)):

@@ -52,8 +52,14 @@ class UpfTrigger(UpfNode):
         self.actions |= {
             "trigger-error": lambda _: self._set_errors({"CIRCUIT_OPEN"}),
             "trigger-stuck": lambda _: setattr(self, "stuck", True),
+            "trigger-free": lambda _: setattr(self, "stuck", False),
             "clear-errors": lambda _: self._set_errors(set()),
         }
+
+    def repack(self) -> None:
+        """Start anew with the canopy packed."""
+        self.fired = self.stuck = False
+        super().repack()
 
     def fire(self, cause: str) -> None:
         """The canopy leaves, once."""
@@ -86,7 +92,7 @@ class UpfTrigger(UpfNode):
             return self.definitions.result(service, "BAD_MAGIC_NUMBER")
         name = self.definitions.type_name(service, request.values)
         if name == "TYPE_LAUNCH":
-            if self.errors and not self.fired:
+            if (self.errors or self.refuses) and not self.fired:
                 return self.definitions.result(service, "FAILED")
             self.fire(f"TriggerService of node {request.source}")
         elif name == "TYPE_SELF_TEST":
@@ -99,5 +105,6 @@ class UpfTrigger(UpfNode):
         constants = self.definitions.types.message(names.TRIGGER_LAUNCH).constants
         if self.mute or values["magic_number"] != constants[names.MAGIC]:
             return
-        if values.get("node_id", 0) in (0, self.node_id) and not self.errors:
+        meant = values.get("node_id", 0) in (0, self.node_id)
+        if meant and not self.errors and not self.refuses:
             self.fire(f"TriggerLaunch of node {source}")

@@ -203,7 +203,7 @@ def test_help_names_every_action_and_layout_default():
 MISTAKES = {
     "--layout telem99": "--layout 'telem99': need one of telem57_airbrake_state, telem5",
     "--telem-path /no/folder": "--telem-path is '/no/folder': there is no layout",
-    "--at 5:explode": "action 'explode' is not known: need one of dump-stalls, fault",
+    "--at 5:explode": "action 'explode' is not known: need one of cut, drogue-fails, dump-",
     "--at 5:jump=Moon": "is no argument of jump: need jump=one of Startup, ",
     "--at soon:land": "--at 'soon:land': need SECONDS:ACTION",
     "--rate 0": "rate is 0.0: need 0.01 to 100 Hz",

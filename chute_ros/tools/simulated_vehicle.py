@@ -1,0 +1,63 @@
+"""What a simulated vehicle consists of: its simulators, their wires and their control sockets."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from chute_ros.errors import ParameterError
+from chute_ros.links.api import Sockets, VehicleKind
+from chute_ros.links.registered import links, vehicles
+
+
+@dataclass(frozen=True)
+class SimulatedVehicle:
+    """name: one of vehicles(); folder: of the control sockets, which nobody else may enter."""
+
+    name: str
+    sockets: Sockets
+    folder: Path
+
+    @property
+    def kind(self) -> VehicleKind:
+        """What the links know of it."""
+        return vehicles()[self.name]
+
+    def connections(self) -> Mapping[str, str]:
+        """Each node's parameter connection."""
+        return {name: links()[name].connection(self.sockets) for name in self.kind.links}
+
+    def simulators(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Each simulator's ROS package and its command, which begins with its executable."""
+        return tuple(
+            (links()[name].package, (*command, "--control", control_path(self.folder, command[0])))
+            for name in self.kind.links
+            for command in links()[name].simulators(self.kind, self.sockets)
+        )
+
+
+def simulators_of(name: str) -> tuple[str, ...]:
+    """The executables of a vehicle's simulators."""
+    nowhere = SimulatedVehicle(name, Sockets("", "", "", ""), Path())
+    return tuple(command[0] for _, command in nowhere.simulators())
+
+
+def control_path(folder: Path | str, simulator: str) -> str:
+    """The control socket of a simulator."""
+    return f"{folder}/{simulator}.sock"
+
+
+def own_folder(path: Path) -> Path:
+    """The folder, made for this user alone. ParameterError: it is there, and another user may
+    write to it."""
+    try:
+        path.mkdir(mode=0o700, exist_ok=True)
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror}: need a folder for sockets") from None
+    about = path.lstat()
+    if about.st_uid != os.geteuid() or stat.S_IMODE(about.st_mode) & 0o077:
+        raise ParameterError(f"{path} is not for this user alone: remove it, or chmod 700 {path}")
+    return path

@@ -1,0 +1,217 @@
+"""Runs one simulated vehicle with its nodes until Ctrl-C, for a person who plays with it.
+
+Everything stays on this host. What can be done to the vehicle are the services sim/NAME in its
+namespace; --do calls one of them from another terminal.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import re
+import secrets
+import shlex
+import signal
+import sys
+import tempfile
+import time
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from chute_ros.errors import ChuteError
+from chute_ros.links.api import SUPERVISOR, Sockets
+from chute_ros.links.registered import module_of, vehicles
+from chute_ros.plain_text import plain
+from chute_ros.ros.middleware import RANGE
+from chute_ros.ros.private_files import open_new
+from chute_ros.sim.bench_actions import ACTIONS, actions_of
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.bench_call import call_action
+from chute_ros.tools.demo_director import Director
+from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
+from chute_ros.tools.launch_checks import Flight
+from chute_ros.tools.processes import Processes, ros_arguments
+from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
+
+#: What a drone can carry, and what a rocket is, as simulation.launch.py names them.
+DRONES, ROCKET = ("mavlink", "upf", "both", "relay"), "umbilical"
+#: How long the supervisor may take until it is READY, s.
+_READY_WITHIN = 60.0
+_PASSWORD = "password"
+#: What the panel writes once it does.
+_LISTENS = "panel at http"
+#: How long ROS may take to find who else is there, s.
+_OTHERS_WITHIN = 1.0
+
+
+class RunsAlreadyError(ChuteError):
+    """A vehicle runs in this namespace."""
+
+
+def main() -> None:
+    """Run it; exit code 2 on a user's mistake, 1 if something ends by itself."""
+    chosen = _options().parse_args()
+    stay_on_this_host()
+    if chosen.do:
+        try:
+            print(call_action(chosen.namespace, chosen.do))
+        except ChuteError as error:
+            sys.exit(f"sim: {chosen.do}: {error}")
+        return
+    with tempfile.TemporaryDirectory(prefix="chute_ros_sim_") as scratch:
+        processes = Processes(Path(scratch))
+        # As a Ctrl-C does.
+        signal.signal(signal.SIGTERM, _end)
+        try:
+            with contextlib.closing(Director(chosen.namespace, processes)) as director:
+                _check_alone(director, chosen.namespace)
+                _start(processes, chosen, Path(scratch))
+                _play(director, processes, chosen, Path(scratch))
+        except ChuteError as error:
+            sys.exit(f"sim: {error}")
+        finally:
+            # A second signal must leave none of them behind.
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.SIG_IGN)
+            processes.end()
+
+
+def _options() -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser("sim", description=__doc__)
+    options.add_argument(
+        "--vehicle",
+        choices=("drone", "rocket"),
+        default="drone",
+        help="a drone with an autopilot, or a rocket on its umbilical (default: drone)",
+    )
+    options.add_argument(
+        "--parachute",
+        choices=DRONES,
+        default="mavlink",
+        help="parachute of the drone (default: mavlink)",
+    )
+    options.add_argument(
+        "--namespace", type=_namespace, default="/sim", help="of the vehicle (default: /sim)"
+    )
+    options.add_argument("--no-panel", action="store_true", help="without the panel")
+    options.add_argument("--port", type=_port, default=8080, help="of the panel (default: 8080)")
+    options.add_argument(
+        "--do",
+        metavar="ACTION",
+        choices=[one.name for one in ACTIONS],
+        help="do this to a vehicle that runs already, and print what was done",
+    )
+    return options
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= 65535):
+        raise argparse.ArgumentTypeError(f"port {text!r}: need a whole number from 1 to 65535")
+    return int(text)
+
+
+def _namespace(text: str) -> str:
+    if not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", text):
+        raise argparse.ArgumentTypeError(
+            f"namespace {plain(text)[:80]!r}: need / and a name of letters, digits and _, for "
+            "example /sim"
+        )
+    return text
+
+
+def _end(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _environment() -> str:
+    """What a shell needs to reach the vehicle, as a command."""
+    around = {RANGE: "LOCALHOST"}
+    if domain := os.environ.get("ROS_DOMAIN_ID"):
+        around["ROS_DOMAIN_ID"] = domain
+    command = "export " + " ".join(f"{name}={value}" for name, value in around.items())
+    script = Path(os.environ.get("VIRTUAL_ENV", "")) / "env.sh"
+    return f". {shlex.quote(str(script))}; {command}" if script.is_file() else command
+
+
+def _check_alone(director: Director, namespace: str) -> None:
+    """RunsAlreadyError: a vehicle is there already, which this one would disturb."""
+    end = time.monotonic() + _OTHERS_WITHIN
+    director.until("nobody answers", 60.0, lambda: time.monotonic() >= end)
+    if director.node.count_publishers("safety/state"):
+        raise RunsAlreadyError(
+            f"a vehicle runs in {namespace} already: end it, or give this one another --namespace"
+        )
+
+
+def _vehicle(chosen: argparse.Namespace) -> str:
+    return ROCKET if chosen.vehicle == "rocket" else str(chosen.parachute)
+
+
+def _start(processes: Processes, chosen: argparse.Namespace, folder: Path) -> None:
+    """Start the nodes, the simulators, sim_bench and the panel."""
+    network, air, bus = free_udp_ports(3)
+    local = "127.0.0.1"
+    sockets = Sockets(
+        f"{local}:{network}", f"{local}:{air}", f"mcast:0:{bus}", f"{folder}/terminal"
+    )
+    vehicle = SimulatedVehicle(_vehicle(chosen), sockets, folder)
+    wires = vehicle.connections()
+    for node in (*vehicle.kind.links, SUPERVISOR):
+        given = dict(vehicle.kind.parameters.get(node, {}))
+        if node in wires:
+            given["connection"] = wires[node]
+        # JSON is YAML as well.
+        told = {name: json.dumps(value) for name, value in given.items()}
+        processes.start(node, module_of(node), *ros_arguments(chosen.namespace, **told))
+    modules = {one.name: one.module for one in entry_points(group="console_scripts")}
+    flight = Flight().options(simulators_of(vehicle.name))
+    for _, (simulator, *arguments) in vehicle.simulators():
+        processes.start(simulator, modules[simulator], *arguments, *flight.get(simulator, ()))
+    bench = ros_arguments(chosen.namespace, vehicle=vehicle.name, folder=folder)
+    processes.start("sim_bench", "chute_ros.tools.sim_bench", *bench)
+    if not chosen.no_panel:
+        panel = ros_arguments(
+            "/",
+            bench="true",
+            port=chosen.port,
+            allow_commands="true",
+            password_file=_password_file(folder),
+        )
+        processes.start("panel", "chute_ros.tools.panel", *panel)
+
+
+def _password_file(folder: Path) -> Path:
+    """With a password of this run."""
+    file = folder / _PASSWORD
+    with os.fdopen(open_new(file), "w") as opened:
+        opened.write(f"{secrets.token_urlsafe(9)}\n")
+    return file
+
+
+def _play(
+    director: Director, processes: Processes, chosen: argparse.Namespace, folder: Path
+) -> None:
+    """Say how to play once the supervisor is READY, then tell what happens until the end."""
+    director.say("sim", "starts the nodes and the simulators, on this host only")
+    director.until("the supervisor is READY", _READY_WITHIN, director.stage(Stage.READY))
+    director.say("supervisor", "READY: every required link is healthy")
+    kind, namespace = _vehicle(chosen), chosen.namespace
+    print(f"\n  nodes       {', '.join([*vehicles()[kind].links, SUPERVISOR, 'sim_bench'])}")
+    print(f"  simulators  {', '.join(simulators_of(kind))}")
+    print(f"  black box   {processes.ros_home}/chute_ros/black_box")
+    if not chosen.no_panel:
+        told = processes.log("panel")
+        director.until("the panel listens", _READY_WITHIN, lambda: _LISTENS in told.read_text())
+        print(f"  panel       http://127.0.0.1:{chosen.port}/vehicle{namespace}")
+        print(f"  password    {(folder / _PASSWORD).read_text().strip()} (to give orders)")
+    print(f"\n  what can be done, each a service {namespace}/sim/NAME:")
+    for one in actions_of(simulators_of(kind)):
+        print(f"    {one.name:<24}{one.title}")
+    print(f"\n  in another terminal:\n    {_environment()}")
+    print(f"    chute --namespace {namespace} watch")
+    print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do take_off")
+    print("\n  Ctrl-C ends it all.\n", flush=True)
+    director.until("it goes on", math.inf, lambda: False)
