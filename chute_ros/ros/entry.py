@@ -29,15 +29,15 @@ _NOT_BUILT = (
 )
 
 
-def run(name: str, place: str) -> None:
+def run(name: str, place: str, actions: bool = False) -> None:
     """Make the node name, whose class is at place (module:class), and spin it until the end; exit
-    with 2 on a user's mistake."""
+    with 2 on a user's mistake. actions: it serves actions, which our own executor does not."""
     with at_ctrl_c(signal.SIG_DFL):
         node_class = _imported(*place.split(":"))
     set_up_middleware()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     import rclpy
-    from rclpy.executors import ExternalShutdownException
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
     from chute_ros.ros.node_executor import new_executor
 
@@ -50,7 +50,7 @@ def run(name: str, place: str) -> None:
         _check_arguments(name)
         _init(name)
         # Before the node: a Ctrl-C in the middle of it leaves half an executor, which complains.
-        executor = new_executor()
+        executor = SingleThreadedExecutor() if actions else new_executor()
         with ctrl_c.held():
             node = node_class(started_with=sys.argv[1:])
         node.get_logger().info(node.settings_taken)

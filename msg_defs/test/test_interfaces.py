@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parents[1]
-INTERFACES = sorted([*PACKAGE.glob("msg/*.msg"), *PACKAGE.glob("srv/*.srv")])
+INTERFACES = sorted(
+    path for kind in ("msg", "srv", "action") for path in PACKAGE.glob(f"{kind}/*.{kind}")
+)
 CONSTANT = re.compile(r"^[\w/]+(\[.*?\])?\s+[A-Z][A-Z0-9_]*\s*=")
 
 

@@ -22,6 +22,7 @@ STATUS, DECISION = (10, VOLATILE), (50, VOLATILE)
 PUBLISHED = {
     "mavlink_parachute": {
         "parachute/status": ("ParachuteStatus", STATUS),
+        "vehicle/battery": ("BatteryState", STATUS),
         "vehicle/state": ("VehicleState", STATUS),
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
         "safety/request": ("SafetyRequest", STATUS),

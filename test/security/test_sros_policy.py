@@ -12,12 +12,15 @@ import pytest
 import yaml
 from chute_msgs.msg import ParachuteStatus
 from node_bench import LOCAL, stamped
+from rclpy.action import graph as actions
+from rclpy.node import Node
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.relay.node import RelayNode
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
 from chute_ros.ros import qos
+from chute_ros.ros.deploy_action_node import DeployActionNode
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 from chute_ros.tools.chute.calling import Call
 from chute_ros.tools.chute.gathering import gather
@@ -39,8 +42,11 @@ NODES = {
     "umbilical": (UmbilicalNode, lambda: "serial:/nowhere/ttyACM0"),
     "relay": (RelayNode, lambda: "serial:/nowhere/ttyUSB0"),
     "safety_supervisor": (SafetySupervisorNode, None),
+    "deploy_action": (DeployActionNode, None),
 }
-LINKS = sorted(set(NODES) - {"safety_supervisor"})
+#: Nodes without a parameter.
+PLAIN = {"deploy_action"}
+LINKS = sorted(set(NODES) - {"safety_supervisor"} - PLAIN)
 ORDERS = [
     *(["arm"], ["disarm"], ["deploy"], ["kill"], ["reset"], ["mode", "active"]),
     *([name, "--link", link] for name in ("arm", "deploy") for link in LINKS),
@@ -61,13 +67,17 @@ COMMAND_LINE = {
         "set_parameters_atomically",
     )
 }
-#: (in the policy, in the graph)
+#: Right in the policy -> what has it in the graph, asked of (node that asks, name, namespace).
 RIGHTS = {
-    "publish": "publisher",
-    "subscribe": "subscriber",
-    "reply": "service",
-    "request": "client",
+    "publish": Node.get_publisher_names_and_types_by_node,
+    "subscribe": Node.get_subscriber_names_and_types_by_node,
+    "reply": Node.get_service_names_and_types_by_node,
+    "request": Node.get_client_names_and_types_by_node,
+    "execute": actions.get_action_server_names_and_types_by_node,
+    "call": actions.get_action_client_names_and_types_by_node,
 }
+#: In the names of the topics and services that an action is made of.
+OF_ACTION = "/_action/"
 
 
 def allowed():
@@ -94,17 +104,19 @@ def in_graph(bench, name, namespace=None):
     the node; None: that of the bench."""
     prefix = f"{bench.namespace}/"
     found = {}
-    for right, what in RIGHTS.items():
-        ask = getattr(bench.client, f"get_{what}_names_and_types_by_node")
+    for right, ask in RIGHTS.items():
         found[right] = {
             one.removeprefix(prefix): kinds[0]
-            for one, kinds in ask(name, namespace or bench.namespace)
+            for one, kinds in ask(bench.client, name, namespace or bench.namespace)
+            if OF_ACTION not in one
         }
     return found
 
 
 def shipped_parameters(name):
     """Of every parameter file that is shipped with this node in it."""
+    if name in PLAIN:
+        return [{}]
     every = (yaml.safe_load(path.read_text()) for path in sorted(CONFIG.glob("*.yaml")))
     mine = [one[f"/**/{name}"]["ros__parameters"] for one in every if f"/**/{name}" in one]
     assert mine
@@ -163,6 +175,7 @@ def test_a_console_may_ask_for_everything_and_say_nothing(everything):
     console = allowed()["console"]
     asked = {name for name, kind in everything["reply"].items() if not kind.startswith(OF_ROS)}
     assert console["request"] == asked
+    assert console["call"] == set(everything["execute"])
     assert console["publish"] == EVERY_NODE
     assert console["subscribe"] == set(everything["publish"]) - {"/parameter_events"}
     assert console["reply"] == COMMAND_LINE
@@ -173,7 +186,7 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
     assert recorder["subscribe"] == set(everything["publish"]) - {"/parameter_events"}
     assert recorder["publish"] == EVERY_NODE
     assert recorder["reply"] == COMMAND_LINE
-    assert recorder["request"] == set()
+    assert recorder["request"] == recorder["call"] == set()
 
 
 def test_the_command_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch):
@@ -185,7 +198,7 @@ def test_the_command_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch
     gather(session, 0.0)
     for words in ORDERS:
         Call(session, order_of(parse(words), "ann@ground"))
-    for node in (*NODES, "standby"):
+    for node in (*sorted(set(NODES) - PLAIN), "standby"):
         parameters_of_node(session, node, 0.0)
     name = session.node.get_name()
     last = "standby/get_parameters"
@@ -246,7 +259,8 @@ def test_only_these_may_say_what_decides(topic, who):
 @pytest.mark.parametrize(
     ("services", "who"),
     [
-        (("safety/deploy", "safety/kill", "safety/set_mode"), {"console", "chute", "panel"}),
+        (("safety/kill", "safety/set_mode"), {"console", "chute", "panel"}),
+        (("safety/deploy",), {"console", "chute", "panel", "deploy_action"}),
         ([f"{link}/deploy" for link in LINKS], {"console", "chute"}),
         (["upf_can/command", "umbilical/command"], {"console"}),
     ],
@@ -254,6 +268,15 @@ def test_only_these_may_say_what_decides(topic, who):
 def test_only_these_may_call_what_fires(services, who):
     for service in services:
         assert {name for name, one in allowed().items() if service in one["request"]} == who
+
+
+def test_only_a_console_may_call_the_action():
+    """Of whom deploy_action passes on what it is asked."""
+    action = "safety/deploy_action"
+    assert {name for name, one in allowed().items() if action in one["call"]} == {"console"}
+    assert {name for name, one in allowed().items() if action in one["execute"]} == {
+        "deploy_action"
+    }
 
 
 def test_nobody_may_change_a_nodes_parameters():

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+TOOLS = ["demo", "replay", "report", "to_rosbag2", "campaign", "explore", "chute"]
 #: Stays in the middle of the imports of a tool, once it has said so.
 SLOW = """
 import signal
@@ -44,7 +45,7 @@ def interrupted(tool):
     return tool.returncode, err
 
 
-@pytest.mark.parametrize("tool", ["demo", "replay", "report", "campaign", "explore", "chute"])
+@pytest.mark.parametrize("tool", TOOLS)
 def test_while_it_imports(tool, tmp_path):
     (tmp_path / "sitecustomize.py").write_text(SLOW)
     path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
@@ -61,7 +62,7 @@ def recording(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("tool", ["replay", "report"])
+@pytest.mark.parametrize("tool", ["replay", "report", "to_rosbag2"])
 def test_while_it_reads(tool, recording):
     started = start(tool, str(recording))
     with recording.open("wb"):  # waits until it is opened there, too

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from chute_msgs.msg import VehicleState
 from chute_msgs.srv import (
     GetInfo,
@@ -25,6 +26,7 @@ from chute_ros.links.mavlink.signing_memory import SigningMemory
 from chute_ros.protocol.events import RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.ros import messages, qos
+from chute_ros.ros.battery import BatteryPublisher
 from chute_ros.ros.device_node import DeviceNode
 from chute_ros.runtime.device import Summary
 from chute_ros.settings import settings_from
@@ -54,10 +56,9 @@ class MavlinkParachuteNode(DeviceNode):
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, frames=lambda: link.received_count
         )
-        vehicle = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
-        self.follow(
-            VehicleReport, lambda one, at: vehicle.publish(messages.vehicle_state(one.state, at))
-        )
+        self._vehicle_publisher = self.create_publisher(VehicleState, "vehicle/state", qos.STATUS)
+        self._battery = BatteryPublisher(self)
+        self.follow(VehicleReport, self._vehicle)
         self.serve(SetTriggers, "~/set_triggers", self._set_triggers)
         self.serve(ParachuteAction, "~/parachute_action", self._parachute_action)
         self.serve(RequestMessage, "~/request_message", self._request_message)
@@ -90,6 +91,10 @@ class MavlinkParachuteNode(DeviceNode):
             *tasks(name, details, self.values["expect_parachute"]),
             self._signing.task(name),
         ]
+
+    def _vehicle(self, report: VehicleReport, stamp: Time) -> None:
+        self._vehicle_publisher.publish(messages.vehicle_state(report.state, stamp))
+        self._battery.publish(report.state, stamp)
 
     def _tell_doubts(self, doubts: tuple[str, ...]) -> None:
         for doubt in set(doubts) - self._doubts:

@@ -1,5 +1,6 @@
 """mavlink_parachute on a real network: what it hears becomes what it publishes."""
 
+import itertools
 import math
 import socket
 
@@ -9,6 +10,7 @@ from chute_msgs.srv import Arm, Deploy, SetTriggers
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mavlink_bench import Autopilot, Module, Network, do
 from node_bench import LOCAL, port_of
+from sensor_msgs.msg import BatteryState
 
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import LinkState, ParachuteState
@@ -100,6 +102,45 @@ def test_without_an_autopilot_nothing_is_made_up(bench, network):
     network.plug(Module())
     bench.until(newest(beats, link_state=LinkState.OK), "the parachute is heard")
     assert states == []
+
+
+# vehicle/battery
+
+
+def test_each_reading_of_the_battery_is_published_once_with_its_time(bench, network):
+    """Given an autopilot that tells its battery four times a second and everything else often."""
+    states = bench.follow(VehicleState, "vehicle/state")
+    batteries = bench.follow(BatteryState, "vehicle/battery")
+    autopilot = Autopilot()
+    autopilot.default_intervals[dialect.MAVLINK_MSG_ID_SYS_STATUS] = 0.25
+    network.plug(autopilot)
+    began = bench.client.get_clock().now().nanoseconds
+    bench.until(lambda: len(batteries) >= 4, "four readings are published")
+    assert len(states) > 2 * len(batteries), "most pictures have no new one"
+    stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in batteries]
+    assert all(after - before > 0.1e9 for before, after in itertools.pairwise(stamps))
+    assert began - 1e9 < stamps[0] < began + 20e9
+    told = batteries[-1]
+    assert told.voltage == pytest.approx(15.8)
+    assert told.percentage == pytest.approx(states[-1].battery_remaining)
+    assert told.present
+    assert told.power_supply_status == BatteryState.POWER_SUPPLY_STATUS_UNKNOWN
+    assert math.isnan(told.current), "not known"
+    assert math.isnan(told.temperature)
+    assert math.isnan(told.capacity)
+
+
+def test_a_battery_that_is_silent_is_published_no_more(bench, network):
+    states = bench.follow(VehicleState, "vehicle/state")
+    batteries = bench.follow(BatteryState, "vehicle/battery")
+    autopilot = Autopilot()
+    loop = network.plug(autopilot)
+    bench.until(lambda: batteries, "a reading is published")
+    do(bench, loop, lambda: autopilot.act("silent"))
+    bench.until(newest(states, link_state=LinkState.STALE), "the silence is told")
+    count = len(batteries)
+    bench.until(newest(states, link_state=LinkState.LOST), "it is lost")
+    assert len(batteries) == count
 
 
 # Who is on the network
