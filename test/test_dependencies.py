@@ -18,8 +18,10 @@ NAMES = {
 }
 #: Imported only where a parameter asks for it, with what to install (ros/vehicle_sources.py).
 OPTIONAL = {"mavros_msgs"}
-#: Comes with rclpy and its interfaces.
-COMES_ALONG = {"builtin_interfaces", "rcl_interfaces", "rosidl_runtime_py", "rosidl_pycommon"}
+#: Comes with rclpy and its interfaces; the last with nicegui, which is built on it.
+COMES_ALONG = {
+    "builtin_interfaces", "rcl_interfaces", "rosidl_runtime_py", "rosidl_pycommon", "starlette",
+}  # fmt: skip
 #: Imported by python-can, and by the dialect that chute_msgs generates.
 NOT_IMPORTED = {"msgpack", "pymavlink"}
 
