@@ -116,7 +116,7 @@ def test_without_its_simulators_each_service_says_who_does_not_run(bench):  # no
 
 
 def test_a_vehicle_that_is_none_is_refused(bench):  # noqa: F811
-    with pytest.raises(ParameterError, match="vehicle of .* is 'car': need one of "):
+    with pytest.raises(ParameterError, match=r"vehicle of .* is 'car': need one of "):
         bench.add(BenchNode, vehicle="car")
     done = subprocess.run(
         [sys.executable, "-m", "chute_ros.tools.sim_bench", "--ros-args", "-p", "vehicle:=car"],
