@@ -14,9 +14,11 @@ import os
 import re
 import shlex
 import signal
+import socket
 import sys
 import tempfile
-import time
+from collections.abc import Iterator
+from hashlib import sha256
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -38,8 +40,6 @@ from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
 DRONES, ROCKET = ("mavlink", "upf", "both", "relay"), "umbilical"
 #: How long the supervisor may take until it is READY, s.
 _READY_WITHIN = 60.0
-#: How long ROS may take to find who else is there, s.
-_OTHERS_WITHIN = 1.0
 
 
 class RunsAlreadyError(ChuteError):
@@ -61,8 +61,10 @@ def main() -> None:
         # As a Ctrl-C does.
         signal.signal(signal.SIGTERM, _end)
         try:
-            with contextlib.closing(Director(chosen.namespace, processes)) as director:
-                _check_alone(director, chosen.namespace)
+            with (
+                _alone(chosen.namespace),
+                contextlib.closing(Director(chosen.namespace, processes)) as director,
+            ):
                 _start(processes, chosen, Path(scratch))
                 _play(director, chosen)
         except ChuteError as error:
@@ -131,14 +133,21 @@ def _environment() -> str:
     return f". {shlex.quote(str(script))}; {command}" if script.is_file() else command
 
 
-def _check_alone(director: Director, namespace: str) -> None:
-    """RunsAlreadyError: a vehicle is there already, which this one would disturb."""
-    end = time.monotonic() + _OTHERS_WITHIN
-    director.until("nobody answers", 60.0, lambda: time.monotonic() >= end)
-    if director.node.count_publishers("safety/state"):
-        raise RunsAlreadyError(
-            f"a vehicle runs in {namespace} already: end it, or give this one another --namespace"
-        )
+@contextlib.contextmanager
+def _alone(namespace: str) -> Iterator[None]:
+    """RunsAlreadyError: another of these runs in this ROS domain and namespace, which this one
+    would disturb. A name without a file, which ends with the process however that ends."""
+    place = f"{os.environ.get('ROS_DOMAIN_ID', '')} {namespace}"
+    name = sha256(place.encode()).hexdigest()[:32]
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as held:
+        try:
+            held.bind(f"\0chute_ros_sim_{name}")
+        except OSError:
+            raise RunsAlreadyError(
+                f"a vehicle runs in {namespace} already: end it, or give this one another "
+                "--namespace"
+            ) from None
+        yield
 
 
 def _vehicle(chosen: argparse.Namespace) -> str:
