@@ -192,10 +192,12 @@ def _play(director: Director, chosen: argparse.Namespace) -> None:
     if chosen.panel:
         print(f"  panel       http://127.0.0.1:{chosen.port}/")
     print(f"\n  what can be done, each a service {namespace}/sim/NAME:")
-    for one in actions_of(simulators_of(kind)):
+    actions = actions_of(simulators_of(kind))
+    for one in actions:
         print(f"    {one.name:<24}{one.title}")
     print(f"\n  in another terminal:\n    {_environment()}")
-    print(f"    chute --namespace {namespace} watch")
-    print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do take_off")
+    print(f"    python3 -m chute_ros.tools.chute --namespace {namespace} watch")
+    (begin,) = [one.name for one in actions if one.leaves_ground]
+    print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do {begin}")
     print("\n  Ctrl-C ends it all.\n", flush=True)
     director.until("it goes on", math.inf, lambda: False)

@@ -210,6 +210,7 @@ def test_each_vehicle_is_started_flies_and_ends_on_a_termination_without_a_trace
     assert simulation.said(f"nodes       {nodes}, safety_supervisor, sim_bench")
     assert simulation.said(f"simulators  {simulators}")
     assert simulation.said(f"    {action} ")
+    assert simulation.said(f"--namespace {bench.namespace} --do {action}")
     player = Player(bench)
     assert player.call(action).success
     player.await_state("IN_FLIGHT")
