@@ -57,8 +57,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "cut_vehicle_link",
         "Cut the vehicle's link",
-        "The autopilot flies on, and nobody receives it nor can reach it. The supervisor reports "
-        "its link STALE, then LOST.",
+        "The autopilot flies on, and nobody receives it nor can reach it. On the ground the "
+        "supervisor blocks flight; in the air the rule 'autopilot lost' warns.",
         ((AUTOPILOT, "cut"),),
     ),
     BenchAction(
@@ -70,8 +70,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "silence_autopilot",
         "Telemetry falls silent",
-        "The autopilot sends nothing, but obeys. The supervisor reports its link STALE, then "
-        "LOST.",
+        "The autopilot sends nothing, but obeys. On the ground the supervisor blocks flight; in "
+        "the air the rule 'autopilot lost' warns.",
         ((AUTOPILOT, "silent"),),
     ),
     BenchAction(
@@ -124,7 +124,7 @@ ACTIONS: tuple[BenchAction, ...] = (
         "low_battery",
         "Vehicle's battery is low",
         "The autopilot's battery drains to 13.4 V and 3 %. On the ground safety/arm is refused; "
-        "in the air the supervisor raises the alarm 'battery dead' after 10 s.",
+        "in the air the rule 'battery dead' warns after 10 s.",
         ((AUTOPILOT, "battery=13.4"),),
     ),
     BenchAction(
@@ -137,7 +137,7 @@ ACTIONS: tuple[BenchAction, ...] = (
         "cut_parachute_link",
         "Cut the parachute's link",
         "The parachute's node neither receives nor reaches its device. On the ground the "
-        "supervisor blocks flight.",
+        "supervisor blocks flight; in the air the rule 'link lost' warns.",
         ((MAVLINK_PARACHUTE, "cut"), (UPF, "cut"), (RELAY, "cut")),
     ),
     BenchAction(

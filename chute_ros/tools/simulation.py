@@ -15,9 +15,11 @@ import re
 import secrets
 import shlex
 import signal
+import socket
 import sys
 import tempfile
-import time
+from collections.abc import Iterator
+from hashlib import sha256
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -43,8 +45,6 @@ _READY_WITHIN = 60.0
 _PASSWORD = "password"
 #: What the panel writes once it does.
 _LISTENS = "panel at http"
-#: How long ROS may take to find who else is there, s.
-_OTHERS_WITHIN = 1.0
 
 
 class RunsAlreadyError(ChuteError):
@@ -66,8 +66,10 @@ def main() -> None:
         # As a Ctrl-C does.
         signal.signal(signal.SIGTERM, _end)
         try:
-            with contextlib.closing(Director(chosen.namespace, processes)) as director:
-                _check_alone(director, chosen.namespace)
+            with (
+                _alone(chosen.namespace),
+                contextlib.closing(Director(chosen.namespace, processes)) as director,
+            ):
                 _start(processes, chosen, Path(scratch))
                 _play(director, processes, chosen, Path(scratch))
         except ChuteError as error:
@@ -136,14 +138,21 @@ def _environment() -> str:
     return f". {shlex.quote(str(script))}; {command}" if script.is_file() else command
 
 
-def _check_alone(director: Director, namespace: str) -> None:
-    """RunsAlreadyError: a vehicle is there already, which this one would disturb."""
-    end = time.monotonic() + _OTHERS_WITHIN
-    director.until("nobody answers", 60.0, lambda: time.monotonic() >= end)
-    if director.node.count_publishers("safety/state"):
-        raise RunsAlreadyError(
-            f"a vehicle runs in {namespace} already: end it, or give this one another --namespace"
-        )
+@contextlib.contextmanager
+def _alone(namespace: str) -> Iterator[None]:
+    """RunsAlreadyError: another of these runs in this ROS domain and namespace, which this one
+    would disturb. A name without a file, which ends with the process however that ends."""
+    place = f"{os.environ.get('ROS_DOMAIN_ID', '')} {namespace}"
+    name = sha256(place.encode()).hexdigest()[:32]
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as held:
+        try:
+            held.bind(f"\0chute_ros_sim_{name}")
+        except OSError:
+            raise RunsAlreadyError(
+                f"a vehicle runs in {namespace} already: end it, or give this one another "
+                "--namespace"
+            ) from None
+        yield
 
 
 def _vehicle(chosen: argparse.Namespace) -> str:
@@ -208,10 +217,12 @@ def _play(
         print(f"  panel       http://127.0.0.1:{chosen.port}/vehicle{namespace}")
         print(f"  password    {(folder / _PASSWORD).read_text().strip()} (to give orders)")
     print(f"\n  what can be done, each a service {namespace}/sim/NAME:")
-    for one in actions_of(simulators_of(kind)):
+    actions = actions_of(simulators_of(kind))
+    for one in actions:
         print(f"    {one.name:<24}{one.title}")
     print(f"\n  in another terminal:\n    {_environment()}")
-    print(f"    chute --namespace {namespace} watch")
-    print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do take_off")
+    print(f"    python3 -m chute_ros.tools.chute --namespace {namespace} watch")
+    (begin,) = [one.name for one in actions if one.leaves_ground]
+    print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do {begin}")
     print("\n  Ctrl-C ends it all.\n", flush=True)
     director.until("it goes on", math.inf, lambda: False)

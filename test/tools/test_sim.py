@@ -1,0 +1,284 @@
+"""make sim: the tutorial of docs/guide/simulation.md flown by services alone, and every end."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from chute_msgs.msg import ParachuteStatus, SafetyDecision, SafetyState, VehicleState
+from node_bench import bench  # noqa: F401
+from std_srvs.srv import Trigger
+
+from chute_ros.ros import qos
+
+PAGE = (Path(__file__).parents[2] / "docs/guide/simulation.md").read_text()
+#: So high it is after a take-off, m.
+HEIGHT = 59.0
+STATES = ("READY", "BLOCKED", "IN_FLIGHT", "DEPLOYED", "FAULT")
+
+
+class Simulation:
+    """The tool as a process, and what it has printed."""
+
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "chute_ros.tools.sim", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        )
+        self.lines = []
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip())
+
+    def said(self, text):
+        return any(text in line for line in self.lines)
+
+    def children(self):
+        """Command lines of its children by their process ids."""
+        pid = self.process.pid
+        found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        return {int(one): Path(f"/proc/{one}/cmdline").read_bytes().split(b"\0") for one in found}
+
+    def end(self, number=signal.SIGINT):
+        """(exit code, standard error)."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        code = self.process.wait(60.0)
+        self._reader.join()
+        errors = self.process.stderr.read()
+        self.process.stdout.close()
+        self.process.stderr.close()
+        return code, errors
+
+
+@pytest.fixture
+def start(bench):  # noqa: F811
+    """Start it, and wait until it says how to play."""
+    started = []
+
+    def begin(*arguments):
+        one = Simulation("--namespace", bench.namespace, *arguments)
+        started.append(one)
+        bench.until(
+            lambda: one.said("Ctrl-C ends it all") or one.process.poll() is not None, "READY", 60.0
+        )
+        return one
+
+    yield begin
+    for one in started:
+        if one.process.poll() is None:
+            one.end()
+
+
+class Player:
+    """A person who calls services, and sees what the vehicle and its supervisor publish."""
+
+    def __init__(self, bench):  # noqa: F811
+        self.bench = bench
+        self.safety = bench.follow(SafetyState, "safety/state", qos.LATCHED)
+        self.decided = bench.follow(SafetyDecision, "safety/decision", qos.DECISION)
+        self.vehicle = bench.follow(VehicleState, "vehicle/state")
+        self.parachute = bench.follow(ParachuteStatus, "parachute/status")
+
+    def call(self, name):
+        service = "safety/reset" if name == "reset" else f"sim/{name}"
+        return self.bench.call(Trigger, service)
+
+    def rule(self, name):
+        (rule,) = [one for one in self.safety[-1].rules if one.name == name]
+        return rule
+
+    def await_state(self, name):
+        state = getattr(SafetyState, name)
+        self.bench.until(
+            lambda: self.safety and self.safety[-1].state == state, f"{name} is reached", 30.0
+        )
+
+    def do(self, name, state):
+        """One row of the tutorial."""
+        if state == "refused":
+            # sim_bench may hear of the block a moment after us; the supervisor disarms meanwhile.
+            self.bench.until(lambda: not self.call(name).success, "it is refused")
+            assert self.call(name).message.startswith("the supervisor blocks flight: ")
+            assert self.vehicle[-1].height < 1.0
+            return
+        if name == "reset":  # which is refused until the vehicle is seen on the ground
+            self.bench.until(lambda: self.call(name).success, "it may be reset")
+        else:
+            answer = self.call(name)
+            assert answer.success, answer.message
+        self.await_state(state)
+        if name == "take_off":
+            self.bench.until(lambda: self.vehicle[-1].height > HEIGHT, "it is up", 40.0)
+
+
+def tutorial():
+    """(action, state, what is seen) of each step."""
+    found = re.search(r"<!-- tutorial: .*?-->\n(.*?)<!-- end of tutorial -->", PAGE, re.S)
+    rows = re.findall(r"^\| (\d+) \| `(\w+)` \| (\w+) \| (.+) \|$", found[1], re.M)
+    assert [int(row[0]) for row in rows] == list(range(1, len(rows) + 1))
+    assert len(rows) == found[1].count("\n") - 2
+    assert {row[2] for row in rows} <= {*STATES, "refused"}
+    return [row[1:] for row in rows]
+
+
+@pytest.mark.xdist_group("played flight")
+def test_the_tutorial_is_flown_by_services_alone_as_it_is_told(start, bench):  # noqa: F811
+    simulation = start()
+    player = Player(bench)
+    before = 0
+    for step, (name, state, _) in enumerate(tutorial(), 1):
+        print(f"step {step}: {name}, {state}")  # for whoever reads of a failure
+        if name == "fail_motor":
+            before = len(player.decided)
+        player.do(name, state)
+        if name == "make_height_lie":
+            bench.until(lambda: player.vehicle[-1].height > HEIGHT + 20.0, "its height runs away")
+            assert player.safety[-1].state == SafetyState.IN_FLIGHT
+        elif name == "wind":
+            bench.until(lambda: abs(player.vehicle[-1].vertical_speed) > 0.3, "a gust moves it")
+            bench.turns(3.0)
+            assert player.safety[-1].state == SafetyState.IN_FLIGHT
+        elif name == "cut_vehicle_link":
+            bench.until(lambda: player.rule("autopilot lost").latched, "the rule warns")
+            assert player.safety[-1].unusable
+        elif (name, state) == ("fail_motor", "DEPLOYED"):
+            actions = [one.action for one in player.decided[before:]]
+            kill, deploy = SafetyDecision.KILL, SafetyDecision.DEPLOY
+            assert actions.index(kill) < actions.index(deploy)
+            bench.until(lambda: player.vehicle[-1].vertical_speed < -6.5, "it falls")
+            bench.until(lambda: player.vehicle[-1].vertical_speed > -6.5, "the canopy carries")
+            assert player.vehicle[-1].height > 10.0
+            bench.until(
+                lambda: player.vehicle[-1].landed_state == VehicleState.ON_GROUND,
+                "it has landed",
+                40.0,
+            )
+            assert player.parachute[-1].deployed
+        elif (name, state) == ("fail_motor", "FAULT"):
+            bench.until(
+                lambda: any("no parachute confirmed" in one for one in player.safety[-1].alarms),
+                "its alarm",
+            )
+            assert not player.parachute[-1].deployed
+    assert simulation.said("DEPLOY CONFIRMED")
+    assert simulation.said("DEPLOY REFUSED")
+    children = simulation.children()
+    assert len(children) == 5
+    assert simulation.end() == (130, "sim: interrupted\n")
+    assert not [one for one in children if Path(f"/proc/{one}").exists()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "nodes", "simulators", "action"),
+    [
+        (("--vehicle", "rocket"), "umbilical", "sim_flight_computer", "launch"),
+        (
+            ("--parachute", "both"),
+            "mavlink_parachute, upf_can",
+            "sim_autopilot, sim_mavlink_parachute, sim_upf",
+            "take_off",
+        ),
+        (
+            ("--parachute", "relay"),
+            "mavlink_parachute, relay",
+            "sim_autopilot, sim_relay",
+            "take_off",
+        ),
+    ],
+    ids=["rocket", "both", "relay"],
+)
+def test_each_vehicle_is_started_flies_and_ends_on_a_termination_without_a_trace(
+    arguments,
+    nodes,
+    simulators,
+    action,
+    start,
+    bench,  # noqa: F811
+):
+    simulation = start(*arguments)
+    assert simulation.said(f"nodes       {nodes}, safety_supervisor, sim_bench")
+    assert simulation.said(f"simulators  {simulators}")
+    assert simulation.said(f"    {action} ")
+    assert simulation.said(f"--namespace {bench.namespace} --do {action}")
+    player = Player(bench)
+    assert player.call(action).success
+    player.await_state("IN_FLIGHT")
+    children = simulation.children()
+    (folder,) = {
+        one.decode().removeprefix("folder:=")
+        for words in children.values()
+        for one in words
+        if one.startswith(b"folder:=")
+    }
+    assert os.stat(folder).st_mode & 0o777 == 0o700
+    assert simulation.end(signal.SIGTERM) == (130, "sim: interrupted\n")
+    assert not [one for one in children if Path(f"/proc/{one}").exists()]
+    assert not Path(folder).exists()
+
+
+def run(*arguments):
+    done = subprocess.run(
+        [sys.executable, "-m", "chute_ros.tools.sim", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_do_prints_what_is_done_or_why_not(start, bench):  # noqa: F811
+    start()
+    namespace = ("--namespace", bench.namespace)
+    code, out, err = run(*namespace, "--do", "refuse_to_open")
+    assert (code, err) == (0, "")
+    assert out.startswith("The parachute does not open")
+    code, out, err = run(*namespace, "--do", "launch")
+    assert (code, out) == (1, "")
+    assert f"sim: launch: {bench.namespace}/sim/launch is not offered within 10 s: start" in err
+    simulation = start()
+    code, errors = simulation.end()
+    assert code == 1
+    assert f"sim: a vehicle runs in {bench.namespace} already: end it, or give this" in errors
+
+
+def test_a_process_that_ends_by_itself_ends_all_with_its_last_words(start, bench):  # noqa: F811
+    simulation = start()
+    children = simulation.children()
+    (autopilot,) = [
+        pid for pid, words in children.items() if b"chute_ros.sim.sim_autopilot" in words
+    ]
+    os.kill(autopilot, signal.SIGKILL)
+    bench.until(lambda: simulation.process.poll() is not None, "it ends", 30.0)
+    code, errors = simulation.end()
+    assert code == 1
+    assert errors.startswith("sim: sim_autopilot ended with code -9:")
+    assert not [one for one in children if Path(f"/proc/{one}").exists()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--vehicle", "boat"), "invalid choice: 'boat'"),
+        (("--parachute", "umbilical"), "invalid choice: 'umbilical'"),
+        (("--port", "0"), "port '0': need a whole number from 1 to 65535"),
+        (("--port", "web"), "port 'web': need a whole number from 1 to 65535"),
+        (("--namespace", "sim car"), "namespace 'sim car': need / and a name of letters"),
+        (("--do", "explode"), "invalid choice: 'explode'"),
+    ],
+)
+def test_a_mistake_is_told_in_one_line(arguments, said):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert said in err.splitlines()[-1]
