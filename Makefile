@@ -57,7 +57,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long bench campaign without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -78,6 +78,13 @@ test-long: build ## run the tests that are long by nature, write docs/evidence/l
 
 bench: build ## measure against bare scripts, write docs/evidence/bench.md
 	@$(OVERLAY) && $(LOCAL) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m bench $(BENCH_ARGS)
+
+pictures: build ## fly the tutorial in a browser, keep its pictures in docs/guide/pictures
+	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && CHUTE_PICTURES=docs/guide/pictures exec python3 -m pytest \
+	    -q -p no:cacheprovider test/panel/test_tutorial.py test/panel/test_panel_orders.py -k "tutorial or twenty"
+
+newcomer: build ## from git clone to a parachute released on the page, in a new folder; write docs/evidence/newcomer.md
+	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && exec python3 scripts/newcomer.py
 
 campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/evidence/campaign.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \

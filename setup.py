@@ -28,6 +28,7 @@ setup(
     maintainer_email="maintainers@chute-ros.org",
     license="Apache-2.0",
     packages=find_packages(include=[NAME, NAME + ".*"]),
+    package_data={f"{NAME}.tools.panel": ["panel.*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/" + NAME]),
         ("share/" + NAME, ["package.xml"]),
@@ -49,6 +50,7 @@ setup(
             *map(simulator, sorted(glob(f"{NAME}/**/sim_*.py", recursive=True))),
             "safety_supervisor = chute_ros.ros.safety_supervisor:main",
             "chute = chute_ros.tools.chute.__main__:main",
+            "panel = chute_ros.tools.panel.__main__:main",
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",

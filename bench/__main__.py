@@ -8,6 +8,7 @@ from bench import (
     device_decoding,
     executors,
     kill_switch,
+    onlookers,
     umbilical_decoding,
     umbilical_telemetry,
     vehicle,
@@ -18,6 +19,7 @@ if __name__ == "__main__":
     parts = [
         kill_switch,
         executors,
+        onlookers,
         vehicle,
         device_decoding,
         umbilical_decoding,

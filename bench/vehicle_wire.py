@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable
 
 from bench.flood import attitude
-from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -26,6 +25,9 @@ NOMINAL_RATE = 65.0
 #: SO_TIMESTAMPNS, also the type of its control message (asm-generic/socket.h): a struct timespec
 #: of the wall clock. Python has no name for it.
 _TIMESTAMPNS, _TIMESPEC = 35, struct.Struct("@qq")
+
+#: In the text of a flight block.
+_BLOCKED = "flight blocked"
 
 
 class VehicleWire:
@@ -40,7 +42,7 @@ class VehicleWire:
         self._parachute = ParachuteDevice(ParachuteSettings(), [])
         self._decoder = FrameDecoder()
         self._encoder = FrameEncoder(1, 1)
-        self._texts = StatusTexts()
+        self._text = ""
         self._flood_interval = 0.0
         self._flood_at = 0.0
         self._stopping = False
@@ -113,8 +115,10 @@ class VehicleWire:
         kind = message.get_type()
         if kind == "STATUSTEXT":
             # The reason comes first, so that the word may be in a later chunk.
-            whole = self._texts.feed(message, time.monotonic())
-            self.blocks += [at for text in whole if "flight blocked" in text.text]
+            before = self._text if message.chunk_seq else ""
+            self._text = before + message.text
+            if _BLOCKED in self._text and _BLOCKED not in before:
+                self.blocks.append(at)
         if kind == "COMMAND_LONG" and message.command == dialect.MAV_CMD_DO_PARACHUTE:
             self.releases.append(at)
 

@@ -82,7 +82,9 @@ class ContradictionError(ParameterError):
 
     def __init__(self, values: Mapping[str, object], names: Mapping[str, str], why: str) -> None:
         self.values, self.why = values, why
-        told = [f"{names[field]} is {value}" for field, value in values.items()]
+        # A text in quotes: it may be empty.
+        texts = [repr(one) if isinstance(one, str) else one for one in values.values()]
+        told = [f"{names[field]} is {text}" for field, text in zip(values, texts, strict=True)]
         super().__init__(f"parameter {' and '.join(told)}: {why}")
 
 

@@ -16,7 +16,12 @@ from launch_ros.actions import Node
 from chute_ros.links.api import SUPERVISOR
 from chute_ros.links.registered import links, vehicles
 from chute_ros.ros.middleware import LEADS_ELSEWHERE, RANGE
-from chute_ros.tools.launch_checks import check_arguments, check_file, checked
+from chute_ros.tools.launch_checks import (
+    check_arguments,
+    check_connections,
+    check_file,
+    checked,
+)
 from launch import LaunchContext, LaunchDescription
 
 #: A node that dies is started again: a supervisor goes on where it stopped, and sends a device
@@ -33,20 +38,26 @@ def _nodes(context: LaunchContext) -> list:
     namespace = LaunchConfiguration("namespace").perform(context)
     # An enclave has the name of its node, with the namespace.
     place = "/".join(["", *filter(None, namespace.split("/"))])
-    names = [*vehicles()[parachute].links, SUPERVISOR]
-    checked("vehicle.launch.py", lambda: check_file(Path(config), place, names))
+    kinds = [links()[link] for link in vehicles()[parachute].links]
+    connections = {
+        kind.name: text
+        for kind in kinds
+        if (text := LaunchConfiguration(kind.argument.name).perform(context))
+    }
+    checked("vehicle.launch.py", lambda: check_connections(connections))
+    names = [*(kind.name for kind in kinds), SUPERVISOR]
+    checked("vehicle.launch.py", lambda: check_file(Path(config), place, names, connections))
     secured = LaunchConfiguration("enclaves").perform(context) == "true"
     nodes = []
-    for link in vehicles()[parachute].links:
-        kind = links()[link]
-        wire = LaunchConfiguration(kind.argument.name).perform(context)
+    for kind in kinds:
+        wire = connections.get(kind.name)
         nodes.append(
             Node(
                 package=kind.package,
-                executable=link,
+                executable=kind.name,
                 namespace=namespace,
                 parameters=[config, *([{"connection": wire}] if wire else [])],
-                ros_arguments=["--enclave", f"{place}/{link}"] if secured else [],
+                ros_arguments=["--enclave", f"{place}/{kind.name}"] if secured else [],
                 output="screen",
                 **LIVES_ON,
             )

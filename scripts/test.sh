@@ -12,6 +12,7 @@ exec 9>"log-$name.lock"
 flock 9
 
 failed=()
+scripts/browser.sh 9>&- || failed+=("browser")
 scripts/lint.sh 9>&- || failed+=("linters")
 
 # Most tests wait for something that another process, a wire or the middleware does: two at a time

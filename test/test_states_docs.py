@@ -1,13 +1,16 @@
 """docs/reference/states.* show what the tables say, and the table of stages has no dead end."""
 
+import enum
 import xml.etree.ElementTree
 from collections.abc import Mapping
 from pathlib import Path
 
+from chute_ros.supervisor import lease
 from chute_ros.supervisor.machine import TRANSITIONS, Event, Stage
 from chute_ros.tools import state_diagram
 from chute_ros.tools.state_drawing import drawing
 
+Transition = tuple[tuple[enum.Enum, enum.Enum], enum.Enum]
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -28,6 +31,33 @@ def never_left(transitions: Mapping[tuple[Stage, Event], Stage]) -> set[Stage]:
 def test_the_text_is_up_to_date() -> None:
     text = (ROOT / state_diagram.TEXT).read_text()
     assert text == state_diagram.states_text(), "run: make docs"
+
+
+def told(text: str, events: type[enum.Enum], states: type[enum.Enum]) -> list[Transition]:
+    """The transitions in the text's tables: (before, event), after."""
+    found = []
+    for line in text.splitlines():
+        event, befores, after, *_ = [
+            *(one.strip() for one in line.strip("| ").split(" | ")),
+            "",
+            "",
+        ]
+        if event in events.__members__:
+            pairs = [(states[one], events[event]) for one in befores.split(", ")]
+            found += [(pair, states[after]) for pair in pairs]
+    return found
+
+
+def test_the_text_has_every_transition_once() -> None:
+    of_vehicle, of_lease = state_diagram.states_text().split("## Which of several")
+    vehicle = told(of_vehicle, Event, Stage)
+    assert len(vehicle) == len(TRANSITIONS)
+    assert dict(vehicle) == TRANSITIONS
+    leading = told(of_lease, lease.Event, lease.Role)
+    assert len(leading) == len(lease.TRANSITIONS)
+    assert dict(leading) == lease.TRANSITIONS
+    arrows = state_diagram.states_text().count("-->")
+    assert arrows == 0, "drawn as well, in a second language"
 
 
 def test_the_picture_is_up_to_date() -> None:

@@ -36,8 +36,7 @@ class Line:
     failure: str
     count: Count
     why: str
-    #: From the failure to the kill and to the release, s, and the height lost meanwhile, m.
-    kill_delay: float
+    #: From the failure to the release, s, and the height lost meanwhile, m.
     release_delay: float
     height_lost: float
     #: Faults that were drawn, by kind.
@@ -103,13 +102,12 @@ def _line(folder: Path, seed: int) -> Line:
         flown, judged = fly_here(folder, scenario)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
-        return Line(*who, Count.BROKEN, why, math.nan, math.nan, math.nan, *drawn)
+        return Line(*who, Count.BROKEN, why, math.nan, math.nan, *drawn)
     at = flown.truth.at
     return Line(
         *who,
         judged.count,
         judged.why,
-        flown.killed - at,
         flown.released - at,
         flown.truth.height - flown.release_height,
         *drawn,

@@ -80,7 +80,6 @@ class Liveness:
         self.since = math.nan
         self.last_heard = math.nan
         self.first_heard = math.nan
-        self.lost_at = math.nan
         self.regained_at = math.nan
         self.lost_count = 0
 
@@ -106,7 +105,6 @@ class Liveness:
             changes += self._take(Event.STALE_LIMIT, now, silence)
         if self.state is LinkState.STALE and now >= self.next_deadline():
             changes += self._take(Event.LOST_LIMIT, now, silence)
-            self.lost_at = now
             self.lost_count += 1
         return changes
 

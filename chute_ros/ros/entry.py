@@ -19,6 +19,8 @@ from chute_ros.ros.middleware import set_up_middleware
 #: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
 #: executor hand a kill to each other, and Python's own 5 ms would be most of its way.
 _SWITCH_INTERVAL = 0.0002
+#: What no vehicle needs for its flight (requirements/extra.in).
+_EXTRA = ("nicegui",)
 _NOT_BUILT = (
     "chute_msgs cannot be imported: build both packages and source the result:\n"
     "  colcon build --base-paths src src/chute_ros/msg_defs   (in your workspace)\n"
@@ -91,6 +93,10 @@ def _imported(module: str, class_name: str) -> Any:
         missing = getattr(error, "name", None) or ""
         if missing.startswith("chute_msgs") or isinstance(error, ChuteError):
             sys.exit(f"{_NOT_BUILT}\n({error})")
+        if missing.partition(".")[0] in _EXTRA:
+            sys.exit(
+                f"{missing} is not installed: `pip install -r requirements/extra.in` brings it"
+            )
         if missing:
             sys.exit(
                 f"{missing} is not installed: `rosdep install --from-paths src "

@@ -1,4 +1,4 @@
-"""/diagnostics of a node's middleware: can one packet end the node?"""
+"""/diagnostics of what a node runs on: its version, its middleware, can one packet end it?"""
 
 from __future__ import annotations
 
@@ -8,13 +8,21 @@ from collections.abc import Mapping
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from chute_ros.ros.middleware import CURED, fast_dds, is_cured, is_local
+from chute_ros.ros.own_version import own_version
+
+#: The names of the task, and of its value that is the node's version.
+TASK, VERSION = "middleware", "chute_ros"
 
 
 def middleware_task(node: str) -> DiagnosticStatus:
     """For diagnostics. It stays the same for as long as the process lives."""
     version, local = fast_dds(), is_local()
     cured = ", ".join(map(_text, CURED))
-    values = {"kept to this host": local, "memory limit (MB)": _limit()}
+    values = {
+        VERSION: own_version(),
+        "kept to this host": local,
+        "memory limit (MB)": _limit(),
+    }
     if version is None:
         return _status(node, DiagnosticStatus.OK, "no Fast DDS", values)
     values |= {"Fast DDS": _text(version), "CVE-2025-64438 is fixed in": cured}
@@ -35,7 +43,7 @@ def _status(
     node: str, level: bytes, message: str, values: Mapping[str, object]
 ) -> DiagnosticStatus:
     pairs = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
-    return DiagnosticStatus(level=level, name=f"{node}: middleware", message=message, values=pairs)
+    return DiagnosticStatus(level=level, name=f"{node}: {TASK}", message=message, values=pairs)
 
 
 def _limit() -> str:

@@ -23,6 +23,7 @@ from chute_ros.protocol.events import (
     RequestReport,
     Severity,
     VehicleChanged,
+    failed_request,
 )
 from chute_ros.runtime.decisions import DecisionCarrier
 from chute_ros.runtime.requests import Begin, CallFailed, RequestTracker
@@ -155,12 +156,12 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
         """In the link's turn: how the device is. details are filled in by whoever asks."""
 
     @abstractmethod
-    def failed_end(self, token: int, text: str) -> Any:
-        """The end of a request that could not be begun."""
-
-    @abstractmethod
     def carry_out(self, decision: Decision) -> None:
         """Do what the gate let through."""
+
+    def failed_end(self, token: int, text: str) -> Any:
+        """The end of a request that could not be begun."""
+        return failed_request(token, text)
 
     def in_turn(self, events: list[Any]) -> None:
         """In the link's turn, before events wait for the owner: what cannot wait."""

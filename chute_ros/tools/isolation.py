@@ -29,6 +29,13 @@ def isolated_ros() -> Iterator[str]:
         yield f"/sim_{secrets.token_hex(4)}"
 
 
+def free_tcp_port() -> int:
+    """A port of 127.0.0.1 that nobody uses at this moment."""
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
 def stay_on_this_host() -> None:
     """Let this process and its children meet nobody on other hosts through ROS."""
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"

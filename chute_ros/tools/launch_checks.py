@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn, TypeVar
@@ -168,12 +168,26 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def check_file(path: Path, namespace: str, nodes: Iterable[str]) -> None:
-    """The parameter file of these nodes. ParameterError: it cannot be read, or has nothing for
-    one of them, or what it has cannot be."""
+def check_connections(given: Mapping[str, str]) -> None:
+    """Launch arguments: device node -> its connection. ParameterError: the node refuses it."""
+    for node, text in given.items():
+        try:
+            settings_from(_settings_of(node), {"connection": text})
+        except ParameterError as error:
+            argument = links()[node].argument.name
+            raise ParameterError(f"launch argument {argument}: {error}") from None
+
+
+def check_file(
+    path: Path, namespace: str, nodes: Iterable[str], connections: Mapping[str, str]
+) -> None:
+    """The parameter file of these nodes. connections: node -> what overrides the file's.
+    ParameterError: it cannot be read, or has nothing for one of them, or what it has cannot be."""
     for name in nodes:
         kind = _settings_of(name)
         given = given_in(path, f"{namespace}/{name}")
+        if name in connections:
+            given = {**given, "connection": connections[name]}
         known = [one.name for one in parameters_of(kind)]
         for other in given.keys() - set(known):
             if near := nearest(other, known, MISSPELT):

@@ -16,6 +16,8 @@ from chute_ros.ros.supervisor_parameters import PARAMETERS as SUPERVISOR_PARAMET
 from chute_ros.settings import Parameter, parameters_of
 from chute_ros.supervisor.measurements import STANDARD_LIMITS, UNITS
 from chute_ros.tools.pages import table, write_or_check
+from chute_ros.tools.panel.parameters import NODE as PANEL
+from chute_ros.tools.panel.parameters import PARAMETERS as PANEL_PARAMETERS
 
 NODES: dict[str, tuple[Parameter, ...]] = {
     **{
@@ -24,6 +26,7 @@ NODES: dict[str, tuple[Parameter, ...]] = {
         if kind.package == "chute_ros"
     },
     SUPERVISOR: SUPERVISOR_PARAMETERS,
+    PANEL: PANEL_PARAMETERS,
 }
 PARAMETERS = Path("docs/reference/parameters.md")
 RULES = Path("docs/reference/rules.md")

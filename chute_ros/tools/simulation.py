@@ -12,6 +12,7 @@ import json
 import math
 import os
 import re
+import secrets
 import shlex
 import signal
 import socket
@@ -27,6 +28,7 @@ from chute_ros.links.api import SUPERVISOR, Sockets
 from chute_ros.links.registered import module_of, vehicles
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import RANGE
+from chute_ros.ros.private_files import open_new
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.bench_call import call_action
@@ -40,6 +42,9 @@ from chute_ros.tools.simulated_vehicle import SimulatedVehicle, simulators_of
 DRONES, ROCKET = ("mavlink", "upf", "both", "relay"), "umbilical"
 #: How long the supervisor may take until it is READY, s.
 _READY_WITHIN = 60.0
+_PASSWORD = "password"
+#: What the panel writes once it does.
+_LISTENS = "panel at http"
 
 
 class RunsAlreadyError(ChuteError):
@@ -58,15 +63,16 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory(prefix="chute_ros_sim_") as scratch:
         processes = Processes(Path(scratch))
-        # As a Ctrl-C does.
-        signal.signal(signal.SIGTERM, _end)
+        # As a Ctrl-C does, of which the entry knows that it came.
+        at_ctrl_c = signal.getsignal(signal.SIGINT)
+        signal.signal(signal.SIGTERM, at_ctrl_c if callable(at_ctrl_c) else _end)
         try:
             with (
                 _alone(chosen.namespace),
                 contextlib.closing(Director(chosen.namespace, processes)) as director,
             ):
                 _start(processes, chosen, Path(scratch))
-                _play(director, chosen)
+                _play(director, processes, chosen, Path(scratch))
         except ChuteError as error:
             sys.exit(f"sim: {error}")
         finally:
@@ -93,7 +99,7 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument(
         "--namespace", type=_namespace, default="/sim", help="of the vehicle (default: /sim)"
     )
-    options.add_argument("--panel", action="store_true", help="start the panel as well")
+    options.add_argument("--no-panel", action="store_true", help="without the panel")
     options.add_argument("--port", type=_port, default=8080, help="of the panel (default: 8080)")
     options.add_argument(
         "--do",
@@ -176,12 +182,28 @@ def _start(processes: Processes, chosen: argparse.Namespace, folder: Path) -> No
         processes.start(simulator, modules[simulator], *arguments, *flight.get(simulator, ()))
     bench = ros_arguments(chosen.namespace, vehicle=vehicle.name, folder=folder)
     processes.start("sim_bench", "chute_ros.tools.sim_bench", *bench)
-    if chosen.panel:
-        panel = ros_arguments(chosen.namespace, bench="true", port=chosen.port)
+    if not chosen.no_panel:
+        panel = ros_arguments(
+            "/",
+            bench="true",
+            port=chosen.port,
+            allow_commands="true",
+            password_file=_password_file(folder),
+        )
         processes.start("panel", "chute_ros.tools.panel", *panel)
 
 
-def _play(director: Director, chosen: argparse.Namespace) -> None:
+def _password_file(folder: Path) -> Path:
+    """With a password of this run."""
+    file = folder / _PASSWORD
+    with os.fdopen(open_new(file), "w") as opened:
+        opened.write(f"{secrets.token_urlsafe(9)}\n")
+    return file
+
+
+def _play(
+    director: Director, processes: Processes, chosen: argparse.Namespace, folder: Path
+) -> None:
     """Say how to play once the supervisor is READY, then tell what happens until the end."""
     director.say("sim", "starts the nodes and the simulators, on this host only")
     director.until("the supervisor is READY", _READY_WITHIN, director.stage(Stage.READY))
@@ -189,8 +211,12 @@ def _play(director: Director, chosen: argparse.Namespace) -> None:
     kind, namespace = _vehicle(chosen), chosen.namespace
     print(f"\n  nodes       {', '.join([*vehicles()[kind].links, SUPERVISOR, 'sim_bench'])}")
     print(f"  simulators  {', '.join(simulators_of(kind))}")
-    if chosen.panel:
-        print(f"  panel       http://127.0.0.1:{chosen.port}/")
+    print(f"  black box   {processes.ros_home}/chute_ros/black_box")
+    if not chosen.no_panel:
+        told = processes.log("panel")
+        director.until("the panel listens", _READY_WITHIN, lambda: _LISTENS in told.read_text())
+        print(f"  panel       http://127.0.0.1:{chosen.port}/vehicle{namespace}")
+        print(f"  password    {(folder / _PASSWORD).read_text().strip()} (to give orders)")
     print(f"\n  what can be done, each a service {namespace}/sim/NAME:")
     actions = actions_of(simulators_of(kind))
     for one in actions:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from chute_ros.supervisor import lease, machine
-from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.pages import table, write_or_check
 from chute_ros.tools.state_drawing import drawing
 
@@ -23,8 +22,8 @@ _HEAD = """\
 # States
 
 Written by `make docs` from the tables in `chute_ros/supervisor/machine.py` and
-`chute_ros/supervisor/lease.py`. A pair of state and event that a table does not list is an
-error of the program: it raises `TransitionError`.
+`chute_ros/supervisor/lease.py`. A pair of state and event that is not listed is an error of the
+program: it raises `TransitionError`.
 
 ## The vehicle
 
@@ -43,13 +42,9 @@ def states_text() -> str:
     """The whole of docs/reference/states.md."""
     parts = [
         _HEAD,
-        _mermaid(machine.TRANSITIONS, first=Stage.STARTUP.name),
-        _table(machine.Stage, machine.Event, machine.TRANSITIONS),
-        _meanings(machine.Event),
+        _table(machine.Event, machine.TRANSITIONS),
         _LEASE,
-        _mermaid(lease.TRANSITIONS),
-        _table(lease.Role, lease.Event, lease.TRANSITIONS),
-        _meanings(lease.Event),
+        _table(lease.Event, lease.TRANSITIONS),
     ]
     return "\n".join(parts)
 
@@ -60,31 +55,16 @@ def main() -> None:
     write_or_check("state_diagram", __doc__, lambda: texts)
 
 
-def _mermaid(transitions: Mapping[tuple[_State, _Event], _State], first: str = "") -> str:
-    lines = ["```mermaid", "stateDiagram-v2"]
-    lines += [f"    [*] --> {first}"] if first else []
-    lines += [
-        f"    {before.name} --> {after.name}: {event.name}"
-        for (before, event), after in transitions.items()
-    ]
-    return "\n".join([*lines, "```", ""])
-
-
-def _table(
-    states: type[_State],
-    events: type[_Event],
-    transitions: Mapping[tuple[_State, _Event], _State],
-) -> str:
-    """One row an event, one column a state; a dash: the pair is not listed."""
+def _table(events: type[_Event], transitions: Mapping[tuple[_State, _Event], _State]) -> str:
+    """One row an event; two if it leads to two states."""
     rows = []
     for event in events:
-        after = [transitions.get((state, event)) for state in states]
-        rows.append((event.name, *(one.name if one is not None else "-" for one in after)))
-    return table(("", *(state.name for state in states)), rows) + "\n"
-
-
-def _meanings(events: type[_Event]) -> str:
-    return table(("event", "meaning"), [(one.name, one.value) for one in events]) + "\n"
+        befores: dict[_State, list[str]] = {}
+        for (before, one), after in transitions.items():
+            if one is event:
+                befores.setdefault(after, []).append(before.name)
+        rows += [(event.name, ", ".join(befores[to]), to.name, event.value) for to in befores]
+    return table(("event", "leads from", "to", "meaning"), rows) + "\n"
 
 
 if __name__ == "__main__":

@@ -34,6 +34,31 @@ def test_every_field_has_a_comment(path):
     assert undocumented_fields(path.read_text()) == []
 
 
+def parts_of_vehicle_state():
+    """Age -> (its default, the numbers of its part); empty: numbers without an age."""
+    found, numbers = {}, []
+    for line in (PACKAGE / "msg" / "VehicleState.msg").read_text().splitlines():
+        kind, name, *default = [*line.split(), "", ""][:3]
+        if name.endswith("_age"):
+            found[name] = (*default, numbers)
+            numbers = []
+        elif kind in ("float32", "float64"):
+            numbers.append(name)
+    found[""] = ("", numbers)
+    return found
+
+
+def test_a_vehicle_state_tells_by_an_age_which_numbers_were_not_filled_in():
+    """They are 0.0, as no message of ROS can have NaN as a default."""
+    parts = parts_of_vehicle_state()
+    assert parts.pop("") == ("", ["uptime"])
+    assert len(parts) > 10
+    for age, (default, _) in parts.items():
+        assert default == "-1.0", age
+    numbers = [name for _, part in parts.values() for name in part]
+    assert {"height", "pressure", "tilt", "latitude", "battery_voltage"} < set(numbers)
+
+
 @pytest.mark.parametrize(
     ("text", "missing"),
     [

@@ -17,7 +17,7 @@ def flights(*every: tuple[Failure, Count, str]) -> Tally:
     tally = Tally(took=3.0 * len(every))
     for seed, (failure, count, second) in enumerate(every):
         who = (seed, "mavlink", "multirotor", failure.value)
-        tally.add(Line(*who, count, "for a test", 0.5, 1.5, 4.0, (), second))
+        tally.add(Line(*who, count, "for a test", 1.5, 4.0, (), second))
     return tally
 
 

@@ -43,7 +43,7 @@ def test_first_heard_stale_lost_and_regained_each_with_its_time():
     assert link.next_deadline() == 15.0
     (lost,) = link.update(15.0)
     assert lost.after is LinkState.LOST
-    assert (link.lost_at, link.lost_count, link.next_deadline()) == (15.0, 1, math.inf)
+    assert (lost.at, link.lost_count, link.next_deadline()) == (15.0, 1, math.inf)
     (back,) = link.heard(20.0)
     assert back.regained
     assert back.silence == 10.0

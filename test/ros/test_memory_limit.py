@@ -12,6 +12,7 @@ from chute_ros.ros import memory_limit, middleware_diagnostics
 from chute_ros.ros.memory_limit import VARIABLE, limit_memory
 from chute_ros.ros.middleware import CURED, fast_dds, is_cured
 from chute_ros.ros.middleware_diagnostics import middleware_task
+from chute_ros.ros.own_version import own_version
 
 GREEDY = (
     "from chute_ros.ros.memory_limit import limit_memory\n"
@@ -143,6 +144,7 @@ def test_diagnostics_name_the_version_and_those_that_are_cured(
     status = middleware_task("drone1/upf_can")
     assert (status.name, status.level) == ("drone1/upf_can: middleware", level)
     assert status.message.startswith(words)
+    assert {one.key: one.value for one in status.values}["chute_ros"] == own_version()
     if level == b"\x01":
         for one in CURED:
             assert ".".join(map(str, one)) in status.message

@@ -148,6 +148,38 @@ def test_a_vehicle_does_not_start_with_a_file_that_is_not_all_for_it(
     assert words in line
 
 
+@pytest.mark.parametrize(
+    ("parachute", "argument", "value", "words"),
+    [
+        ("mavlink", "connection", "x", "connection 'x' is not understood: need udpin:HOST:PORT"),
+        ("mavlink", "connection", "udpin:0.0.0.0:99999", "port '99999' is no number from 0 to"),
+        ("mavlink", "connection", "/dev/ttyUSB0", "did you mean 'serial:/dev/ttyUSB0'?"),
+        ("upf", "bus", "can0", "connection 'can0' is not understood: need mcast:BUS[:PORT]"),
+        ("upf", "bus", "mcast:256", "bus '256' is no number from 0 to 255"),
+        ("umbilical", "cable", "udpin:0.0.0.0:1", "is no serial port: need serial:PATH[:BAUD]"),
+        ("relay", "output", "gpio17", "connection 'gpio17' is no output: need file:PATH"),
+    ],
+)
+def test_a_connection_that_no_node_would_take_is_told_by_the_launch_file(
+    parachute: str, argument: str, value: str, words: str, monkeypatch, capsys
+) -> None:
+    line = refused(monkeypatch, capsys, VEHICLE, parachute=parachute, **{argument: value})
+    assert line.startswith(f"launch argument {argument}: ")
+    assert words in line
+
+
+def test_a_connection_in_a_file_is_looked_at_unless_an_argument_overrides_it(
+    tmp_path: Path, monkeypatch, capsys
+) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(GOOD.format("connection: to be filled in"))
+    given = {"parachute": "mavlink", "config": str(path)}
+    line = refused(monkeypatch, capsys, VEHICLE, **given)
+    assert line.startswith(f"{path}: mavlink_parachute: connection 'to be filled in' is not")
+    made = made_by(LAUNCH / VEHICLE, monkeypatch, **given, connection="udpin:0.0.0.0:1")
+    assert len([one for one in made if "executable" in one.options]) == 2
+
+
 def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "settings.yaml"
     path.write_text(GOOD.format("connection: udpin:0.0.0.0:1"))

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from pathlib import Path
+from unittest.mock import Mock
 from xml.etree import ElementTree
 
 import pytest
 import yaml
-from node_bench import LOCAL
+from chute_msgs.msg import ParachuteStatus
+from node_bench import LOCAL, stamped
 
 from chute_ros.links.mavlink.node import MavlinkParachuteNode
 from chute_ros.links.relay.node import RelayNode
 from chute_ros.links.umbilical.node import UmbilicalNode
 from chute_ros.links.upf.node import UpfCanNode
+from chute_ros.ros import qos
 from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
+from chute_ros.tools.chute.calling import Call
+from chute_ros.tools.chute.gathering import gather
+from chute_ros.tools.chute.listening import Listening
+from chute_ros.tools.chute.node_parameters import parameters_of_node
+from chute_ros.tools.chute.options import parse
+from chute_ros.tools.chute.order import order_of
+from chute_ros.tools.chute.session import Session
+from chute_ros.tools.chute.surroundings import surroundings
 from chute_ros.tools.isolation import free_udp_ports
+from chute_ros.tools.panel import node as panel
+from chute_ros.tools.panel.access import Person
 
 CONFIG = Path(__file__).parents[2] / "config"
 POLICY = CONFIG / "security" / "policy.xml"
@@ -26,6 +40,11 @@ NODES = {
     "relay": (RelayNode, lambda: "serial:/nowhere/ttyUSB0"),
     "safety_supervisor": (SafetySupervisorNode, None),
 }
+LINKS = sorted(set(NODES) - {"safety_supervisor"})
+ORDERS = [
+    *(["arm"], ["disarm"], ["deploy"], ["kill"], ["reset"], ["mode", "active"]),
+    *([name, "--link", link] for name in ("arm", "deploy") for link in LINKS),
+]
 #: What ROS itself gives every node.
 OF_ROS = ("rcl_interfaces/", "type_description_interfaces/")
 EVERY_NODE = {"/rosout", "/parameter_events"}
@@ -70,14 +89,16 @@ def allowed():
     return found
 
 
-def in_graph(bench, name):
-    """Right -> name -> type of what this node does now, as the policy writes it."""
+def in_graph(bench, name, namespace=None):
+    """Right -> name -> type of what this node does now, as the policy writes it. namespace: of
+    the node; None: that of the bench."""
     prefix = f"{bench.namespace}/"
     found = {}
     for right, what in RIGHTS.items():
         ask = getattr(bench.client, f"get_{what}_names_and_types_by_node")
         found[right] = {
-            one.removeprefix(prefix): kinds[0] for one, kinds in ask(name, bench.namespace)
+            one.removeprefix(prefix): kinds[0]
+            for one, kinds in ask(name, namespace or bench.namespace)
         }
     return found
 
@@ -155,6 +176,56 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
     assert recorder["request"] == set()
 
 
+def test_the_command_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch):
+    session = Session(bench.namespace, surroundings({}, ()))
+    bench.at_end.callback(session.close)
+    # Of a subscription for a moment as well something is left to be seen.
+    monkeypatch.setattr(session.node, "destroy_subscription", lambda one: None)
+    Listening(session)
+    gather(session, 0.0)
+    for words in ORDERS:
+        Call(session, order_of(parse(words), "ann@ground"))
+    for node in (*NODES, "standby"):
+        parameters_of_node(session, node, 0.0)
+    name = session.node.get_name()
+    last = "standby/get_parameters"
+    bench.until(lambda: last in in_graph(bench, name)["request"], "it is in the graph")
+    rights = allowed()["chute"]
+    for right, names in in_graph(bench, name).items():
+        assert {one.replace(name, "chute_*") for one in names} == rights[right], right
+
+
+def test_the_panel_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch):
+    monkeypatch.setattr(panel, "PanelServer", lambda node: Mock())
+    page = panel.PanelNode()
+    bench.executor.add_node(page)
+    bench.nodes.append(page)
+    bench.add(SafetySupervisorNode, black_box=False)
+    # Somebody looks at the fleet and at a vehicle with a parachute of each link,
+    page.look_at_all()
+    page.look(bench.namespace)
+    bench.until(lambda: bench.namespace in dict(page.fleet()), "the panel finds the vehicle")
+    seen = bench.client.create_publisher(ParachuteStatus, "parachute/status", qos.STATUS)
+    every = [stamped(bench.client, ParachuteStatus(link=link)) for link in LINKS]
+    bench.client.create_timer(0.2, lambda: [seen.publish(one) for one in every])
+    # and gives every order that needs no link.
+    for words in ORDERS:
+        if "--link" not in words:
+            order = order_of(parse(words), "ann@ground")
+            page.order(bench.namespace, order, Person("ann", "192.0.2.1", math.inf))
+
+    def done():
+        return {
+            right: {one.replace("/panel/", "panel/") for one in names}
+            for right, names in in_graph(bench, "panel", "/").items()
+        }
+
+    rights = allowed()["panel"]
+    bench.until(lambda: done()["request"] >= rights["request"], "it asks who all devices are")
+    for right, names in done().items():
+        assert names == rights[right], right
+
+
 @pytest.mark.parametrize(
     ("topic", "who"),
     [
@@ -162,7 +233,7 @@ def test_a_recorder_may_listen_to_everything_and_do_nothing(everything):
         ("safety/lease", {"safety_supervisor", "standby"}),
         ("safety/state", {"safety_supervisor", "standby"}),
         ("safety/request", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
-        ("safety/person", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
+        ("safety/person", {"mavlink_parachute", "upf_can", "umbilical", "relay", "panel"}),
         ("safety/action", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("parachute/status", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("vehicle/state", {"mavlink_parachute", "umbilical"}),
@@ -172,9 +243,23 @@ def test_only_these_may_say_what_decides(topic, who):
     assert {name for name, rights in allowed().items() if topic in rights["publish"]} == who
 
 
+@pytest.mark.parametrize(
+    ("services", "who"),
+    [
+        (("safety/deploy", "safety/kill", "safety/set_mode"), {"console", "chute", "panel"}),
+        ([f"{link}/deploy" for link in LINKS], {"console", "chute"}),
+        (["upf_can/command", "umbilical/command"], {"console"}),
+    ],
+)
+def test_only_these_may_call_what_fires(services, who):
+    for service in services:
+        assert {name for name, one in allowed().items() if service in one["request"]} == who
+
+
 def test_nobody_may_change_a_nodes_parameters():
     asked = {name for rights in allowed().values() for name in rights["request"]}
-    assert not any("parameters" in name for name in asked)
+    about = {name.rpartition("/")[2] for name in asked if "parameters" in name}
+    assert about == {"list_parameters", "get_parameters"}
     assert not any("*" in name for name in asked)
 
 

@@ -581,7 +581,28 @@ def test_the_doctor_finds_nothing_wrong_with_a_sound_vehicle(ready):
     lines = out.splitlines()
     assert (code, err, [line for line in lines if line.startswith("WRONG")]) == (0, "", []), out
     assert f"OK     supervisor of {ready.bench.namespace}: safety_supervisor" in lines
+    # The stub of a link has no diagnostics.
+    silent = "NOTE   no version of chute_ros is received of mavlink_parachute -> "
+    assert [line for line in lines if line.startswith(silent)]
     assert any(line.startswith("OK     versions: chute_ros ") for line in lines)
+
+
+def test_the_doctor_finds_a_node_of_another_version(ready):
+    name = f"{ready.bench.namespace.lstrip('/')}/mavlink_parachute: middleware"
+    old = DiagnosticStatus(name=name, values=[KeyValue(key="chute_ros", value="0.0.9")])
+    ready.bench.client.create_timer(
+        0.2, publisher_of(ready, DiagnosticArray, "diagnostics", DiagnosticArray(status=[old]))
+    )
+    code, out, _ = run(ready.bench, "doctor", "--json")
+    told = json.loads(out)
+    own = told["versions"]["chute_ros"]
+    (wrong,) = [one for one in told["findings"] if one["level"] == "WRONG"]
+    assert code == 1
+    assert wrong["what"] == (
+        f"versions of chute_ros differ: 0.0.9 of mavlink_parachute; {own} of safety_supervisor"
+    )
+    assert "start its nodes again" in wrong["remedy"]
+    assert {"ROS", "Python", "middleware", "rclpy", "pymavlink"} < told["versions"].keys()
 
 
 def test_the_doctor_finds_a_port_that_is_not_there(ready):

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from test_chute_picture import Heard, heartbeat, stamped
+from heard_vehicle import Heard, heartbeat, stamped
 
 from chute_ros.tools.chute import doctor_computer as computer
 from chute_ros.tools.chute import doctor_ports as ports
@@ -16,6 +16,7 @@ from chute_ros.tools.chute.doctor_vehicle import (
     namesake_findings,
     supervisor_findings,
     task_findings,
+    version_findings,
 )
 from chute_ros.tools.chute.finding import (
     NOTE,
@@ -108,10 +109,27 @@ def test_a_disk_without_room_for_the_black_box(tmp_path, monkeypatch):
 
 
 def test_the_versions_of_a_report_of_a_fault():
-    found = computer.version_finding(surroundings({"ROS_DISTRO": "jazzy"}, INSTALLED), (2, 14, 5))
+    around = surroundings({"ROS_DISTRO": "jazzy"}, INSTALLED)
+    versions = computer.versions(around, (2, 14, 5))
+    found = computer.version_finding(versions)
     assert found.what.startswith("versions: chute_ros ")
     assert "ROS jazzy, Python 3." in found.what
     assert found.what.endswith(", Fast DDS 2.14.5")
+    assert [name for name, one in versions.items() if one is None] == []
+
+
+def test_a_version_that_is_not_known_is_left_out(monkeypatch):
+    monkeypatch.setattr(computer, "_PACKAGES", ("no-such-package",))
+    versions = computer.versions(surroundings({}, INSTALLED), None)
+    assert [name for name, one in versions.items() if one is None] == [
+        "ROS",
+        "Fast DDS",
+        "no-such-package",
+    ]
+    told = computer.version_finding(versions).what
+    assert told.startswith("versions: chute_ros ")
+    assert ", Python 3." in told
+    assert "None" not in told
 
 
 # Ports and buses
@@ -227,6 +245,37 @@ def test_clocks_that_differ(heard, supervisor, device, level, what):
 
 def test_without_heartbeats_nothing_is_said_of_clocks(heard):
     assert clock_findings(heard.picture) == []
+
+
+def versions_of(heard, here="0.2.0", **versions):
+    """The findings where these nodes report these versions; an empty one is not reported."""
+    for node in versions:
+        heard.hears(stamped(heartbeat(node)))
+    told = {"mavros": "9", **versions}
+    tasks = [
+        Task(f"drone1/{node}: middleware", "OK", "", {"chute_ros": one} if one else {}, 0.1)
+        for node, one in told.items()
+    ]
+    return [(one.level, one.what) for one in version_findings(heard.picture, tasks, here)]
+
+
+def test_nodes_of_one_version_are_as_they_should_be(heard):
+    assert versions_of(heard, upf_can="0.2.0", a="0.2.0") == []
+
+
+def test_nodes_of_different_versions_are_named(heard):
+    differ = "versions of chute_ros differ: 0.2.0 of a, upf_can; 0.1.0 of relay"
+    assert versions_of(heard, upf_can="0.2.0", relay="0.1.0", a="0.2.0") == [(WRONG, differ)]
+
+
+def test_a_node_without_a_version_is_noted(heard):
+    silent = (NOTE, "no version of chute_ros is received of relay")
+    assert versions_of(heard, relay="", a="0.2.0") == [silent]
+
+
+def test_a_command_of_another_version_is_noted(heard):
+    other = "the vehicle has chute_ros 0.1.0 of a, relay; this command is of 0.2.0"
+    assert versions_of(heard, relay="0.1.0", a="0.1.0") == [(NOTE, other)]
 
 
 def test_what_nodes_report_themselves():

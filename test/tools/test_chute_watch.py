@@ -6,7 +6,7 @@ import os
 import re
 
 import pytest
-from test_chute_picture import Heard, parachute, stamped, state, vehicle
+from heard_vehicle import Heard, parachute, stamped, state, vehicle
 
 from chute_ros.tools.chute.screen import Screen
 from chute_ros.tools.chute.status_text import Line

@@ -51,6 +51,7 @@ def details_of(link: MavlinkLink, now: float) -> Details:
         link.sent_count,
         {
             "late acknowledgements": link.requests.commands.late_count,
+            "unexpected acknowledgements": link.requests.commands.unexpected_count,
             "heartbeats of devices beyond the limit of sixteen": refused,
         },
         Counter(link.counts),

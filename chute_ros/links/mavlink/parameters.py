@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from chute_ros.links.mavlink.runtime import MavlinkSettings
 from chute_ros.settings import Settings, nested, parameter, parameters_of
-from chute_ros.transport.address import FORMS
+from chute_ros.transport.address import FORMS, parse_address
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,10 @@ class MavlinkParameters(Settings):
     )
     signing_link_id: int = parameter(0, "link id in the signatures of this node", 0, 255)
     runtime: MavlinkSettings = nested(MavlinkSettings())
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parse_address(self.connection)
 
 
 PARAMETERS = parameters_of(MavlinkParameters)

@@ -9,7 +9,6 @@ from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import NAN, Action, Armed, Decision, LinkState, VehicleState
-from chute_ros.protocol.events import RequestFinished, failed_request
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.settings import nested, parameter
 
@@ -67,9 +66,6 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         if reasons:
             reasons += autopilot
         return Summary(state, not reasons, age, tuple(reasons))
-
-    def failed_end(self, token: int, text: str) -> RequestFinished:
-        return failed_request(token, text)
 
     def carry_out(self, decision: Decision) -> None:
         if decision.action is Action.KILL:

@@ -7,7 +7,7 @@ from typing import Any
 
 from chute_ros.links.relay.protocol.link import RelayConfig, RelayLink
 from chute_ros.model import NAN, Action, Decision, LinkState, Outcome
-from chute_ros.protocol.events import AskSupervisor, RequestFinished, failed_request
+from chute_ros.protocol.events import AskSupervisor
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import DeviceRequest
 from chute_ros.settings import nested
@@ -31,9 +31,6 @@ class RelayRuntime(DeviceRuntime[RelaySettings]):
     def summarise(self, link: RelayLink, now: float) -> Summary:
         unmonitored = link.state is LinkState.UNMONITORED
         return Summary(link.state, False, NAN, (_UNMONITORED if unmonitored else _NOT_WRITTEN,))
-
-    def failed_end(self, token: int, text: str) -> RequestFinished:
-        return failed_request(token, text)
 
     def event(self, event: Any) -> None:
         if isinstance(event, AskSupervisor):

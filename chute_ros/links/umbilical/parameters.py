@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from chute_ros.links.umbilical.runtime import UmbilicalSettings
 from chute_ros.settings import Settings, nested, parameter, parameters_of
-from chute_ros.transport.address import SERIAL_FORMS
+from chute_ros.transport.address import SERIAL_FORMS, parse_serial_address
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,10 @@ class UmbilicalParameters(Settings):
         "", "folder for dumps; empty: chute_ros/dumps under ROS_HOME (~/.ros)"
     )
     runtime: UmbilicalSettings = nested(UmbilicalSettings())
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parse_serial_address(self.connection)
 
 
 PARAMETERS = parameters_of(UmbilicalParameters)

@@ -11,7 +11,7 @@ from chute_ros.links.umbilical.protocol.events import TelemetryReceived
 from chute_ros.links.umbilical.protocol.line_parser import LogLine
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
 from chute_ros.model import NAN, Action, Decision, LinkState, ParachuteStatus
-from chute_ros.protocol.events import RequestFinished, VehicleChanged, failed_request
+from chute_ros.protocol.events import VehicleChanged
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary, block_reason
 from chute_ros.settings import nested, parameter
 
@@ -38,9 +38,6 @@ class UmbilicalRuntime(DeviceRuntime[UmbilicalSettings]):
         reasons = reasons_of(status, link.received_bytes, link.config.telemetry.stale_after)
         age = NAN if record is None else now - record.received
         return Summary(computer.liveness.state, status.healthy, age, reasons)
-
-    def failed_end(self, token: int, text: str) -> RequestFinished:
-        return failed_request(token, text)
 
     def take(self, event: Any, now: float) -> None:
         if not isinstance(event, VehicleChanged) or self.settings.publish_vehicle_state:

@@ -10,7 +10,7 @@ from pathlib import Path
 from chute_ros.links.upf.protocol.config import UpfConfig
 from chute_ros.links.upf.runtime import UpfSettings
 from chute_ros.settings import Settings, nested, parameter, parameters_of
-from chute_ros.transport.can_address import CAN_FORMS
+from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,10 @@ class UpfParameters(Settings):
         "file for the node ids that were given out; empty: in chute_ros under ROS_HOME (~/.ros)",
     )
     runtime: UpfSettings = nested(UpfSettings())
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        parse_can_address(self.connection, self.bitrate)
 
 
 PARAMETERS = parameters_of(UpfParameters)

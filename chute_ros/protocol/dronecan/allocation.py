@@ -68,7 +68,6 @@ class Allocator:
     def __init__(self, table: Table, never: Collection[int], yields: bool = False) -> None:
         _check(table)
         self.table: dict[bytes, int] = dict(table)
-        self.given_count = 0
         #: Another allocator was heard, as its node id, at this monotonic time (s).
         self.other = 0
         self.other_heard = -math.inf
@@ -237,7 +236,6 @@ class Allocator:
 
     def _give(self, unique_id: bytes) -> None:
         self._answer(unique_id, self.table[unique_id])
-        self.given_count += 1
 
     def _free(self, wanted: int, in_use: Mapping[int, bytes]) -> int | None:
         """The wanted id or the next free one above it, else the highest free one."""

@@ -71,12 +71,12 @@ class CallFinished:
     not_now: bool = False
     result: int = 0
     words: str = ""
-    superseded: bool = False
+
+    #: A call never takes the place of another.
+    superseded = False
 
     def text(self) -> str:
         """What came of it, in words."""
-        if self.superseded:
-            return f"given up after {self.seconds:.2f} s for a newer call"
         if self.values is None and self.words:
             return self.words
         if self.values is None:

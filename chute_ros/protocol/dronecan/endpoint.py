@@ -33,8 +33,7 @@ class Endpoint:
         self.counts: Counter[str] = Counter()
         self.received_count = 0
         self.sent_count = 0
-        #: Somebody else sends under our node id: how often, and when it was last seen.
-        self.own_id_count = 0
+        #: When somebody else was last seen to send under our node id.
         self.own_id_heard = float("nan")
         self.bus_off = False
         self.bus_off_count = 0
@@ -53,7 +52,6 @@ class Endpoint:
         # Whoever can be heard is not off the bus.
         self.bus_off = False
         if self.node_id and came.source == self.node_id:
-            self.own_id_count += 1
             self.own_id_heard = now
             return None
         self.received_count += 1

@@ -51,9 +51,6 @@ class NodeEntry:
 
     node_id: int
     heard: float
-    health: int = 0
-    mode: int = 0
-    vendor_status: int = 0
     uptime: int = 0
     restarts: int = 0
     information: Mapping[str, Any] | None = None
@@ -125,8 +122,6 @@ class NodeMonitor:
         if entry is None or not entry.alive(now):
             entry = self._nodes[node_id] = NodeEntry(node_id, now)
         entry.heard = now
-        entry.health, entry.mode = values["health"], values["mode"]
-        entry.vendor_status = values["vendor_specific_status_code"]
         backwards = 0 < (entry.transfer_id - transfer_id) % TRANSFER_IDS < TRANSFER_IDS // 2
         if backwards and -1 not in (entry.transfer_id, transfer_id):
             self._counts_backwards(entry, values["uptime_sec"], now)

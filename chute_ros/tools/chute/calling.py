@@ -12,7 +12,8 @@ from chute_ros.tools.chute.errors import CommandError
 from chute_ros.tools.chute.order import Answer, Order, not_answered
 from chute_ros.tools.chute.session import Session
 
-_KINDS: dict[str, Any] = {
+#: Type of a service, by Order.kind.
+KINDS: dict[str, Any] = {
     "Arm": Arm, "Deploy": Deploy, "Kill": Kill, "SetMode": SetMode, "Trigger": Trigger,
 }  # fmt: skip
 
@@ -22,7 +23,7 @@ class Call:
 
     def __init__(self, session: Session, order: Order) -> None:
         self._session, self._order = session, order
-        self._kind = _KINDS[order.kind]
+        self._kind = KINDS[order.kind]
         self._client = session.node.create_client(self._kind, order.service)
 
     def found(self) -> bool:

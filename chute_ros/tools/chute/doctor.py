@@ -12,6 +12,7 @@ from chute_ros.tools.chute.doctor_computer import (
     environment_findings,
     shared_memory_finding,
     version_finding,
+    versions,
 )
 from chute_ros.tools.chute.doctor_ports import port_findings
 from chute_ros.tools.chute.errors import CommandError
@@ -39,11 +40,21 @@ def main(chosen: Chosen) -> int:
             found.append(Finding(WRONG, f"cannot be imported: {error}", remedy))
         except CommandError as error:
             found.append(Finding(WRONG, str(error), "see docs/guide/first_flight.md"))
-    found += [disk_finding(folder), version_finding(around, fast_dds())]
+    of_computer = versions(around, fast_dds())
+    found += [disk_finding(folder), version_finding(of_computer)]
     told = worst_first(found)
     well = all(one.level != WRONG for one in told)
     if chosen.json:
-        print(json_text({"namespace": chosen.namespace, "well": well, "findings": told}))
+        print(
+            json_text(
+                {
+                    "namespace": chosen.namespace,
+                    "well": well,
+                    "findings": told,
+                    "versions": of_computer,
+                }
+            )
+        )
     else:
         print("\n".join(map(plain, finding_lines(told))))
     return DONE if well else NOT_WELL

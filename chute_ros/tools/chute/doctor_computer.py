@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Mapping
+from importlib.metadata import distributions
 from pathlib import Path
 
+from chute_ros.ros.own_version import own_version
 from chute_ros.ros.ros_home import ros_home
 from chute_ros.tools.chute.finding import NOTE, OK, WRONG, Finding
 from chute_ros.tools.chute.surroundings import Surroundings
@@ -16,6 +18,18 @@ _FAST_DDS = "rmw_fastrtps_cpp"
 _HIGHEST_QUIET_DOMAIN = 101
 #: The shared memory of ROS nodes of a vehicle, and a black box for some hours, bytes.
 LEAST_SHARED, LEAST_DISK = 32_000_000, 1_000_000_000
+#: What the nodes import that speaks on a wire or writes a file.
+_PACKAGES = (
+    "chute_msgs",
+    "rclpy",
+    "pymavlink",
+    "dronecan",
+    "python-can",
+    "pyserial",
+    "mcap",
+    "PyYAML",
+    "orjson",
+)
 
 
 def environment_findings(around: Surroundings) -> list[Finding]:
@@ -34,20 +48,30 @@ def environment_findings(around: Surroundings) -> list[Finding]:
     return found
 
 
-def version_finding(around: Surroundings, fast_dds: tuple[int, int, int] | None) -> Finding:
-    """For a report of a fault. fast_dds: that this process has loaded."""
-    try:
-        own = version("chute_ros")
-    except PackageNotFoundError:
-        own = "not installed"
-    parts = [
-        f"chute_ros {own}",
-        f"ROS {around.distribution or 'of no known distribution'}",
-        f"Python {platform.python_version()}",
-    ]
-    if fast_dds is not None:
-        parts.append(f"Fast DDS {'.'.join(map(str, fast_dds))}")
+def versions(around: Surroundings, fast_dds: tuple[int, int, int] | None) -> dict[str, str | None]:
+    """For a report of a fault; None: there is none, or it does not tell. fast_dds: that this
+    process has loaded."""
+    return {
+        "chute_ros": own_version(),
+        "ROS": around.distribution or None,
+        "Python": platform.python_version(),
+        "middleware": around.middleware,
+        "Fast DDS": None if fast_dds is None else ".".join(map(str, fast_dds)),
+        **{name: _installed(name) for name in _PACKAGES},
+        "system": platform.platform(),
+    }
+
+
+def version_finding(of_computer: Mapping[str, str | None]) -> Finding:
+    """The first things that a report of a fault needs."""
+    shown = ("chute_ros", "ROS", "Python", "Fast DDS")
+    parts = [f"{name} {of_computer[name]}" for name in shown if of_computer[name]]
     return Finding(OK, f"versions: {', '.join(parts)}")
+
+
+def _installed(package: str) -> str | None:
+    found = next(iter(distributions(name=package)), None)
+    return None if found is None else found.version
 
 
 def shared_memory_finding(folder: Path = Path("/dev/shm")) -> Finding:

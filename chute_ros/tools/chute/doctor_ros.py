@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from chute_ros.ros.own_version import own_version
 from chute_ros.tools.chute.diagnostic_tasks import Task
 from chute_ros.tools.chute.doctor_ports import connection_finding, trouble_here
 from chute_ros.tools.chute.doctor_vehicle import (
@@ -11,6 +12,7 @@ from chute_ros.tools.chute.doctor_vehicle import (
     namesake_findings,
     supervisor_findings,
     task_findings,
+    version_findings,
 )
 from chute_ros.tools.chute.finding import NOTE, WRONG, Finding
 from chute_ros.tools.chute.gathering import gather
@@ -37,6 +39,7 @@ def vehicle_findings(namespace: str, seconds: float) -> tuple[list[Finding], str
         graph = session.node.get_node_names_and_namespaces()
         found += namesake_findings(graph, namespace)
         found += clock_findings(listening.picture)
+        found += version_findings(listening.picture, tasks, own_version())
         found += _connections(session, tasks, seconds)
         # The wire of each node was told of with its connection.
         found += task_findings([one for one in tasks if one.task != "link"])

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from chute_ros.ros.middleware_diagnostics import TASK, VERSION
 from chute_ros.tools.chute.diagnostic_tasks import Task
 from chute_ros.tools.chute.finding import NOTE, OK, WRONG, Finding
 from chute_ros.tools.chute.hearing import Picture
@@ -65,6 +66,33 @@ def clock_findings(picture: Picture) -> list[Finding]:
         text = f"clocks: those of the vehicle are {ahead[most]:+.1f} s to that of this computer"
         return [Finding(NOTE, text, remedy)]
     return [Finding(OK, f"clocks: {apart:.2f} s apart in the vehicle")]
+
+
+def version_findings(picture: Picture, tasks: Sequence[Task], here: str) -> list[Finding]:
+    """The nodes of the vehicle are of one version of chute_ros. here: that of this command."""
+    # Others' nodes may be in the namespace as well; those of the vehicle send heartbeats.
+    versions = dict.fromkeys(sorted(picture.heartbeats), "")
+    versions |= {
+        one.node: one.values[VERSION]
+        for one in tasks
+        if one.task == TASK and one.node in versions and VERSION in one.values
+    }
+    found = []
+    if silent := [node for node, version in versions.items() if not version]:
+        text = f"no version of chute_ros is received of {', '.join(silent)}"
+        found.append(Finding(NOTE, text, "look whether it is an older one, and update it"))
+    nodes_of: dict[str, list[str]] = {}
+    for node, version in versions.items():
+        if version:
+            nodes_of.setdefault(version, []).append(node)
+    told = "; ".join(f"{version} of {', '.join(nodes)}" for version, nodes in nodes_of.items())
+    if len(nodes_of) > 1:
+        remedy = "install one version on all computers of the vehicle and start its nodes again"
+        found.append(Finding(WRONG, f"versions of chute_ros differ: {told}", remedy))
+    elif nodes_of and here not in nodes_of:
+        text = f"the vehicle has chute_ros {told}; this command is of {here}"
+        found.append(Finding(NOTE, text, "use the command of the vehicle's version"))
+    return found
 
 
 def task_findings(tasks: Sequence[Task]) -> list[Finding]:

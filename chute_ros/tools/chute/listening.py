@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 from chute_msgs.msg import (
@@ -27,14 +28,14 @@ from chute_ros.tools.chute.words import is_old
 SETTLE = 1.5
 
 
-class Listening:
-    """Listens from now on, with the least load for the vehicle: nothing is sent again for it but
-    the latched state."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self.picture = Picture()
-        picture = self.picture
+def subscribe(
+    node: Any, namespace: str, picture: Picture, held: AbstractContextManager[Any] | None = None
+) -> list[Any]:
+    """The subscriptions of node that fill picture with the vehicle in namespace. held: while it
+    is filled."""
+    base = namespace.rstrip("/")
+    return [
+        node.create_subscription(kind, f"{base}/{topic}", _plainly(hear, held), profile)
         for kind, topic, profile, hear in (
             (SafetyState, "safety/state", qos.LATCHED, picture.hear_state),
             (LinkHeartbeat, "safety/heartbeat", qos.newest(qos.STATUS), picture.hear_heartbeat),
@@ -42,8 +43,18 @@ class Listening:
             (VehicleState, "vehicle/state", qos.newest(qos.STATUS), picture.hear_vehicle),
             (SafetyDecision, "safety/decision", qos.newest(qos.DECISION), picture.hear_decision),
             (ActionReport, "safety/action", qos.newest(qos.DECISION), picture.hear_report),
-        ):
-            session.node.create_subscription(kind, topic, _plainly(hear), profile)
+        )
+    ]
+
+
+class Listening:
+    """Listens from now on, with the least load for the vehicle: nothing is sent again for it but
+    the latched state."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.picture = Picture()
+        subscribe(session.node, session.namespace, self.picture)
 
     def view(self) -> VehiclePicture | None:
         """What is shown now."""
@@ -73,8 +84,11 @@ class Listening:
         return {one.name for one in picture.links} <= {one.link for one in picture.parachutes}
 
 
-def _plainly(hear: Callable[[Any, float, float], None]) -> Callable[[Any], None]:
+def _plainly(
+    hear: Callable[[Any, float, float], None], held: AbstractContextManager[Any] | None
+) -> Callable[[Any], None]:
     def heard(message: Any) -> None:
-        hear(with_plain_texts(message), time.monotonic(), time.time())
+        with held or nullcontext():
+            hear(with_plain_texts(message), time.monotonic(), time.time())
 
     return heard

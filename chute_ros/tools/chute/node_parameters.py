@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy.parameter import parameter_value_to_python
-from rclpy.parameter_client import AsyncParameterClient
 
 from chute_ros.tools.chute.session import Session
 
@@ -25,15 +25,21 @@ def nodes(session: Session, node: str | None, seconds: float) -> list[str]:
 
 def parameters_of_node(session: Session, node: str, seconds: float) -> Mapping[str, Any] | None:
     """Parameter -> value; None: no answer within seconds."""
-    client = AsyncParameterClient(session.node, f"{session.namespace.rstrip('/')}/{node}")
-    if not session.until(client.services_are_ready, seconds):
+    # Not rclpy's client of parameters: it can set them as well, which SROS 2 allows nobody.
+    lister = session.node.create_client(ListParameters, f"{node}/list_parameters")
+    getter = session.node.create_client(GetParameters, f"{node}/get_parameters")
+    if not session.until(lambda: _ready(lister, getter), seconds):
         return None
-    listed = client.list_parameters()
+    listed = lister.call_async(ListParameters.Request())
     if not session.until(listed.done, seconds) or listed.result() is None:
         return None
     names = sorted(listed.result().result.names)
-    got = client.get_parameters(names)
+    got = getter.call_async(GetParameters.Request(names=names))
     if not session.until(got.done, seconds) or got.result() is None:
         return None
     values = map(parameter_value_to_python, got.result().values)
     return dict(zip(names, values, strict=False))
+
+
+def _ready(*clients: Any) -> bool:
+    return all(one.service_is_ready() for one in clients)

@@ -42,10 +42,54 @@ class Answer:
 
 def order_of(chosen: Chosen, who: str) -> Order:
     """The order that was chosen. who: gives it, for the record."""
-    make = {"arm": _arm, "disarm": _arm, "deploy": _deploy, "kill": _kill, "mode": _mode}
-    if chosen.command == "reset":
-        return Order("reset", "Trigger", f"{SUPERVISOR}/reset")
-    return make[chosen.command](chosen, who)
+    more, name = chosen.more, chosen.command
+    if name in ("arm", "disarm"):
+        return arm(name == "arm", more.link)
+    if name == "reset":
+        return reset()
+    reason = f"{who}: {more.reason or NO_REASON}"
+    if name == "deploy":
+        return deploy(reason, more.force, more.link)
+    if name == "kill":
+        return kill(reason, more.only)
+    return mode(Mode[more.mode], reason, more.force)
+
+
+def arm(on: bool, link: str | None = None) -> Order:
+    """Arm or disarm: the vehicle, or the parachute of this link past the supervisor."""
+    # triggers 0: the link's default.
+    fields = {"arm": on, "triggers": 0}
+    return Order("arm" if on else "disarm", "Arm", f"{link or SUPERVISOR}/arm", fields)
+
+
+def deploy(reason: str, force: bool = False, link: str | None = None) -> Order:
+    """Release the parachute. force: also where a check forbids it."""
+    does = f"RELEASES the parachute of {link}, past the supervisor" if link else "RELEASES the "
+    if not link:
+        does += "parachute of the vehicle, with a kill before it where the supervisor does so"
+    if force:
+        does += ", also where a check forbids it (--force)"
+    fields = {"force": force, "reason": reason}
+    return Order("deploy", "Deploy", f"{link or SUPERVISOR}/deploy", fields, "DEPLOY", does)
+
+
+def kill(reason: str, only: bool = False) -> Order:
+    """Stop the motors. only: no deploy after it."""
+    does = "STOPS the motors, on the ground and in the air"
+    does += ", and nothing else (--only)" if only else ", and deploys after it where that helps"
+    fields = {"force": False, "kill_only": only, "reason": reason}
+    return Order("kill", "Kill", f"{SUPERVISOR}/kill", fields, "KILL", does)
+
+
+def reset() -> Order:
+    """Back to the start after landing or a test."""
+    return Order("reset", "Trigger", f"{SUPERVISOR}/reset")
+
+
+def mode(wanted: Mode, reason: str, force: bool = False) -> Order:
+    """Set the mode of the supervisor. force: although the vehicle is in flight."""
+    fields = {"mode": int(wanted), "force": force, "reason": reason}
+    return Order("mode", "SetMode", f"{SUPERVISOR}/set_mode", fields)
 
 
 def answer_text(order: Order, answer: Answer) -> str:
@@ -70,39 +114,3 @@ def not_answered(order: Order, how: str) -> str:
         f"{order.name}: {order.service} did not answer {how}: it is NOT known whether it was "
         f"carried out. `chute status` shows what the vehicle reports.{again}"
     )
-
-
-def _arm(chosen: Chosen, who: str) -> Order:
-    arm = chosen.command == "arm"
-    service = f"{chosen.more.link or SUPERVISOR}/arm"
-    # triggers 0: the link's default.
-    return Order(chosen.command, "Arm", service, {"arm": arm, "triggers": 0})
-
-
-def _deploy(chosen: Chosen, who: str) -> Order:
-    link, force = chosen.more.link, chosen.more.force
-    does = f"RELEASES the parachute of {link}, past the supervisor" if link else "RELEASES the "
-    if not link:
-        does += "parachute of the vehicle, with a kill before it where the supervisor does so"
-    if force:
-        does += ", also where a check forbids it (--force)"
-    fields = {"force": force, "reason": _reason(chosen, who)}
-    return Order("deploy", "Deploy", f"{link or SUPERVISOR}/deploy", fields, "DEPLOY", does)
-
-
-def _kill(chosen: Chosen, who: str) -> Order:
-    only = chosen.more.only
-    does = "STOPS the motors, on the ground and in the air"
-    does += ", and nothing else (--only)" if only else ", and deploys after it where that helps"
-    fields = {"force": False, "kill_only": only, "reason": _reason(chosen, who)}
-    return Order("kill", "Kill", f"{SUPERVISOR}/kill", fields, "KILL", does)
-
-
-def _mode(chosen: Chosen, who: str) -> Order:
-    mode, force = Mode[chosen.more.mode], chosen.more.force
-    fields = {"mode": int(mode), "force": force, "reason": _reason(chosen, who)}
-    return Order("mode", "SetMode", f"{SUPERVISOR}/set_mode", fields)
-
-
-def _reason(chosen: Chosen, who: str) -> str:
-    return f"{who}: {chosen.more.reason or NO_REASON}"

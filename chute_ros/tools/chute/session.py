@@ -90,18 +90,23 @@ class Session:
 
     def vehicles(self) -> list[str]:
         """The namespaces in which a supervisor publishes its state."""
-        topics = [name for name, _ in self.node.get_topic_names_and_types()]
-        found = [
-            plain(name.removesuffix(_STATE)) or "/"
-            for name in topics
-            if name.endswith(_STATE) and self.node.count_publishers(name)
-        ]
-        return sorted(found)[:_MOST_TOLD]
+        return namespaces(self.node)[:_MOST_TOLD]
 
     def close(self) -> None:
         """Leave ROS: a call that has not left yet is taken back."""
         self._executor.shutdown()
         self.node.destroy_node()
+
+
+def namespaces(node: Any) -> list[str]:
+    """Those in which a supervisor publishes its state, as far as node has found them."""
+    topics = [name for name, _ in node.get_topic_names_and_types()]
+    found = [
+        plain(name.removesuffix(_STATE)) or "/"
+        for name in topics
+        if name.endswith(_STATE) and node.count_publishers(name)
+    ]
+    return sorted(found)
 
 
 @contextmanager

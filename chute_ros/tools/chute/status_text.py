@@ -18,8 +18,9 @@ from chute_ros.tools.chute.view import (
 from chute_ros.tools.chute.words import age_text, is_old, span_text, value_text
 from chute_ros.tools.timeline_rows import ACTION_TONES, LINK_TONES, STAGE_TONES
 
-_OF_STAGE = {stage.name: tone for stage, tone in STAGE_TONES.items()}
-_OF_LINK = {state.name: tone for state, tone in LINK_TONES.items()}
+#: Name of a state of the vehicle, or of a link -> its tone (timeline_rows.py).
+STAGE_TONE = {stage.name: tone for stage, tone in STAGE_TONES.items()}
+LINK_TONE = {state.name: tone for state, tone in LINK_TONES.items()}
 _OF_ACTION = {action.name: tone for action, tone in ACTION_TONES.items()}
 #: Columns of the name at the beginning of a line.
 _NAME = 19
@@ -38,7 +39,7 @@ def headline(picture: VehiclePicture) -> Line:
     if is_old(picture.age):
         text = f"NOT KNOWN NOW (was {picture.state}, last word {span_text(picture.age)} ago)"
         return Line(text, "quiet")
-    return Line(picture.state, _OF_STAGE.get(picture.state, "quiet"))
+    return Line(picture.state, STAGE_TONE.get(picture.state, "quiet"))
 
 
 def status_lines(picture: VehiclePicture) -> list[Line]:
@@ -92,7 +93,7 @@ def _why(picture: VehiclePicture) -> Iterator[Line]:
         _named("mode", picture.mode), "plain" if picture.mode == Mode.ACTIVE.name else "bad"
     )
     if picture.state_text != picture.state:
-        yield Line(_named("why", picture.state_text), _OF_STAGE.get(picture.state, "quiet"))
+        yield Line(_named("why", picture.state_text), STAGE_TONE.get(picture.state, "quiet"))
     flight = "BLOCKED" if picture.flight_blocked else "not blocked"
     yield Line(_named("flight", flight), "warn" if picture.flight_blocked else "plain")
     for reason in picture.block_reasons:
@@ -112,7 +113,7 @@ def _link(one: LinkView) -> Line:
     text = f"{one.state}, {healthy}, {age_text(one.age)}"
     if one.reasons:
         text += f": {'; '.join(one.reasons)}"
-    tone = _OF_LINK.get(one.state, "warn")
+    tone = LINK_TONE.get(one.state, "warn")
     if one.state == LinkState.OK.name and not one.device_healthy:
         tone = "warn"
     return Line(_named(one.name, text), tone)

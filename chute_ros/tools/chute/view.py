@@ -6,7 +6,16 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.model import Action, Armed, LandedState, LinkState, Outcome, ParachuteState
+from chute_ros.model import (
+    Action,
+    Armed,
+    DeploymentTrigger,
+    LandedState,
+    LinkState,
+    Outcome,
+    ParachuteState,
+    TriggerFlags,
+)
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.chute.hearing import Heard, Picture
@@ -31,22 +40,28 @@ class LinkView:
 
 @dataclass(frozen=True)
 class ParachuteView:
-    """One parachute. age: since its node received it, s."""
+    """One parachute. released_by: what released it, "NONE" if nothing did or it is not known;
+    height: m above take-off; packed_date: "YYYY-MM-DD" or empty; age: since its node received it,
+    s."""
 
     link: str
     device: str
     link_state: str
     state: str
     armed: bool
+    armed_triggers: tuple[str, ...]
     deployed: bool
+    released_by: str
+    height: float
     backup_voltage: float
+    packed_date: str
     faults: tuple[str, ...]
     age: float
 
 
 @dataclass(frozen=True)
 class VehicleView:
-    """The vehicle; ages in s, NaN: never received. battery_remaining: 0 to 1."""
+    """The vehicle; angles in rad; ages in s, NaN: never received. battery_remaining: 0 to 1."""
 
     source: str
     link_state: str
@@ -58,6 +73,11 @@ class VehicleView:
     height_age: float
     vertical_speed: float
     vertical_speed_age: float
+    roll: float
+    pitch: float
+    yaw: float
+    tilt: float
+    attitude_age: float
     battery_voltage: float
     battery_remaining: float
     battery_age: float
@@ -182,11 +202,22 @@ def _parachute(message: Any, age: float) -> ParachuteView:
         link_state=name_of(LinkState, message.link_state),
         state=name_of(ParachuteState, message.state),
         armed=message.armed,
+        armed_triggers=_names(message.armed_triggers),
         deployed=message.deployed,
+        released_by=name_of(DeploymentTrigger, message.deployment_trigger),
+        height=message.height,
         backup_voltage=message.backup_voltage,
+        packed_date=message.packed_date,
         faults=tuple(message.faults),
         age=age,
     )
+
+
+def _names(mask: int) -> tuple[str, ...]:
+    """Of the trigger sources; a bit that has none is shown as it is."""
+    names = [str(one.name) for one in TriggerFlags if one & mask]
+    other = mask & ~sum(TriggerFlags)
+    return tuple(names + ([f"bits {other:#x}"] if other else []))
 
 
 def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
@@ -212,6 +243,11 @@ def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
         height_age=age(message.height_age),
         vertical_speed=number(message.vertical_speed, message.vertical_speed_age),
         vertical_speed_age=age(message.vertical_speed_age),
+        roll=number(message.roll, message.attitude_age),
+        pitch=number(message.pitch, message.attitude_age),
+        yaw=number(message.yaw, message.attitude_age),
+        tilt=number(message.tilt, message.attitude_age),
+        attitude_age=age(message.attitude_age),
         battery_voltage=number(message.battery_voltage, message.battery_age),
         battery_remaining=number(message.battery_remaining, message.battery_age),
         battery_age=age(message.battery_age),

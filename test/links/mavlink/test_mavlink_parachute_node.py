@@ -12,6 +12,8 @@ from node_bench import LOCAL, port_of
 
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 from chute_ros.model import LinkState, ParachuteState
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameEncoder
 
 
 @pytest.fixture
@@ -235,6 +237,23 @@ def test_garbage_is_counted_in_diagnostics_and_harms_nothing(bench, network):
         return link and values(link).get("dropped: bytes that are no MAVLink frame") == "1000"
 
     bench.until(counted, "each byte is counted")
+
+
+def test_an_acknowledgement_that_nobody_waits_for_is_counted_in_diagnostics(bench, network):
+    diagnostics = bench.follow(DiagnosticArray, "/diagnostics")
+    # Of a parachute that was asked for nothing, to the node (system 1, component 191).
+    ack = dialect.MAVLink_command_ack_message(
+        dialect.MAV_CMD_DO_PARACHUTE, 0, target_system=1, target_component=191
+    )
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as parachute:
+        frame = FrameEncoder(1, 161).encode(ack, 0.0)
+        parachute.sendto(frame, (LOCAL, port_of(network.node.loop)))
+
+        def counted():
+            link = tasks(diagnostics).get("mavlink_parachute: link")
+            return link and values(link)["unexpected acknowledgements"] == "1"
+
+        bench.until(counted, "it is counted")
 
 
 def test_a_busy_port_is_an_error_in_diagnostics_until_it_is_free(bench):

@@ -148,7 +148,7 @@ def test_a_cancelled_call_is_neither_sent_nor_told_of():
     assert sorted(end.token for end in calls.take_finished()) == [1, 2, 3, 4]
 
 
-def test_a_call_that_cannot_be_put_on_the_bus_or_gives_way_ends_in_words():
+def test_a_call_that_cannot_be_put_on_the_bus_ends_in_words():
     calls = calling(1)
     (send,) = calls.take_output()
     calls.unsendable(send, "type is 300", 0.0)
@@ -159,9 +159,6 @@ def test_a_call_that_cannot_be_put_on_the_bus_or_gives_way_ends_in_words():
     calls.unsendable(calls.take_output()[0], "nobody waits for it", 0.0)
     assert calls.take_finished() == []
     assert calls.next_deadline() == math.inf
-    (end,) = answer(calling(1), 0, 0.5)
-    newer = end.__class__(**{**end.__dict__, "superseded": True})
-    assert newer.text() == "given up after 0.50 s for a newer call"
 
 
 def test_an_unanswered_id_is_not_used_again_while_its_answer_may_still_come():

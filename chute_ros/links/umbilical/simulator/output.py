@@ -14,8 +14,6 @@ class OutboundQueue:
     """Lines go in as chunks, chunks go out at a rate. cut, garbage: probabilities for a line."""
 
     def __init__(self, packet_rate: float, cut: float, garbage: float, seed: int) -> None:
-        #: Lines that lost their end because the queue was full.
-        self.overflows = 0
         self._interval = 1.0 / packet_rate
         self._cut, self._garbage = cut, garbage
         self._random = random.Random(seed)
@@ -36,7 +34,6 @@ class OutboundQueue:
             data += self._random.randbytes(self._random.randrange(1, 21))
         for start in range(0, len(data), CHUNK):
             if not self.room:
-                self.overflows += 1
                 return
             self.put_chunk(data[start : start + CHUNK], now)
 

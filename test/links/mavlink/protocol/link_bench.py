@@ -5,7 +5,6 @@ from typing import Any
 
 from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.protocol.link import MavlinkLink
-from chute_ros.links.mavlink.protocol.status_texts import StatusTexts
 from chute_ros.protocol.events import Notice, ParachuteChanged, RequestFinished
 from chute_ros.protocol.mavlink.dialect import dialect as d
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
@@ -164,6 +163,9 @@ class Bench:
 
     def texts(self):
         """What a ground station reads."""
-        whole = StatusTexts()
-        said = [(t, m) for t, m in self.sent if m.get_type() == "STATUSTEXT"]
-        return [text.text for t, m in said for text in whole.feed(m, t)]
+        whole = []
+        for message in (m for _, m in self.sent if m.get_type() == "STATUSTEXT"):
+            if message.chunk_seq == 0:
+                whole.append("")
+            whole[-1] += message.text
+        return whole

@@ -1,0 +1,124 @@
+"""What it costs a vehicle that somebody looks at it, by `chute watch` or by the panel.
+
+The same three processes as for the kill switch, three times: one set that nobody looks at, one at
+which `chute watch` looks, one at which the panel does, with one page open. All at the same time,
+taking turns in one run; and what each takes of a core while nothing happens.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from functools import partial
+
+from bench.command import at_least, run, with_children
+from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
+from bench.process_cost import cpu_time
+from bench.report import COMPARED, compared, load
+from chute_ros.tools.isolation import free_tcp_port
+from chute_ros.tools.pages import table
+from chute_ros.tools.processes import Processes, ros_arguments
+
+HEADING = "Onlookers"
+
+NOBODY, WATCH, PANEL = "nobody", "watch", "panel"
+_NODES = ("supervisor", "mavlink", "upf_can")
+#: For how long the processes are watched while nothing happens, s.
+_IDLE = 20.0
+
+
+def add_options(options: argparse.ArgumentParser) -> None:
+    """How much is measured."""
+    options.add_argument(
+        "--onlooker-requests",
+        type=at_least(int, 2),
+        default=100,
+        help="kill switches to each set, idle and under load (default: 100)",
+    )
+
+
+def section(chosen: argparse.Namespace) -> str:
+    """Measure; the section without its heading."""
+    before = load()
+    count = chosen.onlooker_requests
+    peers, cost = with_children(lambda namespace, children: _measure(namespace, children, count))
+    return report(peers, cost, before)
+
+
+def _measure(
+    namespace: str, children: Processes, count: int
+) -> tuple[list[Peer], dict[str, tuple[float, float]]]:
+    starts: dict[str, Start] = {
+        NOBODY: partial(start_ours, mark=f"_{NOBODY}"),
+        WATCH: _start_watched,
+        PANEL: _start_on_page,
+    }
+    peers = measure(namespace, children, starts, count)
+    return peers, _cost(children)
+
+
+def _start_watched(namespace: str, processes: Processes, bus: int, network: int) -> None:
+    start_ours(namespace, processes, bus, network, mark=f"_{WATCH}")
+    command = ("chute_ros.tools.chute", "watch", "--namespace", f"{namespace}_{WATCH}")
+    processes.start(WATCH, "bench.at_terminal", *command)
+
+
+def _start_on_page(namespace: str, processes: Processes, bus: int, network: int) -> None:
+    start_ours(namespace, processes, bus, network, mark=f"_{PANEL}")
+    port = free_tcp_port()
+    processes.start(PANEL, "chute_ros.tools.panel", *ros_arguments("/", port=port))
+    page = f"http://127.0.0.1:{port}/vehicle{namespace}_{PANEL}"
+    processes.start("viewer", "bench.page_viewer", page)
+
+
+def _cost(children: Processes) -> dict[str, tuple[float, float]]:
+    """Of each set's processes, and of its onlooker, in % of a core, while nothing happens."""
+    those = {
+        name: ([f"{node}_{name}" for node in _NODES], [name] if name != NOBODY else [])
+        for name in (NOBODY, WATCH, PANEL)
+    }
+
+    def taken() -> dict[str, list[float]]:
+        return {
+            name: [sum(cpu_time(children.pid(one)) for one in part) for part in parts]
+            for name, parts in those.items()
+        }
+
+    before, began = taken(), time.monotonic()
+    time.sleep(_IDLE)
+    passed, after = time.monotonic() - began, taken()
+    return {
+        name: (
+            100.0 * (after[name][0] - before[name][0]) / passed,
+            100.0 * (after[name][1] - before[name][1]) / passed,
+        )
+        for name in those
+    }
+
+
+def report(peers: list[Peer], cost: dict[str, tuple[float, float]], before: str) -> str:
+    """The section without its heading. cost: % of a core. before: the load when it began."""
+    rows = []
+    for how in (IDLE, LOADED):
+        for which in ("kill", "answer"):
+            times = {p.name: [getattr(r, which) for r in p.rounds[how]] for p in peers}
+            for peer in peers:
+                cells = compared(times[peer.name], times[NOBODY], "{:.2f} ms")
+                rows.append((f"{which}, {how}: {peer.name}", *cells, str(peer.missed[how])))
+    nodes, onlooker = "the three nodes", "who looks"
+    costs = [(name, f"{mine:.1f} %", f"{its:.1f} %") for name, (mine, its) in cost.items()]
+    return (
+        f"{before}\n\n"
+        "The kill switch as above, on three sets of our processes at the same time: nobody looks\n"
+        "at one, `chute watch` at a terminal at another, the panel with one open page at the\n"
+        "third. Ratios are to the one that nobody looks at.\n\n"
+        + table(("looked at by", *COMPARED, "missed"), rows)
+        + f"\n\nOf a core while nothing happens, for {_IDLE:g} s:\n\n"
+        + table(("looked at by", nodes, onlooker), costs)
+        + "\n"
+    )
+
+
+if __name__ == "__main__":
+    run("bench.onlookers", __doc__ or "", [sys.modules[__name__]])

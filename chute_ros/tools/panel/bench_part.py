@@ -1,0 +1,65 @@
+"""What can be done to a simulated vehicle: a button each, and what will happen beside it."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from chute_ros.sim.bench_actions import ACTIONS
+
+if TYPE_CHECKING:
+    from chute_ros.tools.panel.node import PanelNode
+
+_EFFECTS = {one.name: one for one in ACTIONS}
+#: Taking off takes its time, s.
+_LONGEST = 60.0
+
+
+class BenchPart:
+    """Of this vehicle: those of its actions that are offered."""
+
+    def __init__(self, node: PanelNode, namespace: str) -> None:
+        self._node, self._namespace = node, namespace
+        self._offered: list[str] | None = None
+        with ui.element("section").classes("card bench"):
+            ui.html("<h2>Bench: what happens to the simulated vehicle</h2>", sanitize=False)
+            self._rows = ui.element("div")
+            self._answer = ui.label("").classes("answers").props('aria-live="polite"')
+
+    def refresh(self) -> None:
+        """Look what is offered."""
+        offered = [name for name in _EFFECTS if name in self._node.bench(self._namespace)]
+        if offered == self._offered:
+            return
+        self._offered = offered
+        self._rows.clear()
+        with self._rows:
+            for name in offered:
+                self._row(name)
+            if not offered:
+                ui.label("No simulated vehicle offers anything here (services sim/...).")
+
+    def _row(self, name: str) -> None:
+        action = _EFFECTS[name]
+
+        async def pressed() -> None:
+            await self._do(name)
+
+        with ui.element("div").classes("row"):
+            with ui.element("button").on("click", pressed, args=[]):
+                ui.label(action.title)
+            ui.label(action.effect)
+
+    async def _do(self, name: str) -> None:
+        title = _EFFECTS[name].title
+        self._answer.set_text(f"{title}: ...")
+        future: Any = asyncio.wrap_future(self._node.play(self._namespace, name))
+        try:
+            answer = await asyncio.wait_for(future, _LONGEST)
+        except asyncio.TimeoutError:
+            self._answer.set_text(f"{title}: no answer within {_LONGEST:g} s")
+            return
+        outcome = "done" if answer.success else "NOT DONE"
+        self._answer.set_text(f"{title}: {outcome}: {answer.message or 'no message'}")

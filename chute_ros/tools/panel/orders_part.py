@@ -1,0 +1,115 @@
+"""The buttons that order something of a vehicle: held to confirm, and each answer below them."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from chute_ros.plain_text import plain
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.tools.chute import order as orders
+from chute_ros.tools.chute.options import ANSWER
+from chute_ros.tools.chute.order import Order, answer_text, not_answered
+from chute_ros.tools.panel.access import Person
+
+if TYPE_CHECKING:
+    from chute_ros.tools.panel.node import PanelNode
+
+_MOST_ANSWERS = 6
+_LONGEST_REASON = 200
+
+
+class OrdersPart:
+    """Empty where orders are not allowed. token: of the session in which the page was made."""
+
+    def __init__(self, node: PanelNode, namespace: str, token: str) -> None:
+        self._node, self._namespace, self._token = node, namespace, token
+        self._text = ""
+        if not node.settings.allow_commands:
+            return
+        with ui.element("section").classes("card orders"):
+            self._note = ui.label("").classes("note")
+            self._all = ui.element("div")
+            with self._all:
+                with ui.element("div").classes("buttons"):
+                    self._button("DEPLOY", "act", orders.deploy)
+                    self._button("KILL motors", "bad", orders.kill)
+                    self._button("Arm parachutes", "good", lambda _: orders.arm(True))
+                    self._button("Disarm", "warn", lambda _: orders.arm(False))
+                with ui.element("details"):
+                    ui.html("more orders", sanitize=False, tag="summary")
+                    with ui.element("div").classes("buttons"):
+                        self._button("Reset", "quiet", lambda _: orders.reset())
+                        for mode in Mode:
+                            self._button(f"Mode {mode.name}", "quiet", partial(orders.mode, mode))
+                reason = ui.element("input").props(
+                    f'placeholder="reason, for the record" maxlength="{_LONGEST_REASON}" '
+                    'aria-label="reason, for the record"'
+                )
+                reason.on("input", self._take_reason, js_handler="(e) => emit(e.target.value)")
+            self._answers = ui.element("div").classes("answers").props('aria-live="polite"')
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Whether the session still lasts."""
+        if not self._node.settings.allow_commands:
+            return
+        person = self._person()
+        self._note.set_text(
+            f"Hold a button for 1.5 s to give the order, as {person.name}."
+            if person
+            else "Log in to give orders."
+        )
+        self._all.set_visibility(person is not None)
+
+    def _button(self, text: str, tone: str, make: Callable[[str], Order]) -> None:
+        async def held() -> None:
+            await self._give(make)
+
+        button = ui.element("button").classes(f"hold tone-{tone}")
+        with button:
+            ui.html(f"<span>{text}</span><i></i>", sanitize=False)
+        # Sent by panel.js once it was held for long enough.
+        button.on("held", held, args=[])
+
+    def _take_reason(self, event: Any) -> None:
+        self._text = str(event.args)[:_LONGEST_REASON]
+
+    def _person(self) -> Person | None:
+        return self._node.access.person(self._token, time.monotonic())
+
+    async def _give(self, make: Callable[[str], Order]) -> None:
+        person = self._person()
+        if person is None:
+            self._tell("NOT SENT: log in again", "bad")
+            return
+        reason = plain(self._text).strip() or orders.NO_REASON
+        order = make(f"{person.text}: {reason}")
+        line = self._tell(f"{order.name}: sent, no answer yet", "quiet")
+        try:
+            future = asyncio.wrap_future(self._node.order(self._namespace, order, person))
+            answer = await asyncio.wait_for(future, ANSWER)
+        except asyncio.TimeoutError:
+            line(not_answered(order, f"within {ANSWER:g} s"), "bad")
+            return
+        line(answer_text(order, answer), "good" if answer.success else "bad")
+
+    def _tell(self, text: str, tone: str) -> Callable[[str, str], None]:
+        at = time.strftime("%H:%M:%S")
+        with self._answers:
+            label = ui.label(f"{at} {text}").classes(f"is-{tone}")
+        label.move(target_index=0)
+        children = self._answers.default_slot.children
+        while len(children) > _MOST_ANSWERS:
+            children[-1].delete()
+
+        def again(text: str, tone: str) -> None:
+            label.set_text(f"{at} {text}")
+            label.classes(replace=f"is-{tone}")
+
+        return again

@@ -1,0 +1,273 @@
+"""The parts of a vehicle's page as HTML, made of its picture. Pure: what is shown comes in."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Mapping, Sequence
+from html import escape
+
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.tools.chute.diagnostic_tasks import Task
+from chute_ros.tools.chute.status_text import LINK_TONE, STAGE_TONE
+from chute_ros.tools.chute.view import (
+    DecisionView,
+    LinkView,
+    ParachuteView,
+    RuleView,
+    VehiclePicture,
+    VehicleView,
+)
+from chute_ros.tools.chute.words import age_text, is_old, span_text, value_text
+from chute_ros.tools.panel.tones import TONES
+
+#: What a state means to a person, where the supervisor says no more than its name.
+MEANINGS = {
+    "STARTUP": "The supervisor waits for the first word of its links.",
+    "BLOCKED": "The vehicle must not take off.",
+    "READY": "Nothing forbids the take-off; no parachute is armed.",
+    "ARMED": "Nothing forbids the take-off; the parachutes are armed.",
+    "IN_FLIGHT": "The vehicle flies, and is guarded.",
+    "KILLING": "The motors are being stopped.",
+    "DEPLOYING": "The parachute is being released.",
+    "DEPLOYED": "A parachute was released.",
+    "LANDED": "The vehicle has landed.",
+    "FAULT": "What was ordered could not be done.",
+}
+_HISTORY = 8
+_DIAGNOSTIC_TONE = {"WARN": "warn", "STALE": "quiet", "ERROR": "bad"}
+
+
+def banner(picture: VehiclePicture) -> str:
+    """The state in one large word, and why in a sentence."""
+    if is_old(picture.age):
+        word = "NOT KNOWN NOW"
+        why = f"It was {picture.state}; the last word came {span_text(picture.age)} ago."
+        tone = "quiet"
+    else:
+        word, why = picture.state.replace("_", " "), _why(picture)
+        tone = STAGE_TONE.get(picture.state, "quiet")
+    mode = ""
+    if picture.mode != Mode.ACTIVE.name:
+        meant = "decides, and sends nothing" if picture.mode == "SHADOW" else "does nothing"
+        mode = f'<div class="mode">{_sign("bad")} {escape(picture.mode)}: it {meant}</div>'
+    alarms = "".join(f"<li>{escape(one)}</li>" for one in picture.alarms)
+    return (
+        f'<div class="banner tone-{tone}" role="status" aria-live="assertive">'
+        f'<div class="word">{_sign(tone)} {escape(word)}</div><div class="why">{escape(why)}</div>'
+        f"{mode}</div>" + (f'<ul class="alarms">{alarms}</ul>' if alarms else "")
+    )
+
+
+def nothing(namespace: str, around: str, seconds: float) -> str:
+    """The banner before the first word."""
+    why = (
+        f"No supervisor is received in {namespace} for {span_text(seconds)}. Looked for in: "
+        f"{around}."
+    )
+    return (
+        f'<div class="banner tone-quiet" role="status"><div class="word">{_sign("quiet")} NOTHING '
+        f'RECEIVED YET</div><div class="why">{escape(why)}</div></div>'
+    )
+
+
+def blocks(picture: VehiclePicture) -> str:
+    """Why it must not take off, each reason on a line; what of it cannot be used, in flight."""
+    reasons = [*picture.block_reasons]
+    reasons += [f"blocked by device {one}" for one in picture.device_blocks]
+    rows = [_row("flight", "BLOCKED" if picture.flight_blocked else "not blocked", "")]
+    rows += [_row("", one, "warn") for one in reasons]
+    if picture.state == "IN_FLIGHT":
+        rows += [_row("cannot be used", one, "warn") for one in picture.unusable]
+    rows.append(_row("newest decision", picture.newest_decision or "none yet", ""))
+    rows.append(_row("supervisor", f"{picture.supervisor}, {age_text(picture.age)}", ""))
+    return _card("Flight", "".join(rows), is_old(picture.age))
+
+
+def parachutes(
+    those: Sequence[ParachuteView],
+    identities: Mapping[str, str],
+    today: datetime.date,
+) -> str:
+    """A card each. identities: by link and device, as their devices tell."""
+    if not those:
+        return _card("Parachutes", _row("", "never received", "warn"), True)
+    return "".join(_parachute(one, identities, today) for one in those)
+
+
+def links(those: Sequence[LinkView]) -> str:
+    """State and age of each."""
+    rows = "".join(_link(one) for one in those) or _row("", "none required", "")
+    return _card("Links", rows, False)
+
+
+def vehicle(one: VehicleView | None) -> str:
+    """Its measurements, each with its age."""
+    if one is None:
+        return _card("Vehicle", _row("", "never received", "warn"), True)
+    battery = value_text(one.battery_voltage, "V")
+    if one.battery_remaining == one.battery_remaining:
+        battery += f", {one.battery_remaining * 100.0:.0f} %"
+    attitude = ", ".join(
+        f"{name} {value_text(math.degrees(angle), '°', 0)}"
+        for name, angle in (("roll", one.roll), ("pitch", one.pitch), ("yaw", one.yaw))
+    )
+    rows = "".join(
+        _measured(name, value, age)
+        for name, value, age in (
+            ("height", value_text(one.height, "m"), one.height_age),
+            ("vertical speed", value_text(one.vertical_speed, "m/s"), one.vertical_speed_age),
+            ("tilt", value_text(math.degrees(one.tilt), "°", 0), one.attitude_age),
+            ("attitude", attitude, one.attitude_age),
+            ("motors", one.armed, one.armed_age),
+            ("landed state", one.landed_state, one.landed_state_age),
+            ("battery", battery, one.battery_age),
+        )
+    )
+    rows += "".join(_row("fault", fault, "bad") for fault in one.faults)
+    source = one.source or "no known source"
+    return _card(f"Vehicle {source}, link {one.link_state}", rows, False)
+
+
+def rules(those: Sequence[RuleView]) -> str:
+    """A bar for each that is active, which fills as its conditions hold; those that count
+    first."""
+    shown = [one for one in those if one.active or one.counts]
+    rows = "".join(_rule(one) for one in sorted(shown, key=lambda one: not one.counts))
+    if others := [one.name for one in those if one not in shown]:
+        rows += _row("not active now", ", ".join(others), "quiet")
+    return _card("Rules", rows or _row("", "none", ""), False)
+
+
+def decisions(those: Sequence[DecisionView]) -> str:
+    """What was decided since somebody looks, the newest first."""
+    rows = []
+    for one in list(reversed(those))[:_HISTORY]:
+        shadow = " (SHADOW: not sent)" if one.shadow else ""
+        told = [*one.reasons, *(f"→ {outcome}" for outcome in one.outcomes)]
+        lines = "".join(f"<li>{escape(line)}</li>" for line in told)
+        head = f"{one.action}{shadow} by rule '{one.rule}', {span_text(one.age)} ago"
+        rows.append(f'<div class="decision"><b>{escape(head)}</b><ul>{lines}</ul></div>')
+    return _card("Decisions received here", "".join(rows) or _row("", "none", ""), False)
+
+
+def diagnostics(tasks: Sequence[Task]) -> str:
+    """What is not OK, worst first; how many are."""
+    bad = [one for one in tasks if one.level != "OK"]
+    rows = "".join(
+        _row(
+            f"{one.level} {one.node}: {one.task}",
+            one.message,
+            "warn" if one.level == "WARN" else "bad",
+        )
+        for one in bad
+    )
+    rows += _row("", f"{len(tasks) - len(bad)} of {len(tasks)} OK", "")
+    return _card("Diagnostics", rows, False)
+
+
+def _why(picture: VehiclePicture) -> str:
+    if picture.state_text and picture.state_text != picture.state:
+        return picture.state_text
+    if picture.state in ("STARTUP", "BLOCKED") and picture.block_reasons:
+        return picture.block_reasons[0]
+    return MEANINGS.get(picture.state, "")
+
+
+def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetime.date) -> str:
+    rows = [
+        _row("armed", _armed(one), "act" if one.armed else ""),
+        _row("released", _released(one), "act" if one.deployed else ""),
+        _row("state", f"{one.state}, link {one.link_state}", LINK_TONE.get(one.link_state, "")),
+        _row("packed", _packed(one.packed_date, today), ""),
+        _row("own supply", value_text(one.backup_voltage, "V"), ""),
+    ]
+    if one.height == one.height:
+        rows.append(_row("own height", value_text(one.height, "m"), ""))
+    identity = identities.get(f"{one.link} {one.device}", "not told")
+    rows.append(_row("identity", identity, ""))
+    rows += [_row("fault", fault, "bad") for fault in one.faults]
+    rows.append(_row("last word", age_text(one.age), "quiet" if is_old(one.age) else ""))
+    return _card(f"Parachute {one.link} {one.device}", "".join(rows), is_old(one.age))
+
+
+def _armed(one: ParachuteView) -> str:
+    if not one.armed:
+        return "no"
+    return f"YES: {', '.join(one.armed_triggers)}" if one.armed_triggers else "YES"
+
+
+def _released(one: ParachuteView) -> str:
+    if not one.deployed:
+        return "no"
+    return "YES" if one.released_by == "NONE" else f"YES, by {one.released_by}"
+
+
+def _packed(date: str, today: datetime.date) -> str:
+    if not date:
+        return "not told"
+    try:
+        days = (today - datetime.date.fromisoformat(date)).days
+    except ValueError:
+        return date
+    if days < 0:
+        return f"{date}, in {-days} days: one of the two clocks is wrong"
+    return f"{date}, {days} days ago"
+
+
+def _link(one: LinkView) -> str:
+    text = f"{one.state}, device {'healthy' if one.device_healthy else 'NOT healthy'}, "
+    text += age_text(one.age)
+    if one.reasons:
+        text += f": {'; '.join(one.reasons)}"
+    tone = LINK_TONE.get(one.state, "warn")
+    if tone == "good" and not one.device_healthy:
+        tone = "warn"
+    return _row(one.name, text, tone)
+
+
+def _measured(name: str, value: str, age: float) -> str:
+    # A value that was never received is none.
+    told = escape(age_text(age))
+    if age == age:
+        told = f"{escape(value)} <small>{told}</small>"
+    old = " old" if is_old(age) else ""
+    return f'<div class="row{old}"><span>{escape(name)}</span><span>{told}</span></div>'
+
+
+def _rule(one: RuleView) -> str:
+    filled = 0.0 if not one.hold else min(1.0, one.level / one.hold)
+    if one.fulfilled or one.acted_on:
+        filled = 1.0
+    state = (
+        "acted on"
+        if one.acted_on
+        else "fulfilled"
+        if one.fulfilled
+        else f"{one.level:.1f} of {one.hold:.1f} s"
+    )
+    lines = "".join(f"<li>{escape(line)}</li>" for line in one.conditions if one.counts)
+    if one.denied:
+        lines += f"<li>not acted on: {escape(one.denied)}</li>"
+    percent = f"{filled * 100.0:.0f}"
+    return (
+        f'<div class="rule"><div class="row"><span>{escape(one.name)}</span>'
+        f"<span>{escape(one.action)}, {escape(state)}</span></div>"
+        f'<div class="bar" role="progressbar" aria-label="{escape(one.name)}" aria-valuemin="0" '
+        f'aria-valuemax="100" aria-valuenow="{percent}"><i style="width:{percent}%"></i></div>'
+        f"<ul>{lines}</ul></div>"
+    )
+
+
+def _row(name: str, text: str, tone: str) -> str:
+    sign = f"{_sign(tone)} " if tone else ""
+    told = f"<span>{escape(name)}</span><span>{sign}{escape(text)}</span>"
+    return f'<div class="row{f" is-{tone}" if tone else ""}">{told}</div>'
+
+
+def _card(title: str, rows: str, old: bool) -> str:
+    return f'<section class="card{" old" if old else ""}"><h2>{escape(title)}</h2>{rows}</section>'
+
+
+def _sign(tone: str) -> str:
+    return f'<span class="sign" aria-hidden="true">{TONES[tone].sign}</span>' if tone else ""

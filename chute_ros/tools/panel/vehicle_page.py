@@ -1,0 +1,100 @@
+"""The page of one vehicle."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from nicegui import ui
+from starlette.requests import Request
+
+from chute_ros.tools.panel.bench_part import BenchPart
+from chute_ros.tools.panel.chart import Curves
+from chute_ros.tools.panel.login_page import person_of, token_of
+from chute_ros.tools.panel.orders_part import OrdersPart
+from chute_ros.tools.panel.pulse import Pulse
+
+if TYPE_CHECKING:
+    from chute_ros.tools.panel.node import PanelNode
+
+_EVERY = 0.25  # s
+#: A vehicle that is not found is looked for so often, s.
+_LOOKS = 1.0
+#: Of so many turns one draws the curves, and looks what the bench offers.
+_SLOWLY = 8
+_NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
+#: Parts of the page, in their order on a phone; wide screens have two columns.
+_LEFT = ("blocks", "parachutes", "vehicle")
+_RIGHT = ("rocket", "links", "decisions", "rules", "diagnostics")
+
+
+def register(node: PanelNode) -> None:
+    """Add its pages."""
+
+    @ui.page("/vehicle/{name:path}")
+    def show(name: str, request: Request) -> None:
+        namespace = f"/{name.strip('/')}"
+        if not _NAMESPACE.fullmatch(namespace) or namespace not in node.vehicles():
+            _none(node, namespace)
+            return
+        watched = node.look(namespace)
+        ui.context.client.on_delete(lambda: node.leave(namespace))
+        pulse = Pulse()
+        _head(node, namespace, request)
+        shown: dict[str, Any] = {"banner": _part("banner")}
+        # Before all that scrolls: whoever must act must not search.
+        orders = OrdersPart(node, namespace, token_of(request))
+        with ui.element("main").classes("columns"):
+            with ui.element("div"):
+                shown |= {one: _part(one) for one in _LEFT}
+                bench = BenchPart(node, namespace) if node.settings.bench else None
+            with ui.element("div"):
+                curves = Curves()
+                shown |= {one: _part(one) for one in _RIGHT}
+        turns = 0
+
+        def refresh() -> None:
+            nonlocal turns
+            pulse.beat()
+            parts = watched.parts()
+            for name, element in shown.items():
+                element.set_content(parts.get(name, ""))
+            orders.refresh()
+            if turns % _SLOWLY == 0:
+                curves.draw(*watched.drawn())
+                if bench is not None:
+                    bench.refresh()
+            turns += 1
+
+        ui.timer(_EVERY, refresh)
+
+
+def _head(node: PanelNode, namespace: str, request: Request) -> None:
+    with ui.element("header").classes("top"):
+        ui.html(f'<a href="/fleet">all vehicles</a> <b>{namespace}</b>', sanitize=False)
+        if not node.access.is_possible:
+            return
+        onward = quote(f"/vehicle{namespace}")
+        if person := person_of(node, request):
+            with ui.element("form").props(f'method="post" action="/logout?next={onward}"'):
+                ui.label(person.name)
+                ui.element("button").add_slot("default", "log out")
+        else:
+            ui.html(f'<a href="/login?next={onward}">log in</a>', sanitize=False)
+
+
+def _part(name: str) -> Any:
+    return ui.html("", sanitize=False).classes(f"part-{name}")
+
+
+def _none(node: PanelNode, namespace: str) -> None:
+    found = ", ".join(node.vehicles()) or "none"
+    ui.label(f"No supervisor is found in {namespace[:200]}. Vehicles found: {found}.")
+    ui.link("all vehicles", "/fleet")
+
+    def look() -> None:
+        if namespace in node.vehicles():
+            ui.navigate.reload()
+
+    ui.timer(_LOOKS, look)

@@ -1,0 +1,157 @@
+"""Whole flights seen on the page, and ordered there."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, watch_words, word
+from playwright.sync_api import expect
+
+from chute_ros.tools.demo_rig import Rig
+from chute_ros.tools.pilot import Pilot
+from chute_ros.tools.processes import Processes
+
+pytestmark = pytest.mark.xdist_group("panel_flight")
+
+
+@pytest.fixture
+def rig(namespace, tmp_path):
+    """A drone with a MAVLink parachute that is not plugged in yet."""
+    folder = tmp_path / "vehicle"
+    folder.mkdir()
+    processes = Processes(folder)
+    one = Rig.on_free_ports("mavlink", "", namespace, processes)
+    one.start_supervisor("supervisor")
+    one.start_vehicle()
+    yield one
+    processes.end()
+
+
+@pytest.fixture
+def pilot(rig):
+    one = Pilot(rig.pilot, 1)
+    yield one
+    one.close()
+
+
+def answered(page, text):
+    """Wait until an answer to an order is shown."""
+    expect(page.locator(".answers")).to_contain_text(text, timeout=PATIENCE)
+
+
+def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path, await_until):
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    page = open_page(f"{panel.address}/", PHONE, has_touch=True)
+
+    # Given a vehicle whose parachute is missing, when somebody looks, then it says why.
+    def found():
+        page.goto(f"{panel.address}/vehicle{rig.namespace}")
+        return page.locator(".part-banner").count()
+
+    await_until(found, "the vehicle is found")
+    word(page, "BLOCKED")
+    expect(page.locator(".part-banner .why")).to_contain_text("mavlink_parachute")
+    watch_words(page)
+    # When the parachute is plugged in, then all of it is there.
+    rig.start_parachute()
+    word(page, "READY")
+    card = page.locator(".part-parachutes")
+    for text in ("1/161", "2026-06-19", "serial number SIM-0001", "firmware 0.1.0"):
+        expect(card).to_contain_text(text, timeout=PATIENCE)
+    # When the operator logs in and arms, then the page says so, and who.
+    log_in(page)
+    word(page, "READY")
+    watch_words(page)
+    page.get_by_label("reason, for the record").fill("first flight")
+    hold(page, "Arm parachutes")
+    answered(page, "arm: done")
+    word(page, "ARMED")
+    expect(card).to_contain_text("YES: ")
+    # When it flies and a motor fails, then every state is seen.
+    pilot.arm()
+    vehicle = page.locator(".part-vehicle")
+    expect(vehicle).to_contain_text("motorsARMED", timeout=PATIENCE)
+    pilot.take_off(30.0)
+    word(page, "IN FLIGHT")
+    expect(vehicle).to_contain_text("height29.", timeout=PATIENCE)
+    assert fits(page)
+    pilot.fail_motor()
+    word(page, "DEPLOYED")
+    expect(card).to_contain_text("YES, by ")
+    expect(page.locator(".part-decisions")).to_contain_text("DEPLOY by rule")
+    expect(vehicle).to_contain_text("ON_GROUND", timeout=PATIENCE)
+    words = page.evaluate("window.words")
+    assert words[:3] == ["READY", "ARMED", "IN FLIGHT"]
+    assert "DEPLOYED" in words
+    assert set(words[3:]) <= {"KILLING", "DEPLOYING", "DEPLOYED"}
+    # When the operator resets, then it is not released any more, and the record has who did it.
+    page.get_by_text("more orders").click()
+    hold(page, "Reset")
+    answered(page, "reset: ")
+    assert "safety/arm: arm=True, triggers=0, by='Anna at 127.0.0.1 (panel)'" in panel.log()
+    assert "safety/reset: by='Anna at 127.0.0.1 (panel)'" in panel.log()
+    assert fits(page)
+
+
+def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_path, await_until):
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    rig.start_parachute()
+    page = open_page(f"{panel.address}/fleet")
+    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    log_in(page)
+    word(page, "READY")
+    hold(page, "Arm parachutes")
+    word(page, "ARMED")
+    pilot.arm()
+    vehicle = page.locator(".part-vehicle")
+    expect(vehicle).to_contain_text("motorsARMED", timeout=PATIENCE)
+    pilot.take_off(30.0)
+    word(page, "IN FLIGHT")
+    expect(vehicle).to_contain_text("height29.", timeout=PATIENCE)
+    answers = page.locator(".answers > *")
+    given = answers.count()
+    # Given a button that is let go too early, then nothing is ordered.
+    hold(page, "DEPLOY", 0.7)
+    page.mouse.move(0, 0)
+    assert answers.count() == given
+    # Given a finger that slides off, then nothing is ordered.
+    box = page.get_by_role("button", name="DEPLOY").bounding_box()
+    page.mouse.move(box["x"] + 5, box["y"] + 5)
+    page.mouse.down()
+    page.mouse.move(0, 0)
+    page.wait_for_timeout(1800)
+    page.mouse.up()
+    assert answers.count() == given
+    assert "safety/deploy" not in panel.log()
+    # When it is held by the keyboard, then the parachute is released, once.
+    page.get_by_label("reason, for the record").fill("the motor burns")
+    page.get_by_role("button", name="DEPLOY").focus()
+    page.keyboard.down(" ")
+    answered(page, "deploy: done")
+    page.keyboard.up(" ")
+    word(page, "DEPLOYED")
+    assert panel.log().count("safety/deploy: force=") == 1
+    assert "reason='Anna at 127.0.0.1 (panel): the motor burns'" in panel.log()
+    expect(page.locator(".part-decisions")).to_contain_text("the motor burns")
+
+
+def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(
+    rig, start_panel, open_page, await_until
+):
+    panel = start_panel()
+    rig.start_parachute()
+    page = open_page(f"{panel.address}/fleet")
+    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    word(page, "READY")
+    assert page.locator(".orders").count() == 0
+    # When the supervisor falls silent, then its word is not shown as if it were now.
+    rig.processes.send_signal("supervisor", signal.SIGSTOP)
+    word(page, "NOT KNOWN NOW")
+    expect(page.locator(".part-banner .why")).to_contain_text("It was READY; the last word came")
+    rig.processes.send_signal("supervisor", signal.SIGCONT)
+    word(page, "READY")
+    # When the panel itself is gone, then the page says so by itself.
+    panel.processes.send_signal("panel", signal.SIGKILL)
+    expect(page.locator(".lost-note")).to_be_visible(timeout=PATIENCE)
+    assert page.evaluate("document.body.classList.contains('lost')")

@@ -1,0 +1,190 @@
+"""Orders from the page: by whom, and never by nobody; and many vehicles on one page."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from chute_msgs.msg import SafetyState, SafetySummary
+from heard_vehicle import state
+from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, picture, word
+from playwright.sync_api import expect
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from chute_ros.ros import qos
+from chute_ros.supervisor.machine import Stage
+
+pytestmark = pytest.mark.xdist_group("panel_orders")
+
+
+class Vehicles(Node):
+    """Supervisors of many vehicles, as far as a page sees them."""
+
+    def __init__(self, base, stages):
+        super().__init__("vehicles", namespace=base)
+        self.resets = []
+        self._told = []
+        for name, stage in stages.items():
+            self._add(name, stage)
+        self.create_timer(0.5, self._tell)
+
+    def _add(self, name, stage):
+        whole = state(state=int(stage), state_text=stage.name)
+        short = SafetySummary(
+            supervisor="safety_supervisor",
+            state=int(stage),
+            state_name=stage.name,
+            text=stage.name,
+            links_ok=1,
+            links=1,
+        )
+        for kind, topic, message in (
+            (SafetyState, "safety/state", whole),
+            (SafetySummary, "safety/summary", short),
+        ):
+            publisher = self.create_publisher(kind, f"{name}/{topic}", qos.LATCHED)
+            self._told.append((publisher, message))
+        self.create_service(Trigger, f"{name}/safety/reset", self._reset)
+
+    def _tell(self):
+        for publisher, message in self._told:
+            message.header.stamp = self.get_clock().now().to_msg()
+            publisher.publish(message)
+
+    def _reset(self, request, response):
+        self.resets.append(request)
+        response.success, response.message = True, "as at the start"
+        return response
+
+
+@pytest.fixture
+def fly(namespace):
+    """fly(stages): vehicles in these states, which live while the page is waited for."""
+    executor, nodes = SingleThreadedExecutor(), []
+
+    def make(stages):
+        nodes.append(Vehicles(namespace, stages))
+        executor.add_node(nodes[-1])
+        return nodes[-1]
+
+    make.spin = lambda: executor.spin_once(timeout_sec=0.01)
+    yield make
+    executor.shutdown()
+    for one in nodes:
+        one.destroy_node()
+
+
+def until(fly, condition, page):
+    """Both live until this holds."""
+    for _ in range(3000):
+        fly.spin()
+        page.wait_for_timeout(10)
+        if condition():
+            return
+    pytest.fail("not in time")
+
+
+def test_twenty_vehicles_on_a_phone_the_worst_first(fly, namespace, start_panel, open_page):
+    stages = {f"drone{number:02}": Stage.READY for number in range(20)}
+    stages |= {"drone07": Stage.FAULT, "drone13": Stage.DEPLOYING, "drone19": Stage.BLOCKED}
+    fly(stages)
+    panel = start_panel()
+    page = open_page(f"{panel.address}/fleet", PHONE)
+    seen = page.locator(".vehicle:not(.old)")
+    until(fly, lambda: seen.count() == 20, page)
+    names = [text.removeprefix(f"{namespace}/") for text in page.locator("h2").all_inner_texts()]
+    rest = [name for name in stages if name not in ("drone07", "drone13", "drone19")]
+    assert names == ["drone07", "drone13", "drone19", *rest]
+    assert fits(page)
+    picture(page, "fleet.jpg")
+
+
+def test_one_who_logged_out_elsewhere_orders_nothing(
+    fly, namespace, start_panel, open_page, tmp_path
+):
+    vehicles = fly({"drone1": Stage.LANDED})
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    address = f"{panel.address}/vehicle{namespace}/drone1"
+    page = open_page(f"{panel.address}/fleet")
+    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
+    until(fly, link.count, page)
+    page.goto(address)
+    log_in(page)
+    until(fly, page.get_by_text("more orders").is_visible, page)
+    page.get_by_text("more orders").click()
+    # Given a session that was ended on another page of the same browser,
+    other = page.context.new_page()
+    other.goto(address)
+    other.get_by_role("button", name="log out").click()
+    # when the button that is still there is held, by hand or by a script, then nothing is sent.
+    expect(page.get_by_text("Log in to give orders.")).to_be_visible(timeout=PATIENCE)
+    assert page.locator(".hold:visible").count() == 0
+    page.evaluate(
+        """() => document.querySelectorAll("button.hold").forEach(
+            (one) => one.dispatchEvent(new CustomEvent("held")))"""
+    )
+    expect(page.locator(".answers")).to_contain_text("NOT SENT: log in again", timeout=PATIENCE)
+    assert vehicles.resets == []
+    assert "safety/reset" not in panel.log()
+    # When the session is new, then it is sent, and answered.
+    page.reload()
+    log_in(page, "Ben")
+    page.get_by_text("more orders").click()
+    hold(page, "Reset")
+    until(fly, lambda: "as at the start" in page.locator(".answers").inner_text(), page)
+    assert len(vehicles.resets) == 1
+    assert "by='Ben at 127.0.0.1 (panel)'" in panel.log()
+
+
+def test_without_permission_there_is_no_button_at_all(fly, namespace, start_panel, open_page):
+    fly({"drone1": Stage.READY})
+    panel = start_panel()
+    page = open_page(f"{panel.address}/fleet")
+    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
+    until(fly, link.count, page)
+    link.click()
+    until(fly, page.locator(".part-banner .word").count, page)
+    assert page.locator(".hold").count() == 0
+    assert page.get_by_text("log in").count() == 0
+
+
+def test_what_nobody_looks_at_is_not_listened_to(fly, namespace, start_panel, open_page):
+    vehicles = fly({"drone1": Stage.READY})
+    topic = f"{namespace}/drone1/safety/state"
+    panel = start_panel()
+    page = open_page(f"{panel.address}/fleet")
+    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
+    until(fly, link.count, page)
+    assert vehicles.count_subscribers(topic) == 0
+    link.click()
+    until(fly, lambda: vehicles.count_subscribers(topic) == 1, page)
+    # Two that look cost what one does.
+    other = page.context.new_page()
+    other.goto(page.url)
+    until(fly, other.locator(".part-banner .word").count, other)
+    assert vehicles.count_subscribers(topic) == 1
+    page.close()
+    other.goto("about:blank")
+    until(fly, lambda: vehicles.count_subscribers(topic) == 0, other)
+    assert vehicles.count_subscribers(f"{namespace}/drone1/safety/summary") == 0
+
+
+def test_a_vehicle_that_is_not_there_is_told(start_panel, open_page, ros):
+    panel = start_panel()
+    page = open_page(f"{panel.address}/vehicle/nowhere")
+    told = re.compile("No supervisor is found in /nowhere. Vehicles found: ")
+    expect(page.get_by_text(told)).to_be_visible(timeout=PATIENCE)
+
+
+def test_it_is_said_in_which_state_it_is(fly, namespace, start_panel, open_page):
+    fly({"drone1": Stage.FAULT})
+    panel = start_panel()
+    page = open_page(f"{panel.address}/fleet")
+    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
+    until(fly, link.count, page)
+    link.click()
+    until(fly, page.locator(".part-banner .word").count, page)
+    word(page, "FAULT")
+    assert page.locator(".part-banner .banner").get_attribute("role") == "status"

@@ -1,0 +1,251 @@
+"""The parts of a vehicle's page: nothing old as if it were now, no text as HTML. Pure."""
+
+from __future__ import annotations
+
+import datetime
+import html
+import math
+import re
+
+import pytest
+from chute_msgs.msg import ActionReport, RuleState, SafetyDecision, SafetyState, Telem
+from heard_vehicle import Heard, parachute, stamped, state, vehicle
+
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.chute.diagnostic_tasks import Task
+from chute_ros.tools.panel import sections
+from chute_ros.tools.panel.rocket import rocket
+
+TODAY = datetime.date(2026, 7, 1)
+HOSTILE = "<script>alert(1)</script>&\"'"
+
+
+def text_of(part):
+    """What a person reads of it."""
+    return " ".join(html.unescape(re.sub("<[^>]*>", " ", part)).split())
+
+
+def shown(at=0.0, **fields):
+    return Heard().hears(stamped(state(**fields))).view(at)
+
+
+@pytest.mark.parametrize("stage", Stage)
+def test_each_state_is_one_large_word_with_a_reason(stage):
+    part = sections.banner(shown(state=int(stage), state_text=stage.name))
+    word = re.search('class="word">(.*?)</div>', part)[1]
+    assert text_of(word)[2:] == stage.name.replace("_", " ")
+    why = re.search('class="why">(.*?)</div>', part)[1]
+    assert why == html.escape(sections.MEANINGS[stage.name])
+
+
+def test_the_supervisors_own_reason_comes_first():
+    told = {"state": SafetyState.BLOCKED, "flight_blocked": True, "block_reasons": ["no fuel"]}
+    assert "no fuel" in sections.banner(shown(state_text="BLOCKED", **told))
+    assert "BLOCKED: lost" in sections.banner(shown(state_text="BLOCKED: lost", **told))
+
+
+def test_what_is_old_is_no_state():
+    part = text_of(sections.banner(shown(3.0)))
+    assert part == "○ NOT KNOWN NOW It was IN_FLIGHT; the last word came 3 s ago."
+
+
+def test_a_mode_that_does_not_fire_stands_out_and_so_does_an_alarm():
+    part = sections.banner(shown(mode=SafetyState.SHADOW, alarms=["the disk is full"]))
+    assert "SHADOW: it decides, and sends nothing" in text_of(part)
+    assert "the disk is full" in text_of(part)
+    assert "INHIBITED: it does nothing" in text_of(
+        sections.banner(shown(mode=SafetyState.INHIBITED))
+    )
+
+
+def parachute_part(at=0.0, identities=None, **fields):
+    heard = Heard().hears(stamped(state())).hears(stamped(parachute(**fields)))
+    return sections.parachutes(heard.view(at).parachutes, identities or {}, TODAY)
+
+
+def test_a_parachute_with_all_that_is_known_of_it():
+    part = parachute_part(
+        armed_triggers=4 | 8,
+        deployed=True,
+        deployment_trigger=4,
+        packed_date="2026-06-19",
+        backup_voltage=8.25,
+        faults=["low power"],
+        identities={"mavlink_parachute 1/161": "ACME, serial number 7, firmware 1.2"},
+    )
+    assert text_of(part) == (
+        "Parachute mavlink_parachute 1/161 armed ▼ YES: FC, OFFBOARD released ▼ YES, by MAVLINK "
+        "state ● ARMED, link OK packed 2026-06-19, 12 days ago own supply 8.2 V own height 0.0 m "
+        "identity ACME, serial number 7, firmware 1.2 fault ✖ low power last word <1 s ago"
+    )
+
+
+def test_a_parachute_that_is_silent_is_grey():
+    assert 'class="card"' in parachute_part(1.9)
+    part = parachute_part(2.5)
+    assert 'class="card old"' in part
+    assert "OLD: 2 s ago" in text_of(part)
+
+
+@pytest.mark.parametrize(
+    ("date", "told"),
+    [
+        ("", "packed not told"),
+        ("2026-07-01", "2026-07-01, 0 days ago"),
+        ("2026-07-03", "2026-07-03, in 2 days: one of the two clocks is wrong"),
+        ("soon", "packed soon"),
+    ],
+)
+def test_the_day_of_packing_and_its_age(date, told):
+    assert told in text_of(parachute_part(packed_date=date))
+
+
+def test_each_measurement_of_the_vehicle_has_its_age():
+    heard = Heard().hears(stamped(state()))
+    heard.hears(vehicle(roll=0.1, pitch=0.0, yaw=math.pi, tilt=0.1, attitude_age=5.0))
+    part = sections.vehicle(heard.view().vehicle)
+    assert "height 61.2 m <1 s ago" in text_of(part)
+    assert '<div class="row old"><span>tilt</span><span>6 ° <small>OLD: 5 s ago' in part
+    assert "battery 15.8 V, 87 % 1 s ago" in text_of(part)
+    assert "never received" in text_of(sections.vehicle(None))
+
+
+def test_rules_are_bars_that_fill():
+    rules = [
+        RuleState(name="excess tilt", action=SafetyDecision.DEPLOY, alive=True, hold=0.25),
+        RuleState(
+            name="free fall",
+            action=SafetyDecision.DEPLOY,
+            alive=True,
+            level=0.25,
+            hold=0.5,
+            conditions=["[x] acceleration 0.65 (below 2)"],
+        ),
+        RuleState(name="on the ground alone", action=SafetyDecision.KILL, hold=0.25),
+        RuleState(name="battery", action=0, alive=True, fulfilled=True, denied="not armed"),
+    ]
+    part = sections.rules(shown(rules=rules).rules)
+    assert re.findall(r'aria-label="(.*?)".*?aria-valuenow="(\d+)"', part) == [
+        ("free fall", "50"),
+        ("battery", "100"),
+        ("excess tilt", "0"),
+    ]
+    assert "not acted on: not armed" in part
+    assert "[x] acceleration 0.65 (below 2)" in part
+    assert "not active now ○ on the ground alone" in text_of(part)
+
+
+def test_decisions_the_newest_first_with_what_came_of_them():
+    heard = Heard().hears(stamped(state()))
+    for number, action in ((1, SafetyDecision.KILL), (2, SafetyDecision.DEPLOY)):
+        one = SafetyDecision(epoch=7, id=number, action=action, rule="free fall", reasons=["fast"])
+        heard.hears(stamped(one))
+    heard.hears(
+        ActionReport(epoch=7, id=2, link="mavlink_parachute", action=4, outcome=1, detail="sent")
+    )
+    part = text_of(sections.decisions(heard.view().decisions))
+    assert part.index("DEPLOY by rule 'free fall'") < part.index("KILL by rule 'free fall'")
+    assert "→ mavlink_parachute SENT: sent" in part
+
+
+def test_diagnostics_tell_what_is_not_ok():
+    tasks = [
+        Task("drone/upf_can: controller 33", "ERROR", "no power", {}, 0.1),
+        Task("drone/upf_can: link", "OK", "open", {}, 0.1),
+    ]
+    assert text_of(sections.diagnostics(tasks)) == (
+        "Diagnostics ERROR upf_can: controller 33 ✖ no power 1 of 2 OK"
+    )
+
+
+def test_before_the_first_word_it_says_what_it_looks_for():
+    assert "No supervisor is received in /drone1 for 12 s. Looked for in: ROS domain 3." in (
+        text_of(sections.nothing("/drone1", "ROS domain 3", 12.0))
+    )
+
+
+def test_no_text_from_the_network_becomes_a_part_of_the_page():
+    rule = RuleState(name=HOSTILE, alive=True, level=1.0, hold=1.0, conditions=[HOSTILE])
+    hostile = state(
+        supervisor=HOSTILE,
+        state_text=HOSTILE,
+        block_reasons=[HOSTILE],
+        device_blocks=[HOSTILE],
+        alarms=[HOSTILE],
+        unusable=[HOSTILE],
+        links=[HOSTILE],
+        decision_id=1,
+        decision_rule=HOSTILE,
+        rules=[rule],
+    )
+    heard = Heard().hears(stamped(hostile))
+    heard.hears(stamped(parachute(link=HOSTILE, device=HOSTILE, packed_date=HOSTILE)))
+    heard.hears(vehicle(source=HOSTILE, faults=[HOSTILE]))
+    heard.hears(stamped(SafetyDecision(epoch=7, id=1, rule=HOSTILE, reasons=[HOSTILE])))
+    picture = heard.view()
+    telem = Telem(layout=HOSTILE)
+    task = Task(f"a/{HOSTILE}: {HOSTILE}", "WARN", HOSTILE, {}, 0.0)
+    page = "".join(
+        (
+            sections.banner(picture),
+            sections.blocks(picture),
+            sections.parachutes(picture.parachutes, {f"{HOSTILE} {HOSTILE}": HOSTILE}, TODAY),
+            sections.links(picture.links),
+            sections.vehicle(picture.vehicle),
+            sections.rules(picture.rules),
+            sections.decisions(picture.decisions),
+            sections.diagnostics([task]),
+            sections.nothing(HOSTILE, HOSTILE, 1.0),
+            rocket(telem, 0.0, [task]),
+        )
+    )
+    assert page.count("&lt;script&gt;") >= 20
+    assert "<script" not in page
+    assert "\"'" not in html.unescape(re.sub(">[^<]*<", "><", page)).replace("&\"'", "")
+
+
+def test_a_rocket_with_its_valves_and_its_memory():
+    telem = Telem(
+        layout="telem57",
+        flight_mode=Telem.COAST,
+        altitude=812.4,
+        predicted_apogee=1500.0,
+        sv_open=1,
+        mav_open=0,
+        ssa_drogue_deployed=1,
+        ssa_main_deployed=-1,
+        airbrake_state=1,
+        airbrake_deployment=0.25,
+        num_satellites=9,
+        blims_dist_to_target=320.0,
+        blims_bearing_deg=45.0,
+    )
+    memory = Task(
+        "rocket/umbilical: memory", "OK", "dump of flash", {"newest progress": "40 %"}, 0.1
+    )
+    assert text_of(rocket(telem, 0.2, [memory])) == (
+        "Rocket flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid valve OPEN "
+        "main valve closed drogue DEPLOYED main parachute not told air brake deployed, 25 % open "
+        "satellites 9 BLiMS target 320 m at 45 ° telemetry telem57, <1 s ago "
+        "memory dump of flash (40 %)"
+    )
+    assert 'class="card old"' in rocket(telem, 3.0, [])
+
+
+def test_what_a_rocket_does_not_tell_is_not_told():
+    nothing = Telem(
+        flight_mode=255,
+        altitude=math.nan,
+        predicted_apogee=math.nan,
+        sv_open=-1,
+        mav_open=-1,
+        ssa_drogue_deployed=-1,
+        ssa_main_deployed=-1,
+        airbrake_state=-1,
+        num_satellites=-1,
+        blims_dist_to_target=math.nan,
+    )
+    part = text_of(rocket(nothing, math.nan, []))
+    assert part.count("not told") == 7
+    assert part.count("not known") == 2
+    assert "never received" in part

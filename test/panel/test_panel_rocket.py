@@ -1,0 +1,91 @@
+"""A rocket's whole flight on its page: cable, flash, key, launch, apogee, drogue, main."""
+
+from __future__ import annotations
+
+import pytest
+from chute_msgs.srv import UmbilicalCommand
+from panel_bench import PATIENCE, hold, log_in, password_file, watch_words, word
+from playwright.sync_api import expect
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from chute_ros.tools.processes import Processes
+from chute_ros.tools.rocket_rig import RocketRig
+
+pytestmark = pytest.mark.xdist_group("panel_rocket")
+
+
+@pytest.fixture
+def rig(namespace, tmp_path):
+    """A rocket whose cable is not plugged in yet, and its ground station."""
+    folder = tmp_path / "rocket"
+    folder.mkdir()
+    processes = Processes(folder)
+    one = RocketRig("", namespace, processes, folder)
+    one.start_ground()
+    yield one
+    processes.end()
+
+
+@pytest.fixture
+def command(namespace):
+    """command(name): as the operator's own tools send it to the flight computer."""
+    executor, node = SingleThreadedExecutor(), Node("operator", namespace=namespace)
+    executor.add_node(node)
+    client = node.create_client(UmbilicalCommand, "umbilical/command")
+
+    def send(name, force=False):
+        assert client.wait_for_service(timeout_sec=PATIENCE / 1000)
+        request = UmbilicalCommand.Request(command=name, force=force, reason="test")
+        future = client.call_async(request)
+        executor.spin_until_future_complete(future, timeout_sec=PATIENCE / 1000)
+        return future.result()
+
+    yield send
+    executor.shutdown()
+    node.destroy_node()
+
+
+def test_a_rocket_from_the_cable_to_the_main(
+    rig, command, namespace, start_panel, open_page, tmp_path
+):
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    page = open_page(f"{panel.address}/fleet")
+    page.locator(f'a[href="/vehicle{namespace}"]').click(timeout=PATIENCE)
+    log_in(page)
+    word(page, "BLOCKED")
+    rocket, answers = page.locator(".part-rocket"), page.locator(".answers").first
+    assert rocket.locator("section").count() == 0
+    # When the cable is plugged in, then the flight computer tells what it knows.
+    rig.plug_cable_in()
+    word(page, "READY")
+    for text in (
+        "flight modeSTARTUP",
+        "main valveclosed",
+        "droguenot deployed",
+        "no dump or wipe",
+    ):
+        expect(rocket).to_contain_text(text, timeout=PATIENCE)
+    # Given a flash that was not wiped, then arming is refused, with the reason.
+    hold(page, "Arm parachutes")
+    expect(answers).to_contain_text("arm: NOT DONE", timeout=PATIENCE)
+    expect(answers).to_contain_text("flash")
+    assert command("wipe_flash").success
+    word(page, "READY")
+    hold(page, "Arm parachutes")
+    expect(answers).to_contain_text("arm: done", timeout=PATIENCE)
+    word(page, "ARMED")
+    # When it is launched, then every stage is seen.
+    watch_words(page)
+    assert command("launch", force=True).confirmed
+    expect(rocket).to_contain_text("main valveOPEN", timeout=PATIENCE)
+    expect(rocket).to_contain_text("flight modeCOAST", timeout=PATIENCE)
+    word(page, "IN FLIGHT")
+    # When it falls past its apogee without a drogue, then the operator releases it on the page.
+    expect(page.locator(".part-vehicle")).to_contain_text("vertical speed-", timeout=PATIENCE)
+    hold(page, "DEPLOY")
+    expect(answers).to_contain_text("deploy: done", timeout=PATIENCE)
+    expect(rocket).to_contain_text("drogueDEPLOYED", timeout=PATIENCE)
+    expect(rocket).to_contain_text("main parachuteDEPLOYED", timeout=PATIENCE)
+    word(page, "DEPLOYED")
+    assert page.evaluate("window.words")[:2] == ["ARMED", "IN FLIGHT"]
