@@ -63,8 +63,9 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory(prefix="chute_ros_sim_") as scratch:
         processes = Processes(Path(scratch))
-        # As a Ctrl-C does.
-        signal.signal(signal.SIGTERM, _end)
+        # As a Ctrl-C does, of which the entry knows that it came.
+        at_ctrl_c = signal.getsignal(signal.SIGINT)
+        signal.signal(signal.SIGTERM, at_ctrl_c if callable(at_ctrl_c) else _end)
         try:
             with (
                 _alone(chosen.namespace),

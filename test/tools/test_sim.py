@@ -67,7 +67,8 @@ def start(bench):  # noqa: F811
     started = []
 
     def begin(*arguments):
-        one = Simulation("--namespace", bench.namespace, *arguments)
+        # The panel has tests of its own.
+        one = Simulation("--no-panel", "--namespace", bench.namespace, *arguments)
         started.append(one)
         bench.until(
             lambda: one.said("Ctrl-C ends it all") or one.process.poll() is not None, "READY", 60.0
@@ -78,6 +79,7 @@ def start(bench):  # noqa: F811
     for one in started:
         if one.process.poll() is None:
             one.end()
+        print("\n".join(one.lines))  # for whoever reads of a failure
 
 
 class Player:
