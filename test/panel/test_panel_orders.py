@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 
 import pytest
 from chute_msgs.msg import SafetyState, SafetySummary
@@ -123,7 +124,8 @@ def test_one_who_logged_out_elsewhere_orders_nothing(
     assert page.locator(".hold:visible").count() == 0
     page.evaluate(
         """() => document.querySelectorAll("button.hold").forEach(
-            (one) => one.dispatchEvent(new CustomEvent("held")))"""
+            (one) => one.dispatchEvent(new CustomEvent("held",
+                {detail: Number(document.querySelector(".pulse").textContent)})))"""
     )
     expect(page.locator(".answers")).to_contain_text("NOT SENT: log in again", timeout=PATIENCE)
     assert vehicles.resets == []
@@ -136,6 +138,31 @@ def test_one_who_logged_out_elsewhere_orders_nothing(
     until(fly, lambda: "as at the start" in page.locator(".answers").inner_text(), page)
     assert len(vehicles.resets) == 1
     assert "by='Ben at 127.0.0.1 (panel)'" in panel.log()
+
+
+def test_an_order_that_waited_for_a_cut_connection_is_not_obeyed(
+    fly, namespace, start_panel, open_page, tmp_path
+):
+    vehicles = fly({"drone1": Stage.LANDED})
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    page = open_page(f"{panel.address}/fleet")
+    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
+    until(fly, link.count, page)
+    link.click()
+    log_in(page)
+    until(fly, page.get_by_text("more orders").is_visible, page)
+    page.get_by_text("more orders").click()
+    # Given a panel that hears its pages no more,
+    panel.processes.send_signal("panel", signal.SIGSTOP)
+    # when somebody holds a button before the page has noticed, and it comes back later,
+    hold(page, "Reset")
+    expect(page.locator(".lost-note")).to_be_visible(timeout=PATIENCE)
+    page.wait_for_timeout(2000)
+    panel.processes.send_signal("panel", signal.SIGCONT)
+    # then nothing is sent.
+    told = "Reset: NOT SENT: the page was not connected; hold it again"
+    until(fly, lambda: told in page.locator(".answers").inner_text(), page)
+    assert vehicles.resets == []
 
 
 def test_without_permission_there_is_no_button_at_all(fly, namespace, start_panel, open_page):

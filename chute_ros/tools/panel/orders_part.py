@@ -16,19 +16,24 @@ from chute_ros.tools.chute import order as orders
 from chute_ros.tools.chute.options import ANSWER
 from chute_ros.tools.chute.order import Order, answer_text, not_answered
 from chute_ros.tools.panel.access import Person
+from chute_ros.tools.panel.pulse import Pulse
 
 if TYPE_CHECKING:
     from chute_ros.tools.panel.node import PanelNode
 
 _MOST_ANSWERS = 6
+#: Who holds a button looks at a page that is no older, s.
+_SEEN_WITHIN = 3.0
 _LONGEST_REASON = 200
 
 
 class OrdersPart:
-    """Empty where orders are not allowed. token: of the session in which the page was made."""
+    """Empty where orders are not allowed. token: of the session in which the page was made;
+    pulse: of the page."""
 
-    def __init__(self, node: PanelNode, namespace: str, token: str) -> None:
+    def __init__(self, node: PanelNode, namespace: str, token: str, pulse: Pulse) -> None:
         self._node, self._namespace, self._token = node, namespace, token
+        self._pulse = pulse
         self._text = ""
         if not node.settings.allow_commands:
             return
@@ -68,14 +73,18 @@ class OrdersPart:
         self._all.set_visibility(person is not None)
 
     def _button(self, text: str, tone: str, make: Callable[[str], Order]) -> None:
-        async def held() -> None:
+        async def held(event: Any) -> None:
+            # Given before a connection was cut, it would be obeyed when nobody expects it.
+            if self._pulse.age(event.args) > _SEEN_WITHIN:
+                self._tell(f"{text}: NOT SENT: the page was not connected; hold it again", "bad")
+                return
             await self._give(make)
 
         button = ui.element("button").classes(f"hold tone-{tone}")
         with button:
             ui.html(f"<span>{text}</span><i></i>", sanitize=False)
         # Sent by panel.js once it was held for long enough.
-        button.on("held", held, args=[])
+        button.on("held", held, js_handler="(e) => emit(e.detail)")
 
     def _take_reason(self, event: Any) -> None:
         self._text = str(event.args)[:_LONGEST_REASON]

@@ -3,6 +3,8 @@
 (() => {
   const HOLD = 1500, LOST = 3000, SLIDE = 40;  // ms, ms, CSS pixels
   let held = null, timer = null, from = null;
+  let beat = "", at = performance.now();
+  const pulse = () => document.querySelector(".pulse");
   const begin = (button) => {
     if (!button || held) return;
     held = button;
@@ -10,7 +12,8 @@
     timer = setTimeout(() => {
       const done = held;
       end();
-      done.dispatchEvent(new CustomEvent("held"));
+      // With the newest pulse: what arrives late, after a connection that was cut, is not obeyed.
+      done.dispatchEvent(new CustomEvent("held", {detail: Number(pulse()?.textContent)}));
     }, HOLD);
   };
   const end = () => {
@@ -42,11 +45,9 @@
   document.addEventListener("visibilitychange", end);
   window.addEventListener("blur", end);
 
-  let beat = "", at = performance.now();
   setInterval(() => {
-    const pulse = document.querySelector(".pulse");
-    if (!pulse) return;
-    if (pulse.textContent !== beat) { beat = pulse.textContent; at = performance.now(); }
+    if (!pulse()) return;
+    if (pulse().textContent !== beat) { beat = pulse().textContent; at = performance.now(); }
     const lost = performance.now() - at > LOST;
     document.body.classList.toggle("lost", lost);
     if (lost) end();

@@ -44,7 +44,7 @@ def register(node: PanelNode) -> None:
         _head(node, namespace, request)
         shown: dict[str, Any] = {"banner": _part("banner")}
         # Before all that scrolls: whoever must act must not search.
-        orders = OrdersPart(node, namespace, token_of(request))
+        orders = OrdersPart(node, namespace, token_of(request), pulse)
         with ui.element("main").classes("columns"):
             with ui.element("div"):
                 shown |= {one: _part(one) for one in _LEFT}
