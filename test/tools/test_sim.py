@@ -100,6 +100,9 @@ class Player:
         (rule,) = [one for one in self.safety[-1].rules if one.name == name]
         return rule
 
+    def blocked_by(self, reason):
+        return any(one.startswith(reason) for one in self.safety[-1].block_reasons)
+
     def await_state(self, name):
         state = getattr(SafetyState, name)
         self.bench.until(
@@ -133,6 +136,9 @@ class Player:
             answer = self.call(name)
             assert answer.success, answer.message
         self.await_state(state)
+        if name == "cut_parachute_link":
+            # Right after a reset the supervisor blocks flight for a moment for another reason.
+            self.bench.until(lambda: self.blocked_by("mavlink_parachute: its device is "), name)
         if name == "take_off":
             self.bench.until(lambda: self.vehicle[-1].height > HEIGHT, "it is up", 40.0)
 
