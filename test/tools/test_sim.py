@@ -100,11 +100,27 @@ class Player:
         (rule,) = [one for one in self.safety[-1].rules if one.name == name]
         return rule
 
+    def blocked_by(self, reason):
+        return any(one.startswith(reason) for one in self.safety[-1].block_reasons)
+
     def await_state(self, name):
         state = getattr(SafetyState, name)
         self.bench.until(
             lambda: self.safety and self.safety[-1].state == state, f"{name} is reached", 30.0
         )
+
+    def leave_ground(self, action):
+        """On a busy machine a node may be silent for so long that the supervisor blocks flight
+        and disarms the vehicle again: a person then does it once more."""
+
+        def flies():
+            state = self.safety[-1].state if self.safety else SafetyState.STARTUP
+            if state == SafetyState.READY and self.vehicle[-1].armed != VehicleState.ARMED:
+                self.call(action)
+            return state == SafetyState.IN_FLIGHT
+
+        self.bench.until(lambda: self.vehicle, "the vehicle is received")
+        self.bench.until(flies, f"it flies after {action}", 40.0)
 
     def do(self, name, state):
         """One row of the tutorial."""
@@ -120,6 +136,9 @@ class Player:
             answer = self.call(name)
             assert answer.success, answer.message
         self.await_state(state)
+        if name == "cut_parachute_link":
+            # Right after a reset the supervisor blocks flight for a moment for another reason.
+            self.bench.until(lambda: self.blocked_by("mavlink_parachute: its device is "), name)
         if name == "take_off":
             self.bench.until(lambda: self.vehicle[-1].height > HEIGHT, "it is up", 40.0)
 
@@ -214,8 +233,7 @@ def test_each_vehicle_is_started_flies_and_ends_on_a_termination_without_a_trace
     assert simulation.said(f"    {action} ")
     assert simulation.said(f"--namespace {bench.namespace} --do {action}")
     player = Player(bench)
-    assert player.call(action).success
-    player.await_state("IN_FLIGHT")
+    player.leave_ground(action)
     children = simulation.children()
     (folder,) = {
         one.decode().removeprefix("folder:=")
