@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from panel_bench import LAPTOP, Panel, browser_path
+from panel_vehicles import vehicles_in
 from playwright.sync_api import sync_playwright
 
 
@@ -47,3 +48,8 @@ def start_panel(tmp_path, await_until, ros):
     yield make
     for one in panels:
         one.close()
+
+
+@pytest.fixture
+def fly(namespace):
+    yield from vehicles_in(namespace)

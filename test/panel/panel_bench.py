@@ -98,13 +98,28 @@ def watch_words(page):
     page.evaluate(_WORDS)
 
 
-def hold(page, name, seconds=1.8):
-    """Press a button for so long, as a finger would."""
-    # Once it stays where it is.
-    page.get_by_role("button", name=name, exact=True).hover(timeout=PATIENCE)
-    page.mouse.down()
-    page.wait_for_timeout(seconds * 1000)
+def hold(page, name, seconds=None):
+    """Press a button as a finger would, for so long; None: until it is counted as held."""
+    press(page, name)
+    if seconds is None:
+        page.wait_for_function("!document.querySelector('.holding')", timeout=PATIENCE)
+    else:
+        page.wait_for_timeout(seconds * 1000)
     page.mouse.up()
+
+
+def press(page, name):
+    """A finger on a button, which counts from now on: a page that was opened just now does not
+    count it before its first beats."""
+    for _ in range(20):
+        # Once it stays where it is.
+        page.get_by_role("button", name=name, exact=True).hover(timeout=PATIENCE)
+        page.mouse.down()
+        if page.locator(".holding").count():
+            return
+        page.mouse.up()
+        page.wait_for_timeout(250)
+    raise AssertionError(f"{name} is not counted as held")
 
 
 def picture(page, name):

@@ -39,26 +39,26 @@ def refused(access, password, address, now):
 
 def test_a_session_is_of_who_logged_in_until_it_ends(access):
     token = access.log_in("  Anna  Berg ", RIGHT, PHONE, 10.0)
-    person = access.person(token, 11.0)
+    person = access.person(token, PHONE, 11.0)
     assert (person.name, person.address) == ("Anna Berg", PHONE)
     assert person.text == "Anna Berg at 10.0.0.5 (panel)"
-    assert access.person(token, 10.0 + SESSION_LASTS - 0.1) is person
-    assert access.person(token, 10.0 + SESSION_LASTS) is None
+    assert access.person(token, PHONE, 10.0 + SESSION_LASTS - 0.1) is person
+    assert access.person(token, PHONE, 10.0 + SESSION_LASTS) is None
     # Ended once, it does not come back.
-    assert access.person(token, 11.0) is None
+    assert access.person(token, PHONE, 11.0) is None
 
 
 def test_another_token_is_nobodys(access):
     access.log_in("Anna", RIGHT, PHONE, 0.0)
-    assert [access.person(one, 1.0) for one in (None, "", "token 2")] == [None] * 3
+    assert [access.person(one, PHONE, 1.0) for one in (None, "", "token 2")] == [None] * 3
 
 
 def test_logging_out_ends_one_session_alone(access):
     anna, ben = (access.log_in(name, RIGHT, PHONE, 0.0) for name in ("Anna", "Ben"))
     access.log_out(anna)
     access.log_out("what is no token")
-    assert access.person(anna, 1.0) is None
-    assert access.person(ben, 1.0).name == "Ben"
+    assert access.person(anna, PHONE, 1.0) is None
+    assert access.person(ben, PHONE, 1.0).name == "Ben"
 
 
 def test_without_a_password_nobody_can_log_in():
@@ -77,7 +77,7 @@ def test_a_name_is_needed_for_the_record(access, name):
 def test_no_other_password_is_right(password):
     access = Access(RIGHT, lambda: "token")
     assert refused(access, password, PHONE, 0.0) == "wrong password"
-    assert access.person("token", 0.0) is None
+    assert access.person("token", PHONE, 0.0) is None
 
 
 def test_guessing_takes_longer_each_time_also_for_the_right_one(access):
@@ -94,7 +94,7 @@ def test_guessing_takes_longer_each_time_also_for_the_right_one(access):
     # Another one is not kept waiting, and the right one is let in once the wait is over.
     access.log_in("Ben", RIGHT, LAPTOP, now)
     token = access.log_in("Anna", RIGHT, PHONE, now + 8 * FIRST_WAIT)
-    assert access.person(token, now + 8 * FIRST_WAIT)
+    assert access.person(token, PHONE, now + 8 * FIRST_WAIT)
     # And what was wrong before is forgiven.
     assert refused(access, "guess", PHONE, now + 100.0) == "wrong password"
 
@@ -105,6 +105,22 @@ def test_the_longest_wait_is_bounded(access):
         refused(access, "guess", PHONE, now)
         now += LONGEST_WAIT
     assert access.log_in("Anna", RIGHT, PHONE, now)
+
+
+def test_a_session_is_of_the_network_in_which_it_began(access):
+    token = access.log_in("Anna", RIGHT, PHONE, 0.0)
+    assert access.person(token, LAPTOP, 1.0) is None
+    assert access.person(token, PHONE, 1.0).name == "Anna"
+    far = access.log_in("Ben", RIGHT, "2001:db8::1", 0.0)
+    assert access.person(far, "2001:db8::2", 1.0).name == "Ben"
+
+
+def test_strangers_who_guess_shut_nobody_out_who_has_logged_in_before(access):
+    access.log_in("Anna", RIGHT, PHONE, 0.0)
+    for number in range(MOST_TRIES):
+        refused(access, "guess", f"10.0.1.{number}", 1.0)
+    assert refused(access, RIGHT, LAPTOP, 2.0).startswith("too many wrong passwords")
+    assert access.log_in("Anna", RIGHT, PHONE, 2.0)
 
 
 def test_many_addresses_guess_no_faster(access):
@@ -131,5 +147,5 @@ def test_what_is_remembered_is_bounded(access):
         now += TRIES_WITHIN
         refused(access, "guess", f"10.{number // 65536}.{number // 256 % 256}.{number % 256}", now)
     tokens = [access.log_in("Anna", RIGHT, LAPTOP, now := now + 60.0) for _ in range(60)]
-    alive = [access.person(one, now) is not None for one in tokens]
+    alive = [access.person(one, LAPTOP, now) is not None for one in tokens]
     assert alive == [False] * (60 - MOST_SESSIONS) + [True] * MOST_SESSIONS

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.tools.panel.border import Border, is_ours, own_names, why_not
+from chute_ros.tools.panel.border import MOST_PAGES, Border, is_ours, own_names, why_not
 
 NAMES = own_names(["Vehicle.example", ""])
 
 
 def scope(kind="http", method="GET", **headers):
-    sent = [(name.encode(), value.encode()) for name, value in headers.items()]
-    return {"type": kind, "method": method, "headers": sent}
+    sent = [(name.replace("_", "-").encode(), value.encode()) for name, value in headers.items()]
+    return {"type": kind, "method": method, "path": "/fleet", "headers": sent}
 
 
 @pytest.mark.parametrize(
@@ -55,11 +55,33 @@ def test_a_page_of_somebody_else_is_refused(kind, method):
     assert why_not(ours, NAMES) == ""
 
 
+def test_a_picture_on_another_page_opens_none_here_and_a_link_does():
+    other = {"host": "127.0.0.1:8080", "sec_fetch_site": "cross-site"}
+    assert why_not(scope(**other, sec_fetch_mode="no-cors"), NAMES)
+    assert why_not(scope(**other, sec_fetch_mode="navigate"), NAMES) == ""
+
+
+@given(st.text())
+def test_whatever_an_origin_is_it_raises_nothing(origin):
+    sent = {"type": "http", "method": "GET", "path": "/", "headers": []}
+    sent["headers"] = [(b"host", b"localhost"), (b"origin", origin.encode("latin-1", "replace"))]
+    assert why_not(sent, NAMES)
+
+
+def test_more_pages_than_memory_has_room_for_are_refused_and_the_login_is_not():
+    (start, _), (login, _) = (
+        passed(scope(host="localhost"), MOST_PAGES),
+        passed({**scope(host="localhost"), "path": "/login"}, MOST_PAGES),
+    )
+    assert (start["status"], login["status"]) == (503, 200)
+    assert passed(scope(host="localhost"), MOST_PAGES - 1)[0]["status"] == 200
+
+
 def test_a_page_that_is_just_read_needs_no_origin():
     assert why_not(scope(host="localhost"), NAMES) == ""
 
 
-def passed(what):
+def passed(what, pages=0):
     """What an application behind the border sends for this scope."""
     sent = []
 
@@ -75,7 +97,7 @@ def passed(what):
 
     # Nothing in it waits.
     with pytest.raises(StopIteration):
-        Border(application, NAMES)(what, receive, send).send(None)
+        Border(application, NAMES, lambda: pages)(what, receive, send).send(None)
     return sent
 
 

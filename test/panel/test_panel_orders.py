@@ -6,85 +6,13 @@ import re
 import signal
 
 import pytest
-from chute_msgs.msg import SafetyState, SafetySummary
-from heard_vehicle import state
 from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, picture, word
+from panel_vehicles import open_vehicle, ready_to_reset, until
 from playwright.sync_api import expect
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from std_srvs.srv import Trigger
 
-from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
 
 pytestmark = pytest.mark.xdist_group("panel_orders")
-
-
-class Vehicles(Node):
-    """Supervisors of many vehicles, as far as a page sees them."""
-
-    def __init__(self, base, stages):
-        super().__init__("vehicles", namespace=base)
-        self.resets = []
-        self._told = []
-        for name, stage in stages.items():
-            self._add(name, stage)
-        self.create_timer(0.5, self._tell)
-
-    def _add(self, name, stage):
-        whole = state(state=int(stage), state_text=stage.name)
-        short = SafetySummary(
-            supervisor="safety_supervisor",
-            state=int(stage),
-            state_name=stage.name,
-            text=stage.name,
-            links_ok=1,
-            links=1,
-        )
-        for kind, topic, message in (
-            (SafetyState, "safety/state", whole),
-            (SafetySummary, "safety/summary", short),
-        ):
-            publisher = self.create_publisher(kind, f"{name}/{topic}", qos.LATCHED)
-            self._told.append((publisher, message))
-        self.create_service(Trigger, f"{name}/safety/reset", self._reset)
-
-    def _tell(self):
-        for publisher, message in self._told:
-            message.header.stamp = self.get_clock().now().to_msg()
-            publisher.publish(message)
-
-    def _reset(self, request, response):
-        self.resets.append(request)
-        response.success, response.message = True, "as at the start"
-        return response
-
-
-@pytest.fixture
-def fly(namespace):
-    """fly(stages): vehicles in these states, which live while the page is waited for."""
-    executor, nodes = SingleThreadedExecutor(), []
-
-    def make(stages):
-        nodes.append(Vehicles(namespace, stages))
-        executor.add_node(nodes[-1])
-        return nodes[-1]
-
-    make.spin = lambda: executor.spin_once(timeout_sec=0.01)
-    yield make
-    executor.shutdown()
-    for one in nodes:
-        one.destroy_node()
-
-
-def until(fly, condition, page):
-    """Both live until this holds."""
-    for _ in range(3000):
-        fly.spin()
-        page.wait_for_timeout(10)
-        if condition():
-            return
-    pytest.fail("not in time")
 
 
 def test_twenty_vehicles_on_a_phone_the_worst_first(fly, namespace, start_panel, open_page):
@@ -108,13 +36,7 @@ def test_one_who_logged_out_elsewhere_orders_nothing(
     vehicles = fly({"drone1": Stage.LANDED})
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     address = f"{panel.address}/vehicle{namespace}/drone1"
-    page = open_page(f"{panel.address}/fleet")
-    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
-    until(fly, link.count, page)
-    page.goto(address)
-    log_in(page)
-    until(fly, page.get_by_text("more orders").is_visible, page)
-    page.get_by_text("more orders").click()
+    page = ready_to_reset(fly, panel, open_page, f"{namespace}/drone1")
     # Given a session that was ended on another page of the same browser,
     other = page.context.new_page()
     other.goto(address)
@@ -145,34 +67,25 @@ def test_an_order_that_waited_for_a_cut_connection_is_not_obeyed(
 ):
     vehicles = fly({"drone1": Stage.LANDED})
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
-    page = open_page(f"{panel.address}/fleet")
-    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
-    until(fly, link.count, page)
-    link.click()
-    log_in(page)
-    until(fly, page.get_by_text("more orders").is_visible, page)
-    page.get_by_text("more orders").click()
+    page = ready_to_reset(fly, panel, open_page, f"{namespace}/drone1")
     # Given a panel that hears its pages no more,
     panel.processes.send_signal("panel", signal.SIGSTOP)
     # when somebody holds a button before the page has noticed, and it comes back later,
-    hold(page, "Reset")
+    hold(page, "Reset", 2.0)
     expect(page.locator(".lost-note")).to_be_visible(timeout=PATIENCE)
-    page.wait_for_timeout(2000)
     panel.processes.send_signal("panel", signal.SIGCONT)
-    # then nothing is sent.
-    told = "Reset: NOT SENT: the page was not connected; hold it again"
-    until(fly, lambda: told in page.locator(".answers").inner_text(), page)
+    # then nothing is sent, nor was.
+    expect(page.locator(".lost-note")).to_be_hidden(timeout=PATIENCE)
+    beat = page.locator(".pulse").text_content()
+    until(fly, lambda: page.locator(".pulse").text_content() != beat, page)
     assert vehicles.resets == []
+    assert "safety/reset" not in panel.log()
 
 
 def test_without_permission_there_is_no_button_at_all(fly, namespace, start_panel, open_page):
     fly({"drone1": Stage.READY})
     panel = start_panel()
-    page = open_page(f"{panel.address}/fleet")
-    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
-    until(fly, link.count, page)
-    link.click()
-    until(fly, page.locator(".part-banner .word").count, page)
+    page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
     assert page.locator(".hold").count() == 0
     assert page.get_by_text("log in").count() == 0
 
@@ -208,10 +121,6 @@ def test_a_vehicle_that_is_not_there_is_told(start_panel, open_page, ros):
 def test_it_is_said_in_which_state_it_is(fly, namespace, start_panel, open_page):
     fly({"drone1": Stage.FAULT})
     panel = start_panel()
-    page = open_page(f"{panel.address}/fleet")
-    link = page.locator(f'a[href="/vehicle{namespace}/drone1"]')
-    until(fly, link.count, page)
-    link.click()
-    until(fly, page.locator(".part-banner .word").count, page)
+    page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
     word(page, "FAULT")
-    assert page.locator(".part-banner .banner").get_attribute("role") == "status"
+    assert page.locator(".part-banner").get_attribute("role") == "status"

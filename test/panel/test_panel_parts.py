@@ -124,7 +124,7 @@ def test_rules_are_bars_that_fill():
         RuleState(name="on the ground alone", action=SafetyDecision.KILL, hold=0.25),
         RuleState(name="battery", action=0, alive=True, fulfilled=True, denied="not armed"),
     ]
-    part = sections.rules(shown(rules=rules).rules)
+    part = sections.rules(shown(rules=rules).rules, False)
     assert re.findall(r'aria-label="(.*?)".*?aria-valuenow="(\d+)"', part) == [
         ("free fall", "50"),
         ("battery", "100"),
@@ -156,6 +156,23 @@ def test_diagnostics_tell_what_is_not_ok():
     assert text_of(sections.diagnostics(tasks)) == (
         "Diagnostics ERROR upf_can: controller 33 ✖ no power 1 of 2 OK"
     )
+
+
+def test_what_a_silent_supervisor_said_is_grey_everywhere():
+    heard = Heard().hears(stamped(state(rules=[RuleState(name="free fall", alive=True)])))
+    picture = heard.view(3.0)
+    for part in (sections.links(picture.links, True), sections.rules(picture.rules, True)):
+        assert 'class="card old"' in part
+        assert "is-good" not in part
+    tasks = [Task("drone/safety_supervisor: decisions", "OK", "READY", {}, 6.0)]
+    assert text_of(sections.diagnostics(tasks)) == (
+        "Diagnostics safety_supervisor: decisions ○ not received now; OLD: 6 s ago 0 of 1 OK"
+    )
+
+
+def test_a_mode_without_a_name_is_not_explained():
+    part = text_of(sections.banner(shown(mode=77)))
+    assert "number 77: what it does is not known" in part
 
 
 def test_before_the_first_word_it_says_what_it_looks_for():
@@ -190,9 +207,9 @@ def test_no_text_from_the_network_becomes_a_part_of_the_page():
             sections.banner(picture),
             sections.blocks(picture),
             sections.parachutes(picture.parachutes, {f"{HOSTILE} {HOSTILE}": HOSTILE}, TODAY),
-            sections.links(picture.links),
+            sections.links(picture.links, False),
             sections.vehicle(picture.vehicle),
-            sections.rules(picture.rules),
+            sections.rules(picture.rules, False),
             sections.decisions(picture.decisions),
             sections.diagnostics([task]),
             sections.nothing(HOSTILE, HOSTILE, 1.0),
@@ -227,7 +244,7 @@ def test_a_rocket_with_its_valves_and_its_memory():
         "Rocket flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid valve OPEN "
         "main valve closed drogue DEPLOYED main parachute not told air brake deployed, 25 % open "
         "satellites 9 BLiMS target 320 m at 45 ° telemetry telem57, <1 s ago "
-        "memory dump of flash (40 %)"
+        "memory dump of flash (40 %), <1 s ago"
     )
     assert 'class="card old"' in rocket(telem, 3.0, [])
 

@@ -54,7 +54,10 @@ class Access:
         self._sessions: OrderedDict[str, Person] = OrderedDict()
         #: Address -> (mistakes, refused until).
         self._mistakes: OrderedDict[str, tuple[int, float]] = OrderedDict()
+        #: Of wrong passwords, of all addresses.
         self._tries: deque[float] = deque(maxlen=MOST_TRIES)
+        #: Networks from which somebody has logged in: strangers who guess do not shut them out.
+        self._known: OrderedDict[str, None] = OrderedDict()
 
     @property
     def is_possible(self) -> bool:
@@ -72,21 +75,27 @@ class Access:
             )
         key = _network_of(address)
         self._be_patient(key, now)
-        self._tries.append(now)
         given = password.encode(errors="replace")[:LONGEST_PASSWORD]
         if not hmac.compare_digest(given, self._password):
+            self._tries.append(now)
             self._remember_mistake(key, now)
             raise AccessRefusedError("wrong password")
         self._mistakes.pop(key, None)
+        self._known[key] = None
+        while len(self._known) > MOST_ADDRESSES:
+            self._known.popitem(last=False)
         token = self._make_token()
         self._sessions[token] = Person(name, address, now + SESSION_LASTS)
         while len(self._sessions) > MOST_SESSIONS:
             self._sessions.popitem(last=False)
         return token
 
-    def person(self, token: str | None, now: float) -> Person | None:
-        """Whose session this is; None: nobody's, or it has ended."""
+    def person(self, token: str | None, address: str, now: float) -> Person | None:
+        """Whose session this is; None: nobody's, or it has ended. It is of the network in which it
+        began: a cookie that went astray is of no use elsewhere."""
         person = self._sessions.get(token or "")
+        if person is not None and _network_of(person.address) != _network_of(address):
+            return None
         if person is not None and now >= person.until:
             del self._sessions[token or ""]
             return None
@@ -98,7 +107,8 @@ class Access:
 
     def _be_patient(self, key: str, now: float) -> None:
         _, until = self._mistakes.get(key, (0, now))
-        if len(self._tries) == MOST_TRIES and now < self._tries[0] + TRIES_WITHIN:
+        many = len(self._tries) == MOST_TRIES and now < self._tries[0] + TRIES_WITHIN
+        if many and key not in self._known:
             until = max(until, self._tries[0] + TRIES_WITHIN)
         if now < until:
             # Also with the right password: the answer must tell nothing of it.

@@ -30,7 +30,8 @@ class BenchPart:
 
     def refresh(self) -> None:
         """Look what is offered."""
-        offered = [name for name in _EFFECTS if name in self._node.bench(self._namespace)]
+        there = self._node.bench(self._namespace)
+        offered = [name for name in _EFFECTS if name in there]
         if offered == self._offered:
             return
         self._offered = offered

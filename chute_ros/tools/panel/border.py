@@ -18,8 +18,7 @@ Receive = Callable[[], Awaitable[Any]]
 Send = Callable[[Any], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-_READS = ("GET", "HEAD", "OPTIONS")
-#: No other page may frame it, to have its buttons pressed; it is kept by nobody.
+#: No other page may frame it, to have its buttons pressed.
 _HEADERS = (
     (b"x-frame-options", b"DENY"),
     (b"content-security-policy", b"frame-ancestors 'none'; form-action 'self'; base-uri 'self'"),
@@ -54,20 +53,34 @@ def why_not(scope: Scope, names: frozenset[str]) -> str:
     host = headers.get(b"host", "")
     if not is_ours(host, names):
         return "not a name of this panel: see its parameter host_names"
-    if scope["type"] == "http" and scope["method"] in _READS and b"origin" not in headers:
-        return ""
     # Browsers send the origin with all that is no plain reading; what is no browser need not.
     origin = headers.get(b"origin")
-    if origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+    if origin is not None and _place_of(origin) != host.lower():
+        return "asked for by a page of somebody else"
+    # A picture on another page would open pages here; a link on it is followed by a person.
+    follows = headers.get(b"sec-fetch-mode") == "navigate"
+    if headers.get(b"sec-fetch-site") == "cross-site" and not follows:
         return "asked for by a page of somebody else"
     return ""
 
 
-class Border:
-    """An ASGI application in front of another. names: own_names."""
+def _place_of(origin: str) -> str:
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return ""
 
-    def __init__(self, app: App, names: frozenset[str]) -> None:
-        self._app, self._names = app, names
+
+#: Each takes memory, also one that nobody looks at; the login is always there.
+MOST_PAGES = 60
+_ASSETS = ("/_nicegui", "/favicon", "/login", "/logout")
+
+
+class Border:
+    """An ASGI application in front of another. names: own_names; pages: how many are open."""
+
+    def __init__(self, app: App, names: frozenset[str], pages: Callable[[], int]) -> None:
+        self._app, self._names, self._pages = app, names, pages
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """One connection."""
@@ -75,22 +88,28 @@ class Border:
             await self._app(scope, receive, send)
             return
         if why := why_not(scope, self._names):
-            await _refuse(scope, receive, send, why)
+            await _refuse(scope, receive, send, 403, why)
+            return
+        is_page = scope["type"] == "http" and not scope["path"].startswith(_ASSETS)
+        if is_page and scope["method"] == "GET" and self._pages() >= MOST_PAGES:
+            why = f"{MOST_PAGES} pages are open, or were a moment ago: close some, or wait"
+            await _refuse(scope, receive, send, 503, why)
             return
 
         async def sending(message: Any) -> None:
             if message["type"] == "http.response.start":
-                message["headers"] = [*message.get("headers", ()), *_HEADERS]
+                kept = ((b"cache-control", b"no-store"),) if is_page else ()
+                message["headers"] = [*message.get("headers", ()), *_HEADERS, *kept]
             await send(message)
 
         await self._app(scope, receive, sending)
 
 
-async def _refuse(scope: Scope, receive: Receive, send: Send, why: str) -> None:
+async def _refuse(scope: Scope, receive: Receive, send: Send, status: int, why: str) -> None:
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": 1008})
         return
     head = [(b"content-type", b"text/plain; charset=utf-8"), *_HEADERS]
-    await send({"type": "http.response.start", "status": 403, "headers": head})
+    await send({"type": "http.response.start", "status": status, "headers": head})
     await send({"type": "http.response.body", "body": f"refused: {why}\n".encode()})

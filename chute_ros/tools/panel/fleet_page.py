@@ -44,11 +44,12 @@ def _show(node: PanelNode, goes_on: bool) -> None:
 
     def refresh() -> None:
         nonlocal alone
-        pulse.beat()
         those = node.fleet()
         cards.set_content(fleet(those, time.monotonic()))
         alone = alone + 1 if len(those) == 1 else 0
         if goes_on and alone == _ALONE:
             ui.navigate.to(link_to(those[0][0]))
+        # Last: what fails before it must not seem to be of now.
+        pulse.beat()
 
     ui.timer(_EVERY, refresh)

@@ -37,12 +37,22 @@ their records.</p>{told}<form method="post" action="/login?next={next}">
 
 def person_of(node: PanelNode, request: Request) -> Person | None:
     """Who asks; None: nobody who has logged in."""
-    return node.access.person(request.cookies.get(COOKIE), time.monotonic())
+    return node.access.person(token_of(request), address_of(request), time.monotonic())
 
 
 def token_of(request: Request) -> str:
     """The session's; empty: none."""
-    return request.cookies.get(COOKIE, "")
+    return request.cookies.get(cookie_name(request.url.scheme == "https"), "")
+
+
+def address_of(request: Request) -> str:
+    """Whence it is asked."""
+    return request.client.host if request.client else "nowhere"
+
+
+def cookie_name(secure: bool) -> str:
+    """Browsers let nobody but this page set one of that prefix."""
+    return f"__Host-{COOKIE}" if secure else COOKIE
 
 
 def register(node: PanelNode, secure: bool) -> None:
@@ -56,16 +66,17 @@ def register(node: PanelNode, secure: bool) -> None:
     async def log_in(request: Request) -> Any:
         fields = await _fields(request)
         name, password = plain(fields.get("name", "")), fields.get("password", "")
-        address = request.client.host if request.client else "nowhere"
+        address = address_of(request)
         try:
             token = node.access.log_in(name, password, address, time.monotonic())
         except AccessRefusedError as error:
             node.get_logger().warning(f"login of {name[:40]!r} from {address}: {error}")
             return HTMLResponse(_form(_next(request), str(error), name), status_code=403)
+        node.access.log_out(token_of(request))
         node.get_logger().info(f"{name[:40]!r} logged in from {address}")
         answer = RedirectResponse(_next(request), status_code=303)
         answer.set_cookie(
-            COOKIE,
+            cookie_name(secure),
             token,
             max_age=int(SESSION_LASTS),
             secure=secure,
@@ -76,9 +87,9 @@ def register(node: PanelNode, secure: bool) -> None:
 
     @app.post("/logout")
     async def log_out(request: Request) -> Any:
-        node.access.log_out(request.cookies.get(COOKIE))
+        node.access.log_out(token_of(request))
         answer = RedirectResponse(_next(request), status_code=303)
-        answer.delete_cookie(COOKIE)
+        answer.delete_cookie(cookie_name(secure), secure=secure)
         return answer
 
 

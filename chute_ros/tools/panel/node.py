@@ -12,7 +12,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from functools import partial
 from threading import Lock
 from typing import Any
@@ -41,6 +40,8 @@ from chute_ros.tools.panel.watched import Watched
 _AROUND = surroundings(os.environ, installed_middlewares()).text()
 #: Vehicles that are followed at most; a stranger on the network may invent many.
 MOST_VEHICLES = 50
+#: An order that waited longer in this process is not sent, s.
+_SENT_WITHIN = 1.0
 #: What a simulated vehicle offers to be done to it.
 BENCH = "sim/"
 
@@ -84,6 +85,10 @@ class PanelNode(Node):
         """The namespaces in which a supervisor publishes its state."""
         return namespaces(self)[:MOST_VEHICLES]
 
+    def is_there(self, namespace: str) -> bool:
+        """A supervisor publishes its state in this namespace."""
+        return bool(self.count_publishers(f"{namespace.rstrip('/')}/safety/state"))
+
     def look(self, namespace: str) -> Watched:
         """From now on somebody looks at this vehicle, until leave."""
         with self._lock:
@@ -120,9 +125,17 @@ class PanelNode(Node):
 
     def fleet(self) -> list[tuple[str, Heard | None]]:
         """Each vehicle with its newest summary. Somebody looks at all."""
-        for namespace in self.vehicles():
-            with self._lock:
-                if self._fleet_viewers and namespace not in self._summaries:
+        there = self.vehicles()
+        with self._lock:
+            # One that was received stays on the page when it is gone: that is what must be seen.
+            for namespace, (subscription, heard) in list(self._summaries.items()):
+                if heard is None and namespace not in there:
+                    del self._summaries[namespace]
+                    if subscription is not None:
+                        self._want(partial(self.destroy_subscription, subscription))
+            for namespace in there:
+                room = len(self._summaries) < MOST_VEHICLES
+                if self._fleet_viewers and room and namespace not in self._summaries:
                     self._summaries[namespace] = (None, None)
                     self._want(partial(self._follow, namespace))
         with self._lock:
@@ -146,7 +159,8 @@ class PanelNode(Node):
         self, namespace: str, service: str, kind: Any, fields: Any, person: Person | None
     ) -> Future[Answer]:
         future: Future[Answer] = Future()
-        self._want(lambda: self._call(namespace, service, kind, fields, person, future))
+        wanted = time.monotonic()
+        self._want(lambda: self._call(namespace, service, kind, fields, person, future, wanted))
         return future
 
     def _want(self, function: Callable[[], None]) -> None:
@@ -157,7 +171,15 @@ class PanelNode(Node):
 
     def _do_wanted(self) -> None:
         while self._wanted:
-            self._wanted.popleft()()
+            self.guarded(self._wanted.popleft())
+
+    def guarded(self, function: Callable[[], None]) -> None:
+        """Call it; whatever a stranger on the network has done, the panel goes on."""
+        try:
+            function()
+        except Exception as error:  # noqa: BLE001
+            kind = type(error).__name__
+            self.get_logger().error(plain(f"{kind}: {error}"), throttle_duration_sec=10.0)
 
     def _follow(self, namespace: str) -> None:
         def hear(message: Any) -> None:
@@ -183,11 +205,18 @@ class PanelNode(Node):
         fields: Any,
         person: Person | None,
         answer: Future[Answer],
+        wanted: float,
     ) -> None:
+        """wanted: when, monotonic s: what waited for too long nobody expects any more."""
         name = f"{namespace.rstrip('/')}/{service}"
         if name not in self._callers:
             self._callers[name] = self.create_client(kind, name)
         client, request = self._callers[name], kind.Request(**fields)
+        if not answer.set_running_or_notify_cancel():
+            return
+        if time.monotonic() - wanted > _SENT_WITHIN:
+            answer.set_result(Answer(False, "nothing was sent: the panel was held up", None))
+            return
         if not client.service_is_ready():
             answer.set_result(Answer(False, f"nothing was sent: {service} is not offered", None))
             return
@@ -198,9 +227,7 @@ class PanelNode(Node):
             one = Answer(message.success, message.message, getattr(message, "accepted", None))
             if record is not None:
                 record(one)
-            # The page that asked may be gone.
-            with suppress(Exception):
-                answer.set_result(one)
+            answer.set_result(one)
 
         client.call_async(request).add_done_callback(answered)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
+from starlette.requests import Request
 
 from chute_ros.plain_text import plain
 from chute_ros.supervisor.inputs import Mode
@@ -16,6 +18,7 @@ from chute_ros.tools.chute import order as orders
 from chute_ros.tools.chute.options import ANSWER
 from chute_ros.tools.chute.order import Order, answer_text, not_answered
 from chute_ros.tools.panel.access import Person
+from chute_ros.tools.panel.login_page import person_of
 from chute_ros.tools.panel.pulse import Pulse
 
 if TYPE_CHECKING:
@@ -23,18 +26,21 @@ if TYPE_CHECKING:
 
 _MOST_ANSWERS = 6
 #: Who holds a button looks at a page that is no older, s.
-_SEEN_WITHIN = 3.0
+_SEEN_WITHIN = 2.0
+#: Nobody can hold a button twice in this time, s.
+_AGAIN_AFTER = 1.0
 _LONGEST_REASON = 200
 
 
 class OrdersPart:
-    """Empty where orders are not allowed. token: of the session in which the page was made;
-    pulse: of the page."""
+    """Empty where orders are not allowed. request: for the page; pulse: of it."""
 
-    def __init__(self, node: PanelNode, namespace: str, token: str, pulse: Pulse) -> None:
-        self._node, self._namespace, self._token = node, namespace, token
+    def __init__(self, node: PanelNode, namespace: str, request: Request, pulse: Pulse) -> None:
+        self._node, self._namespace, self._request = node, namespace, request
         self._pulse = pulse
         self._text = ""
+        #: Name of an order -> when it was given last, monotonic s.
+        self._given: dict[str, float] = {}
         if not node.settings.allow_commands:
             return
         with ui.element("section").classes("card orders"):
@@ -90,7 +96,7 @@ class OrdersPart:
         self._text = str(event.args)[:_LONGEST_REASON]
 
     def _person(self) -> Person | None:
-        return self._node.access.person(self._token, time.monotonic())
+        return person_of(self._node, self._request)
 
     async def _give(self, make: Callable[[str], Order]) -> None:
         person = self._person()
@@ -99,13 +105,18 @@ class OrdersPart:
             return
         reason = plain(self._text).strip() or orders.NO_REASON
         order = make(f"{person.text}: {reason}")
-        line = self._tell(f"{order.name}: sent, no answer yet", "quiet")
-        try:
-            future = asyncio.wrap_future(self._node.order(self._namespace, order, person))
-            answer = await asyncio.wait_for(future, ANSWER)
-        except asyncio.TimeoutError:
-            line(not_answered(order, f"within {ANSWER:g} s"), "bad")
+        now = time.monotonic()
+        if now < self._given.get(order.name, -math.inf) + _AGAIN_AFTER:
+            self._tell(f"{order.name}: NOT SENT: the same was given just now", "bad")
             return
+        self._given[order.name] = now
+        line = self._tell(f"{order.name}: sent, no answer yet", "quiet")
+        future = asyncio.wrap_future(self._node.order(self._namespace, order, person))
+        await asyncio.wait({future}, timeout=ANSWER)
+        if not future.done():
+            line(not_answered(order, f"within {ANSWER:g} s"), "bad")
+        # It may still come.
+        answer = await future
         line(answer_text(order, answer), "good" if answer.success else "bad")
 
     def _tell(self, text: str, tone: str) -> Callable[[str, str], None]:

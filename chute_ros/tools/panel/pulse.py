@@ -21,7 +21,7 @@ class Pulse:
 
     def __init__(self) -> None:
         self._count = 0
-        #: (number, when it was sent, monotonic s)
+        #: (number, when it was sent, s)
         self._beats: deque[tuple[int, float]] = deque(maxlen=_REMEMBERED)
         self._element = ui.html("", sanitize=False).classes("pulse").props("aria-hidden=true")
         ui.html(
@@ -33,10 +33,15 @@ class Pulse:
     def beat(self) -> None:
         """What is shown is of now."""
         self._count += 1
-        self._beats.append((self._count, time.monotonic()))
+        self._beats.append((self._count, _now()))
         self._element.set_content(str(self._count))
 
     def age(self, number: object) -> float:
         """Since this beat was sent, s; infinity: it was not, or long ago."""
         sent = dict(self._beats).get(number, -math.inf) if isinstance(number, int) else -math.inf
-        return time.monotonic() - sent
+        return _now() - sent
+
+
+def _now() -> float:
+    """Goes on while the computer sleeps, s."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)

@@ -36,7 +36,8 @@ def rocket(telem: Any, age: float, tasks: Iterable[Task]) -> str:
     for task in tasks:
         if task.node == "umbilical" and task.task == _MEMORY:
             progress = task.values.get("newest progress", "")
-            rows.append(("memory", f"{task.message}{f' ({progress})' if progress else ''}"))
+            what = f"{task.message}{f' ({progress})' if progress else ''}"
+            rows.append(("memory", f"{what}, {age_text(task.age)}"))
     told = "".join(
         f'<div class="row"><span>{escape(name)}</span><span>{escape(text)}</span></div>'
         for name, text in rows

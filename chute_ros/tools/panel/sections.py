@@ -35,6 +35,9 @@ MEANINGS = {
     "FAULT": "What was ordered could not be done.",
 }
 _HISTORY = 8
+_MODES = {"SHADOW": "it decides, and sends nothing", "INHIBITED": "it does nothing"}
+#: Diagnostics come once a second; those that do not are not of now, s.
+_DIAGNOSTICS_WITHIN = 5.0
 _DIAGNOSTIC_TONE = {"WARN": "warn", "STALE": "quiet", "ERROR": "bad"}
 
 
@@ -49,11 +52,11 @@ def banner(picture: VehiclePicture) -> str:
         tone = STAGE_TONE.get(picture.state, "quiet")
     mode = ""
     if picture.mode != Mode.ACTIVE.name:
-        meant = "decides, and sends nothing" if picture.mode == "SHADOW" else "does nothing"
-        mode = f'<div class="mode">{_sign("bad")} {escape(picture.mode)}: it {meant}</div>'
+        meant = _MODES.get(picture.mode, "what it does is not known")
+        mode = f'<div class="mode">{_sign("bad")} {escape(picture.mode)}: {escape(meant)}</div>'
     alarms = "".join(f"<li>{escape(one)}</li>" for one in picture.alarms)
     return (
-        f'<div class="banner tone-{tone}" role="status" aria-live="assertive">'
+        f'<div class="banner tone-{tone}">'
         f'<div class="word">{_sign(tone)} {escape(word)}</div><div class="why">{escape(why)}</div>'
         f"{mode}</div>" + (f'<ul class="alarms">{alarms}</ul>' if alarms else "")
     )
@@ -66,7 +69,7 @@ def nothing(namespace: str, around: str, seconds: float) -> str:
         f"{around}."
     )
     return (
-        f'<div class="banner tone-quiet" role="status"><div class="word">{_sign("quiet")} NOTHING '
+        f'<div class="banner tone-quiet"><div class="word">{_sign("quiet")} NOTHING '
         f'RECEIVED YET</div><div class="why">{escape(why)}</div></div>'
     )
 
@@ -95,10 +98,10 @@ def parachutes(
     return "".join(_parachute(one, identities, today) for one in those)
 
 
-def links(those: Sequence[LinkView]) -> str:
-    """State and age of each."""
-    rows = "".join(_link(one) for one in those) or _row("", "none required", "")
-    return _card("Links", rows, False)
+def links(those: Sequence[LinkView], old: bool) -> str:
+    """State and age of each. old: the supervisor that judges them is silent."""
+    rows = "".join(_link(one, old) for one in those) or _row("", "none required", "")
+    return _card("Links", rows, old)
 
 
 def vehicle(one: VehicleView | None) -> str:
@@ -129,14 +132,14 @@ def vehicle(one: VehicleView | None) -> str:
     return _card(f"Vehicle {source}, link {one.link_state}", rows, False)
 
 
-def rules(those: Sequence[RuleView]) -> str:
+def rules(those: Sequence[RuleView], old: bool) -> str:
     """A bar for each that is active, which fills as its conditions hold; those that count
-    first."""
+    first. old: the supervisor is silent."""
     shown = [one for one in those if one.active or one.counts]
     rows = "".join(_rule(one) for one in sorted(shown, key=lambda one: not one.counts))
     if others := [one.name for one in those if one not in shown]:
         rows += _row("not active now", ", ".join(others), "quiet")
-    return _card("Rules", rows or _row("", "none", ""), False)
+    return _card("Rules", rows or _row("", "none", ""), old)
 
 
 def decisions(those: Sequence[DecisionView]) -> str:
@@ -153,16 +156,18 @@ def decisions(those: Sequence[DecisionView]) -> str:
 
 def diagnostics(tasks: Sequence[Task]) -> str:
     """What is not OK, worst first; how many are."""
-    bad = [one for one in tasks if one.level != "OK"]
+    old = [one for one in tasks if one.age > _DIAGNOSTICS_WITHIN]
+    now = [one for one in tasks if one not in old]
+    bad = [one for one in now if one.level != "OK"]
     rows = "".join(
-        _row(
-            f"{one.level} {one.node}: {one.task}",
-            one.message,
-            "warn" if one.level == "WARN" else "bad",
-        )
+        _row(f"{one.level} {one.node}: {one.task}", one.message, _DIAGNOSTIC_TONE[one.level])
         for one in bad
     )
-    rows += _row("", f"{len(tasks) - len(bad)} of {len(tasks)} OK", "")
+    rows += "".join(
+        _row(f"{one.node}: {one.task}", f"not received now; {age_text(one.age)}", "quiet")
+        for one in old
+    )
+    rows += _row("", f"{len(now) - len(bad)} of {len(tasks)} OK", "")
     return _card("Diagnostics", rows, False)
 
 
@@ -215,7 +220,7 @@ def _packed(date: str, today: datetime.date) -> str:
     return f"{date}, {days} days ago"
 
 
-def _link(one: LinkView) -> str:
+def _link(one: LinkView, old: bool) -> str:
     text = f"{one.state}, device {'healthy' if one.device_healthy else 'NOT healthy'}, "
     text += age_text(one.age)
     if one.reasons:
@@ -223,7 +228,7 @@ def _link(one: LinkView) -> str:
     tone = LINK_TONE.get(one.state, "warn")
     if tone == "good" and not one.device_healthy:
         tone = "warn"
-    return _row(one.name, text, tone)
+    return _row(one.name, text, "quiet" if old else tone)
 
 
 def _measured(name: str, value: str, age: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import socket
 import ssl
@@ -9,12 +10,14 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nicegui import app, ui
+from nicegui import Client, app, core, ui
 from nicegui.server import Server
+from starlette.responses import PlainTextResponse
 
 from chute_ros.errors import ParameterError
 from chute_ros.tools.panel import fleet_page, login_page, vehicle_page
 from chute_ros.tools.panel.border import Border, own_names
+from chute_ros.tools.panel.plain_log import plain_log_of
 
 if TYPE_CHECKING:
     from chute_ros.tools.panel.node import PanelNode
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
 #: A browser that is away for so long is looked after no more, s: its vehicle costs nothing then.
 _RECONNECT = 5.0
 _END = 5.0
+#: A page that was sent and never used is dropped after so long; looked after so often, s.
+_UNUSED, _PRUNES = 10.0, 5.0
 _ANY = ("0.0.0.0", "::")
 
 
@@ -49,7 +54,13 @@ class PanelServer:
     def start(self) -> None:
         """Serve until stop."""
         names = own_names([*self._node.settings.host_names, self._node.settings.host])
-        app.add_middleware(Border, names=names)
+        app.add_middleware(Border, names=names, pages=lambda: len(Client.instances))
+        app.add_exception_handler(404, _nothing_here)
+        # Pages that no browser came back for.
+        app.timer(_PRUNES, lambda: Client.prune_instances(client_age_threshold=_UNUSED))
+        # Any visitor may send it, and it would be a line of the log.
+        core.sio.on("log", lambda *_: None)
+        plain_log_of("nicegui", "uvicorn.error", "asyncio", "socketio", "engineio")
         folder = Path(__file__).parent
         for tag, name in (("style", "panel.css"), ("script", "panel.js")):
             ui.add_head_html(f"<{tag}>{(folder / name).read_text()}</{tag}>", shared=True)
@@ -83,6 +94,9 @@ class PanelServer:
                 binding_refresh_interval=None,
                 reconnect_timeout=_RECONNECT,
                 timeout_graceful_shutdown=1,
+                language="en-US",
+                # Anybody may write that header.
+                proxy_headers=False,
                 ssl_certfile=settings.certificate_file or None,
                 ssl_keyfile=settings.key_file or None,
             )
@@ -94,11 +108,22 @@ class PanelServer:
         log = node.get_logger()
         log.info(f"panel at {self.address}")
         settings = node.settings
-        if settings.allow_commands and not self.secure and settings.host != "127.0.0.1":
+        if settings.allow_commands and not self.secure and not _is_loopback(settings.host):
             log.warning(
                 "passwords and orders are sent in clear text: set certificate_file and key_file, "
                 "or keep strangers from this network"
             )
+
+
+async def _nothing_here(*_: object) -> PlainTextResponse:
+    return PlainTextResponse("There is no such page: / has all vehicles.\n", 404)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def _listening(host: str, port: int) -> socket.socket:

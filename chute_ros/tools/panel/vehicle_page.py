@@ -11,7 +11,7 @@ from starlette.requests import Request
 
 from chute_ros.tools.panel.bench_part import BenchPart
 from chute_ros.tools.panel.chart import Curves
-from chute_ros.tools.panel.login_page import person_of, token_of
+from chute_ros.tools.panel.login_page import person_of
 from chute_ros.tools.panel.orders_part import OrdersPart
 from chute_ros.tools.panel.pulse import Pulse
 
@@ -35,17 +35,18 @@ def register(node: PanelNode) -> None:
     @ui.page("/vehicle/{name:path}")
     def show(name: str, request: Request) -> None:
         namespace = f"/{name.strip('/')}"
-        if not _NAMESPACE.fullmatch(namespace) or namespace not in node.vehicles():
+        if not _NAMESPACE.fullmatch(namespace) or not node.is_there(namespace):
             _none(node, namespace)
             return
         watched = node.look(namespace)
         ui.context.client.on_delete(lambda: node.leave(namespace))
+        ui.page_title(f"{namespace}: chute_ros")
         pulse = Pulse()
         _head(node, namespace, request)
-        shown: dict[str, Any] = {"banner": _part("banner")}
+        shown: dict[str, Any] = {"banner": _part("banner").props('role="status"')}
         # Before all that scrolls: whoever must act must not search.
-        orders = OrdersPart(node, namespace, token_of(request), pulse)
-        with ui.element("main").classes("columns"):
+        orders = OrdersPart(node, namespace, request, pulse)
+        with ui.element("div").classes("columns"):
             with ui.element("div"):
                 shown |= {one: _part(one) for one in _LEFT}
                 bench = BenchPart(node, namespace) if node.settings.bench else None
@@ -56,7 +57,6 @@ def register(node: PanelNode) -> None:
 
         def refresh() -> None:
             nonlocal turns
-            pulse.beat()
             parts = watched.parts()
             for name, element in shown.items():
                 element.set_content(parts.get(name, ""))
@@ -66,6 +66,8 @@ def register(node: PanelNode) -> None:
                 if bench is not None:
                     bench.refresh()
             turns += 1
+            # Last: what fails before it must not seem to be of now.
+            pulse.beat()
 
         ui.timer(_EVERY, refresh)
 
@@ -94,7 +96,7 @@ def _none(node: PanelNode, namespace: str) -> None:
     ui.link("all vehicles", "/fleet")
 
     def look() -> None:
-        if namespace in node.vehicles():
+        if _NAMESPACE.fullmatch(namespace) and node.is_there(namespace):
             ui.navigate.reload()
 
     ui.timer(_LOOKS, look)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import math
+import re
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -23,6 +24,7 @@ from chute_ros.tools.chute.diagnostic_tasks import DiagnosticTasks
 from chute_ros.tools.chute.hearing import Picture
 from chute_ros.tools.chute.listening import subscribe
 from chute_ros.tools.chute.view import VehiclePicture, view
+from chute_ros.tools.chute.words import is_old
 from chute_ros.tools.panel import sections
 from chute_ros.tools.panel.rocket import rocket
 from chute_ros.tools.panel.trace import Mark, Point, Trace
@@ -31,6 +33,9 @@ from chute_ros.tools.panel.trace import Mark, Point, Trace
 _SOONEST = 0.2
 #: The curves are drawn on so often, s.
 _FOLLOWS = 0.25
+_NODE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
+#: Of DroneCAN.
+_HIGHEST_NODE_ID = 127
 #: A device that did not answer who it is is asked again after so long, s.
 _ASK_AGAIN = 30.0
 
@@ -66,7 +71,7 @@ class Watched:
         ):
             profile = qos.newest(qos.STATUS)
             held.append(node.create_subscription(kind, f"{base}/{topic}", hear, profile))
-        timer = node.create_timer(_FOLLOWS, self._follow)
+        timer = node.create_timer(_FOLLOWS, partial(node.guarded, self._follow))
         self._ends = [partial(node.destroy_subscription, one) for one in held]
         self._ends.append(partial(node.destroy_timer, timer))
 
@@ -103,8 +108,8 @@ class Watched:
                 picture.parachutes, self._identities, datetime.date.today()
             ),
             "vehicle": sections.vehicle(picture.vehicle),
-            "links": sections.links(picture.links),
-            "rules": sections.rules(picture.rules),
+            "links": sections.links(picture.links, is_old(picture.age)),
+            "rules": sections.rules(picture.rules, is_old(picture.age)),
             "decisions": sections.decisions(picture.decisions),
             "diagnostics": sections.diagnostics(tasks),
         }
@@ -131,10 +136,13 @@ class Watched:
             if picture is None:
                 return
             self._draw(picture, wall)
+            # A stranger's names are none of a node.
+            names = {one.name for one in picture.links if _NODE_NAME.fullmatch(one.name)}
             unknown = [
                 (one.link, one.device)
                 for one in picture.parachutes
-                if f"{one.link} {one.device}" not in self._identities
+                if one.link in names
+                and f"{one.link} {one.device}" not in self._identities
                 and now >= self._asked.get(f"{one.link} {one.device}", -math.inf) + _ASK_AGAIN
             ]
             self._asked |= {f"{link} {device}": now for link, device in unknown}
@@ -152,9 +160,10 @@ class Watched:
 
     def _ask_identity(self, link: str, device: str) -> None:
         base = f"{self.namespace.rstrip('/')}/{link}"
+        is_id = device.isascii() and device.isdigit() and int(device[:4]) <= _HIGHEST_NODE_ID
         asks: tuple[tuple[Any, str, dict[str, Any]], ...] = (
             (GetInfo, "get_info", {"device": device}),
-            (GetNodeInfo, "get_node_info", {"node_id": int(device) if device.isdigit() else 0}),
+            (GetNodeInfo, "get_node_info", {"node_id": int(device) if is_id else 0}),
         )
         for kind, name, fields in asks:
             if (link, kind) not in self._clients:
