@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-WIRES = {"MAVLink", "CAN", "umbilical", "ROS network", "files"}
+WIRES = {"MAVLink", "CAN", "umbilical", "ROS network", "files", "web"}
 
 #: What stands beside a row's own story.
 UNNAMED = {
