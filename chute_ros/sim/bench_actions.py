@@ -17,7 +17,7 @@ FLIGHT_COMPUTER = "sim_flight_computer"
 LIGHT_AIR = 0.5
 
 #: Executable of a simulator, and what it is told to do.
-Order = tuple[str, str]
+SimulatorOrder = tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class BenchAction:
     name: str
     title: str
     effect: str
-    orders: tuple[Order, ...]
+    orders: tuple[SimulatorOrder, ...]
     leaves_ground: bool = False
 
 

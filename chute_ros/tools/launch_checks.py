@@ -24,7 +24,7 @@ from chute_ros.sim.bench_actions import (
     AUTOPILOT,
     FLIGHT_COMPUTER,
     LIGHT_AIR,
-    Order,
+    SimulatorOrder,
     actions_of,
 )
 
@@ -114,7 +114,9 @@ class Flight:
             options.setdefault(simulator, []).extend(("--at", f"{at:g}:{action}"))
         return options
 
-    def _begin(self, simulators: Sequence[str]) -> tuple[float, list[tuple[float, Order]]]:
+    def _begin(
+        self, simulators: Sequence[str]
+    ) -> tuple[float, list[tuple[float, SimulatorOrder]]]:
         """When the vehicle leaves the ground, s after its start, NaN: never; and its orders."""
         if self.launch:
             _needs("launch", self.launch, FLIGHT_COMPUTER, simulators)
@@ -128,7 +130,7 @@ class Flight:
         return math.nan, []
 
 
-def _failure(text: str, simulators: Sequence[str]) -> tuple[float, tuple[Order, ...]]:
+def _failure(text: str, simulators: Sequence[str]) -> tuple[float, tuple[SimulatorOrder, ...]]:
     """How long after the take-off, s, which orders."""
     what, _, after = text.strip().partition("@")
     orders = {one.name: one.orders for one in actions_of(simulators)}

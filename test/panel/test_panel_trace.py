@@ -7,13 +7,13 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chute_ros.tools.panel.trace import MOST_DRAWN, SPAN, STEP, Point, Trace
+from chute_ros.tools.panel.trace import MOST_DRAWN, SPAN, STEP, MotionPoint, Trace
 
 
 def traced(heights, start=1000.0, step=STEP):
     trace = Trace()
     for number, height in enumerate(heights):
-        trace.add(Point(start + number * step, height, 0.0))
+        trace.add(MotionPoint(start + number * step, height, 0.0))
     return trace
 
 
@@ -43,6 +43,6 @@ def test_what_is_drawn_has_the_highest_and_the_lowest(heights):
 def test_a_clock_that_is_set_back_begins_a_new_curve():
     trace = traced([1.0, 2.0])
     trace.mark(1000.1, "KILL")
-    trace.add(Point(500.0, 3.0, 0.0))
+    trace.add(MotionPoint(500.0, 3.0, 0.0))
     assert [one.height for one in trace.points] == [3.0]
     assert not trace.marks

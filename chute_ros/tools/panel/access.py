@@ -1,4 +1,4 @@
-"""Who may give orders: a password, sessions, and patience with whoever guesses.
+"""Who may give orders: a password, sessions, and a wait for each wrong password.
 
 Pure: the time and the tokens come in.
 """
@@ -32,7 +32,7 @@ class AccessRefusedError(ChuteError):
 
 
 @dataclass(frozen=True)
-class Person:
+class Operator:
     """Who has logged in, by the name that they gave, from which address; until: monotonic s."""
 
     name: str
@@ -51,7 +51,7 @@ class Access:
     def __init__(self, password: str | None, make_token: Callable[[], str]) -> None:
         self._password = None if password is None else password.encode()
         self._make_token = make_token
-        self._sessions: OrderedDict[str, Person] = OrderedDict()
+        self._sessions: OrderedDict[str, Operator] = OrderedDict()
         #: Address -> (mistakes, refused until).
         self._mistakes: OrderedDict[str, tuple[int, float]] = OrderedDict()
         #: Of wrong passwords, of all addresses.
@@ -85,12 +85,12 @@ class Access:
         while len(self._known) > MOST_ADDRESSES:
             self._known.popitem(last=False)
         token = self._make_token()
-        self._sessions[token] = Person(name, address, now + SESSION_LASTS)
+        self._sessions[token] = Operator(name, address, now + SESSION_LASTS)
         while len(self._sessions) > MOST_SESSIONS:
             self._sessions.popitem(last=False)
         return token
 
-    def person(self, token: str | None, address: str, now: float) -> Person | None:
+    def person(self, token: str | None, address: str, now: float) -> Operator | None:
         """Whose session this is; None: nobody's, or it has ended. It is of the network in which it
         began: a cookie that went astray is of no use elsewhere."""
         person = self._sessions.get(token or "")

@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import ui
 
-from chute_ros.tools.panel.trace import Mark, Point
+from chute_ros.tools.panel.trace import DecisionMark, MotionPoint
 
 _AXES = (("height", "m", "#2f74c0"), ("vertical speed", "m/s", "#b06a00"))
 
@@ -21,8 +21,8 @@ class Curves:
             ui.html("<h2>Height and vertical speed</h2>", sanitize=False)
             self._chart = ui.echart(_options()).classes("curves")
 
-    def draw(self, points: Sequence[Point], marks: Sequence[Mark]) -> None:
-        """All of it anew."""
+    def draw(self, points: Sequence[MotionPoint], marks: Sequence[DecisionMark]) -> None:
+        """All of it."""
         heights = [[one.at * 1000.0, _number(one.height)] for one in points]
         speeds = [[one.at * 1000.0, _number(one.vertical_speed)] for one in points]
         lines = [

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse
 
 from chute_ros.plain_text import plain
-from chute_ros.tools.panel.access import SESSION_LASTS, AccessRefusedError, Person
+from chute_ros.tools.panel.access import SESSION_LASTS, AccessRefusedError, Operator
 
 if TYPE_CHECKING:
     from chute_ros.tools.panel.node import PanelNode
@@ -35,7 +35,7 @@ their records.</p>{told}<form method="post" action="/login?next={next}">
   autocomplete="current-password"><button>Log in</button></form></body></html>"""
 
 
-def person_of(node: PanelNode, request: Request) -> Person | None:
+def person_of(node: PanelNode, request: Request) -> Operator | None:
     """Who asks; None: nobody who has logged in."""
     return node.access.person(token_of(request), address_of(request), time.monotonic())
 

@@ -30,7 +30,7 @@ from chute_ros.tools.chute.hearing import Heard
 from chute_ros.tools.chute.order import Answer, Order
 from chute_ros.tools.chute.session import namespaces
 from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
-from chute_ros.tools.panel.access import Access, Person
+from chute_ros.tools.panel.access import Access, Operator
 from chute_ros.tools.panel.parameters import NODE, PARAMETERS, PanelSettings
 from chute_ros.tools.panel.password import password_from
 from chute_ros.tools.panel.server import PanelServer
@@ -147,7 +147,7 @@ class PanelNode(Node):
         names = [name for name, _ in self.get_service_names_and_types()]
         return sorted(plain(name.removeprefix(own)) for name in names if name.startswith(own))
 
-    def order(self, namespace: str, order: Order, person: Person) -> Future[Answer]:
+    def order(self, namespace: str, order: Order, person: Operator) -> Future[Answer]:
         """Send it, and record who ordered it and what was answered."""
         return self._send(namespace, order.service, KINDS[order.kind], order.fields, person)
 
@@ -156,7 +156,7 @@ class PanelNode(Node):
         return self._send(namespace, f"{BENCH}{name}", Trigger, {}, None)
 
     def _send(
-        self, namespace: str, service: str, kind: Any, fields: Any, person: Person | None
+        self, namespace: str, service: str, kind: Any, fields: Any, person: Operator | None
     ) -> Future[Answer]:
         future: Future[Answer] = Future()
         wanted = time.monotonic()
@@ -203,7 +203,7 @@ class PanelNode(Node):
         service: str,
         kind: Any,
         fields: Any,
-        person: Person | None,
+        person: Operator | None,
         answer: Future[Answer],
         wanted: float,
     ) -> None:
@@ -232,7 +232,7 @@ class PanelNode(Node):
         client.call_async(request).add_done_callback(answered)
 
     def _record(
-        self, namespace: str, service: str, request: Any, person: Person
+        self, namespace: str, service: str, request: Any, person: Operator
     ) -> Callable[[Answer], None]:
         """Put who orders what on safety/person and into the log; what is returned puts the
         answer there."""

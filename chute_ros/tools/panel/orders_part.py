@@ -17,7 +17,7 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute import order as orders
 from chute_ros.tools.chute.options import ANSWER
 from chute_ros.tools.chute.order import Order, answer_text, not_answered
-from chute_ros.tools.panel.access import Person
+from chute_ros.tools.panel.access import Operator
 from chute_ros.tools.panel.login_page import person_of
 from chute_ros.tools.panel.pulse import Pulse
 
@@ -95,7 +95,7 @@ class OrdersPart:
     def _take_reason(self, event: Any) -> None:
         self._text = str(event.args)[:_LONGEST_REASON]
 
-    def _person(self) -> Person | None:
+    def _person(self) -> Operator | None:
         return person_of(self._node, self._request)
 
     async def _give(self, make: Callable[[str], Order]) -> None:

@@ -40,8 +40,8 @@ class PanelSettings(Settings):
     key_file: str = parameter("", "private key (PEM) of certificate_file")
     bench: bool = parameter(
         False,
-        "show what can be done to a simulated vehicle (services sim/...); whoever sees the page "
-        "may do it",
+        "show what can be done to a simulated vehicle (services sim/...); everybody who sees the "
+        "page may do it",
     )
 
     def __post_init__(self) -> None:

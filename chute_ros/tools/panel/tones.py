@@ -1,7 +1,7 @@
 """Colours with a meaning, each with a sign of its own: nobody needs to tell the colours apart.
 
 The tones are those of every picture of the suite (timeline_rows.py); these colours differ in
-lightness as well, for whoever sees red and green alike, and in the sun.
+lightness as well, for people who see red and green alike, and for the sun.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ MOST_MARKS = 20
 
 
 @dataclass(frozen=True)
-class Point:
+class MotionPoint:
     """at: Unix s, as the page's own clock; m above take-off; m/s, up positive; NaN: not known."""
 
     at: float
@@ -23,7 +23,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Mark:
+class DecisionMark:
     """A decision. text: its action."""
 
     at: float
@@ -34,10 +34,10 @@ class Mark:
 class Trace:
     """What was received of one vehicle since somebody looks."""
 
-    points: deque[Point] = field(default_factory=deque)
-    marks: deque[Mark] = field(default_factory=lambda: deque(maxlen=MOST_MARKS))
+    points: deque[MotionPoint] = field(default_factory=deque)
+    marks: deque[DecisionMark] = field(default_factory=lambda: deque(maxlen=MOST_MARKS))
 
-    def add(self, point: Point) -> None:
+    def add(self, point: MotionPoint) -> None:
         """The newest; one that comes too soon after the last is left out."""
         if self.points and 0.0 <= point.at - self.points[-1].at < STEP:
             return
@@ -51,16 +51,16 @@ class Trace:
 
     def mark(self, at: float, text: str) -> None:
         """A decision that came now."""
-        self.marks.append(Mark(at, text))
+        self.marks.append(DecisionMark(at, text))
 
-    def drawn(self) -> list[Point]:
+    def drawn(self) -> list[MotionPoint]:
         """At most MOST_DRAWN: of each part of the time the lowest and the highest, so that no peak
         is lost."""
         points = list(self.points)
         size = -(-len(points) // (MOST_DRAWN // 2))
         if size <= 2:
             return points
-        kept: list[Point] = []
+        kept: list[MotionPoint] = []
         for start in range(0, len(points), size):
             part = points[start : start + size]
             known = [one for one in part if not math.isnan(one.height)] or part

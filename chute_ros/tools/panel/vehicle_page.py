@@ -44,7 +44,7 @@ def register(node: PanelNode) -> None:
         pulse = Pulse()
         _head(node, namespace, request)
         shown: dict[str, Any] = {"banner": _part("banner").props('role="status"')}
-        # Before all that scrolls: whoever must act must not search.
+        # Before all that scrolls: an operator who must act must not search.
         orders = OrdersPart(node, namespace, request, pulse)
         with ui.element("div").classes("columns"):
             with ui.element("div"):

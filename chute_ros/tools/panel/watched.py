@@ -27,7 +27,7 @@ from chute_ros.tools.chute.view import VehiclePicture, view
 from chute_ros.tools.chute.words import is_old
 from chute_ros.tools.panel import sections
 from chute_ros.tools.panel.rocket import rocket
-from chute_ros.tools.panel.trace import Mark, Point, Trace
+from chute_ros.tools.panel.trace import DecisionMark, MotionPoint, Trace
 
 #: The parts are made at most so often, however many look, s.
 _SOONEST = 0.2
@@ -91,7 +91,7 @@ class Watched:
                 self._made = (now, parts)
             return parts
 
-    def drawn(self) -> tuple[list[Point], list[Mark]]:
+    def drawn(self) -> tuple[list[MotionPoint], list[DecisionMark]]:
         """The curves."""
         with self._lock:
             return self._trace.drawn(), list(self._trace.marks)
@@ -152,7 +152,7 @@ class Watched:
     def _draw(self, picture: VehiclePicture, wall: float) -> None:
         vehicle = picture.vehicle
         if vehicle is not None and vehicle.height_age < 2.0:
-            self._trace.add(Point(wall, vehicle.height, vehicle.vertical_speed))
+            self._trace.add(MotionPoint(wall, vehicle.height, vehicle.vertical_speed))
         for one in picture.decisions:
             if (one.epoch, one.id) > self._marked:
                 self._marked = (one.epoch, one.id)
