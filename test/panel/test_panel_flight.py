@@ -12,7 +12,8 @@ from chute_ros.tools.demo_rig import Rig
 from chute_ros.tools.pilot import Pilot
 from chute_ros.tools.processes import Processes
 
-pytestmark = pytest.mark.xdist_group("panel_flight")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ from playwright.sync_api import expect
 
 from chute_ros.supervisor.machine import Stage
 
-pytestmark = pytest.mark.xdist_group("panel_holding")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 #: Longer than a button must be held, ms; and until an order that was given would have come.
 HELD, CAME = 1900, 1500
 

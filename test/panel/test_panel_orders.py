@@ -12,7 +12,8 @@ from playwright.sync_api import expect
 
 from chute_ros.supervisor.machine import Stage
 
-pytestmark = pytest.mark.xdist_group("panel_orders")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 
 
 def test_twenty_vehicles_on_a_phone_the_worst_first(fly, namespace, start_panel, open_page):

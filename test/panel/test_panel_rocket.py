@@ -12,7 +12,8 @@ from rclpy.node import Node
 from chute_ros.tools.processes import Processes
 from chute_ros.tools.rocket_rig import RocketRig
 
-pytestmark = pytest.mark.xdist_group("panel_rocket")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 
 
 @pytest.fixture

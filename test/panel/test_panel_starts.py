@@ -16,7 +16,8 @@ from panel_bench import PASSWORD, password_file
 
 from chute_ros.tools.processes import ros_arguments
 
-pytestmark = pytest.mark.xdist_group("panel_starts")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 
 
 def started_with(**parameters):

@@ -15,7 +15,8 @@ from chute_ros.ros import qos
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.panel.border import MOST_PAGES
 
-pytestmark = pytest.mark.xdist_group("panel_strangers")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 
 
 def get(panel, path, **headers):

@@ -14,7 +14,8 @@ from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.isolation import free_tcp_port
 from chute_ros.tools.processes import Processes
 
-pytestmark = pytest.mark.xdist_group("tutorial")
+# One browser at a time: it takes a core of its own.
+pytestmark = pytest.mark.xdist_group("browser")
 
 PAGE = Path(__file__).parents[2] / "docs/guide/tutorial.md"
 WORDS = {one.name.replace("_", " ") for one in Stage}

@@ -14,9 +14,14 @@ from chute_ros.links.registered import links
 from chute_ros.ros.parameters import descriptor
 from chute_ros.ros.supervisor_parameters import SupervisorParameters
 from chute_ros.settings import Parameter, Settings, parameters_of, settings_from
+from chute_ros.tools.panel.parameters import PanelSettings
 from chute_ros.tools.parameter_docs import NODES
 
-ROOTS = (*(load(kind.parameters) for kind in links().values()), SupervisorParameters)
+ROOTS = (
+    *(load(kind.parameters) for kind in links().values()),
+    SupervisorParameters,
+    PanelSettings,
+)
 
 
 def with_nested(kind: type[Settings]) -> Iterator[type[Settings]]:

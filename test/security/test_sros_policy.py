@@ -32,7 +32,7 @@ from chute_ros.tools.chute.session import Session
 from chute_ros.tools.chute.surroundings import surroundings
 from chute_ros.tools.isolation import free_udp_ports
 from chute_ros.tools.panel import node as panel
-from chute_ros.tools.panel.access import Person
+from chute_ros.tools.panel.access import Operator
 
 CONFIG = Path(__file__).parents[2] / "config"
 POLICY = CONFIG / "security" / "policy.xml"
@@ -225,7 +225,7 @@ def test_the_panel_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch):
     for words in ORDERS:
         if "--link" not in words:
             order = order_of(parse(words), "ann@ground")
-            page.order(bench.namespace, order, Person("ann", "192.0.2.1", math.inf))
+            page.order(bench.namespace, order, Operator("ann", "192.0.2.1", math.inf))
 
     def done():
         return {

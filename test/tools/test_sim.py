@@ -140,7 +140,8 @@ class Player:
             # Right after a reset the supervisor blocks flight for a moment for another reason.
             self.bench.until(lambda: self.blocked_by("mavlink_parachute: its device is "), name)
         if name == "take_off":
-            self.bench.until(lambda: self.vehicle[-1].height > HEIGHT, "it is up", 40.0)
+            heights = self.vehicle
+            self.bench.until(lambda: heights and heights[-1].height > HEIGHT, "it is up", 40.0)
 
 
 def tutorial():

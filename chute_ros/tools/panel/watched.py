@@ -36,6 +36,8 @@ _FOLLOWS = 0.25
 _NODE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 #: Of DroneCAN.
 _HIGHEST_NODE_ID = 127
+#: Services that are asked at most; a stranger may invent many links.
+_MOST_ASKED = 32
 #: A device that did not answer who it is is asked again after so long, s.
 _ASK_AGAIN = 30.0
 
@@ -136,12 +138,11 @@ class Watched:
             if picture is None:
                 return
             self._draw(picture, wall)
-            # A stranger's names are none of a node.
-            names = {one.name for one in picture.links if _NODE_NAME.fullmatch(one.name)}
             unknown = [
                 (one.link, one.device)
                 for one in picture.parachutes
-                if one.link in names
+                # A stranger's names may be none of a node.
+                if _NODE_NAME.fullmatch(one.link)
                 and f"{one.link} {one.device}" not in self._identities
                 and now >= self._asked.get(f"{one.link} {one.device}", -math.inf) + _ASK_AGAIN
             ]
@@ -167,6 +168,8 @@ class Watched:
         )
         for kind, name, fields in asks:
             if (link, kind) not in self._clients:
+                if len(self._clients) >= _MOST_ASKED:
+                    return
                 client = self._node.create_client(kind, f"{base}/{name}")
                 self._clients[link, kind] = client
                 self._ends.append(partial(self._node.destroy_client, client))

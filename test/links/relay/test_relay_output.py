@@ -115,9 +115,8 @@ def test_bytes_as_text_and_as_digits():
 
 
 def test_a_node_that_would_fire_at_rest_does_not_start(bench):
-    with pytest.raises(
-        ParameterError, match="output_fire is 1 and output_rest is 1: the output would always fire"
-    ):
+    told = "output_fire is '1' and output_rest is '1': the output would always fire"
+    with pytest.raises(ParameterError, match=told):
         Board(bench, output_fire="1", output_rest="1")
 
 
