@@ -6,6 +6,7 @@ another.
 
 from __future__ import annotations
 
+import asyncio
 import re
 import sys
 import time
@@ -17,9 +18,9 @@ import socketio
 _TRIES, _EVERY = 60, 0.5  # s
 
 
-def look(address: str) -> None:
+async def look(address: str) -> None:
     """Until the end."""
-    client = socketio.Client()
+    client = socketio.AsyncClient()
     parts = urlsplit(address)
     query = urlencode(
         {
@@ -31,13 +32,13 @@ def look(address: str) -> None:
             "old_tab_id": "null",
         }
     )
-    client.connect(
+    await client.connect(
         f"{parts.scheme}://{parts.netloc}?{query}",
         socketio_path="/_nicegui_ws/socket.io",
         transports=["websocket"],
     )
     print("looks", flush=True)
-    client.wait()
+    await client.wait()
 
 
 def _client_id(address: str) -> str:
@@ -46,8 +47,8 @@ def _client_id(address: str) -> str:
         try:
             with urllib.request.urlopen(address, timeout=10.0) as answer:
                 text = answer.read().decode()
-            found = re.search(r'"client_id": ?"([^"]+)"', text)
-            if found and "part-banner" in text:
+            found = re.search(r"['\"]client_id['\"]: ?['\"]([\w-]+)", text)
+            if found and "No supervisor is found" not in text:
                 return found[1]
         except OSError:
             pass  # it has not started yet
@@ -56,4 +57,4 @@ def _client_id(address: str) -> str:
 
 
 if __name__ == "__main__":
-    look(sys.argv[1])
+    asyncio.run(look(sys.argv[1]))

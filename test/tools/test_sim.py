@@ -243,7 +243,10 @@ def test_each_vehicle_is_started_flies_and_ends_on_a_termination_without_a_trace
         if one.startswith(b"folder:=")
     }
     assert os.stat(folder).st_mode & 0o777 == 0o700
-    assert simulation.end(signal.SIGTERM) == (130, "sim: interrupted\n")
+    code, errors = simulation.end(signal.SIGTERM)
+    # rclpy of Kilted may add that a handler of its own was never awaited.
+    assert (code, errors.partition("\n")[0]) == (130, "sim: interrupted")
+    assert "Traceback" not in errors
     assert not [one for one in children if Path(f"/proc/{one}").exists()]
     assert not Path(folder).exists()
 
