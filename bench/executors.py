@@ -8,21 +8,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from functools import partial
 
 from bench.command import at_least, run, with_children
 from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
 from bench.on_executor import EXECUTORS
-from bench.process_cost import cpu_time
+from bench.process_cost import WATCHED_FOR, idle_costs
 from bench.report import load, summary
 from chute_ros.tools.pages import table
 from chute_ros.tools.processes import Processes
 
 HEADING = "Executors"
-
-#: For how long the processes are watched while nothing happens, s.
-_IDLE = 20.0
 
 
 def add_options(options: argparse.ArgumentParser) -> None:
@@ -51,19 +47,10 @@ def _measure(
         for name in EXECUTORS
     }
     peers = measure(namespace, children, starts, count)
-    return peers, _cost(children, list(starts))
-
-
-def _cost(children: Processes, names: list[str]) -> dict[str, float]:
-    """Of each executor's processes, in % of a core, while nothing happens."""
-
-    def taken(name: str) -> float:
-        return sum(cpu_time(children.pid(one)) for one in children.names() if one.endswith(name))
-
-    before, began = {name: taken(f"_{name}") for name in names}, time.monotonic()
-    time.sleep(_IDLE)
-    passed = time.monotonic() - began
-    return {name: 100.0 * (taken(f"_{name}") - before[name]) / passed for name in names}
+    groups = {
+        name: [one for one in children.names() if one.endswith(f"_{name}")] for name in starts
+    }
+    return peers, idle_costs(children, groups)
 
 
 def report(peers: list[Peer], cost: dict[str, float], before: str) -> str:
@@ -85,7 +72,7 @@ def report(peers: list[Peer], cost: dict[str, float], before: str) -> str:
         f"{before}\n\n"
         "The kill switch as above, on sets of our processes that differ in their executor alone,\n"
         "taking turns in one run: median / 99th percentile. Of a core: the three processes of a\n"
-        f"set together, without a device on their wires, for {_IDLE:g} s.\n\n"
+        f"set together, without a device on their wires, for {WATCHED_FOR:g} s.\n\n"
         + table(head, rows)
         + "\n"
     )

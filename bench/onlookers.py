@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from functools import partial
 
 from bench.command import at_least, run, with_children
 from bench.kill_switch import IDLE, LOADED, Peer, Start, measure, start_ours
-from bench.process_cost import cpu_time
+from bench.process_cost import WATCHED_FOR, idle_costs
 from bench.report import COMPARED, compared, load
 from chute_ros.tools.isolation import free_tcp_port
 from chute_ros.tools.pages import table
@@ -24,8 +23,6 @@ HEADING = "Onlookers"
 
 NOBODY, WATCH, PANEL = "nobody", "watch", "panel"
 _NODES = ("supervisor", "mavlink", "upf_can")
-#: For how long the processes are watched while nothing happens, s.
-_IDLE = 20.0
 
 
 def add_options(options: argparse.ArgumentParser) -> None:
@@ -74,27 +71,10 @@ def _start_on_page(namespace: str, processes: Processes, bus: int, network: int)
 
 def _cost(children: Processes) -> dict[str, tuple[float, float]]:
     """Of each set's processes, and of its onlooker, in % of a core, while nothing happens."""
-    those = {
-        name: ([f"{node}_{name}" for node in _NODES], [name] if name != NOBODY else [])
-        for name in (NOBODY, WATCH, PANEL)
-    }
-
-    def taken() -> dict[str, list[float]]:
-        return {
-            name: [sum(cpu_time(children.pid(one)) for one in part) for part in parts]
-            for name, parts in those.items()
-        }
-
-    before, began = taken(), time.monotonic()
-    time.sleep(_IDLE)
-    passed, after = time.monotonic() - began, taken()
-    return {
-        name: (
-            100.0 * (after[name][0] - before[name][0]) / passed,
-            100.0 * (after[name][1] - before[name][1]) / passed,
-        )
-        for name in those
-    }
+    sets = {name: [f"{node}_{name}" for node in _NODES] for name in (NOBODY, WATCH, PANEL)}
+    onlookers = {f"at {name}": [name] for name in (WATCH, PANEL)}
+    costs = idle_costs(children, sets | onlookers)
+    return {name: (costs[name], costs.get(f"at {name}", 0.0)) for name in sets}
 
 
 def report(peers: list[Peer], cost: dict[str, tuple[float, float]], before: str) -> str:
@@ -114,7 +94,7 @@ def report(peers: list[Peer], cost: dict[str, tuple[float, float]], before: str)
         "at one, `chute watch` at a terminal at another, the panel with one open page at the\n"
         "third. Ratios are to the one that nobody looks at.\n\n"
         + table(("looked at by", *COMPARED, "missed"), rows)
-        + f"\n\nOf a core while nothing happens, for {_IDLE:g} s:\n\n"
+        + f"\n\nOf a core while nothing happens, for {WATCHED_FOR:g} s:\n\n"
         + table(("looked at by", nodes, onlooker), costs)
         + "\n"
     )

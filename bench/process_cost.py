@@ -3,7 +3,30 @@
 from __future__ import annotations
 
 import os
+import time
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+from chute_ros.tools.processes import Processes
+
+#: For how long processes are watched while nothing happens, s.
+WATCHED_FOR = 20.0
+
+
+def idle_costs(children: Processes, groups: Mapping[str, Iterable[str]]) -> dict[str, float]:
+    """What the children of each group take together while nothing happens, in % of a core."""
+    those = {group: list(names) for group, names in groups.items()}
+
+    def taken() -> dict[str, float]:
+        return {
+            group: sum(cpu_time(children.pid(one)) for one in names)
+            for group, names in those.items()
+        }
+
+    before, began = taken(), time.monotonic()
+    time.sleep(WATCHED_FOR)
+    passed, after = time.monotonic() - began, taken()
+    return {group: 100.0 * (after[group] - before[group]) / passed for group in those}
 
 
 def cpu_time(pid: int | str) -> float:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
 from chute_ros.plain_text import plain
+from chute_ros.tools.recordings import chosen, listed
 
 
 def recording_options(program: str, description: str | None) -> argparse.ArgumentParser:
@@ -29,6 +31,32 @@ def recording_options(program: str, description: str | None) -> argparse.Argumen
         help="which recording, if the files are of several (without it they are listed)",
     )
     return options
+
+
+def make_each(
+    program: str,
+    given: argparse.Namespace,
+    one: str,
+    make: Callable[[list[Path], Path | None], None],
+) -> bool:
+    """Call make(files, --output) for each recording that was chosen, and tell each that it cannot
+    make (ChuteError); whether all were made. one: what --output is ("one page")."""
+    made = True
+    try:
+        found = chosen(given.files, given.recording)
+        if given.output is not None and len(found) > 1:
+            text = f"--output is {one}, and these are {len(found)} recordings"
+            raise ChuteError(f"{text}: choose one with --recording NUMBER\n{listed(found)}")
+        for recording in found:
+            try:
+                make(recording.files, given.output)
+            except ChuteError as error:
+                made = False
+                complain(program, error)
+    except ChuteError as error:
+        made = False
+        complain(program, error)
+    return made
 
 
 def write(path: Path, text: str) -> None:

@@ -13,14 +13,12 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from chute_msgs.msg import PersonRequest, SafetyDecision, SafetyState
 
-from chute_ros.errors import ChuteError
 from chute_ros.ros.supervisor_messages import state_message
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.tools.flight_story import DECISION, PERSON, tell
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, read
-from chute_ros.tools.recording_options import complain, recording_options, write
-from chute_ros.tools.recordings import chosen, listed
+from chute_ros.tools.recording_options import make_each, recording_options, write
 from chute_ros.tools.releases import releases
 from chute_ros.tools.replay_picture import vehicle_curves
 from chute_ros.tools.replaying import Replayer
@@ -42,22 +40,13 @@ def main() -> None:
         "--output", type=Path, metavar="HTML", help="output file (default: FILE.html)"
     )
     given = options.parse_args()
-    failed = False
-    try:
-        found = chosen(given.files, given.recording)
-        if given.output is not None and len(found) > 1:
-            text = f"--output is one page, and these are {len(found)} recordings"
-            raise ChuteError(f"{text}: choose one with --recording NUMBER\n{listed(found)}")
-        for one in found:
-            try:
-                print(_report(one.files, given.output), flush=True)
-            except ChuteError as error:
-                failed = True
-                complain("report", error)
-    except ChuteError as error:
-        failed = True
-        complain("report", error)
-    sys.exit(2 if failed else 0)
+    made = make_each(
+        "report",
+        given,
+        "one page",
+        lambda files, output: print(_report(files, output), flush=True),
+    )
+    sys.exit(0 if made else 2)
 
 
 def _report(files: list[Path], output: Path | None) -> Path:

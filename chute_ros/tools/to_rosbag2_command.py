@@ -17,8 +17,7 @@ from chute_ros.plain_text import plain
 from chute_ros.tools.mcap_entries import Entry, McapEntries
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import utc
-from chute_ros.tools.recording_options import complain, recording_options
-from chute_ros.tools.recordings import chosen, listed
+from chute_ros.tools.recording_options import make_each, recording_options
 from chute_ros.tools.rosbag2_folder import Rosbag2Folder
 
 #: A pause so long (s) is no pause of a supervisor, which records several times a second.
@@ -32,30 +31,20 @@ def main() -> None:
         "--output", type=Path, metavar="FOLDER", help="folder to make (default: FILE.rosbag2)"
     )
     given = options.parse_args()
-    failed = False
-    try:
-        found = chosen(given.files, given.recording)
-        if given.output is not None and len(found) > 1:
-            text = f"--output is one folder, and these are {len(found)} recordings"
-            raise ChuteError(f"{text}: choose one with --recording NUMBER\n{listed(found)}")
-        for one in found:
-            output = given.output or one.files[0].with_suffix(".rosbag2")
-            try:
-                for remark in convert(one.files, output):
-                    _tell(remark)
-                print(output, flush=True)
-            except ChuteError as error:
-                failed = True
-                complain("to_rosbag2", error)
-    except ChuteError as error:
-        failed = True
-        complain("to_rosbag2", error)
-    if not failed:
+    made = make_each("to_rosbag2", given, "one folder", _convert)
+    if made:
         _tell(
             "play where no vehicle hears it: a recorded request or heartbeat is one to every "
             "node in the same domain"
         )
-    sys.exit(2 if failed else 0)
+    sys.exit(0 if made else 2)
+
+
+def _convert(files: list[Path], given: Path | None) -> None:
+    output = given or files[0].with_suffix(".rosbag2")
+    for remark in convert(files, output):
+        _tell(remark)
+    print(output, flush=True)
 
 
 def convert(files: list[Path], output: Path) -> list[str]:

@@ -51,6 +51,16 @@ def read_regular_text(path: Path) -> str:
     return read_regular(path)[1].decode("utf-8")
 
 
+def why_not_secret(name: str | Path, about: os.stat_result) -> str:
+    """Why what is in it may be no secret, and what to do; empty: only its user can read it, who is
+    ours or root."""
+    if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        return f"{name} may be read by others: chmod 600 {name}"
+    if about.st_uid not in (0, os.geteuid()):
+        return f"{name} belongs to another user: chown it"
+    return ""
+
+
 def _check(about: os.stat_result) -> None:
     if not stat.S_ISREG(about.st_mode):
         kind = next((name for is_it, name in _KINDS if is_it(about.st_mode)), "something else")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 import time
 
 from chute_ros.errors import SigningKeyError
@@ -18,7 +17,12 @@ from chute_ros.protocol.mavlink.signing import (
     key_from_text,
 )
 from chute_ros.transport.given_path import given_path
-from chute_ros.transport.regular_file import NotRegularError, TooLongError, read_regular
+from chute_ros.transport.regular_file import (
+    NotRegularError,
+    TooLongError,
+    read_regular,
+    why_not_secret,
+)
 
 #: Where the wall clock was set back, signing goes on so far after the newest time that was kept:
 #: the last ones before a crash were not. s
@@ -38,10 +42,8 @@ def signing_from_file(
     """
     before = before or Times()
     about, text = _read(name, option)
-    if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise SigningKeyError(f"{option}: {name} may be read by others: chmod 600 {name}")
-    if about.st_uid not in (0, os.geteuid()):
-        raise SigningKeyError(f"{option}: {name} belongs to another user: chown it")
+    if why := why_not_secret(name, about):
+        raise SigningKeyError(f"{option}: {why}")
     key = key_from_text(text, f"{option}: {name}")
     start = time.time()
     newest = EPOCH_2015 + before.newest / UNITS_PER_SECOND

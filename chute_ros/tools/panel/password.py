@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import stat
 from pathlib import Path
 
 from chute_ros.errors import ParameterError
-from chute_ros.transport.regular_file import read_regular
+from chute_ros.transport.regular_file import read_regular, why_not_secret
 
 SHORTEST = 10
 
@@ -22,12 +20,8 @@ def password_from(name: str) -> str | None:
         text = data.decode("utf-8").rstrip("\r\n")
     except (OSError, UnicodeDecodeError) as error:
         raise ParameterError(f"parameter password_file: {path}: {error}") from None
-    if about.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise ParameterError(
-            f"parameter password_file: {path} may be read by others: chmod 600 {path}"
-        )
-    if about.st_uid not in (0, os.geteuid()):
-        raise ParameterError(f"parameter password_file: {path} belongs to another user: chown it")
+    if why := why_not_secret(path, about):
+        raise ParameterError(f"parameter password_file: {why}")
     if len(text) < SHORTEST or "\n" in text:
         raise ParameterError(
             f"parameter password_file: {path} has no password: need one line of {SHORTEST} "
