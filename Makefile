@@ -81,10 +81,11 @@ bench: build ## measure against bare scripts, write docs/evidence/bench.md
 
 pictures: build ## fly the tutorial in a browser, keep its pictures in docs/guide/pictures
 	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && CHUTE_PICTURES=docs/guide/pictures exec python3 -m pytest \
-	    -q -p no:cacheprovider test/panel/test_tutorial.py test/panel/test_panel_orders.py -k "tutorial or twenty"
+	    -q -p no:cacheprovider test/panel -k "tutorial or twenty or phone or rocket_from"
 
 newcomer: build ## from git clone to a parachute released on the page, in a new folder; write docs/evidence/newcomer.md
-	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && exec python3 scripts/newcomer.py
+	@$(OVERLAY) && $(LOCAL) && scripts/browser.sh && PYTHONPATH="$$PWD/test/panel:$$PYTHONPATH" \
+	    exec python3 scripts/newcomer.py
 
 campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/evidence/campaign.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \

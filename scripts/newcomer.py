@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+from panel_bench import PATIENCE, browser_path, hold, log_in_with, word
 from playwright.sync_api import Page, expect, sync_playwright
 
 from chute_ros.tools.isolation import free_tcp_port
@@ -27,10 +28,8 @@ from chute_ros.tools.pages import table
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs/evidence/newcomer.md"
-_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-#: Of a page, ms; and of the set-up, s.
-_PATIENCE, _SET_UP = 60_000, 1800.0
-_HOLD = 1800  # ms
+#: How long the set-up may take, s.
+_SET_UP = 1800.0
 #: What this environment has set, and a newcomer has not.
 _OURS = re.compile(r"_?(ROS|AMENT|COLCON|CHUTE|CMAKE|PYTHON|LD_LIBRARY|VIRTUAL|RMW|MAKE|MFLAGS).*")
 
@@ -75,8 +74,9 @@ def main() -> None:
             assert address is not None
             assert password is not None
             with sync_playwright() as playwright:
-                path = next(filter(None, map(shutil.which, _BROWSERS)))
-                browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+                browser = playwright.chromium.launch(
+                    executable_path=browser_path(), args=["--no-sandbox"]
+                )
                 page = browser.new_page()
                 page.goto(address[1])
                 _play(page, password[1], step)
@@ -95,34 +95,19 @@ def main() -> None:
     )
 
 
-def _play(page: Page, password: str, step: object) -> None:
-    assert callable(step)
-
-    def word(text: str) -> None:
-        expect(page.locator(".part-banner .word")).to_contain_text(text, timeout=_PATIENCE)
-
-    def hold(name: str) -> None:
-        page.get_by_role("button", name=name, exact=True).hover(timeout=_PATIENCE)
-        page.mouse.down()
-        page.wait_for_timeout(_HOLD)
-        page.mouse.up()
-
-    word("READY")
+def _play(page: Page, password: str, step: Callable[[str], None]) -> None:
+    word(page, "READY")
     step("the page shows READY")
-    page.get_by_role("link", name="log in").click()
-    page.get_by_label("Your name").fill("Newcomer")
-    page.get_by_label("Password").fill(password)
-    page.get_by_role("button", name="Log in").click()
-    hold("Arm parachutes")
-    word("ARMED")
+    log_in_with(page, "Newcomer", password)
+    hold(page, "Arm parachutes")
+    word(page, "ARMED")
     step("logged in, and armed the parachute")
     page.get_by_role("button", name="Take off", exact=True).click()
-    word("IN FLIGHT")
-    height = page.locator(".part-vehicle")
-    expect(height).to_contain_text("60.0 m", timeout=_PATIENCE)
+    word(page, "IN FLIGHT")
+    expect(page.locator(".part-vehicle")).to_contain_text("60.0 m", timeout=PATIENCE)
     step("in flight, at 60 m")
-    hold("DEPLOY")
-    word("DEPLOYED")
+    hold(page, "DEPLOY")
+    word(page, "DEPLOYED")
     step("held DEPLOY: the parachute is released")
 
 

@@ -5,7 +5,17 @@ from __future__ import annotations
 import signal
 
 import pytest
-from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, watch_words, word
+from panel_bench import (
+    PATIENCE,
+    PHONE,
+    fits,
+    hold,
+    log_in,
+    password_file,
+    picture,
+    watch_words,
+    word,
+)
 from playwright.sync_api import expect
 
 from chute_ros.tools.demo_rig import Rig
@@ -17,12 +27,13 @@ pytestmark = pytest.mark.xdist_group("browser")
 
 
 @pytest.fixture
-def rig(namespace, tmp_path):
-    """A drone with a MAVLink parachute that is not plugged in yet."""
+def rig(request, namespace, tmp_path):
+    """A drone whose parachute is not plugged in yet: a MAVLink one, or of the kind that a test
+    names."""
     folder = tmp_path / "vehicle"
     folder.mkdir()
     processes = Processes(folder)
-    one = Rig.on_free_ports("mavlink", "", namespace, processes)
+    one = Rig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
     one.start_supervisor("supervisor")
     one.start_vehicle()
     yield one
@@ -77,6 +88,7 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path,
     word(page, "IN FLIGHT")
     expect(vehicle).to_contain_text("height29.", timeout=PATIENCE)
     assert fits(page)
+    picture(page, "phone_in_flight.jpg")
     pilot.fail_motor()
     word(page, "DEPLOYED")
     expect(card).to_contain_text("YES, by ")
@@ -135,6 +147,40 @@ def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_pat
     assert panel.log().count("safety/deploy: force=") == 1
     assert "reason='Anna at 127.0.0.1 (panel): the motor burns'" in panel.log()
     expect(page.locator(".part-decisions")).to_contain_text("the motor burns")
+
+
+@pytest.mark.parametrize("rig", ["both"], indirect=True)
+def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_path):
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    rig.start_parachute()
+    page = open_page(f"{panel.address}/fleet")
+    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    log_in(page)
+    word(page, "READY")
+    # Then each parachute has a card, with who its device says it is,
+    cards = page.locator(".part-parachutes section")
+    expect(cards).to_have_count(2, timeout=PATIENCE)
+    mavlink, upf = (cards.filter(has_text=name) for name in ("mavlink_parachute", "upf_can 33"))
+    expect(mavlink).to_contain_text("serial number SIM-0001", timeout=PATIENCE)
+    expect(upf).to_contain_text("upf.controller", timeout=PATIENCE)
+    expect(upf).to_contain_text("own supply8.")
+    # both are armed by one order,
+    hold(page, "Arm parachutes")
+    word(page, "ARMED")
+    for card in (mavlink, upf):
+        expect(card).to_contain_text("armed▼ YES", timeout=PATIENCE)
+    pilot.arm()
+    vehicle = page.locator(".part-vehicle")
+    expect(vehicle).to_contain_text("motorsARMED", timeout=PATIENCE)
+    pilot.take_off(30.0)
+    word(page, "IN FLIGHT")
+    expect(vehicle).to_contain_text("height29.", timeout=PATIENCE)
+    # and the first one that confirms is enough.
+    pilot.fail_motor()
+    word(page, "DEPLOYED")
+    expect(mavlink).to_contain_text("released▼ YES", timeout=PATIENCE)
+    expect(upf).to_contain_text("releasedno")
+    expect(vehicle).to_contain_text("ON_GROUND", timeout=PATIENCE)
 
 
 def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(

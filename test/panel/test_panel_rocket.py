@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from chute_msgs.srv import UmbilicalCommand
-from panel_bench import PATIENCE, hold, log_in, password_file, watch_words, word
+from panel_bench import PATIENCE, hold, log_in, password_file, picture, watch_words, word
 from playwright.sync_api import expect
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -81,6 +81,7 @@ def test_a_rocket_from_the_cable_to_the_main(
     assert command("launch", force=True).confirmed
     expect(rocket).to_contain_text("main valveOPEN", timeout=PATIENCE)
     expect(rocket).to_contain_text("flight modeCOAST", timeout=PATIENCE)
+    picture(page, "rocket.jpg")
     word(page, "IN FLIGHT")
     # When it falls past its apogee without a drogue, then the operator releases it on the page.
     expect(page.locator(".part-vehicle")).to_contain_text("vertical speed-", timeout=PATIENCE)

@@ -6,11 +6,11 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
 import pytest
+from printing_process import PrintingProcess
 
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import FrameDecoder, FrameEncoder
@@ -51,42 +51,12 @@ def environment(tmp_path):
     return environment_without(ROS, tmp_path)
 
 
-class Simulator:
-    """One that runs, and the lines that it has printed."""
-
-    def __init__(self, name, environment, *arguments):
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", name, *arguments],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.lines = []
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def said(self, text):
-        return next((line for line in self.lines if text in line), None)
-
-    def end(self, number=signal.SIGINT):
-        """Its exit code after this signal."""
-        self.process.send_signal(number)
-        code = self.process.wait(20.0)
-        self._reader.join()
-        return code
-
-
 @pytest.fixture
 def start(environment):
     started = []
 
     def begin(name, *arguments):
-        started.append(Simulator(name, environment, *arguments))
+        started.append(PrintingProcess(name, *arguments, environment=environment))
         return started[-1]
 
     yield begin
@@ -190,9 +160,8 @@ def test_it_needs_the_packages_that_its_page_says_and_no_others(
     assert not more or f"`{more[0]} msg_defs/" in row[1]
     missing = tuple(name for name, package in PACKAGES.items() if package not in row[0].split())
     assert len(PACKAGES) - len(missing) == len(row[0].split())
-    running = Simulator(
-        simulator, environment_without(ROS + missing, tmp_path), *connection, *more
-    )
+    environment = environment_without(ROS + missing, tmp_path)
+    running = PrintingProcess(simulator, *connection, *more, environment=environment)
     try:
         await_until(lambda: running.said("is open"), "it is open")
         assert running.end() == 0

@@ -7,9 +7,9 @@ import socket
 import stat
 import subprocess
 import sys
-import threading
 
 import pytest
+from printing_process import PrintingProcess
 
 from chute_ros.links.relay.protocol.link import RelayConfig
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -29,37 +29,15 @@ EVERY = pytest.mark.parametrize("name", MODULES)
 LOCAL = "127.0.0.1"
 
 
-class Running:
-    """A simulator in a process of its own, and the lines that it has printed."""
+class Running(PrintingProcess):
+    """A simulator that can be told what to do."""
 
     def __init__(self, name, path, *more):
-        self.path, self.lines = str(path), []
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", MODULES[name], "--control", self.path, *more],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def said(self, text):
-        return any(text in line for line in self.lines)
+        self.path = str(path)
+        super().__init__(MODULES[name], "--control", self.path, *more)
 
     def order(self, action):
         return order(self.path, action, 10.0)
-
-    def end(self, number=signal.SIGINT):
-        if self.process.poll() is None:
-            self.process.send_signal(number)
-        code = self.process.wait(20.0)
-        self._reader.join()
-        self.process.stdout.close()
-        return code
 
 
 @pytest.fixture

@@ -5,12 +5,12 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 from chute_msgs.msg import ParachuteStatus, SafetyDecision, SafetyState, VehicleState
 from node_bench import bench  # noqa: F401
+from printing_process import PrintingProcess
 from std_srvs.srv import Trigger
 
 from chute_ros.ros import qos
@@ -21,27 +21,16 @@ HEIGHT = 59.0
 STATES = ("READY", "BLOCKED", "IN_FLIGHT", "DEPLOYED", "FAULT")
 
 
-class Simulation:
-    """The tool as a process, and what it has printed."""
+class Simulation(PrintingProcess):
+    """The tool as a process."""
 
     def __init__(self, *arguments):
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "chute_ros.tools.sim", *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        super().__init__(
+            "chute_ros.tools.sim",
+            *arguments,
+            environment={**os.environ, "PYTHONUNBUFFERED": "1"},
+            errors=subprocess.PIPE,
         )
-        self.lines = []
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self):
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def said(self, text):
-        return any(text in line for line in self.lines)
 
     def children(self):
         """Command lines of its children by their process ids."""
@@ -51,12 +40,8 @@ class Simulation:
 
     def end(self, number=signal.SIGINT):
         """(exit code, standard error)."""
-        if self.process.poll() is None:
-            self.process.send_signal(number)
-        code = self.process.wait(60.0)
-        self._reader.join()
+        code = super().end(number, 60.0)
         errors = self.process.stderr.read()
-        self.process.stdout.close()
         self.process.stderr.close()
         return code, errors
 

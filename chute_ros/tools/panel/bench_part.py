@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from chute_ros.sim.bench_actions import ACTIONS
+from chute_ros.tools.chute.order import Order, answer_text, not_answered
 
 if TYPE_CHECKING:
     from chute_ros.tools.panel.node import PanelNode
 
+#: What a simulated vehicle offers to be done to it is a service of this folder.
+BENCH = "sim/"
 _EFFECTS = {one.name: one for one in ACTIONS}
 #: Taking off takes its time, s.
 _LONGEST = 60.0
@@ -30,7 +33,7 @@ class BenchPart:
 
     def refresh(self) -> None:
         """Look what is offered."""
-        there = self._node.bench(self._namespace)
+        there = self._node.offered(self._namespace, BENCH)
         offered = [name for name in _EFFECTS if name in there]
         if offered == self._offered:
             return
@@ -54,13 +57,12 @@ class BenchPart:
             ui.label(action.effect)
 
     async def _do(self, name: str) -> None:
-        title = _EFFECTS[name].title
-        self._answer.set_text(f"{title}: ...")
-        future: Any = asyncio.wrap_future(self._node.play(self._namespace, name))
+        order = Order(_EFFECTS[name].title, "Trigger", f"{BENCH}{name}")
+        self._answer.set_text(f"{order.name}: ...")
+        future: Any = asyncio.wrap_future(self._node.order(self._namespace, order, None))
         try:
             answer = await asyncio.wait_for(future, _LONGEST)
         except asyncio.TimeoutError:
-            self._answer.set_text(f"{title}: no answer within {_LONGEST:g} s")
+            self._answer.set_text(not_answered(order, f"within {_LONGEST:g} s"))
             return
-        outcome = "done" if answer.success else "NOT DONE"
-        self._answer.set_text(f"{title}: {outcome}: {answer.message or 'no message'}")
+        self._answer.set_text(answer_text(order, answer))

@@ -18,7 +18,6 @@ from typing import Any
 
 from chute_msgs.msg import PersonRequest, SafetySummary
 from rclpy.node import Node
-from std_srvs.srv import Trigger
 
 from chute_ros.plain_text import plain
 from chute_ros.ros import messages, qos
@@ -42,8 +41,6 @@ _AROUND = surroundings(os.environ, installed_middlewares()).text()
 MOST_VEHICLES = 50
 #: An order that waited longer in this process is not sent, s.
 _SENT_WITHIN = 1.0
-#: What a simulated vehicle offers to be done to it.
-BENCH = "sim/"
 
 
 class PanelNode(Node):
@@ -141,26 +138,18 @@ class PanelNode(Node):
         with self._lock:
             return [(name, heard) for name, (_, heard) in self._summaries.items()]
 
-    def bench(self, namespace: str) -> list[str]:
-        """The names of what can be done to this simulated vehicle."""
-        own = f"{namespace.rstrip('/')}/{BENCH}"
+    def offered(self, namespace: str, folder: str) -> list[str]:
+        """The names of the services in a folder of this vehicle's."""
+        own = f"{namespace.rstrip('/')}/{folder}"
         names = [name for name, _ in self.get_service_names_and_types()]
         return sorted(plain(name.removeprefix(own)) for name in names if name.startswith(own))
 
-    def order(self, namespace: str, order: Order, person: Operator) -> Future[Answer]:
-        """Send it, and record who ordered it and what was answered."""
-        return self._send(namespace, order.service, KINDS[order.kind], order.fields, person)
-
-    def play(self, namespace: str, name: str) -> Future[Answer]:
-        """Do one of bench."""
-        return self._send(namespace, f"{BENCH}{name}", Trigger, {}, None)
-
-    def _send(
-        self, namespace: str, service: str, kind: Any, fields: Any, person: Operator | None
-    ) -> Future[Answer]:
+    def order(self, namespace: str, order: Order, person: Operator | None) -> Future[Answer]:
+        """Send it, and record who ordered it and what was answered; person: None: it is done to a
+        simulated vehicle, and nobody's."""
         future: Future[Answer] = Future()
         wanted = time.monotonic()
-        self._want(lambda: self._call(namespace, service, kind, fields, person, future, wanted))
+        self._want(lambda: self._call(namespace, order, person, future, wanted))
         return future
 
     def _want(self, function: Callable[[], None]) -> None:
@@ -200,18 +189,17 @@ class PanelNode(Node):
     def _call(
         self,
         namespace: str,
-        service: str,
-        kind: Any,
-        fields: Any,
+        order: Order,
         person: Operator | None,
         answer: Future[Answer],
         wanted: float,
     ) -> None:
         """wanted: when, monotonic s: what waited for too long nobody expects any more."""
+        kind, service = KINDS[order.kind], order.service
         name = f"{namespace.rstrip('/')}/{service}"
         if name not in self._callers:
             self._callers[name] = self.create_client(kind, name)
-        client, request = self._callers[name], kind.Request(**fields)
+        client, request = self._callers[name], kind.Request(**order.fields)
         if not answer.set_running_or_notify_cancel():
             return
         if time.monotonic() - wanted > _SENT_WITHIN:
