@@ -28,6 +28,8 @@ STEP = 0.02  # s
 _SPOOLS_UP = 1.0
 #: Usual strength of the gusts of each m/s of wind, m/s^2.
 _GUSTS = 0.15
+#: The same in still air: no vehicle hovers without moving; what does not is taken for stuck.
+_STILL_AIR = 0.1
 _MOTOR, _OFF = float(dialect.FAILURE_UNIT_SYSTEM_MOTOR), float(dialect.FAILURE_TYPE_OFF)
 
 
@@ -43,7 +45,7 @@ class AutopilotDevice(AutopilotTelemetry):
         model: GustyModel | None = None,
         kind: AutopilotKind = GENERIC,
     ) -> None:
-        model = model or GustyModel(chance=random.Random(system_id))
+        model = model or GustyModel(gusts=_STILL_AIR, chance=random.Random(system_id))
         super().__init__(system_id, script, model)
         self.kind = kind
         self.battery = Battery()
@@ -186,7 +188,7 @@ class AutopilotDevice(AutopilotTelemetry):
 
     def _blow(self, speed: float) -> None:
         self.model.calm()
-        self.model.gusts = _GUSTS * speed
+        self.model.gusts = max(_STILL_AIR, _GUSTS * speed)
 
     def _mend(self) -> None:
         self.model.mend()

@@ -128,7 +128,7 @@ def test_a_stuck_estimator_repeats_itself_in_the_fall_until_the_autopilot_restar
     station.run(1.0)
     heights = {one.relative_alt for one in station.messages(POSITION)}
     assert heights == {before.relative_alt}
-    assert {one.roll for one in station.messages("ATTITUDE")} == {0.0}
+    assert len({one.roll for one in station.messages("ATTITUDE")}) == 1
     assert station.device.model.height < 18.0
     station.device.act("reboot")
     station.run(0.3)
@@ -147,8 +147,10 @@ def test_wind_moves_it_in_the_air_and_ends():
     station.run(5.0)
     station.forget()
     station.run(2.0)
-    assert {one.vz for one in station.messages(POSITION)} == {0}
-    assert {one.roll for one in station.messages("ATTITUDE")} == {0.0}
+    assert max(abs(one.vz) for one in station.messages(POSITION)) < 20, "cm/s"
+    rolls = [abs(one.roll) for one in station.messages("ATTITUDE")]
+    assert 0.0 < max(rolls) < math.radians(1.5), "in still air too it does not stand quite still"
+    assert len(set(rolls)) == len(rolls)
 
 
 def test_on_the_ground_no_wind_moves_it():

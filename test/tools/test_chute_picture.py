@@ -38,7 +38,8 @@ def test_a_vehicle_in_flight(heard):
         RuleState(name="on the ground alone", action=SafetyDecision.KILL, hold=0.25),
     ]
     told = {"decision_id": 3, "decision_action": 2, "decision_rule": "links"}
-    heard.hears(stamped(state(rules=rules, unusable=["tilt_deg: stuck"], **told)))
+    unusable = ["attitude_error: never received", "tilt_deg: stuck", "age: never received"]
+    heard.hears(stamped(state(rules=rules, unusable=unusable, **told)))
     heard.hears(stamped(parachute())).hears(vehicle())
     assert heard.text() == [
         "IN_FLIGHT",
@@ -46,6 +47,7 @@ def test_a_vehicle_in_flight(heard):
         "  mode               ACTIVE",
         "  flight             not blocked",
         "  cannot be used     tilt_deg: stuck",
+        "  not measured       attitude_error, age",
         "links",
         "  mavlink_parachute  OK, device healthy, <1 s ago",
         "parachutes",

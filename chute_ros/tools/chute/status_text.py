@@ -106,6 +106,8 @@ def _why(picture: VehiclePicture) -> Iterator[Line]:
         # On the ground a measurement that does not move is none, and that is no news.
         for one in picture.unusable:
             yield Line(_named("cannot be used", one), "warn")
+        if picture.never_given:
+            yield Line(_named("not measured", ", ".join(picture.never_given)), "plain")
 
 
 def _link(one: LinkView) -> Line:

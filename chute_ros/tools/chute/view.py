@@ -19,12 +19,14 @@ from chute_ros.model import (
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.chute.hearing import Heard, Picture
-from chute_ros.tools.chute.words import is_old, name_of
+from chute_ros.tools.chute.words import NEVER, is_old, name_of
 
 #: States in which nothing is wrong, if there is no alarm.
 WELL = ("READY", "ARMED", "IN_FLIGHT", "LANDED")
 #: chute_msgs/SafetyState.LINK_REGAINED, which only the supervisor's judgement has.
 _REGAINED = 4
+#: The end of such a line of SafetyState.unusable.
+_NEVER_GIVEN = f": {NEVER}"
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,10 @@ class VehiclePicture:
     block_reasons: tuple[str, ...]
     device_blocks: tuple[str, ...]
     alarms: tuple[str, ...]
+    #: Measurements that came once and cannot be used now, each with its reason.
     unusable: tuple[str, ...]
+    #: Measurements that the vehicle never gave.
+    never_given: tuple[str, ...]
     links: tuple[LinkView, ...]
     parachutes: tuple[ParachuteView, ...]
     vehicle: VehicleView | None
@@ -165,7 +170,12 @@ def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
         block_reasons=tuple(message.block_reasons),
         device_blocks=tuple(message.device_blocks),
         alarms=alarms,
-        unusable=tuple(message.unusable),
+        unusable=tuple(one for one in message.unusable if not one.endswith(_NEVER_GIVEN)),
+        never_given=tuple(
+            one.removesuffix(_NEVER_GIVEN)
+            for one in message.unusable
+            if one.endswith(_NEVER_GIVEN)
+        ),
         links=_links(picture, message, age),
         parachutes=tuple(
             _parachute(one.message, picture.parachute_age(one, now))

@@ -82,6 +82,8 @@ def blocks(picture: VehiclePicture) -> str:
     rows += [_row("", one, "warn") for one in reasons]
     if picture.state == "IN_FLIGHT":
         rows += [_row("cannot be used", one, "warn") for one in picture.unusable]
+        if picture.never_given:
+            rows.append(_row("not measured", ", ".join(picture.never_given), ""))
     rows.append(_row("newest decision", picture.newest_decision or "none yet", ""))
     rows.append(_row("supervisor", f"{picture.supervisor}, {age_text(picture.age)}", ""))
     return _card("Flight", "".join(rows), is_old(picture.age))
