@@ -289,7 +289,7 @@ def test_every_rule_has_its_story(name: str) -> None:
     # test_motors_stopped.py, test_uncommanded_sink.py, test_canopy.py.
     told |= {"tipped over at take-off", "killed aloft and silent", "motors stopped in flight"}
     told |= {"disarmed in flight", "uncommanded sink", "sinks fast", "canopy does not carry"}
-    told |= {"sinks fast under a canopy", "killed and falling"}
+    told |= {"sinks fast under a canopy", "killed and falling", "ballistic"}
     assert {rule.name for rule in shipped(name).profile.rules} <= told
 
 
@@ -386,6 +386,22 @@ def test_a_rocket_that_falls_is_deployed_beside_heights_that_tell_nothing(height
     story = Story(shipped("rocket")).ready().fly(1.0, height=3000.0, vertical_speed=1.0)
     story.sink(story.t + 8.0, 60.0, height=height, acceleration=3.0)
     assert story.fired() == ["KILL", "DEPLOY"]
+
+
+@pytest.mark.parametrize(("sinks", "fires"), [(38.0, False), (59.0, False), (70.0, True)])
+def test_a_rocket_that_falls_as_fast_as_it_can_is_told_from_one_under_its_drogue(
+    sinks: float, fires: bool
+) -> None:
+    """Given a sink that does not grow, as of recorded rockets under a drogue at 8 km and near the
+    ground, and of one that came down without any: it was known before only as it sped up."""
+    story = Story(shipped("rocket")).ready().fly(1.0, height=3000.0, vertical_speed=1.0)
+    story.fly(4.0, height=math.nan, vertical_speed=math.nan)
+    for step in range(40):
+        height = 2800.0 - sinks * step * 0.1
+        story.fly(story.t + 0.1, every=0.1, height=height, vertical_speed=-sinks)
+    assert bool(story.fired()) is fires
+    if fires:
+        assert story.newest(D).rule == "ballistic"
 
 
 def test_a_rocket_in_fault_that_comes_down_is_deployed() -> None:
