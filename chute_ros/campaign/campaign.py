@@ -19,6 +19,7 @@ from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
+from chute_ros.campaign.tapes import TapeFile
 
 #: Flights that one process flies before it tells of them.
 _BATCH = 10
@@ -43,6 +44,8 @@ class Line:
     faults: tuple[str, ...] = ()
     #: Who tells of an aircraft besides its autopilot; empty: nobody.
     second: str = ""
+    #: Whose physics flew it, and what failed on its tape; empty: the small model.
+    body: str = ""
 
 
 @dataclass
@@ -57,6 +60,8 @@ class Tally:
     faults: Counter[str] = field(default_factory=Counter)
     #: Of aircraft whose autopilot lost its power: (who tells besides it, count) -> flights.
     powerless: Counter[tuple[str, Count]] = field(default_factory=Counter)
+    #: Of flights on tapes: (body and its failure, other faults were drawn, count) -> flights.
+    by_body: Counter[tuple[str, bool, Count]] = field(default_factory=Counter)
     wrong: list[Line] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     #: s, of all that flew at the same time.
@@ -75,6 +80,8 @@ class Tally:
         self.faults.update(line.faults)
         if line.failure == Failure.POWER.value:
             self.powerless[line.second, line.count] += 1
+        if line.body:
+            self.by_body[line.body, bool(line.faults), line.count] += 1
         if line.count is Count.NOT_TOLD:
             self.reasons[line.why] += 1
         if line.count in WRONG:
@@ -87,22 +94,33 @@ class Tally:
 _shipped = functools.cache(Shipped)
 
 
-def fly_here(folder: Path, scenario: Scenario) -> tuple[Flown, Judged]:
+def drawn(folder: Path, seed: int, tapes: TapeFile | None = None) -> Scenario:
+    """The flight of a seed; tapes: some fly one of these."""
+    scenario, given = draw(seed), _shipped(folder, tapes).tapes
+    return scenario if given is None else given.drawn(scenario)
+
+
+def fly_here(
+    folder: Path, scenario: Scenario, tapes: TapeFile | None = None
+) -> tuple[Flown, Judged]:
     """One flight, and what it is counted as."""
-    flown = fly(scenario, _shipped(folder))
+    flown = fly(scenario, _shipped(folder, tapes))
     return flown, judge(flown)
 
 
-def _line(folder: Path, seed: int) -> Line:
-    scenario = draw(seed)
+def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
+    scenario = drawn(folder, seed, tapes)
     faults = tuple(type(one).__name__ for one in scenario.faults)
-    who = (seed, scenario.vehicle, scenario.profile, scenario.failure.value)
-    drawn = (faults, ", ".join(sorted(scenario.second_sources)))
+    taped = scenario.tape
+    failure = f"{taped.failed} ({taped.name})" if taped else scenario.failure.value
+    who = (seed, scenario.vehicle, scenario.profile, failure)
+    body = f"{taped.body}: {taped.failed}" if taped else ""
+    more = (faults, ", ".join(sorted(scenario.second_sources)), body)
     try:
-        flown, judged = fly_here(folder, scenario)
+        flown, judged = fly_here(folder, scenario, tapes)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
-        return Line(*who, Count.BROKEN, why, math.nan, math.nan, *drawn)
+        return Line(*who, Count.BROKEN, why, math.nan, math.nan, *more)
     at = flown.truth.at
     return Line(
         *who,
@@ -110,7 +128,7 @@ def _line(folder: Path, seed: int) -> Line:
         judged.why,
         flown.released - at,
         flown.truth.height - flown.release_height,
-        *drawn,
+        *more,
     )
 
 
@@ -120,15 +138,16 @@ def run(
     jobs: int,
     progress: Callable[[Tally], None],
     tally: Tally,
+    tapes: TapeFile | None = None,
 ) -> Tally:
     """Flights with these seeds, in their order, added to tally, which has the first of them
-    already. folder: of the profiles.
+    already. folder: of the profiles; tapes: bodies that some of them fly.
 
     Ended by Ctrl-C it returns those until then: hours of flights are not lost. BrokenProcessPool:
     one of its processes ended by itself; tally has those until then."""
     begun = time.monotonic() - tally.took
     try:
-        for line in _all(folder, seeds[tally.flights :], jobs):
+        for line in _all(folder, seeds[tally.flights :], jobs, tapes):
             tally.add(line)
             tally.took = time.monotonic() - begun
             progress(tally)
@@ -137,16 +156,16 @@ def run(
     return tally
 
 
-def _batch(folder: Path, seeds: Sequence[int]) -> list[Line]:
-    return [_line(folder, seed) for seed in seeds]
+def _batch(folder: Path, seeds: Sequence[int], tapes: TapeFile | None) -> list[Line]:
+    return [_line(folder, seed, tapes) for seed in seeds]
 
 
-def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
+def _all(folder: Path, seeds: Sequence[int], jobs: int, tapes: TapeFile | None) -> Iterator[Line]:
     if jobs == 1:
-        yield from (_line(folder, seed) for seed in seeds)
+        yield from (_line(folder, seed, tapes) for seed in seeds)
         return
     # Read before the processes part, so that they share it.
-    shipped = _shipped(folder)
+    shipped = _shipped(folder, tapes)
     shipped.read_all()
     # No collection of garbage looks through it again (4 % of a flight); PyPy's works otherwise.
     if hasattr(gc, "freeze"):
@@ -157,7 +176,7 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     ordered: deque[Future[list[Line]]] = deque()
     try:
         for first in range(0, len(seeds), _BATCH):
-            ordered.append(pool.submit(_batch, folder, seeds[first : first + _BATCH]))
+            ordered.append(pool.submit(_batch, folder, seeds[first : first + _BATCH], tapes))
             if len(ordered) > _AHEAD * jobs:
                 yield from ordered.popleft().result()
         for batch in ordered:

@@ -22,16 +22,16 @@ FORMAT = 1
 _NOT_FLYING = ("ros", "tools")
 
 
-def code_that_flies(profiles: Path) -> str:
-    """A sum of it, of the profiles and of the wires' data types: flights of two sums cannot be
-    counted together."""
+def code_that_flies(profiles: Path, *more: Path) -> str:
+    """A sum of it, of the profiles, of the wires' data types and of more files: flights of two
+    sums cannot be counted together."""
     package = Path(chute_ros.__file__).parent
     files = [
         one
         for one in package.rglob("*.py")
         if one.relative_to(package).parts[0] not in _NOT_FLYING
     ]
-    files += profiles.glob("*.yaml")
+    files += (*profiles.glob("*.yaml"), *more)
     files.append(Path(dialect.__file__))
     for folder in ("dsdl", "telem"):
         found = shared_folder(folder, "the wires' data types").rglob("*")
@@ -54,6 +54,9 @@ def text_of(tally: Tally, seed: int, code: str) -> str:
         "reasons": tally.reasons,
         "faults": tally.faults,
         "powerless": [[second, count.name, n] for (second, count), n in tally.powerless.items()],
+        "by_body": [
+            [body, faulty, count.name, n] for (body, faulty, count), n in tally.by_body.items()
+        ],
         "by_vehicle": [
             [vehicle, profile, count.name, n]
             for (vehicle, profile, count), n in tally.by_vehicle.items()
@@ -83,6 +86,9 @@ def tally_of(text: str, seed: int, code: str, named: str) -> Tally:
             faults=Counter(values["faults"]),
             powerless=Counter(
                 {(second, Count[name]): n for second, name, n in values["powerless"]}
+            ),
+            by_body=Counter(
+                {(body, faulty, Count[name]): n for body, faulty, name, n in values["by_body"]}
             ),
             by_vehicle=Counter(
                 {
