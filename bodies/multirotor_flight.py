@@ -235,15 +235,24 @@ class _Flight:
         told = {"height": float(self._target[2]), "speed": 0.0}
         if flown < hop:
             return {"cmd_thrust": 1.8 * weight, "cmd_q": np.array([0.0, 0.0, 0.0, 1.0]), **told}
-        angle = math.radians(self._plan.turns * (flown - hop))
-        turned = np.array([math.sin(angle / 2.0), 0.0, 0.0, math.cos(angle / 2.0)])
-        return {"cmd_thrust": 0.25 * weight, "cmd_q": turned, **told}
+        angle, rate = (
+            math.radians(self._plan.turns * (flown - hop)),
+            math.radians(self._plan.turns),
+        )
+        # RotorPy's controller knows no commanded rate and damps the turn: it is led by as much.
+        lead = rate * self._vehicle.kd_att / self._vehicle.kp_att
+        return {
+            "cmd_thrust": 0.25 * weight,
+            "cmd_q": _rolled(angle + lead),
+            "told_q": _rolled(angle),
+            **told,
+        }
 
     # -- what it does ----------------------------------------------------------------------------
 
     def _row(self, control: dict[str, Any]) -> Row:
         state = self._state
-        own, told = angles(state["q"]), angles(control["cmd_q"])
+        own, told = angles(state["q"]), angles(control.get("told_q", control["cmd_q"]))
         return Row(
             float(state["x"][2]),
             float(state["v"][2]),
@@ -255,6 +264,11 @@ class _Flight:
             control["speed"],
             control["cmd_thrust"] / self._vehicle.most_thrust,
         )
+
+
+def _rolled(angle: float) -> Any:
+    """The attitude with this roll, rad."""
+    return np.array([math.sin(angle / 2.0), 0.0, 0.0, math.cos(angle / 2.0)])
 
 
 def _turned(axis: Any) -> Any:

@@ -87,6 +87,8 @@ def truth_of(model: TapedModel, begun: float) -> Truth:
         return Truth(at, at + _NO_HURRY, height)
 
     def is_soft(row: int) -> bool:
+        if columns["height"][row] <= 0.0:
+            return False
         roll, pitch = columns["roll"][row], columns["pitch"][row]
         body = FlightModel(
             fall_speed=model.fall_speed,
