@@ -14,7 +14,7 @@ from chute_ros.sim.tape import GRAINS, STEP, Label, Tape, pack
 MOST_TILT = math.radians(60.0)
 #: A flight in which nothing fails is lost when it is never again within this of its command, rad.
 _OBEYS = math.radians(30.0)
-#: A sink was commanded if it is within this of what was, m/s.
+#: A sink was commanded if it is within this of what was; what lies over sinks by more, m/s.
 _BEYOND = 3.0
 #: What is like a level flight in attitude (rad) and force (m/s^2), for so long after it shows, s.
 _LEVEL_TILT, _LEVEL_FORCE, _LOOKED_AT = 0.9, 4.0, 3.0
@@ -62,10 +62,19 @@ class Row:
         return self.vertical_speed < -SOFT or self.tilt > MOST_TILT
 
     @property
-    def shows(self) -> bool:
+    def strays(self) -> bool:
         """The same, and nobody commanded it."""
-        sinks = self.vertical_speed < min(-SOFT, self.commanded_vertical_speed - _BEYOND)
-        return sinks or (self.tilt > MOST_TILT and self.disobeys > _OBEYS)
+        lies_over = self.tilt > MOST_TILT and self.disobeys > _OBEYS
+        return self._sinks or lies_over
+
+    @property
+    def shows(self) -> bool:
+        """It sinks so, or strays and sinks: attitude alone is one sign, and ends no flight."""
+        return self._sinks or (self.strays and self.vertical_speed < -_BEYOND)
+
+    @property
+    def _sinks(self) -> bool:
+        return self.vertical_speed < min(-SOFT, self.commanded_vertical_speed - _BEYOND)
 
 
 class Recorder:
@@ -124,11 +133,10 @@ class Recorder:
             first = self._lost()
         else:
             return label
-        shows = next((at for at in range(first, len(rows)) if rows[at].shows), None)
-        if shows is None:
-            if not label.ends_hard:
-                return label
-            shows = len(rows) - 1
+        after = range(first, len(rows))
+        if not label.ends_hard and not any(rows[at].strays for at in after):
+            return label
+        shows = next((at for at in after if rows[at].shows), len(rows) - 1)
         seen = rows[shows : shows + round(_LOOKED_AT / STEP)]
         level = all(
             row.tilt <= _LEVEL_TILT and abs(row.force - GRAVITY) <= _LEVEL_FORCE for row in seen

@@ -52,10 +52,11 @@ class Label:
     """What a tape is. Times: s after its first row; NaN: it never was so.
 
     body: the physics, with its version; profile: as the supervisor's; failed: in words; failed_at:
-    from when on; lost_at: since when it is out of control, if that ever shows; shows_at: when it
-    first shows in a sink faster than a soft landing or a tilt above 60 degrees; ends_hard: so it
-    touches down; level: it sinks with about the attitude and the force of one that flies;
-    fall_speed: m/s without motors in the end; parameters: whatever else was drawn.
+    from when on; lost_at: since when it is out of control, if it ever sinks faster than a soft
+    landing or lies over; shows_at: when both its attitude and its sink, or its sink alone, first
+    tell that; ends_hard: so it touches down; level: it sinks with about the attitude and the force
+    of one that flies; fall_speed: m/s without motors in the end; parameters: whatever else was
+    drawn.
     """
 
     name: str

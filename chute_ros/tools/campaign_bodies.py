@@ -34,7 +34,8 @@ The truth is the tape's:
   60 degrees over without a command to do so.
 - If it then touches the ground faster than {SOFT} m/s, or more than 60 degrees over, it must be
   released. The last moment is found by putting the small model's canopy onto each row of the
-  tape; the time that is needed counts from the first such sink or tilt.
+  tape; the time that is needed counts from the first such sink, or the first such tilt with a
+  sink of 3 m/s: attitude alone is one sign, and ends no flight.
 - If it is lost and comes down softly by chance, or is in the air when the tape ends, neither a
   release nor none is wrong.
 - All others fly: every kill or release there is false.

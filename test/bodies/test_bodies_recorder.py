@@ -62,6 +62,18 @@ def test_a_fast_descent_that_was_commanded_shows_nothing() -> None:
     assert math.isnan(told.lost_at)
 
 
+def test_what_lies_over_shows_once_it_sinks_as_well() -> None:
+    # Given a tilt of 90 degrees from 1 s on, that begins to sink 1 s later
+    over = [replace(HOVER, roll=1.6)] * 50
+    told = label([HOVER] * 50 + over + sinking(5.0, roll=1.6)[50:], failed_at=1.0)
+    assert (told.lost_at, told.shows_at, told.ends_hard) == (1.0, 2.0, True)
+
+
+def test_what_lies_over_and_never_sinks_was_lost_and_ends_softly() -> None:
+    told = label([HOVER] * 50 + [replace(HOVER, roll=1.6)] * 50, failed_at=1.0)
+    assert (told.lost_at, told.ends_hard) == (1.0, False)
+
+
 def test_where_nothing_fails_it_is_lost_when_it_obeys_no_more() -> None:
     told = label(sinking(9.0, roll=1.5))
     assert (told.lost_at, told.ends_hard) == (1.0, True)
