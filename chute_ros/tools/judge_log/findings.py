@@ -1,0 +1,96 @@
+"""What a judged log tells: what was decided, how near each rule came, what was not known."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from chute_ros.model import Action
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.judge_log.log_flight import Judged
+from chute_ros.tools.state_rows import RuleTold, rules_of
+
+_DIGITS = str.maketrans("0123456789", "0" * 10)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A measurement that could not be used for this share (0 to 1) of the flight, and why."""
+
+    name: str
+    share: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Rating:
+    """One rule of the profile that ends a flight, in this one. nearest: its measurements when they
+    came nearest to their limits, in words; undecided: share of the flight (0 to 1) in which a
+    condition could not be said."""
+
+    told: RuleTold
+    nearest: tuple[str, ...]
+    undecided: float
+
+    @property
+    def share(self) -> float:
+        """The highest counter as a share of what fulfils the rule."""
+        if self.told.hold > 0.0:
+            return self.told.peak / self.told.hold
+        return 0.0 if math.isnan(self.told.fulfilled_at) else 1.0
+
+
+def verdict(judged: Judged) -> str:
+    """In a few words."""
+    if judged.fired:
+        return ", ".join(
+            f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired
+        )
+    if not judged.flew:
+        return "never in flight"
+    return "nothing ended the flight"
+
+
+def ratings(judged: Judged) -> list[Rating]:
+    """Of each rule that may end a flight, the nearest first."""
+    in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
+    told = {one.name: one for one in rules_of(judged.pictures)}
+    found = []
+    for rule in judged.config.profile.rules:
+        if rule.action >= Action.KILL and rule.name in told:
+            alive = [r for one in in_flight for r in one.rules if r.name == rule.name and r.alive]
+            unsaid = sum(any(text.startswith("[?]") for text in one.conditions) for one in alive)
+            share = unsaid / len(alive) if alive else 0.0
+            nearest = tuple(judged.nearest.words(rule))
+            found.append(Rating(told[rule.name], nearest, share))
+    return sorted(found, key=lambda one: -one.share)
+
+
+def unknown(judged: Judged) -> list[Unknown]:
+    """What of the vehicle could not be used in flight, the longest first."""
+    in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
+    reasons: dict[str, Counter[str]] = {}
+    for one in in_flight:
+        for line in one.unusable:
+            name, _, why = line.partition(": ")
+            reasons.setdefault(name, Counter())[why.translate(_DIGITS)] += 1
+    lines = [line.partition(": ") for one in in_flight for line in one.unusable]
+    newest = {name: why for name, _, why in lines}
+    found = [
+        Unknown(name, sum(whys.values()) / len(in_flight), newest[name])
+        for name, whys in reasons.items()
+    ]
+    return sorted(found, key=lambda one: -one.share)
+
+
+def blocked(judged: Judged) -> list[str]:
+    """Why the vehicle must not have taken off, as the supervisor knew it when it did; empty: it
+    was ready, or nobody knows."""
+    before: Sequence[str] = ()
+    for _, one in judged.pictures:
+        if one.state == Stage.IN_FLIGHT:
+            return list(before)
+        before = one.block_reasons
+    return []
