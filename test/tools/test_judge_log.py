@@ -213,7 +213,7 @@ def test_what_was_missing_to_decide_is_told(landed, tmp_path):
     told = {part.name: part for part in unknown(one)}
     assert (told["tilt_deg"].share, told["tilt_deg"].why) == (1.0, "never received")
     tilt = next(rating for rating in ratings(one) if rating.told.name == "excess tilt")
-    assert tilt.undecided > 0.9
+    assert tilt.blind > 0.9
 
 
 def test_a_sweep_tells_which_threshold_would_have_kept_it_clean(fallen, tmp_path):

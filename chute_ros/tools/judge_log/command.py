@@ -18,7 +18,7 @@ from chute_ros.errors import ChuteError
 from chute_ros.plain_text import plain
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.supervisor.config import SupervisorConfig
-from chute_ros.tools.judge_log import formats, table
+from chute_ros.tools.judge_log import formats, known, table
 from chute_ros.tools.judge_log.findings import ratings, unknown, verdict
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import Judged, fly
@@ -30,6 +30,8 @@ from chute_ros.tools.recording_options import complain, write
 CLEAN, FIRED, UNREADABLE = 0, 1, 2
 #: What carries one parachute on MAVLink.
 _VEHICLE = "mavlink"
+#: What was not known for a smaller share of the flight is on the page alone.
+_TOLD = 0.05
 
 
 def main() -> None:
@@ -54,6 +56,10 @@ def main() -> None:
         if judged:
             write(given.page, page(judged, unread))
             print(f"page: {given.page}")
+        if given.known:
+            flights = [one for one, _ in judged]
+            write(given.table, known.page(flights, unread, known.known_of(given.known)))
+            print(f"table: {given.table}")
     except ChuteError as error:
         complain("judge_log", error)
         sys.exit(UNREADABLE)
@@ -82,6 +88,19 @@ def _options() -> argparse.ArgumentParser:
         "--sweep",
         action="store_true",
         help="also find which thresholds would have kept each flight clean",
+    )
+    options.add_argument(
+        "--known",
+        type=Path,
+        metavar="TSV",
+        help="what happened in these flights: compare, and write the table of --table",
+    )
+    options.add_argument(
+        "--table",
+        type=Path,
+        default=Path("judged.md"),
+        metavar="MD",
+        help="with --known: the table to write (default: %(default)s)",
     )
     options.add_argument(
         "--column",
@@ -138,8 +157,10 @@ def _tell(one: Judged, tried: Sequence[Tried]) -> None:
     lines += [
         f"  not known: {u.name} for {100.0 * u.share:.0f} % of the flight ({u.why})"
         for u in unknown(one)
-        if u.share >= 0.05
+        if u.share >= _TOLD
     ]
+    blind = [r for r in ratings(one) if r.blind >= _TOLD]
+    lines += [f"  blind: {r.told.name} for {100.0 * r.blind:.0f} % of the flight" for r in blind]
     lines += [f"  note: {text}" for text in log.remarks]
     for t in tried:
         clean = f"clean from {t.clean:.3g}" if t.clean == t.clean else "not clean with any tried"

@@ -27,12 +27,12 @@ class Unknown:
 @dataclass(frozen=True)
 class Rating:
     """One rule of the profile that ends a flight, in this one. nearest: its measurements when they
-    came nearest to their limits, in words; undecided: share of the flight (0 to 1) in which a
-    condition could not be said."""
+    came nearest to their limits, in words; blind: share of the time (0 to 1) in which too
+    little was known for it to be fulfilled."""
 
     told: RuleTold
     nearest: tuple[str, ...]
-    undecided: float
+    blind: float
 
     @property
     def share(self) -> float:
@@ -53,18 +53,21 @@ def verdict(judged: Judged) -> str:
     return "nothing ended the flight"
 
 
+def height_at(judged: Judged, at: float) -> float:
+    """The height (m) that was known then; NaN: none."""
+    known = [state.height for when, state in judged.vehicle if when <= at]
+    return known[-1] if known else math.nan
+
+
 def ratings(judged: Judged) -> list[Rating]:
     """Of each rule that may end a flight, the nearest first."""
-    in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
     told = {one.name: one for one in rules_of(judged.pictures)}
-    found = []
-    for rule in judged.config.profile.rules:
-        if rule.action >= Action.KILL and rule.name in told:
-            alive = [r for one in in_flight for r in one.rules if r.name == rule.name and r.alive]
-            unsaid = sum(any(text.startswith("[?]") for text in one.conditions) for one in alive)
-            share = unsaid / len(alive) if alive else 0.0
-            nearest = tuple(judged.nearest.words(rule))
-            found.append(Rating(told[rule.name], nearest, share))
+    near = judged.nearest
+    found = [
+        Rating(told[rule.name], tuple(near.words(rule)), near.blind(rule))
+        for rule in judged.config.profile.rules
+        if rule.action >= Action.KILL and rule.name in told
+    ]
     return sorted(found, key=lambda one: -one.share)
 
 

@@ -73,7 +73,7 @@ class Judged:
     @property
     def flew(self) -> float:
         """For how long it was guarded in flight, s."""
-        times = [(at, one.state) for at, one in self.pictures]
+        times = [(at, one.state) for at, one in self.pictures if at >= 0.0]
         return sum(
             min(after - at, 2.0 * _APART + 1.0)
             for (at, state), (after, _) in zip(times, times[1:], strict=False)

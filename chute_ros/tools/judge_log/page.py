@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.judge_log.findings import blocked, ratings, unknown, verdict
+from chute_ros.tools.judge_log.findings import blocked, height_at, ratings, unknown, verdict
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.judge_log.sweep import Tried
@@ -146,12 +147,12 @@ def _decisions(one: Judged) -> str:
 
 
 def _height(one: Judged, at: float) -> str:
-    known = [state.height for when, state in one.vehicle if when <= at]
-    return f"{known[-1]:.1f}" if known else ""
+    height = height_at(one, at)
+    return f"{height:.1f}" if math.isfinite(height) else ""
 
 
 def _ratings(one: Judged) -> str:
-    heads = ("rule", "action", "highest counter, s", "of, s", "at, s", "not decidable, %")
+    heads = ("rule", "action", "highest counter, s", "of, s", "at, s", "blind, %")
     return table(
         (*heads, "nearest values", "conditions at the highest counter"),
         (
@@ -161,7 +162,7 @@ def _ratings(one: Judged) -> str:
                 number(f"{r.told.peak:.2f}"),
                 number(f"{r.told.hold:.2f}"),
                 number(f"{r.told.peak_at:.1f}" if r.told.peak else ""),
-                number(f"{100.0 * r.undecided:.0f}"),
+                number(f"{100.0 * r.blind:.0f}"),
                 words(listing(r.nearest)),
                 words(listing(r.told.conditions) if r.told.peak else ""),
             )
