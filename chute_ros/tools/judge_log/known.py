@@ -17,7 +17,7 @@ from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.pages import table
 
 #: What a flight asks for: nothing that ends it; the motors stopped or the parachute released from
-#: a moment on, at the latest at another; either.
+#: a moment on, at the latest at another; either, but nothing before that moment.
 FLIES, ENDS, EITHER = "flies", "ends", "either"
 _ABOUT = """Flights of others, from public repositories, judged as they were recorded by
 [judge_log](../guide/judge_log.md): what the shipped profiles would have decided. What happened is
@@ -71,13 +71,12 @@ def mistake(known: Known, judged: Judged) -> str:
     first = judged.fired[0][0] if judged.fired else None
     if known.right == FLIES and first is not None:
         return f"ended at {first:.1f} s, and it flew well"
-    if known.right == ENDS:
-        if first is None:
-            return "not ended"
-        if first < known.begin:
-            return f"ended at {first:.1f} s, before anything failed ({known.begin:g} s)"
-        if first > known.end:
-            return f"ended at {first:.1f} s, later than {known.end:g} s"
+    if known.right == ENDS and first is None:
+        return "not ended"
+    if first is not None and first < known.begin:
+        return f"ended at {first:.1f} s, before anything failed ({known.begin:g} s)"
+    if known.right == ENDS and first is not None and first > known.end:
+        return f"ended at {first:.1f} s, later than {known.end:g} s"
     return ""
 
 
