@@ -160,7 +160,9 @@ def _tell(one: Judged, tried: Sequence[Tried]) -> None:
         if u.share >= _TOLD
     ]
     blind = [r for r in ratings(one) if r.blind >= _TOLD]
-    lines += [f"  blind: {r.told.name} for {100.0 * r.blind:.0f} % of the flight" for r in blind]
+    if blind:
+        shares = ", ".join(f"{r.told.name} {100.0 * r.blind:.0f} %" for r in blind)
+        lines.append(f"  rules blind for a share of the flight: {shares}")
     lines += [f"  note: {text}" for text in log.remarks]
     for t in tried:
         clean = f"clean from {t.clean:.3g}" if t.clean == t.clean else "not clean with any tried"

@@ -26,13 +26,15 @@ MAGIC = b"\xa3\x95"
 
 #: EV.Id: armed, disarmed; landed, and not.
 _ARMED, _DISARMED, _LANDED, _NOT_LANDED = 10, 11, 18, 28
-#: What tells the vertical speed, the best first: message, field, factor to m/s up.
+#: What tells the vertical speed, the best first: what the height controller flew by is what was
+#: sent; of the estimators one may have run beside it. Message, field, factor to m/s up (of a
+#: CTUN as a whole number: cm/s).
 _SPEEDS = (
+    ("CTUN", "CRt", 0.01),
+    ("CTUN", "CRate", 0.01),
     ("XKF1", "VD", -1.0),
     ("NKF1", "VD", -1.0),
     ("EKF1", "VD", -1.0),
-    ("CTUN", "CRt", 0.01),
-    ("CTUN", "CRate", 0.01),
     ("GPS", "VZ", -1.0),
 )
 _IMUS = {"IMU": 0, "IMU2": 1, "IMU3": 2}
@@ -118,8 +120,9 @@ class _Teller:
         self._speed_of = len(_SPEEDS)
         self._speed = math.nan
         self._home_altitude = math.nan
-        #: Positions by the height controller.
+        #: Positions by the height controller, and by the second estimator.
         self._by_controller: list[tuple[float, Any]] = []
+        self._by_ahr2: list[tuple[float, Any]] = []
         self._makers = {
             "ATT": self._att,
             "POS": self._pos,
@@ -146,7 +149,9 @@ class _Teller:
         self._newest[kind] = entry
         for number, (message, name, factor) in enumerate(_SPEEDS[: self._speed_of + 1]):
             if kind == message and hasattr(entry, name) and _instance(entry) == 0:
-                self._speed_of, self._speed = number, factor * getattr(entry, name)
+                value = getattr(entry, name)
+                whole = 1.0 if kind == "CTUN" and isinstance(value, float) else factor
+                self._speed_of, self._speed = number, whole * value
         maker = self._makers.get(kind)
         if maker is not None:
             maker(entry)
@@ -163,8 +168,8 @@ class _Teller:
         if self._parameters.get("Q_ENABLE", 0) > 0:
             vehicle_type = dialect.MAV_TYPE_VTOL_FIXEDROTOR
         remarks = []
-        if "POS" not in self._newest and "AHR2" not in self._newest:
-            for at, message in self._by_controller:
+        if "POS" not in self._newest:
+            for at, message in self._by_controller or self._by_ahr2:
                 self._out.add(at, message)
         if not self._arming:
             remarks.append("nothing tells when it was armed: taken to be armed throughout")
@@ -218,15 +223,14 @@ class _Teller:
         )
 
     def _ahr2(self, entry: Any) -> None:
-        if "POS" not in self._newest and hasattr(entry, "Alt"):
+        # The second estimator's: where the first one's is not in the log.
+        if hasattr(entry, "Alt") and math.isfinite(self._speed):
             height = entry.Alt - self._home(entry.Alt)
-            self._out.add(
-                self._at,
-                told.position(height, _known(self._speed), entry.Alt, entry.Lat, entry.Lng),
-            )
+            where = (entry.Alt, entry.Lat, entry.Lng)
+            self._by_ahr2.append((self._at, told.position(height, self._speed, *where)))
 
     def _ctun(self, entry: Any) -> None:
-        # Logs older than POS and AHR2: the height of the controller, which a barometer led.
+        # Logs older than POS: the height of the controller, which a barometer led.
         names = ("Alt", "BAlt", "BarAlt")
         height = next((getattr(entry, n) for n in names if hasattr(entry, n)), math.nan)
         if math.isfinite(height) and math.isfinite(self._speed):
