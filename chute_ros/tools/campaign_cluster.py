@@ -164,4 +164,7 @@ async def _identity(address: str) -> None:
 def _told(error: BaseException) -> str:
     """In one line."""
     text = str(error).partition("\n")[0]
-    return text if isinstance(error, CampaignError) else f"{type(error).__name__}: {text}"
+    # A plain Exception is Dask's, around the name of what was raised elsewhere.
+    if isinstance(error, CampaignError) or type(error) is Exception:
+        return text
+    return f"{type(error).__name__}: {text}"

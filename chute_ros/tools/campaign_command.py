@@ -170,10 +170,10 @@ def _flyers(scheduler: str | None, profiles: Path, jobs: int) -> Iterator[_Flyer
         from chute_ros.tools.campaign_cluster import Cluster
 
         cluster = Cluster(scheduler)
-    except ModuleNotFoundError as error:
+    except ImportError as error:
         refused = (
-            f"--scheduler needs {error.name}, which is not installed: "
-            "`pip install -r requirements/extra.in` brings it"
+            f"--scheduler needs {error.name}, which this Python cannot import: "
+            "`python3 -m pip install -r requirements/extra.in` brings it"
         )
     except CampaignError as error:
         refused = str(error)
