@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -164,6 +165,23 @@ def test_a_full_disk_does_not_end_the_flights(monkeypatch, tmp_path, capsys):
     told = capsys.readouterr()
     assert "2 of 2 flights in" in told.out
     assert "not saved: [Errno 28] No space left on device" in told.err
+
+
+def test_a_file_that_takes_long_to_write_is_written_less_often(monkeypatch, tmp_path):
+    now, written = [0.0], []
+
+    def slow(*_):
+        now[0] += 10.0
+        written.append(now[0])
+        return ""
+
+    monkeypatch.setattr(campaign, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(campaign.checkpoint, "text_of", slow)
+    kept = campaign._Kept(tmp_path / "kept.json", 0, tmp_path)
+    while now[0] < 500.0:
+        kept.look(flights.Tally())
+        now[0] += 1.0
+    assert written == [70.0, 270.0, 470.0], "a twentieth of the time"
 
 
 def full_disk(*_):
