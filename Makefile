@@ -33,11 +33,13 @@ LOOPS ?= 300
 MINUTES ?= 10
 # How many flights of the campaign, and the seed of the first; of so many fly only the first EACH of
 # each kind (empty: all). A PyPy of 3.10 or newer, if there is one, flies four times as many a minute;
+# SCHEDULER: tcp://HOST:PORT of the Dask cluster to fly on (docs/guide/cluster.md; empty: this machine);
 # CAMPAIGN_ARGS: what else the campaign's command takes.
 FLIGHTS ?= 1000
 SEED ?= 0
 EACH ?=
 PYPY ?=
+SCHEDULER ?=
 CAMPAIGN_ARGS ?=
 WITHOUT_ARGS ?=
 
@@ -89,7 +91,8 @@ newcomer: build ## from git clone to a parachute released on the page, in a new 
 
 campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/evidence/campaign.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
-	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) $(CAMPAIGN_ARGS) \
+	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
+	    $(if $(SCHEDULER),--scheduler $(SCHEDULER)) $(CAMPAIGN_ARGS) \
 	    $(if $(EACH),--each $(EACH) --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md)
 
 without: build ## fly the campaign without a rule or heuristic, to see what needs it (WITHOUT_ARGS="--together ...")

@@ -1,17 +1,14 @@
-"""Many flights on all cores, counted; the same for the same seed."""
+"""Many flights, counted; the same for the same seeds."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
-import gc
 import math
-import signal
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
-from multiprocessing import active_children, get_context
 from pathlib import Path
 
 from chute_ros.campaign.draw import draw
@@ -19,11 +16,6 @@ from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
-
-#: Flights that one process flies before it tells of them.
-_BATCH = 10
-#: Batches for each process that are given out before the oldest is told of.
-_AHEAD = 4
 
 
 @dataclass(frozen=True)
@@ -84,13 +76,18 @@ class Tally:
 
 
 #: Of this process; each reads them once.
-_shipped = functools.cache(Shipped)
+shipped = functools.cache(Shipped)
 
 
 def fly_here(folder: Path, scenario: Scenario) -> tuple[Flown, Judged]:
     """One flight, and what it is counted as."""
-    flown = fly(scenario, _shipped(folder))
+    flown = fly(scenario, shipped(folder))
     return flown, judge(flown)
+
+
+def fly_bundle(folder: Path, seeds: Sequence[int]) -> list[Line]:
+    """One flight for each seed, in this process. folder: of the profiles."""
+    return [_line(folder, seed) for seed in seeds]
 
 
 def _line(folder: Path, seed: int) -> Line:
@@ -115,56 +112,16 @@ def _line(folder: Path, seed: int) -> Line:
 
 
 def run(
-    folder: Path,
-    seeds: Sequence[int],
-    jobs: int,
-    progress: Callable[[Tally], None],
-    tally: Tally,
+    flown: Generator[Line, None, None], progress: Callable[[Tally], None], tally: Tally
 ) -> Tally:
-    """Flights with these seeds, in their order, added to tally, which has the first of them
-    already. folder: of the profiles.
+    """Flights in the order of their seeds, added to tally as they come.
 
-    Ended by Ctrl-C it returns those until then: hours of flights are not lost. BrokenProcessPool:
-    one of its processes ended by itself; tally has those until then."""
+    Ended by Ctrl-C it returns those until then: hours of flights are not lost. CampaignError: what
+    flies them ended by itself; tally has those until then."""
     begun = time.monotonic() - tally.took
-    try:
-        for line in _all(folder, seeds[tally.flights :], jobs):
+    with contextlib.suppress(KeyboardInterrupt), contextlib.closing(flown):
+        for line in flown:
             tally.add(line)
             tally.took = time.monotonic() - begun
             progress(tally)
-    except KeyboardInterrupt:
-        pass
     return tally
-
-
-def _batch(folder: Path, seeds: Sequence[int]) -> list[Line]:
-    return [_line(folder, seed) for seed in seeds]
-
-
-def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
-    if jobs == 1:
-        yield from (_line(folder, seed) for seed in seeds)
-        return
-    # Read before the processes part, so that they share it.
-    shipped = _shipped(folder)
-    shipped.read_all()
-    # No collection of garbage looks through it again (4 % of a flight); PyPy's works otherwise.
-    if hasattr(gc, "freeze"):
-        gc.freeze()
-    # Ctrl-C reaches every process of a terminal: ours ends them.
-    ignores = (signal.SIGINT, signal.SIG_IGN)
-    pool = ProcessPoolExecutor(jobs, get_context("fork"), signal.signal, ignores)
-    ordered: deque[Future[list[Line]]] = deque()
-    try:
-        for first in range(0, len(seeds), _BATCH):
-            ordered.append(pool.submit(_batch, folder, seeds[first : first + _BATCH]))
-            if len(ordered) > _AHEAD * jobs:
-                yield from ordered.popleft().result()
-        for batch in ordered:
-            yield from batch.result()
-    finally:
-        # Nobody waits for what they fly now.
-        for process in active_children():
-            process.kill()
-        # Not left to the end of Python, which then may wake a thread that has just ended (EBADF).
-        pool.shutdown(cancel_futures=True)
