@@ -15,10 +15,10 @@ from log_bench import FAILS, FAILS_AT, FORMATS, LANDS, Told, flown
 
 from chute_ros.model import Action
 from chute_ros.tools.judge_log import command, formats, table
-from chute_ros.tools.judge_log.findings import ratings, unknown, verdict
+from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.log_flight import Judged
-from chute_ros.tools.judge_log.page import page
+from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import sweep
 
 EACH = pytest.mark.parametrize("name", FORMATS)
@@ -51,7 +51,7 @@ def highest(one: Judged) -> float:
 @EACH
 def test_a_flight_that_went_well_is_not_ended(name, landed, tmp_path):
     one = judged(FORMATS[name](landed, tmp_path / name))
-    assert verdict(one) == "nothing ended the flight"
+    assert verdict_of(one).words == "nothing ended the flight"
     assert 40.0 < one.flew < 67.0, "from its take-off to its landing"
     assert highest(one) == pytest.approx(60.0, abs=0.5)
     assert one.ended == pytest.approx(one.log.duration)
@@ -230,7 +230,9 @@ def test_the_page_has_every_log_and_nothing_of_it_raw(fallen, tmp_path):
     path = FORMATS["flight.tlog"](fallen, tmp_path / "<script>.tlog")
     one = judged(path)
     one.log.remarks.append("<b>remark</b>\x1b[2J")
-    text = page([(one, sweep(one))], [(tmp_path / "<i>", LogError("<u>no log</u>"))])
+    verdict = verdict_of(one)
+    part = flight_section(0, verdict, one, sweep(one))
+    text = page([(verdict, part)], [(tmp_path / "<i>", LogError("<u>no log</u>"))])
     assert text.startswith("<!DOCTYPE html>")
     for raw in ("<script>", "<b>remark", "<i>", "<u>", "\x1b"):
         assert raw not in text

@@ -9,25 +9,25 @@ from log_bench import FAILS, FAILS_AT, LANDS, flown, tlog
 
 from chute_ros.errors import ChuteError
 from chute_ros.tools.judge_log import command, formats
+from chute_ros.tools.judge_log.findings import Verdict, verdict_of
 from chute_ros.tools.judge_log.flight_log import LogError, without_gaps
 from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, page
-from chute_ros.tools.judge_log.log_flight import Judged
 
 HEAD = "file\tsource\treal\twhat_happened\tright\tfrom\tuntil"
 
 
-def judged(path: Path) -> Judged:
+def judged(path: Path) -> Verdict:
     log = formats.read(path, {})
-    return command.flown(log, command.config_of(log, None))
+    return verdict_of(command.flown(log, command.config_of(log, None)))
 
 
 @pytest.fixture(scope="module")
-def landed(tmp_path_factory) -> Judged:
+def landed(tmp_path_factory) -> Verdict:
     return judged(tlog(flown(LANDS, 40.0), tmp_path_factory.mktemp("logs") / "well.tlog"))
 
 
 @pytest.fixture(scope="module")
-def fallen(tmp_path_factory) -> Judged:
+def fallen(tmp_path_factory) -> Verdict:
     told = flown(FAILS, FAILS_AT + 4.0)
     return judged(tlog(told, tmp_path_factory.mktemp("logs") / "fell.tlog"))
 
@@ -37,7 +37,7 @@ def known(right: str, begin: float = 0.0, end: float = 0.0) -> Known:
 
 
 def test_an_end_is_right_from_the_failure_on_until_it_is_too_late(landed, fallen):
-    at = fallen.fired[0][0]
+    at = fallen.first
     assert mistake(known("ends", at - 1.0, at + 1.0), fallen) == ""
     assert mistake(known("ends", at + 0.5, at + 1.0), fallen).startswith(
         f"ended at {at:.1f} s, be"

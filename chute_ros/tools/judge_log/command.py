@@ -19,10 +19,10 @@ from chute_ros.plain_text import plain
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.tools.judge_log import formats, known, table
-from chute_ros.tools.judge_log.findings import ratings, unknown, verdict
+from chute_ros.tools.judge_log.findings import Verdict, ratings, unknown, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import Judged, fly
-from chute_ros.tools.judge_log.page import page
+from chute_ros.tools.judge_log.page import flight_section, page
 from chute_ros.tools.judge_log.sweep import Tried, sweep
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording_options import complain, write
@@ -38,7 +38,7 @@ def main() -> None:
     """Exit code 0: nothing would have been released, and no motor stopped in flight; 1: something
     would; 2: a file cannot be read, and nothing of the others would have been."""
     given = _options().parse_args()
-    judged: list[tuple[Judged, Sequence[Tried]]] = []
+    flights: list[tuple[Verdict, str]] = []
     unread: list[tuple[Path, LogError]] = []
     try:
         columns = dict(given.column)
@@ -51,20 +51,23 @@ def main() -> None:
                 continue
             one = flown(log, config_of(log, given.profile))
             tried = sweep(one) if given.sweep else []
-            _tell(one, tried)
-            judged.append((one, tried))
-        if judged:
-            write(given.page, page(judged, unread))
+            verdict = verdict_of(one)
+            _tell(verdict, one, tried)
+            # What was seen of a flight takes a hundred times as much memory.
+            flights.append((verdict, flight_section(len(flights), verdict, one, tried)))
+        if flights:
+            write(given.page, page(flights, unread))
             print(f"page: {given.page}")
         if given.known:
-            flights = [one for one, _ in judged]
-            write(given.table, known.page(flights, unread, known.known_of(given.known)))
+            verdicts = [verdict for verdict, _ in flights]
+            write(given.table, known.page(verdicts, unread, known.known_of(given.known)))
             print(f"table: {given.table}")
     except ChuteError as error:
         complain("judge_log", error)
         sys.exit(UNREADABLE)
-    fired = any(one.fired for one, _ in judged)
-    sys.exit(FIRED if fired else UNREADABLE if unread else CLEAN)
+    sys.exit(
+        FIRED if any(verdict.ended for verdict, _ in flights) else UNREADABLE if unread else CLEAN
+    )
 
 
 def _options() -> argparse.ArgumentParser:
@@ -141,12 +144,12 @@ def flown(log: FlightLog, config: SupervisorConfig) -> Judged:
     return fly(log, config, log.duration, lambda at: progress.at(max(0, round(at))))
 
 
-def _tell(one: Judged, tried: Sequence[Tried]) -> None:
+def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
     log = one.log
     lines = [
         f"{log.path}: {log.format}, profile {one.config.profile.name}",
         f"  {log.duration:.0f} s, {one.flew:.0f} s in flight",
-        f"  {verdict(one)}",
+        f"  {verdict.words}",
     ]
     lines += [f"    {'; '.join(d.reasons)}" for _, d in one.fired]
     near = [r for r in ratings(one) if r.share > 0.0][:3]

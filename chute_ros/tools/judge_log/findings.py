@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from chute_ros.model import Action
 from chute_ros.supervisor.machine import Stage
@@ -42,15 +43,52 @@ class Rating:
         return 0.0 if math.isnan(self.told.fulfilled_at) else 1.0
 
 
-def verdict(judged: Judged) -> str:
-    """In a few words."""
+@dataclass(frozen=True)
+class Verdict:
+    """A judged log in a few words, without what was seen of it. first: when it was ended, s of the
+    log, NaN: it was not; release_height: where a parachute was released, m, NaN: none was, or
+    nobody knew."""
+
+    path: Path
+    format: str
+    profile: str
+    duration: float
+    flew: float
+    words: str
+    nearest: str
+    first: float
+    release_height: float
+
+    @property
+    def ended(self) -> bool:
+        """A parachute would have been released, or the motors stopped in flight."""
+        return not math.isnan(self.first)
+
+
+def verdict_of(judged: Judged) -> Verdict:
+    """Of this log."""
+    released = [at for at, one in judged.fired if one.action is Action.DEPLOY]
+    nearest = next((r for r in ratings(judged) if r.share > 0.0), None)
+    near = f"{nearest.told.name}: {100.0 * nearest.share:.0f} %" if nearest else "none moved"
+    return Verdict(
+        judged.log.path,
+        judged.log.format,
+        judged.config.profile.name,
+        judged.log.duration,
+        judged.flew,
+        _words(judged),
+        near,
+        judged.fired[0][0] if judged.fired else math.nan,
+        height_at(judged, released[0]) if released else math.nan,
+    )
+
+
+def _words(judged: Judged) -> str:
     if judged.fired:
         return ", ".join(
             f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired
         )
-    if not judged.flew:
-        return "never in flight"
-    return "nothing ended the flight"
+    return "nothing ended the flight" if judged.flew else "never in flight"
 
 
 def height_at(judged: Judged, at: float) -> float:

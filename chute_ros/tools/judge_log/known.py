@@ -4,16 +4,15 @@ that is right."""
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
-from chute_ros.model import Action
 from chute_ros.plain_text import plain
-from chute_ros.tools.judge_log.findings import height_at, verdict
+from chute_ros.tools.judge_log.findings import Verdict
 from chute_ros.tools.judge_log.flight_log import LogError
-from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.pages import table
 
 #: What a flight asks for: nothing that ends it; the motors stopped or the parachute released from
@@ -66,31 +65,31 @@ def _known(row: dict[str, str]) -> Known:
     return Known(row["file"], row["source"], real, row["what_happened"], row["right"], *times)
 
 
-def mistake(known: Known, judged: Judged) -> str:
+def mistake(known: Known, verdict: Verdict) -> str:
     """What was decided wrongly, in words; empty: nothing."""
-    first = judged.fired[0][0] if judged.fired else None
-    if known.right == FLIES and first is not None:
-        return f"ended at {first:.1f} s, and it flew well"
-    if known.right == ENDS and first is None:
+    at = verdict.first
+    if known.right == FLIES and verdict.ended:
+        return f"ended at {at:.1f} s, and it flew well"
+    if known.right == ENDS and not verdict.ended:
         return "not ended"
-    if first is not None and first < known.begin:
-        return f"ended at {first:.1f} s, before anything failed ({known.begin:g} s)"
-    if known.right == ENDS and first is not None and first > known.end:
-        return f"ended at {first:.1f} s, later than {known.end:g} s"
+    if at < known.begin:
+        return f"ended at {at:.1f} s, before anything failed ({known.begin:g} s)"
+    if known.right == ENDS and at > known.end:
+        return f"ended at {at:.1f} s, later than {known.end:g} s"
     return ""
 
 
 def page(
-    judged: Sequence[Judged], unread: Sequence[tuple[Path, LogError]], known: dict[str, Known]
+    verdicts: Sequence[Verdict], unread: Sequence[tuple[Path, LogError]], known: dict[str, Known]
 ) -> str:
     """The page. ChuteError: of a log nothing is known."""
-    missing = [one.log.path.name for one in judged if one.log.path.name not in known]
+    missing = [one.path.name for one in verdicts if one.path.name not in known]
     if missing:
         raise ChuteError(f"--known has no line for {', '.join(missing)}")
-    rows = [(known[one.log.path.name], one) for one in judged]
-    wrong = [(what, text) for what, one in rows if (text := mistake(what, one))]
+    rows = [(known[one.path.name], one) for one in verdicts]
+    wrong = sum(bool(mistake(what, one)) for what, one in rows)
     real = sum(what.real for what, _ in rows)
-    ended = sum(bool(one.fired) for _, one in rows)
+    ended = sum(one.ended for _, one in rows)
     hours = sum(one.flew for _, one in rows) / 3600.0
     lines = [
         "# Recorded flights",
@@ -98,8 +97,7 @@ def page(
         _ABOUT,
         (
             f"{len(rows)} logs, {real} of them of real vehicles, {hours:.1f} hours in flight; "
-            f"{ended} were ended, {len(wrong)} wrongly. "
-            "What cannot be read is listed below the table."
+            f"{ended} were ended, {wrong} wrongly. What cannot be read is listed below the table."
         ),
         "",
         table(
@@ -110,23 +108,22 @@ def page(
     if unread:
         lines += ["", "## Not read", ""]
         lines += [f"- {_cell(path.name)}: {_cell(_why(path, error))}" for path, error in unread]
+    sources = [what for what, _ in rows]
+    sources += [known[path.name] for path, _ in unread if path.name in known]
     lines += ["", "## Sources", ""]
-    every = [*rows, *((known[p.name], None) for p, _ in unread if p.name in known)]
-    lines += [f"- {_cell(what.file)}: {_cell(what.source)}" for what, _ in every]
+    lines += [f"- {_cell(what.file)}: {_cell(what.source)}" for what in sources]
     return "\n".join(lines) + "\n"
 
 
-def _row(known: Known, one: Judged) -> Sequence[str]:
-    decided = verdict(one)
-    released = [at for at, d in one.fired if d.action is Action.DEPLOY]
-    if released:
-        decided += f", released at {height_at(one, released[0]):.0f} m"
-    where = "" if known.real else " (simulated)"
+def _row(known: Known, one: Verdict) -> Sequence[str]:
+    height = one.release_height
+    where = "" if math.isnan(height) else f", released at {height:.0f} m"
+    simulated = "" if known.real else " (simulated)"
     return (
         _cell(known.file),
-        _cell(known.what_happened + where),
+        _cell(known.what_happened + simulated),
         f"{one.flew:.0f}",
-        _cell(decided),
+        _cell(one.words + where),
         _cell(mistake(known, one) or "yes"),
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.judge_log.findings import blocked, height_at, ratings, unknown, verdict
+from chute_ros.tools.judge_log.findings import Verdict, blocked, height_at, ratings, unknown
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.judge_log.sweep import Tried
@@ -34,15 +34,14 @@ _LIMITS = (
 _MOST_POINTS = 4000
 
 
-def page(
-    judged: Sequence[tuple[Judged, Sequence[Tried]]], unread: Sequence[tuple[Path, LogError]]
-) -> str:
-    """The whole page."""
-    title = f"{len(judged)} recorded flights, judged"
+def page(flights: Sequence[tuple[Verdict, str]], unread: Sequence[tuple[Path, LogError]]) -> str:
+    """The whole page. flights: each with its flight_section."""
+    title = f"{len(flights)} recorded flights, judged"
+    verdicts = [verdict for verdict, _ in flights]
     parts = [
         f"<h1>{escaped(title)}</h1>\n{_LIMITS}",
-        section("Flights", _overview(judged, unread)),
-        *(_flight(number, one, tried) for number, (one, tried) in enumerate(judged)),
+        section("Flights", _overview(verdicts, unread)),
+        *(text for _, text in flights),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -52,23 +51,19 @@ def page(
     )
 
 
-def _overview(
-    judged: Sequence[tuple[Judged, Sequence[Tried]]], unread: Sequence[tuple[Path, LogError]]
-) -> str:
+def _overview(verdicts: Sequence[Verdict], unread: Sequence[tuple[Path, LogError]]) -> str:
     rows: list[tuple[str, ...]] = []
-    for place, (one, _) in enumerate(judged):
-        tone = "act" if one.fired else "good" if one.flew else "quiet"
-        nearest = next((r for r in ratings(one) if r.share > 0.0), None)
-        near = f"{nearest.told.name}: {100.0 * nearest.share:.0f} %" if nearest else "none moved"
+    for place, one in enumerate(verdicts):
+        tone = "act" if one.ended else "good" if one.flew else "quiet"
         rows.append(
             (
-                cell(f'<a href="#flight{place}">{escaped(one.log.path.name)}</a>'),
-                cell(escaped(one.log.format)),
-                cell(escaped(one.config.profile.name)),
-                number(f"{one.log.duration:.0f}"),
+                cell(f'<a href="#flight{place}">{escaped(one.path.name)}</a>'),
+                cell(escaped(one.format)),
+                cell(escaped(one.profile)),
+                number(f"{one.duration:.0f}"),
                 number(f"{one.flew:.0f}"),
-                words(f'<b class="{tone}">{escaped(verdict(one))}</b>'),
-                cell(escaped(near)),
+                words(f'<b class="{tone}">{escaped(one.words)}</b>'),
+                cell(escaped(one.nearest)),
             )
         )
     for path, error in unread:
@@ -78,7 +73,8 @@ def _overview(
     return table(heads, rows)
 
 
-def _flight(place: int, one: Judged, tried: Sequence[Tried]) -> str:
+def flight_section(place: int, verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> str:
+    """What is told of one flight; place: its number on the page, from 0."""
     inner = [
         f'<p>{escaped(one.log.path)}</p><p class="dim">{escaped(_about(one))}</p>',
         "".join(f'<p><b class="warn">{escaped(text)}</b></p>' for text in one.log.remarks),
@@ -95,7 +91,7 @@ def _flight(place: int, one: Judged, tried: Sequence[Tried]) -> str:
     if tried:
         inner += ["<h3>Thresholds that would have kept it clean</h3>", _tried(tried)]
     heading = f'<span id="flight{place}">{escaped(one.log.path.name)}</span>'
-    title = f"<h2>{heading}: {escaped(verdict(one))}</h2>"
+    title = f"<h2>{heading}: {escaped(verdict.words)}</h2>"
     return f"<section>\n{title}\n{''.join(inner)}\n</section>\n"
 
 
