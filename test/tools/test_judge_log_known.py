@@ -47,7 +47,7 @@ def test_an_end_is_right_from_the_failure_on_until_it_is_too_late(landed, fallen
     )
     assert mistake(known("ends", 1.0, 2.0), landed) == "not ended"
     assert mistake(known(FLIES), landed) == ""
-    assert mistake(known(FLIES), fallen) == f"ended at {at:.1f} s, and it flew well"
+    assert mistake(known(FLIES), fallen) == f"ended at {at:.1f} s, and nothing asked for it"
     assert mistake(known("either", at + 0.5), fallen).startswith(f"ended at {at:.1f} s, before")
     assert mistake(known("either"), landed) == mistake(known("either"), fallen) == ""
 

@@ -69,7 +69,7 @@ def mistake(known: Known, verdict: Verdict) -> str:
     """What was decided wrongly, in words; empty: nothing."""
     at = verdict.first
     if known.right == FLIES and verdict.ended:
-        return f"ended at {at:.1f} s, and it flew well"
+        return f"ended at {at:.1f} s, and nothing asked for it"
     if known.right == ENDS and not verdict.ended:
         return "not ended"
     if at < known.begin:
