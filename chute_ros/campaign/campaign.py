@@ -13,12 +13,15 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import active_children, get_context
 from pathlib import Path
+from typing import TypeVar
 
 from chute_ros.campaign.draw import draw
 from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
+
+LineT = TypeVar("LineT")
 
 #: Flights that one process flies before it tells of them.
 _BATCH = 10
@@ -128,7 +131,7 @@ def run(
     one of its processes ended by itself; tally has those until then."""
     begun = time.monotonic() - tally.took
     try:
-        for line in _all(folder, seeds[tally.flights :], jobs):
+        for line in flown_by(_batch, folder, seeds[tally.flights :], jobs):
             tally.add(line)
             tally.took = time.monotonic() - begun
             progress(tally)
@@ -141,9 +144,17 @@ def _batch(folder: Path, seeds: Sequence[int]) -> list[Line]:
     return [_line(folder, seed) for seed in seeds]
 
 
-def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
+def flown_by(
+    batch: Callable[[Path, Sequence[int]], list[LineT]],
+    folder: Path,
+    seeds: Sequence[int],
+    jobs: int,
+) -> Iterator[LineT]:
+    """What batch returns of the flights with these seeds, in their order, from so many processes.
+    folder: of the profiles. BrokenProcessPool: one of them ended by itself."""
     if jobs == 1:
-        yield from (_line(folder, seed) for seed in seeds)
+        for seed in seeds:
+            yield from batch(folder, [seed])
         return
     # Read before the processes part, so that they share it.
     shipped = _shipped(folder)
@@ -154,14 +165,14 @@ def _all(folder: Path, seeds: Sequence[int], jobs: int) -> Iterator[Line]:
     # Ctrl-C reaches every process of a terminal: ours ends them.
     ignores = (signal.SIGINT, signal.SIG_IGN)
     pool = ProcessPoolExecutor(jobs, get_context("fork"), signal.signal, ignores)
-    ordered: deque[Future[list[Line]]] = deque()
+    ordered: deque[Future[list[LineT]]] = deque()
     try:
         for first in range(0, len(seeds), _BATCH):
-            ordered.append(pool.submit(_batch, folder, seeds[first : first + _BATCH]))
+            ordered.append(pool.submit(batch, folder, seeds[first : first + _BATCH]))
             if len(ordered) > _AHEAD * jobs:
                 yield from ordered.popleft().result()
-        for batch in ordered:
-            yield from batch.result()
+        for future in ordered:
+            yield from future.result()
     finally:
         # Nobody waits for what they fly now.
         for process in active_children():

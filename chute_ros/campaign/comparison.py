@@ -40,11 +40,11 @@ class Compared:
     count: Count
     bare: Count
     why: str
-    #: Only a parachute could land it softly, and one in time would have.
+    #: Only a parachute could land it softly, and the guard had not ended its flight before.
     needed: bool
     #: Of those, from that moment to the release, s, and the height lost meanwhile, m.
-    delay: float
-    lost: float
+    delay: float = math.nan
+    lost: float = math.nan
 
 
 def comparable(scenario: Scenario) -> Scenario | None:
@@ -56,10 +56,11 @@ def comparable(scenario: Scenario) -> Scenario | None:
 
 
 def bare_count(flown: Flown) -> Count:
-    """Return what the flight is without any excuse: neither faults nor time excuse anything."""
+    """Return what the flight is where neither faults nor haste excuse anything; NO_TIME: no
+    release, however early, would have helped."""
     no_faults = replace(flown.scenario, faults=())
     count = judge(replace(flown, scenario=no_faults, refused=math.nan)).count
-    if count not in (Count.NO_TIME, Count.NOT_TOLD):
+    if count not in (Count.NO_TIME, Count.NOT_TOLD) or not flown.truth.leeway >= 0.0:
         return count
     return Count.MISSED if math.isnan(flown.released) else Count.LATE
 
@@ -78,13 +79,17 @@ def fault_of(scenario: Scenario) -> str:
     return "second source" if faults else "none"
 
 
-def compare(folder: Path, seed: int) -> list[Compared]:
-    """Fly the flight of this seed with each guard; empty: it is a rocket's. folder: of the
+def compare(folder: Path, seeds: Sequence[int]) -> list[list[Compared]]:
+    """Fly the flight of each seed with each guard; an empty list: it is a rocket's. folder: of the
     profiles."""
+    return [_with_each(folder, seed) for seed in seeds]
+
+
+def _with_each(folder: Path, seed: int) -> list[Compared]:
     scenario = comparable(draw(seed))
     if scenario is None:
         return []
-    factors: Sequence[float] = FACTORS if seed % CURVE_OF == 0 else (1.0,)
+    factors = FACTORS if seed % CURVE_OF == 0 else (1.0,)
     return [_one(folder, scenario, guard, k) for guard in GUARDS for k in factors]
 
 
@@ -94,28 +99,21 @@ def _shipped(folder: Path, factor: float) -> Shipped:
 
 
 def _one(folder: Path, scenario: Scenario, guard: Guard, factor: float) -> Compared:
-    if guard.peer is None:
-        flown = fly(scenario, _shipped(folder, factor))
-    else:
-        peer = guard.peer(scenario.profile, factor)
-        flown = fly(scenario, _shipped(folder, 1.0), peer)
-    judged, truth = judge(flown), flown.truth
-    # Some guards end a flight that would have gone well: what follows then is no need.
-    needed = truth.falls and not truth.lands_softly and truth.leeway >= 0.0
-    seen = needed and flown.released >= truth.at
-    manoeuvre = scenario.manoeuvre
-    return Compared(
-        scenario.seed,
-        guard.name,
-        factor,
-        scenario.profile,
-        scenario.failure.value,
-        fault_of(scenario),
-        "" if manoeuvre is None else manoeuvre.kind,
-        judged.count,
-        bare_count(flown),
-        judged.why,
-        needed,
-        flown.released - truth.at if seen else math.nan,
-        truth.height - flown.release_height if seen else math.nan,
+    flight = (
+        *(scenario.seed, guard.name, factor, scenario.profile, scenario.failure.value),
+        *(fault_of(scenario), scenario.manoeuvre.kind if scenario.manoeuvre else ""),
     )
+    try:
+        peer = None if guard.peer is None else guard.peer(scenario.profile, factor)
+        flown = fly(scenario, _shipped(folder, factor if peer is None else 1.0), peer)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
+        why = f"{type(error).__name__}: {error}"
+        return Compared(*flight, Count.BROKEN, Count.BROKEN, why, False)
+    judged, bare, truth = judge(flown), bare_count(flown), flown.truth
+    # Where a guard ended a flight that went well, what follows is no need.
+    helps = truth.falls and truth.leeway >= 0.0 and not truth.lands_softly
+    needed = helps and bare is not Count.FALSE
+    told = (*flight, judged.count, bare, judged.why, needed)
+    if not needed or not flown.released >= truth.at:
+        return Compared(*told)
+    return Compared(*told, flown.released - truth.at, truth.height - flown.release_height)

@@ -73,6 +73,8 @@ class PeerAircraft(Aircraft):
 class DecidingAutopilot(CampaignAutopilot):
     """ordered: told of a kill as it stops the motors, and of a deploy as it releases."""
 
+    model: WindyModel
+
     def __init__(
         self,
         model: WindyModel,

@@ -21,6 +21,8 @@ _CRASH_ANGLE, _CRASH_LEAN, _CRASH_TIME = 30.0, 15.0, 2.0
 _CRASH_SPEED, _CRASH_ACCELERATION = 10.0, 3.0
 #: LAND_DETECTOR_ACCEL_LPF_CUTOFF (config.h), Hz.
 _CUTOFF = 1.0
+#: read_barometer() is called by update_altitude(), at 10 Hz (Copter.cpp); as a loop comes, s.
+_BAROMETER_EVERY = 0.1 - 1e-6
 #: A loop that comes late is still one loop, s.
 _LONGEST_LOOP = 0.05
 
@@ -41,7 +43,7 @@ class ArduCopter:
         self._crashed = Held()
         #: Its acceleration without gravity, filtered, m/s^2.
         self._acceleration = 0.0
-        self._before = -math.inf
+        self._before = self._read_at = -math.inf
 
     def step(self, belief: Belief) -> Order | None:
         """Look at what the autopilot believes now."""
@@ -49,8 +51,7 @@ class ArduCopter:
         self._before = belief.now
         share = passed / (passed + 1.0 / (2.0 * math.pi * _CUTOFF))
         self._acceleration += share * (belief.force - _GRAVITY - self._acceleration)
-        if not math.isnan(belief.pressure_height):
-            self._pressure_height = belief.pressure_height
+        self._read_barometer(belief)
         sinks = self._sink.reasons(belief)
         error = abs(belief.tilt - belief.commanded_tilt)
         if not belief.armed or belief.landed or belief.acro:
@@ -63,6 +64,11 @@ class ArduCopter:
             if lost := self._loses_control(error, passed):
                 return Order(Action.DEPLOY, "loss of control", lost)
         return self._crash(belief, error)
+
+    def _read_barometer(self, belief: Belief) -> None:
+        due = belief.now - self._read_at >= _BAROMETER_EVERY
+        if due and not math.isnan(belief.pressure_height):
+            self._read_at, self._pressure_height = belief.now, belief.pressure_height
 
     def _loses_control(self, error: float, passed: float) -> Reasons:
         """Why a release is due; empty: it is not."""

@@ -1,9 +1,8 @@
-"""PX4's failure detector with flight termination enabled (CBRK_FLIGHTTERM 0) and a parachute on its
-outputs.
+"""PX4's failure detector with flight termination (CBRK_FLIGHTTERM 0), a parachute on an output.
 
-Source: PX4 src/modules/commander/failure_detector/FailureDetector.cpp and its parameters,
-commander/failsafe/failsafe.cpp (checkStateAndMode) and framework.cpp (getSelectedAction): whoever is
-armed is terminated; the land detector is not asked.
+Source: PX4 src/modules/commander, failure_detector/FailureDetector.cpp and its parameters,
+failsafe/failsafe.cpp (checkStateAndMode) and framework.cpp (getSelectedAction). An armed vehicle
+is terminated; the land detector is not asked.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ class Px4:
     """altitude_loss: FD_ALT_LOSS, m; 0, the default: off. It is for rotary wings alone. scale: of
     the angle, of the loss, and of their times."""
 
-    #: In one cycle of its outputs.
-    release_delay = 0.0
+    #: With the motors; the next step, so that it is seen which came first.
+    release_delay = 0.02
 
     def __init__(self, altitude_loss: float = 0.0, scale: float = 1.0) -> None:
         self._angle, self._angle_time = _ANGLE * scale, _ANGLE_TIME * scale

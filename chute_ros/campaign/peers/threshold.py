@@ -1,15 +1,15 @@
 """What a careful team writes in an afternoon: tilt or sink beyond a limit for a while.
 
-Its limits are ours: 60 degrees as PX4's FD_FAIL_R, and 80 for an aeroplane, which banks; 10 m/s, as
-autopilots descend with at most 1.5 m/s by themselves (ArduCopter WPNAV_SPEED_DN, PX4
-MPC_Z_V_AUTO_DN), and with a margin for what a pilot flies; half a second, so that a gust or one
-wrong sample does nothing; ArduPilot's height and delay (CHUTE_ALT_MIN, CHUTE_DELAY_MS).
+Its limits are ours. Tilt: 60 degrees as PX4's FD_FAIL_R, and 80 for an aeroplane, which banks.
+Sink: 10 m/s; autopilots descend with at most 1.5 m/s by themselves (ArduCopter WPNAV_SPEED_DN, PX4
+MPC_Z_V_AUTO_DN), pilots faster. Half a second, so that a gust or one wrong sample does nothing.
+Height and delay as ArduPilot (CHUTE_ALT_MIN, CHUTE_DELAY_MS).
 """
 
 from __future__ import annotations
 
 from chute_ros.campaign.peers.ap_parachute import LOWEST, RELEASE_DELAY
-from chute_ros.campaign.peers.api import Belief, Held, Order, above, below
+from chute_ros.campaign.peers.api import Belief, Held, Order, Reasons, above, below
 from chute_ros.model import Action
 
 _TILT, _TILT_OF_A_WING, _SINK, _TIME = 60.0, 80.0, 10.0, 0.5
@@ -33,7 +33,7 @@ class Threshold:
         sinks = self._sinks.lasts(flies and speed < -self._sink, now) >= self._time
         if not tilts and not sinks:
             return None
-        reasons = ()
+        reasons: Reasons = ()
         if tilts:
             reasons = (above("tilt_deg", tilt, self._tilt),)
         if sinks:
