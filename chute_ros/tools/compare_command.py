@@ -57,6 +57,8 @@ def main() -> None:
     if chosen.page and lines:
         how = f"{chosen.jobs} at a time on {machine()}"
         _write(chosen.page, Run(seeds, chosen.seed, took, how), lines)
+    elif chosen.page:
+        print(f"{chosen.page} is not written: none of these flights is one of an aircraft")
     if any(line.count is Count.BROKEN for line in lines):
         sys.exit(1)
     if ended == "interrupted":
