@@ -42,6 +42,7 @@ PYPY ?=
 SCHEDULER ?=
 CAMPAIGN_ARGS ?=
 WITHOUT_ARGS ?=
+COMPARE_ARGS ?=
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -59,7 +60,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long pictures newcomer bench campaign without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign compare without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -94,6 +95,11 @@ campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n o
 	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
 	    $(if $(SCHEDULER),--scheduler $(SCHEDULER)) $(CAMPAIGN_ARGS) \
 	    $(if $(EACH),--each $(EACH) --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md)
+
+compare: build ## fly FLIGHTS flights from SEED on with this product, ArduPilot's and PX4's checks and a threshold, write docs/evidence/compare.*
+	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
+	    -m chute_ros.tools.compare --flights $(FLIGHTS) --seed $(SEED) \
+	    --page docs/evidence/compare.md $(COMPARE_ARGS)
 
 without: build ## fly the campaign without a rule or heuristic, to see what needs it (WITHOUT_ARGS="--together ...")
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3) \

@@ -73,7 +73,7 @@ class Aircraft(Rig):
         self.feeling: list[Callable[[Motion], None]] = []
         self.network = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
         traits = scenario.autopilot
-        self.autopilot = CampaignAutopilot(self.model, self.sensors, _kind_of(scenario))
+        self.autopilot = self.make_autopilot(_kind_of(scenario))
         self.autopilot.home = Home(drift=traits.home_drift, homing=traits.homing)
         if traits.imus > 1:
             self.autopilot.add_second_imu()
@@ -87,6 +87,10 @@ class Aircraft(Rig):
         self._speed = 0.0
         self._left = self._flew = False
         self._first_out = ""
+
+    def make_autopilot(self, kind: AutopilotKind) -> CampaignAutopilot:
+        """The one that flies it."""
+        return CampaignAutopilot(self.model, self.sensors, kind)
 
     # -- the flight ------------------------------------------------------------------------------
 

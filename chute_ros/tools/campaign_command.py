@@ -163,7 +163,9 @@ def _flyers(scheduler: str | None, profiles: Path, jobs: int) -> Iterator[_Flyer
     """On the cluster of a scheduler, or here. Exit code 2: there is none, or it differs."""
     if scheduler is None:
         how = f"{jobs} at a time on {machine()}"
-        yield _Flyers(jobs, how, lambda seeds: flown_here(profiles, seeds, jobs))
+        yield _Flyers(
+            jobs, how, lambda seeds: flown_here(campaign.fly_bundle, profiles, seeds, jobs)
+        )
         return
     try:
         # Here: no other campaign needs it.
