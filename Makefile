@@ -33,11 +33,13 @@ LOOPS ?= 300
 MINUTES ?= 10
 # How many flights of the campaign, and the seed of the first; of so many fly only the first EACH of
 # each kind (empty: all). A PyPy of 3.10 or newer, if there is one, flies four times as many a minute;
+# SCHEDULER: tcp://HOST:PORT of the Dask cluster to fly on (docs/guide/cluster.md; empty: this machine);
 # CAMPAIGN_ARGS: what else the campaign's command takes.
 FLIGHTS ?= 1000
 SEED ?= 0
 EACH ?=
 PYPY ?=
+SCHEDULER ?=
 CAMPAIGN_ARGS ?=
 # Where make tapes writes, how many flights of each kind it flies; and the file of tapes that make
 # campaign flies (empty: none).
@@ -45,6 +47,7 @@ TAPES_FOLDER ?= tapes
 TAPES_ARGS ?=
 TAPES ?=
 WITHOUT_ARGS ?=
+COMPARE_ARGS ?=
 
 SET_UP := command -v "$(PYTHON)" >/dev/null \
     || { echo 'chute_ros set-up: no $(PYTHON) found: install Python 3.10 to 3.13, or name one: make PYTHON=...' >&2; exit 1; }; \
@@ -62,7 +65,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long pictures newcomer bench campaign without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign compare without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -94,7 +97,8 @@ newcomer: build ## from git clone to a parachute released on the page, in a new 
 
 campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n of each kind), write docs/evidence/campaign.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
-	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) $(CAMPAIGN_ARGS) \
+	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
+	    $(if $(SCHEDULER),--scheduler $(SCHEDULER)) $(CAMPAIGN_ARGS) \
 	    $(if $(TAPES),--tapes "$(TAPES)" --tapes-only --page docs/evidence/bodies.md,$(if $(EACH),--each $(EACH) \
 	    --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md))
 
@@ -105,6 +109,11 @@ tapes: .venv-bodies/done ## record multirotors of RotorPy and aeroplanes of JSBS
 	@rm -rf .venv-bodies && "$(PYTHON)" -m venv .venv-bodies \
 	    && .venv-bodies/bin/pip install --quiet --disable-pip-version-check --only-binary :all: \
 	        --require-hashes -r requirements/bodies.lock && touch $@
+
+compare: build ## fly FLIGHTS flights from SEED on with this product, ArduPilot's and PX4's checks and a threshold, write docs/evidence/compare.*
+	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
+	    -m chute_ros.tools.compare --flights $(FLIGHTS) --seed $(SEED) \
+	    --page docs/evidence/compare.md $(COMPARE_ARGS)
 
 without: build ## fly the campaign without a rule or heuristic, to see what needs it (WITHOUT_ARGS="--together ...")
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3) \

@@ -57,6 +57,7 @@ setup(
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",
             "to_rosbag2 = chute_ros.tools.to_rosbag2:main",
+            "judge_log = chute_ros.tools.judge_log.__main__:main",
             "campaign = chute_ros.tools.campaign:main",
         ],
     },

@@ -36,6 +36,10 @@ class ProfileError(ChuteError, ValueError):
     """A profile of rules is not right. The text lists each mistake with its line and the fix."""
 
 
+class CampaignError(ChuteError):
+    """What flies a campaign cannot begin, or ended by itself. The text says why, and the fix."""
+
+
 class NameTakenError(ChuteError):
     """Another living supervisor has this name. The text says which, and the fix."""
 

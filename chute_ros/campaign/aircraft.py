@@ -69,12 +69,10 @@ class Aircraft(Rig):
         taped = scenario.tape
         if taped is None:
             self.model = WindyModel(fall_speed=scenario.fall_speed, **air)
-            made: type[CampaignAutopilot] = CampaignAutopilot
         else:
             tape = shipped.tape(taped.name)
             self.model = TapedModel(fall_speed=scenario.fall_speed, tape=tape, **air)
             self.sensors = self.sensors_of[""] = RealSensors(self.chance("sensors"), self.model)
-            made = TapedAutopilot
         self.model.descent, self.model.unheld = scenario.descent, scenario.unheld
         self.model.canopy_speed = scenario.canopy.speed
         self.model.canopy_opening_time = scenario.canopy.opens
@@ -82,7 +80,7 @@ class Aircraft(Rig):
         self.feeling: list[Callable[[Motion], None]] = []
         self.network = Bus(self.world, MAVLINK, f"{scenario.seed} mavlink")
         traits = scenario.autopilot
-        self.autopilot = made(self.model, self.sensors, _kind_of(scenario))
+        self.autopilot = self.make_autopilot(_kind_of(scenario))
         self.autopilot.home = Home(drift=traits.home_drift, homing=traits.homing)
         if traits.imus > 1:
             self.autopilot.add_second_imu()
@@ -96,6 +94,12 @@ class Aircraft(Rig):
         self._speed = 0.0
         self._left = self._flew = False
         self._first_out = ""
+
+    def make_autopilot(self, kind: AutopilotKind) -> CampaignAutopilot:
+        """The one that flies it."""
+        if isinstance(self.model, TapedModel):
+            return TapedAutopilot(self.model, self.sensors, kind)
+        return CampaignAutopilot(self.model, self.sensors, kind)
 
     # -- the flight ------------------------------------------------------------------------------
 

@@ -1,17 +1,14 @@
-"""Many flights on all cores, counted; the same for the same seed."""
+"""Many flights, counted; the same for the same seeds."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
-import gc
 import math
-import signal
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections import Counter
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
-from multiprocessing import active_children, get_context
 from pathlib import Path
 
 from chute_ros.campaign.draw import draw
@@ -20,11 +17,6 @@ from chute_ros.campaign.judge import WRONG, Count, Judged, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.tapes import TapeFile
-
-#: Flights that one process flies before it tells of them.
-_BATCH = 10
-#: Batches for each process that are given out before the oldest is told of.
-_AHEAD = 4
 
 
 @dataclass(frozen=True)
@@ -91,12 +83,12 @@ class Tally:
 
 
 #: Of this process; each reads them once.
-_shipped = functools.cache(Shipped)
+shipped = functools.cache(Shipped)
 
 
 def drawn(folder: Path, seed: int, tapes: TapeFile | None = None) -> Scenario:
     """The flight of a seed; tapes: some fly one of these."""
-    scenario, given = draw(seed), _shipped(folder, tapes).tapes
+    scenario, given = draw(seed), shipped(folder, tapes).tapes
     return scenario if given is None else given.drawn(scenario)
 
 
@@ -104,8 +96,14 @@ def fly_here(
     folder: Path, scenario: Scenario, tapes: TapeFile | None = None
 ) -> tuple[Flown, Judged]:
     """One flight, and what it is counted as."""
-    flown = fly(scenario, _shipped(folder, tapes))
+    flown = fly(scenario, shipped(folder, tapes))
     return flown, judge(flown)
+
+
+def fly_bundle(folder: Path, seeds: Sequence[int], tapes: TapeFile | None = None) -> list[Line]:
+    """One flight for each seed, in this process. folder: of the profiles; tapes: bodies that some
+    of them fly."""
+    return [_line(folder, seed, tapes) for seed in seeds]
 
 
 def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
@@ -133,57 +131,16 @@ def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
 
 
 def run(
-    folder: Path,
-    seeds: Sequence[int],
-    jobs: int,
-    progress: Callable[[Tally], None],
-    tally: Tally,
-    tapes: TapeFile | None = None,
+    flown: Generator[Line, None, None], progress: Callable[[Tally], None], tally: Tally
 ) -> Tally:
-    """Flights with these seeds, in their order, added to tally, which has the first of them
-    already. folder: of the profiles; tapes: bodies that some of them fly.
+    """Flights in the order of their seeds, added to tally as they come.
 
-    Ended by Ctrl-C it returns those until then: hours of flights are not lost. BrokenProcessPool:
-    one of its processes ended by itself; tally has those until then."""
+    Ended by Ctrl-C it returns those until then: hours of flights are not lost. CampaignError: what
+    flies them ended by itself; tally has those until then."""
     begun = time.monotonic() - tally.took
-    try:
-        for line in _all(folder, seeds[tally.flights :], jobs, tapes):
+    with contextlib.suppress(KeyboardInterrupt), contextlib.closing(flown):
+        for line in flown:
             tally.add(line)
             tally.took = time.monotonic() - begun
             progress(tally)
-    except KeyboardInterrupt:
-        pass
     return tally
-
-
-def _batch(folder: Path, seeds: Sequence[int], tapes: TapeFile | None) -> list[Line]:
-    return [_line(folder, seed, tapes) for seed in seeds]
-
-
-def _all(folder: Path, seeds: Sequence[int], jobs: int, tapes: TapeFile | None) -> Iterator[Line]:
-    if jobs == 1:
-        yield from (_line(folder, seed, tapes) for seed in seeds)
-        return
-    # Read before the processes part, so that they share it.
-    shipped = _shipped(folder, tapes)
-    shipped.read_all()
-    # No collection of garbage looks through it again (4 % of a flight); PyPy's works otherwise.
-    if hasattr(gc, "freeze"):
-        gc.freeze()
-    # Ctrl-C reaches every process of a terminal: ours ends them.
-    ignores = (signal.SIGINT, signal.SIG_IGN)
-    pool = ProcessPoolExecutor(jobs, get_context("fork"), signal.signal, ignores)
-    ordered: deque[Future[list[Line]]] = deque()
-    try:
-        for first in range(0, len(seeds), _BATCH):
-            ordered.append(pool.submit(_batch, folder, seeds[first : first + _BATCH], tapes))
-            if len(ordered) > _AHEAD * jobs:
-                yield from ordered.popleft().result()
-        for batch in ordered:
-            yield from batch.result()
-    finally:
-        # Nobody waits for what they fly now.
-        for process in active_children():
-            process.kill()
-        # Not left to the end of Python, which then may wake a thread that has just ended (EBADF).
-        pool.shutdown(cancel_futures=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import astuple, fields
 from pathlib import Path
 from typing import Any
@@ -22,23 +23,35 @@ FORMAT = 1
 _NOT_FLYING = ("ros", "tools")
 
 
-def code_that_flies(profiles: Path, *more: Path) -> str:
-    """A sum of it, of the profiles, of the wires' data types and of more files: flights of two
-    sums cannot be counted together."""
+def parts_that_fly(profiles: Path) -> dict[str, str]:
+    """A sum of each part that decides what becomes of a flight: the code, the profiles, the wires'
+    data types."""
     package = Path(chute_ros.__file__).parent
-    files = [
-        one
-        for one in package.rglob("*.py")
-        if one.relative_to(package).parts[0] not in _NOT_FLYING
-    ]
-    files += (*profiles.glob("*.yaml"), *more)
-    files.append(Path(dialect.__file__))
-    for folder in ("dsdl", "telem"):
-        found = shared_folder(folder, "the wires' data types").rglob("*")
-        files += [one for one in found if one.is_file()]
+    modules = package.rglob("*.py")
+    shared = [shared_folder(one, "the wires' data types").rglob("*") for one in ("dsdl", "telem")]
+    return {
+        "code": _sum(
+            one for one in modules if one.relative_to(package).parts[0] not in _NOT_FLYING
+        ),
+        "profiles": _sum(profiles.glob("*.yaml")),
+        "data types": _sum([Path(dialect.__file__), *shared[0], *shared[1]]),
+    }
+
+
+def code_that_flies(profiles: Path, *more: Path) -> str:
+    """A sum of all these parts, and of more files: flights of two sums cannot be counted
+    together."""
+    total = hashlib.sha256()
+    for part in (*parts_that_fly(profiles).values(), *([_sum(more)] if more else [])):
+        total.update(bytes.fromhex(part))
+    return total.hexdigest()
+
+
+def _sum(files: Iterable[Path]) -> str:
     total = hashlib.sha256()
     for file in sorted(files, key=lambda one: (one.name, str(one))):
-        total.update(hashlib.sha256(file.read_bytes()).digest())
+        if file.is_file():
+            total.update(hashlib.sha256(file.read_bytes()).digest())
     return total.hexdigest()
 
 

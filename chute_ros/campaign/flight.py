@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 from chute_ros.campaign.aircraft import Aircraft
+from chute_ros.campaign.peer_rig import MakePeer, PeerAircraft
 from chute_ros.campaign.rig import Rig
 from chute_ros.campaign.scenario import ClockJump, Fault, HomeMove, Scenario, Stop, WayFault
 from chute_ros.campaign.shipped import Shipped
@@ -16,7 +17,6 @@ from chute_ros.links.api import load
 from chute_ros.model import Action, Decision
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.gate import OPERATOR
-from chute_ros.supervisor.machine import Stage
 
 _READY_WITHIN, _UP_WITHIN = 15.0, 9.0  # s
 #: A pilot looks at the vehicle so often, and not before, s.
@@ -96,13 +96,22 @@ class Call:
             self.answer = answer
 
 
-class Flight:
-    """Everything that lives in one world."""
+def _rig(scenario: Scenario, shipped: Shipped, make_peer: MakePeer | None) -> Rig:
+    if make_peer is not None:
+        return PeerAircraft(scenario, shipped, make_peer)
+    kind: type[Rig] = load(scenario.carries.rig) if scenario.carries.rig else Aircraft
+    return kind(scenario, shipped)
 
-    def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
+
+class Flight:
+    """Everything that lives in one world. make_peer: who decides in place of supervisors, of an
+    aircraft."""
+
+    def __init__(
+        self, scenario: Scenario, shipped: Shipped, make_peer: MakePeer | None = None
+    ) -> None:
         self.scenario = scenario
-        kind: type[Rig] = load(scenario.carries.rig) if scenario.carries.rig else Aircraft
-        self.rig: Rig = kind(scenario, shipped)
+        self.rig = _rig(scenario, shipped, make_peer)
         self._arming: Call | None = None
         self._person = Call(self.rig, self._wish)
         self.up = self._took_off = math.nan
@@ -142,7 +151,7 @@ class Flight:
             if self._may_fly(now):
                 rig.take_off(now)
                 self._took_off = now
-        elif rig.is_up() and self._is_believed():
+        elif rig.is_up() and rig.sees_flight:
             self.up = now + (0.0 if self.scenario.burn else _SETTLES)
             rig.plan(self.up)
             if self.scenario.person is not None:
@@ -151,8 +160,7 @@ class Flight:
         rig.world.post(now + _LOOKS, self._look)
 
     def _may_fly(self, now: float) -> bool:
-        leader = self.rig.leader
-        if leader is None or leader.state.stage not in (Stage.READY, Stage.ARMED):
+        if not self.rig.is_ready:
             return False
         if not self.scenario.arms:
             return True
@@ -163,10 +171,6 @@ class Flight:
         if answer is not None and not answer.success:
             self._arming = None  # until the next look
         return answer is not None and answer.success
-
-    def _is_believed(self) -> bool:
-        leader = self.rig.leader
-        return leader is not None and (self.scenario.stands or leader.state.flight.airborne)
 
     # -- the end ---------------------------------------------------------------------------------
 
@@ -188,9 +192,7 @@ class Flight:
 
     def _flown(self) -> Flown:
         rig = self.rig
-        acted = sorted(
-            (one for node in rig.nodes.values() for one in node.acted), key=lambda one: one.at
-        )
+        acted = rig.acted()
         killed = [one.at for one in acted if one.decision.action is Action.KILL]
         again = sum(node.ordered_again for node in rig.nodes.values())
         for host in rig.supervisors:
@@ -222,6 +224,6 @@ class Flight:
         )
 
 
-def fly(scenario: Scenario, shipped: Shipped) -> Flown:
+def fly(scenario: Scenario, shipped: Shipped, make_peer: MakePeer | None = None) -> Flown:
     """One flight from beginning to end."""
-    return Flight(scenario, shipped).run()
+    return Flight(scenario, shipped, make_peer).run()

@@ -26,10 +26,11 @@ from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.truth import Course
 from chute_ros.campaign.vehicle import WindyModel
-from chute_ros.campaign.virtual_node import VirtualNode
+from chute_ros.campaign.virtual_node import Acted, VirtualNode
 from chute_ros.campaign.world import World
 from chute_ros.runtime.arming import Answered
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Stage
 
 #: Between two stalls of an overloaded host, at most, s.
 _BETWEEN_STALLS = 0.5
@@ -53,8 +54,15 @@ class Rig(Course, ABC):
         self._restart: dict[str, Callable[[float], None]] = {}
         #: When the only parachute refused its release by a wrong height, virtual s; NaN: never.
         self.refused_at: Callable[[], float] = lambda: math.nan
+        self.join_supervisors()
+
+    def join_supervisors(self) -> None:
+        """One, or two."""
+        scenario = self.scenario
         for rank, name in enumerate(("supervisor", "standby")[: 1 + scenario.standby]):
-            config = shipped.config(scenario.vehicle, scenario.profile, scenario.standby, rank)
+            config = self.shipped.config(
+                scenario.vehicle, scenario.profile, scenario.standby, rank
+            )
             process, sources = self.process(name), scenario.vehicle_sources
             host = SupervisorHost(config, sources, process, self.ros, self._call_arm)
             self.supervisors.append(host)
@@ -94,6 +102,23 @@ class Rig(Course, ABC):
         """The supervisor whose services are there and answer."""
         leading = [one for one in self.supervisors if one.leading]
         return next((one for one in leading if one.process.runs(self.world.now)), None)
+
+    @property
+    def is_ready(self) -> bool:
+        """Nothing blocks its flight."""
+        leader = self.leader
+        return leader is not None and leader.state.stage in (Stage.READY, Stage.ARMED)
+
+    @property
+    def sees_flight(self) -> bool:
+        """Who decides about it has learnt that it flies, if it does."""
+        leader = self.leader
+        return leader is not None and (self.scenario.stands or leader.state.flight.airborne)
+
+    def acted(self) -> list[Acted]:
+        """What was let through to its devices, in the order of time."""
+        every = (one for node in self.nodes.values() for one in node.acted)
+        return sorted(every, key=lambda one: one.at)
 
     def join_links(self) -> None:
         """The nodes of its links, and their devices."""

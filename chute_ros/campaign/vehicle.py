@@ -136,11 +136,16 @@ class CampaignAutopilot(AutopilotDevice):
 
     def _extended_sys_state(self) -> Any:
         message: Any = super()._extended_sys_state()
-        if self.estimator.tells_of_flight(self.now):
-            message.landed_state = dialect.MAV_LANDED_STATE_IN_AIR
-        if self._sensors.lies("landed", self.now):
-            message.landed_state = dialect.MAV_LANDED_STATE_ON_GROUND
+        landed, flying = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
+        message.landed_state = landed if self._landed else flying
         return message
+
+    @property
+    def _landed(self) -> bool:
+        """By its land detector."""
+        if self._sensors.lies("landed", self.now):
+            return True
+        return not self._takes_itself_to_fly and not self.estimator.tells_of_flight(self.now)
 
     def _heartbeat(self) -> Any:
         message: Any = super()._heartbeat()

@@ -76,7 +76,7 @@ def pressure_rate(config: SupervisorConfig, state: State, now: float) -> float:
     has jumped within that second."""
     if state.measured(PRESSURE_ALTITUDE).doubt(PRESSURE_ALTITUDE, now):
         return math.nan
-    return _rate_of(config, state, PRESSURE_ALTITUDE, now)[0]
+    return _rate_of(config, state, PRESSURE_ALTITUDE, _newest_word(config, state, now))[0]
 
 
 def pressure_change(config: SupervisorConfig, state: State, now: float) -> Rise:
@@ -103,8 +103,21 @@ def pressure_height(config: SupervisorConfig, state: State, now: float) -> float
     known = state.measured(PRESSURE_ALTITUDE)
     if known.has_jumped(now):
         return math.nan
-    usable = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
+    usable = known.usable(
+        config.profile.limits[PRESSURE_ALTITUDE], _newest_word(config, state, now)
+    )
     return usable - state.flight.ground_pressure_altitude
+
+
+def _newest_word(config: SupervisorConfig, state: State, now: float) -> float:
+    """When the vehicle last told how it moves, monotonic s, as long as that is still believed.
+    Where all falls silent, a barometer that was heard a moment before the rest must not get old a
+    moment before the rest, and leave an estimator alone that it has just denied."""
+    claims = (HEIGHT, VERTICAL_SPEED)
+    times = [state.measured(name).measured_at for name in (*claims, PRESSURE_ALTITUDE)]
+    newest = max((at for at in times if at <= now), default=now)
+    believed = max(config.profile.limits[name].max_age for name in claims)
+    return newest if now - newest <= believed else now
 
 
 def rate_count(config: SupervisorConfig, state: State, now: float) -> int:

@@ -2,6 +2,7 @@
 
 A wrong flight is saved as a scenario, as text: --replay SEED or FILE shows it step by step.
 Ctrl-C ends the campaign: the flights until then are counted and written; --resume FILE continues.
+--scheduler flies them on the workers of a Dask cluster: docs/guide/cluster.md.
 """
 
 from __future__ import annotations
@@ -11,35 +12,46 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import urlsplit
 
 from chute_ros.campaign import campaign, checkpoint
 from chute_ros.campaign.judge import Count
+from chute_ros.campaign.pool import flown_here
 from chute_ros.campaign.rare import OfEach, rare
 from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.campaign.tapes import TapeFile, Tapes
-from chute_ros.errors import RecordError
+from chute_ros.errors import CampaignError, RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
 from chute_ros.tools.campaign_bodies import page_of_bodies
 from chute_ros.tools.campaign_page import page
 from chute_ros.tools.campaign_picture import picture
+from chute_ros.tools.campaign_plan import plan
 from chute_ros.tools.machine import machine
 
 _TELL_EVERY = 5.0  # s
 _KEEP_EVERY = 60.0  # s
 #: So many of those that must not be are told; all are saved.
 _MOST_TOLD = 20
-_BROKEN = (
-    "campaign: one of its processes ended by itself (killed, as for want of memory, or by a fault "
-    "of its interpreter); the flights until then are reported, and --resume FILE "
-    "continues from them"
-)
+_BROKEN = "the flights until then are reported, and --resume FILE continues from them"
+
+
+class _Flyers(NamedTuple):
+    """Who flies."""
+
+    #: At the same time.
+    number: int
+    #: What the speed depends on.
+    how: str
+    #: The flights of seeds, in their order.
+    flown: Callable[[Sequence[int]], Generator[campaign.Line, None, None]]
 
 
 def main() -> None:
@@ -58,7 +70,16 @@ def main() -> None:
             "kinds as often as the common"
         ),
     )
-    options.add_argument("--jobs", type=positive, default=os.cpu_count() or 1, help="processes")
+    where = options.add_mutually_exclusive_group()
+    where.add_argument(
+        "--jobs", type=positive, default=os.cpu_count() or 1, help="processes of this machine"
+    )
+    where.add_argument(
+        "--scheduler",
+        type=scheduler,
+        metavar="tcp://HOST:PORT",
+        help="fly on the workers of this Dask cluster",
+    )
     options.add_argument(
         "--page", type=writable, help="write the results to this page, with pictures beside it"
     )
@@ -86,17 +107,31 @@ def main() -> None:
     options.add_argument(
         "--replay", type=scenario, metavar="SEED|FILE", help="show one flight step by step"
     )
+    options.add_argument(
+        "--plan",
+        type=positive,
+        metavar="N",
+        help="print how long N flights take on how many cores, at the rate of this run",
+    )
+    options.add_argument(
+        "--core-hour-price",
+        type=price,
+        metavar="PRICE",
+        help="price of a core for an hour, in any currency, for the costs of --plan",
+    )
     # `ros2 run` adds arguments for nodes, which this is none of.
     chosen, _ = options.parse_known_args()
     profiles = config_folder() / "profiles"
     if chosen.tapes_only and chosen.tapes is None:
         options.error("argument --tapes-only: name the file with --tapes")
+    if chosen.tapes is not None and chosen.scheduler is not None:
+        options.error("argument --tapes: the workers of a cluster have no such file: fly here")
     file = None if chosen.tapes is None else TapeFile(chosen.tapes, chosen.tapes_only)
-    flown = partial(campaign.drawn, profiles, tapes=file)
+    drawn = partial(campaign.drawn, profiles, tapes=file)
     if chosen.replay is not None:
         given = chosen.replay
         try:
-            _replay(profiles, flown(given) if isinstance(given, int) else given, file)
+            _replay(profiles, drawn(given) if isinstance(given, int) else given, file)
         except RecordError as error:
             options.error(f"argument --replay: {error}")
         return
@@ -107,7 +142,7 @@ def main() -> None:
         seeds = rare(seeds, chosen.each)
     if chosen.tapes_only:
         # A rocket has none, nor has a profile of which no tape was recorded.
-        seeds = [seed for seed in seeds if flown(seed).tape is not None]
+        seeds = [seed for seed in seeds if drawn(seed).tape is not None]
     if len(seeds) < chosen.flights:
         print(f"{len(seeds)} of {chosen.flights} seeds are flown", file=sys.stderr, flush=True)
     kept = _Kept(chosen.resume, chosen.seed, profiles, file)
@@ -115,12 +150,13 @@ def main() -> None:
         tally = kept.tally()
     except RecordError as error:
         options.error(f"argument --resume: {error}")
-    progress = _Progress(len(seeds), chosen.failures, kept, flown)
-    broken = False
-    try:
-        campaign.run(profiles, seeds, chosen.jobs, progress.look, tally, file)
-    except BrokenProcessPool:
-        broken = True
+    progress = _Progress(len(seeds), chosen.failures, kept, drawn)
+    before, took_before, broken = tally.flights, tally.took, ""
+    with _flyers(chosen.scheduler, profiles, chosen.jobs, file) as flyers:
+        try:
+            campaign.run(flyers.flown(seeds[tally.flights :]), progress.look, tally)
+        except CampaignError as error:
+            broken = str(error)
     kept.keep(tally)
     for count in Count:
         print(f"{tally.counts[count]:8d}  {count.value}")
@@ -132,20 +168,54 @@ def main() -> None:
     elif tally.wrong:
         print(f"saved in {chosen.failures}; --replay FILE shows one step by step")
     if chosen.page and tally.flights:
-        how = f"{chosen.jobs} at a time on {machine()}"
         of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
-        if file is not None:
-            command = f"FLIGHTS={chosen.flights} SEED={chosen.seed}"
-            chosen.page.write_text(page_of_bodies(tally, Tapes(file), command, how))
+        if file is None:
+            _write(tally, chosen.page, chosen.seed, flyers.how, of_each)
         else:
-            _write(tally, chosen.page, chosen.seed, how, of_each)
+            command = f"FLIGHTS={chosen.flights} SEED={chosen.seed}"
+            chosen.page.write_text(page_of_bodies(tally, Tapes(file), command, flyers.how))
+    flown = tally.flights - before
+    if chosen.plan and flown:
+        rate = flown / (tally.took - took_before) / flyers.number
+        print(plan(chosen.plan, rate, flown, chosen.core_hour_price))
     if broken:
-        sys.exit(_BROKEN)
+        sys.exit(f"campaign: {broken}; {_BROKEN}")
     if tally.wrong:
         sys.exit(1)
     if tally.flights < len(seeds):
         # What was flown until then is told; now it ends as every tool does.
         raise KeyboardInterrupt
+
+
+@contextmanager
+def _flyers(
+    scheduler: str | None, profiles: Path, jobs: int, tapes: TapeFile | None
+) -> Iterator[_Flyers]:
+    """On the cluster of a scheduler, or here. Exit code 2: there is none, or it differs."""
+    if scheduler is None:
+        how = f"{jobs} at a time on {machine()}"
+        bundle = partial(campaign.fly_bundle, tapes=tapes)
+        yield _Flyers(jobs, how, lambda seeds: flown_here(bundle, profiles, seeds, jobs))
+        return
+    try:
+        # Here: no other campaign needs it.
+        from chute_ros.tools.campaign_cluster import Cluster
+
+        cluster = Cluster(scheduler)
+    except ImportError as error:
+        refused = (
+            f"--scheduler needs {error.name}, which this Python cannot import: "
+            "`python3 -m pip install -r requirements/extra.in` brings it"
+        )
+    except CampaignError as error:
+        refused = str(error)
+    else:
+        with closing(cluster):
+            how = f"{cluster.workers} workers of a Dask cluster: {cluster.machines}"
+            yield _Flyers(cluster.workers, how, cluster.flown)
+        return
+    print(f"campaign: {refused}", file=sys.stderr)
+    sys.exit(2)
 
 
 def _told(line: campaign.Line) -> str:
@@ -162,7 +232,7 @@ class _Kept:
         self._path, self._seed = path, seed
         more = () if tapes is None else (tapes.path,)
         self._code = "" if path is None else checkpoint.code_that_flies(profiles, *more)
-        self._at = time.monotonic()
+        self._due = time.monotonic() + _KEEP_EVERY
 
     def tally(self) -> campaign.Tally:
         """The flights of the last time; RecordError: they are not of this campaign."""
@@ -175,18 +245,21 @@ class _Kept:
 
     def look(self, tally: campaign.Tally) -> None:
         """Keep it from time to time."""
-        if time.monotonic() - self._at >= _KEEP_EVERY:
+        if time.monotonic() >= self._due:
             self.keep(tally)
 
     def keep(self, tally: campaign.Tally) -> None:
         """Now: whole, or as it was."""
-        self._at = time.monotonic()
         if self._path is None:
             return
+        begun = time.monotonic()
         try:
             replace_text(self._path, checkpoint.text_of(tally, self._seed, self._code))
         except OSError as error:
             print(f"not saved: {error}; trying again", file=sys.stderr, flush=True)
+        ended = time.monotonic()
+        # Of millions of flights the file is large: a twentieth of the time at most goes to it.
+        self._due = ended + max(_KEEP_EVERY, 19.0 * (ended - begun))
 
 
 class _Progress:
@@ -238,6 +311,29 @@ def positive(text: str) -> int:
         number = 0
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text}: need a whole number, 1 or more")
+    return number
+
+
+def scheduler(text: str) -> str:
+    """Its address: a client waits for ever for what is none."""
+    try:
+        parts = urlsplit(text)
+        named = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
+    except ValueError:
+        named = None
+    if not named or text != f"{parts.scheme}://{parts.netloc}":
+        raise argparse.ArgumentTypeError(f"{text}: need tcp://HOST:PORT")
+    return text
+
+
+def price(text: str) -> float:
+    """0 or more."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0.0 <= number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: need a number, 0 or more")
     return number
 
 

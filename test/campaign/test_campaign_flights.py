@@ -13,6 +13,7 @@ from chute_ros.campaign.draw import draw
 from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.flight import Flight, fly
 from chute_ros.campaign.judge import Count, judge
+from chute_ros.campaign.pool import flown_here
 from chute_ros.campaign.scenario import (
     MOST_FAULTS,
     PROFILES,
@@ -237,7 +238,9 @@ def test_every_world_is_drawn() -> None:
 def test_a_campaign_counts_every_flight_once() -> None:
     tallies = []
     tally = campaign.run(
-        FOLDER, range(100, 106), 2, lambda one: tallies.append(one.flights), campaign.Tally()
+        flown_here(FOLDER, range(100, 106), 2),
+        lambda one: tallies.append(one.flights),
+        campaign.Tally(),
     )
     assert tallies == [1, 2, 3, 4, 5, 6]
     assert sum(tally.counts.values()) == tally.flights == 6
@@ -250,6 +253,6 @@ def test_an_exception_in_a_flight_is_counted_and_ends_nothing(monkeypatch) -> No
         raise ValueError("the rig fell apart")
 
     monkeypatch.setattr(campaign, "fly", broken)
-    tally = campaign.run(FOLDER, range(2), 1, lambda _: None, campaign.Tally())
+    tally = campaign.run(flown_here(FOLDER, range(2), 1), lambda _: None, campaign.Tally())
     assert tally.counts[Count.BROKEN] == 2
     assert tally.wrong[0].why == "ValueError: the rig fell apart"

@@ -33,7 +33,11 @@ PATHS = {
     "DiagnosticSummary": lambda one: [one["topicToRender"]],
     "DiagnosticStatusPanel": lambda one: [one["topicToRender"]],
     "RosOut": lambda one: [one["topicToRender"]],
+    "Tab": lambda one: [],
 }
+#: Of a screen of 1080 lines Lichtblick leaves so many to the panels; a row of a timeline needs
+#: 64 of them, the title of its panel and the time below it 40, a bar of tabs 30.
+LINES, LINES_A_ROW, LINES_OF_PANEL, LINES_OF_TABS = 960, 64, 40, 30
 
 
 class _Root:
@@ -88,13 +92,24 @@ def paths(file: Path) -> list[str]:
     ]
 
 
-def placed(layout: Any) -> list[str]:
-    """Ids of the panels of a layout."""
-    if isinstance(layout, str):
-        return [layout]
-    assert layout["direction"] in ("row", "column")
-    assert 0 < layout["splitPercentage"] < 100
-    return placed(layout["first"]) + placed(layout["second"])
+def placed(file: Path) -> list[tuple[str, float]]:
+    """Ids of the panels of a layout, and how many lines of the screen each has."""
+    configs = panels(file)
+
+    def inside(layout: Any, lines: float) -> list[tuple[str, float]]:
+        if isinstance(layout, str):
+            if not layout.startswith("Tab!"):
+                return [(layout, lines)]
+            tabs = [one["layout"] for one in configs[layout]["tabs"]]
+            shown = [panel for tab in tabs for panel in inside(tab, lines - LINES_OF_TABS)]
+            return [(layout, lines), *shown]
+        assert layout["direction"] in ("row", "column")
+        assert 0 < layout["splitPercentage"] < 100
+        share = layout["splitPercentage"] / 100
+        above, below = (share, 1 - share) if layout["direction"] == "column" else (1, 1)
+        return inside(layout["first"], above * lines) + inside(layout["second"], below * lines)
+
+    return inside(json.loads(file.read_text())["layout"], LINES)
 
 
 def test_there_is_one_for_the_field_the_bench_and_the_black_box():
@@ -122,8 +137,32 @@ def test_what_is_plotted_is_a_number(file, topics):
 
 @pytest.mark.parametrize("file", FOXGLOVE, ids=lambda one: one.stem)
 def test_each_panel_has_its_place(file):
-    layout = json.loads(file.read_text())["layout"]
-    assert sorted(placed(layout)) == sorted(panels(file))
+    assert sorted(id_ for id_, _ in placed(file)) == sorted(panels(file))
+
+
+@pytest.mark.parametrize("file", FOXGLOVE, ids=lambda one: one.stem)
+def test_each_row_of_a_timeline_is_seen(file):
+    """What does not fit is below the edge of its panel."""
+    for id_, lines in placed(file):
+        if id_.startswith("StateTransitions!"):
+            rows = len(panels(file)[id_]["paths"])
+            assert rows * LINES_A_ROW + LINES_OF_PANEL <= lines, id_
+
+
+@pytest.mark.parametrize("file", FOXGLOVE, ids=lambda one: one.stem)
+def test_a_plot_hides_nothing_and_joins_nothing(file):
+    """Its legend is beside the curves; of an array the elements of one moment would be joined."""
+    for id_, one in panels(file).items():
+        if id_.startswith("Plot!"):
+            assert one["legendDisplay"] == "left", id_
+            assert not any("[:]" in path for path in PATHS["Plot"](one)), id_
+
+
+@pytest.mark.parametrize("file", FOXGLOVE, ids=lambda one: one.stem)
+def test_each_panel_has_its_title_in_both_viewers(file):
+    for id_, one in panels(file).items():
+        if not id_.startswith("Tab!"):
+            assert one["lichtblickPanelTitle"] == one["foxglovePanelTitle"] != "", id_
 
 
 def test_the_layout_of_a_black_box_names_only_what_is_recorded(topics):

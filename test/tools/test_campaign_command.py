@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -21,6 +22,8 @@ from chute_ros.campaign.scenario import Failure
 from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
 from chute_ros.tools.machine import machine
+
+TAPES = str(Path(__file__).parents[1] / "campaign" / "tapes" / "bodies.tapes")
 
 
 def run(monkeypatch, *arguments):
@@ -38,10 +41,25 @@ def run(monkeypatch, *arguments):
         (["--each", "1", "--resume", "/tmp/kept"], "argument --each: a campaign of each kind"),
         (["--jobs", "0"], "argument --jobs: 0: need a whole number, 1 or more"),
         (["--jobs", "many"], "argument --jobs: many: need a whole number, 1 or more"),
+        (["--scheduler", ""], "argument --scheduler: : need tcp://HOST:PORT"),
+        (["--scheduler", "host"], "argument --scheduler: host: need tcp://HOST:PORT"),
+        (["--scheduler", "tcp://host"], "argument --scheduler: tcp://host: need tcp://HOST:PORT"),
+        (["--scheduler", "tcp://:1"], "argument --scheduler: tcp://:1: need tcp://HOST:PORT"),
+        (["--scheduler", "tcp://h:99999"], "tcp://h:99999: need tcp://HOST:PORT"),
+        (["--scheduler", "http://h:1"], "http://h:1: need tcp://HOST:PORT"),
+        (["--scheduler", "tcp://h:1/x"], "tcp://h:1/x: need tcp://HOST:PORT"),
+        (["--scheduler", "tcp://h:1", "--jobs", "999"], "argument --jobs: not allowed with"),
+        (["--plan", "0"], "argument --plan: 0: need a whole number, 1 or more"),
+        (["--core-hour-price", "-1"], "argument --core-hour-price: -1: need a number, 0 or more"),
+        (["--core-hour-price", "nan"], "--core-hour-price: nan: need a number, 0 or more"),
         (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
         (["--page", "/tmp"], "argument --page: /tmp: no file can be written there"),
         (["--tapes", "/nowhere"], "argument --tapes: /nowhere: No such file or directory"),
         (["--tapes", __file__], "test_campaign_command.py: no file of tapes: it does not begin"),
+        (
+            ["--tapes", TAPES, "--scheduler", "tcp://127.0.0.1:1"],
+            "argument --tapes: the workers of a cluster have no such file: fly here",
+        ),
         (["--tapes-only"], "argument --tapes-only: name the file with --tapes"),
         (["--replay", "/nowhere"], "argument --replay: /nowhere: need a seed, or a file: "),
         (["--replay", __file__], "is no scenario of a campaign: JSONDecodeError"),
@@ -89,9 +107,8 @@ def test_of_each_kind_it_flies_the_first(monkeypatch, tmp_path, capsys):
 
 
 def test_bodies_made_by_others_have_a_page_of_their_own(monkeypatch, tmp_path, capsys):
-    tapes = str(Path(__file__).parents[1] / "campaign" / "tapes" / "bodies.tapes")
     page, failures = tmp_path / "bodies.md", str(tmp_path / "failures")
-    given = ("--tapes", tapes, "--tapes-only", "--jobs", "1", "--failures", failures)
+    given = ("--tapes", TAPES, "--tapes-only", "--jobs", "1", "--failures", failures)
     run(monkeypatch, "--flights", "4", "--page", str(page), *given)
     told = capsys.readouterr()
     assert "2 of 4 seeds are flown" in told.err
@@ -171,6 +188,23 @@ def test_a_full_disk_does_not_end_the_flights(monkeypatch, tmp_path, capsys):
     told = capsys.readouterr()
     assert "2 of 2 flights in" in told.out
     assert "not saved: [Errno 28] No space left on device" in told.err
+
+
+def test_a_file_that_takes_long_to_write_is_written_less_often(monkeypatch, tmp_path):
+    now, written = [0.0], []
+
+    def slow(*_):
+        now[0] += 10.0
+        written.append(now[0])
+        return ""
+
+    monkeypatch.setattr(campaign, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(campaign.checkpoint, "text_of", slow)
+    kept = campaign._Kept(tmp_path / "kept.json", 0, tmp_path)
+    while now[0] < 500.0:
+        kept.look(flights.Tally())
+        now[0] += 1.0
+    assert written == [70.0, 270.0, 470.0], "a twentieth of the time"
 
 
 def full_disk(*_):

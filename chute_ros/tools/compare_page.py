@@ -1,0 +1,254 @@
+"""The comparison with what people use today as a page."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from chute_ros.campaign.comparison import CURVE_OF, FACTORS, Compared
+from chute_ros.campaign.guards import GUARDS, OURS
+from chute_ros.campaign.judge import Count
+from chute_ros.tools.compare_classes import (
+    MISSED,
+    Better,
+    better,
+    by_class,
+    missed_and_false,
+    paired_delays,
+)
+from chute_ros.tools.pages import table
+
+_INTRODUCTION = """\
+The flights of the [fault campaign](campaign.md), flown again for each guard in one run and counted
+by the same judge from the same truth. A guard is who decides about motors and parachute: this
+product, or one of its peers. A peer runs in the autopilot itself, 50 times a second (the step of
+the flight model), on what that autopilot's own sensors and estimator say, with the scenario's
+faults of both. The peer is dead or hung while the autopilot is, and begins again when it restarts.
+It stops the motors and releases the parachute on its own output. Each peer is written in our own
+words from its documentation and source (`chute_ros/campaign/peers/`, each number with its source);
+it is not the peer's code."""
+
+_RULES = """\
+What makes this fair, or not:
+
+- Rockets are left out: no peer flies them. Nobody orders anything: no arming, kill or deploy by a
+  person. No parachute releases itself, and every canopy carries and opens in 1.2 s: these are
+  features of parachutes, not of guards. Two parachutes on two links are flown by this product
+  alone; a peer has one.
+- Faults on networks, buses, cables, nodes and the supervisor's process exist for this product
+  only. They are harmless to a peer in the autopilot. Vehicles with an IMU or odometry besides
+  the autopilot have it for this product only; a peer does not read it.
+- A wrong `disarmed` in a heartbeat is a fault of the telemetry, and harmless to a peer. A wrong
+  `landed` is the land detector's, and reaches a peer as well.
+- Flips and dives of 45 degrees and more are flown in ArduCopter's FLIP or ACRO mode and PX4's Acro
+  mode, where their attitude checks are off; after a failure they are on at once. The threshold
+  does not know the mode.
+- PX4 only disarms within 4 s of its arming (COM_LKDOWN_TKO, COM_SPOOLUP_TIME). The climb, which
+  the campaign shortens, counts as if flown at 6 m/s. PX4's source does not ask the land detector
+  before a termination. Disarming after a landing (COM_DISARM_LAND), which a wrong `landed` would
+  cause in the air, is not modelled.
+- A vehicle takes off when this product's supervisor, or at once when the peer, lets it. Gusts and
+  the noise of sensors are of the same strength, but not the same sample by sample.
+- The judge's excuses are the campaign's, for every guard: too little time (2 s and more), sensors
+  that were wrong in pairs, ways and processes that failed. The second count excuses nothing: it
+  asks only whether the vehicle was saved and whether one that flew well was left alone. Flights
+  that no release could save stay "no time" there."""
+
+_CLASSES = """\
+In each cell: missed or late / false, without any excuse."""
+
+_BETTER = """\
+Every class in which a peer has fewer missed or late or fewer false flights than this product,
+without any excuse, or releases earlier: the median over the flights in which both released, of
+five at least. Seeds: flights that the peer ends well and this product does not, or those in which
+the peer is earliest. A guard that never acts has no false flight."""
+_DELAYS = """\
+Of the flights that only a parachute could save. The last two columns: medians over the flights in
+which both the peer and this product released."""
+_SCALES = ", ".join(f"{one:g}" for one in FACTORS)
+_CURVES = f"""\
+One of {CURVE_OF} flights was flown again with the limits of each guard scaled by {_SCALES} (the
+first table says which). Missed or late in percent of the flights that only a parachute could save;
+false in percent of all. The large dot: not scaled."""
+
+
+class Run(NamedTuple):
+    """seeds: flown from seed first on; took: s; how: what the speed depends on, in words."""
+
+    seeds: int
+    first: int
+    took: float
+    how: str
+
+
+def page(lines: Sequence[Compared], run: Run, pictures: Sequence[str]) -> str:
+    """As Markdown. pictures: the names of the files of the curves and of the delays."""
+    curves, delays = pictures
+    plain = [one for one in lines if one.factor == 1.0]
+    command = f"make compare FLIGHTS={run.seeds} SEED={run.first}"
+    flights = len({one.seed for one in plain})
+    told = f"{flights} flights of aircraft with each guard, {run.took:.0f} s, {run.how}"
+    parts = [
+        "# Beside what people use today",
+        f"Written by `{command}`: {told}.",
+        _INTRODUCTION,
+        table(("guard", "settings, and what is scaled for the curves"), _guards()),
+        _RULES,
+        *_counted(plain),
+        "## From the failure to the release",
+        f"![delays]({delays})",
+        _DELAYS,
+        _delays(plain),
+        "## By class",
+        _CLASSES,
+        *(_classes(plain, title, key) for title, key in _KEYS),
+        "## False against missed",
+        f"![curves]({curves})",
+        _CURVES,
+        _curve(lines),
+        "## Where others are better",
+        _BETTER,
+        _table_of_better(plain),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+#: Titles of classes, and what a flight's class is.
+_KEYS: tuple[tuple[str, Callable[[Compared], tuple[str, str]]], ...] = (
+    ("what fails", lambda one: (one.profile, one.failure)),
+    ("fault", lambda one: (one.profile, one.fault)),
+    ("manoeuvre", lambda one: (one.profile, one.manoeuvre or "none")),
+)
+
+
+def _guards() -> list[tuple[str, str]]:
+    return [(one.name, one.about) for one in GUARDS]
+
+
+def _counted(plain: Sequence[Compared]) -> list[str]:
+    parts = []
+    for profile in sorted({one.profile for one in plain}):
+        of = [one for one in plain if one.profile == profile]
+        parts += [
+            f"## Counted: {profile}",
+            "As the campaign counts:",
+            _counts(of, lambda one: one.count),
+            "Without any excuse:",
+            _counts(of, lambda one: one.bare),
+        ]
+    return parts
+
+
+def _counts(of: Sequence[Compared], count: Callable[[Compared], Count]) -> str:
+    present = [c for c in Count if any(count(one) is c for one in of)]
+    rows = []
+    for guard in GUARDS:
+        counts = [count(one) for one in of if one.guard == guard.name]
+        rows.append((guard.name, *(str(counts.count(c)) for c in present)))
+    return table(("guard", *(c.value.partition(":")[0] for c in present)), rows)
+
+
+def _delays(plain: Sequence[Compared]) -> str:
+    rows = []
+    for profile in sorted({one.profile for one in plain}):
+        of = [one for one in plain if one.profile == profile]
+        for guard in GUARDS:
+            mine = [one for one in of if one.guard == guard.name]
+            told = [one for one in mine if not math.isnan(one.delay)]
+            pairs = paired_delays(of, guard.name) if guard is not OURS else []
+            rows.append(
+                (
+                    f"{profile}, {guard.name}",
+                    f"{len(told)} of {sum(one.needed for one in mine)}",
+                    *_spread([one.delay for one in told], "s"),
+                    *_spread([one.lost for one in told], "m"),
+                    *_medians(pairs),
+                )
+            )
+    head = ("guard", "released of needed", "delay: median", "99th percentile")
+    lost = ("height lost: median", "99th percentile", "both: the peer", "this product")
+    return table((*head, *lost), rows)
+
+
+def _spread(values: list[float], unit: str) -> tuple[str, str]:
+    if not values:
+        return "", ""
+    high = sorted(values)[math.ceil(0.99 * len(values)) - 1]
+    return f"{statistics.median(values):.2f} {unit}", f"{high:.2f} {unit}"
+
+
+def _medians(pairs: list[tuple[float, float]]) -> tuple[str, str]:
+    if not pairs:
+        return "", ""
+    theirs, ours = zip(*pairs, strict=True)
+    return f"{statistics.median(theirs):.2f} s", f"{statistics.median(ours):.2f} s"
+
+
+def _classes(
+    plain: Sequence[Compared], title: str, key: Callable[[Compared], tuple[str, str]]
+) -> str:
+    rows = []
+    for (profile, name), of in by_class(plain, key):
+        flights = sum(one.guard == OURS.name for one in of)
+        cells = (missed_and_false(of, guard.name) for guard in GUARDS)
+        rows.append((profile, name, str(flights), *(f"{m} / {f}" for m, f in cells)))
+    return table(("profile", title, "flights", *(one.name for one in GUARDS)), rows)
+
+
+def _curve(lines: Sequence[Compared]) -> str:
+    rows = []
+    for profile in sorted({one.profile for one in lines}):
+        for guard in GUARDS:
+            cells = (shares(lines, profile, guard.name, factor) for factor in FACTORS)
+            told = ("" if one is None else f"{one[0]:.1f} / {one[1]:.1f}" for one in cells)
+            rows.append((f"{profile}, {guard.name}", *told))
+    return table(("missed / false, %", *(f"{one:g}" for one in FACTORS)), rows)
+
+
+def shares(
+    lines: Sequence[Compared], profile: str, guard: str, factor: float
+) -> tuple[float, float] | None:
+    """Return missed or late in percent of those that need a parachute, and false in percent of
+    all, of the flights of the curve; None: there is none."""
+    of = [
+        one
+        for one in lines
+        if one.seed % CURVE_OF == 0
+        and (one.profile, one.guard, one.factor) == (profile, guard, factor)
+    ]
+    if not of:
+        return None
+    needed = sum(one.needed for one in of)
+    missed = sum(one.bare in MISSED for one in of)
+    false = sum(one.bare is Count.FALSE for one in of)
+    return 100.0 * missed / max(1, needed), 100.0 * false / len(of)
+
+
+def _table_of_better(plain: Sequence[Compared]) -> str:
+    rows: list[tuple[str, ...]] = []
+    for _, key in _KEYS:
+        for (profile, name), of in by_class(plain, key):
+            for guard in GUARDS:
+                one = better(of, guard.name) if guard is not OURS else None
+                if one is not None:
+                    rows.append((f"{profile}: {name}", guard.name, *_cells(one)))
+    if not rows:
+        return "None."
+    head = ("class", "peer", "missed or late: peer, ours", "false: peer, ours")
+    return table((*head, "median delay: peer, ours", "seeds"), rows)
+
+
+def _cells(one: Better) -> tuple[str, ...]:
+    missed = _marked(one.missed, one.missed[0] < one.missed[1])
+    false = _marked(one.false, one.false[0] < one.false[1])
+    delay = ""
+    if one.delay is not None:
+        delay = _marked(tuple(f"{s:.2f} s" for s in one.delay), one.earlier)
+    return missed, false, delay, ", ".join(str(seed) for seed in one.seeds)
+
+
+def _marked(pair: Sequence[object], is_better: bool) -> str:
+    text = ", ".join(str(one) for one in pair)
+    return f"**{text}**" if is_better else text

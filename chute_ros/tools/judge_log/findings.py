@@ -1,0 +1,137 @@
+"""What a judged log tells: what was decided, how near each rule came, what was not known."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from chute_ros.model import Action
+from chute_ros.supervisor.machine import Stage
+from chute_ros.tools.judge_log.log_flight import Judged
+from chute_ros.tools.state_rows import RuleTold, rules_of
+
+_DIGITS = str.maketrans("0123456789", "0" * 10)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A measurement that could not be used for this share (0 to 1) of the flight, and why."""
+
+    name: str
+    share: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Rating:
+    """One rule of the profile that ends a flight, in this one. nearest: its measurements when they
+    came nearest to their limits, in words; blind: share of the time (0 to 1) in which too
+    little was known for it to be fulfilled."""
+
+    told: RuleTold
+    nearest: tuple[str, ...]
+    blind: float
+
+    @property
+    def share(self) -> float:
+        """The highest counter as a share of what fulfils the rule."""
+        if self.told.hold > 0.0:
+            return self.told.peak / self.told.hold
+        return 0.0 if math.isnan(self.told.fulfilled_at) else 1.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A judged log in a few words, without what was seen of it. first: when it was ended, s of the
+    log, NaN: it was not; release_height: where a parachute was released, m, NaN: none was, or
+    nobody knew."""
+
+    path: Path
+    format: str
+    profile: str
+    duration: float
+    flew: float
+    words: str
+    nearest: str
+    first: float
+    release_height: float
+
+    @property
+    def ended(self) -> bool:
+        """A parachute would have been released, or the motors stopped in flight."""
+        return not math.isnan(self.first)
+
+
+def verdict_of(judged: Judged) -> Verdict:
+    """Of this log."""
+    released = [at for at, one in judged.fired if one.action is Action.DEPLOY]
+    nearest = next((r for r in ratings(judged) if r.share > 0.0), None)
+    near = f"{nearest.told.name}: {100.0 * nearest.share:.0f} %" if nearest else "none moved"
+    return Verdict(
+        judged.log.path,
+        judged.log.format,
+        judged.config.profile.name,
+        judged.log.duration,
+        judged.flew,
+        _words(judged),
+        near,
+        judged.fired[0][0] if judged.fired else math.nan,
+        height_at(judged, released[0]) if released else math.nan,
+    )
+
+
+def _words(judged: Judged) -> str:
+    if judged.fired:
+        return ", ".join(
+            f"{one.action.name} at {at:.1f} s ({one.rule})" for at, one in judged.fired
+        )
+    return "nothing ended the flight" if judged.flew else "never in flight"
+
+
+def height_at(judged: Judged, at: float) -> float:
+    """The height (m) that was known then; NaN: none."""
+    known = [state.height for when, state in judged.vehicle if when <= at]
+    return known[-1] if known else math.nan
+
+
+def ratings(judged: Judged) -> list[Rating]:
+    """Of each rule that may end a flight, the nearest first."""
+    told = {one.name: one for one in rules_of(judged.pictures)}
+    near = judged.nearest
+    found = [
+        Rating(told[rule.name], tuple(near.words(rule)), near.blind(rule))
+        for rule in judged.config.profile.rules
+        if rule.action >= Action.KILL and rule.name in told
+    ]
+    return sorted(found, key=lambda one: -one.share)
+
+
+def unknown(judged: Judged) -> list[Unknown]:
+    """What of the vehicle could not be used in flight, the longest first."""
+    in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
+    reasons: dict[str, Counter[str]] = {}
+    for one in in_flight:
+        for line in one.unusable:
+            name, _, why = line.partition(": ")
+            reasons.setdefault(name, Counter())[why.translate(_DIGITS)] += 1
+    lines = [line.partition(": ") for one in in_flight for line in one.unusable]
+    newest = {name: why for name, _, why in lines}
+    found = [
+        Unknown(name, sum(whys.values()) / len(in_flight), newest[name])
+        for name, whys in reasons.items()
+    ]
+    return sorted(found, key=lambda one: -one.share)
+
+
+def blocked(judged: Judged) -> list[str]:
+    """Why the vehicle must not have taken off, as the supervisor knew it when it did; empty: it
+    was ready, or nobody knows."""
+    before: Sequence[str] = ()
+    for _, one in judged.pictures:
+        if one.state == Stage.IN_FLIGHT:
+            return list(before)
+        before = one.block_reasons
+    return []

@@ -1,0 +1,110 @@
+"""A flight that was recorded without this suite, as its autopilot would have told of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from chute_ros.errors import ChuteError
+from chute_ros.links.mavlink.protocol.firmware import is_aeroplane
+from chute_ros.protocol.mavlink.dialect import dialect
+
+#: No link carries a message of one kind more often than this, s.
+_APART = 0.02
+#: The longest silence of a log that is lived through, s.
+_GAP = 600.0
+
+
+class LogError(ChuteError):
+    """A file cannot be read as a log. The text names the file and the reason."""
+
+
+def reason(error: Exception) -> str:
+    """An error of a library in words."""
+    return str(error) or type(error).__name__
+
+
+@dataclass
+class FlightLog:
+    """messages: (s from the start, message of the dialect), in the order of time; their
+    time_boot_ms is filled in as they are sent, unless they came over a link (as_sent)."""
+
+    path: Path
+    #: Which format, in words.
+    format: str
+    #: HEARTBEAT.type and HEARTBEAT.autopilot.
+    vehicle_type: int
+    autopilot: int
+    messages: list[tuple[float, Any]]
+    #: Of the autopilot, by name.
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    #: They are what came over a radio or a cable, at its rates; otherwise each kind comes as often
+    #: as it is asked for, and was recorded.
+    as_sent: bool = False
+    #: What a reader must be told of the file.
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return self.messages[-1][0] if self.messages else 0.0
+
+    @property
+    def profile(self) -> str:
+        """The shipped profile for what flew."""
+        if self.vehicle_type == dialect.MAV_TYPE_ROCKET:
+            return "rocket"
+        return "fixed_wing" if is_aeroplane(self.vehicle_type) else "multirotor"
+
+
+class MessageLog:
+    """Messages of one log as they are read: those that a link would carry."""
+
+    def __init__(self) -> None:
+        self._messages: list[tuple[float, Any]] = []
+        self._newest: dict[tuple[int, Any], float] = {}
+
+    def add(self, at: float, message: Any, which: Any = None) -> None:
+        """which: of several of a kind. What comes sooner after the one before than any link
+        carries it is left out."""
+        key = (message.get_msgId(), which)
+        # A hundredth of a step: times are rounded.
+        if math.isfinite(at) and at - self._newest.get(key, -math.inf) >= _APART * 0.99:
+            self._newest[key] = at
+            self._messages.append((at, message))
+
+    def add_change(self, at: float, message: Any) -> None:
+        """A message that is never left out."""
+        if math.isfinite(at):
+            self._messages.append((at, message))
+
+    def seconds(self) -> list[float]:
+        """One moment of each second in which there is a message."""
+        found = {math.floor(at): at for at, _ in reversed(self._messages)}
+        return sorted(found.values())
+
+    def in_order(self, remarks: list[str]) -> list[tuple[float, Any]]:
+        """From the first on, whose time is 0. remarks: gets what a reader must be told of it."""
+        return without_gaps(sorted(self._messages, key=lambda one: one[0]), remarks)
+
+
+def without_gaps(
+    messages: Sequence[tuple[float, Any]], remarks: list[str]
+) -> list[tuple[float, Any]]:
+    """The same from time 0 on, and no silence longer than _GAP: a damaged time is years away."""
+    found, shift, before = [], 0.0, math.nan
+    for at, message in messages:
+        if math.isnan(before):
+            shift = at
+        elif at - before > _GAP:
+            shift += at - before - _GAP
+            remarks.append(
+                f"a gap of {at - before:.0f} s is shortened to {_GAP:g} s, "
+                f"{before - messages[0][0]:.0f} s after its begin"
+            )
+        before = at
+        found.append((at - shift, message))
+    return found

@@ -1,0 +1,189 @@
+"""Tables of numbers (.csv) of a rocket's flight, as an altimeter wrote them.
+
+A heading is found by its name, or given: height="Altitude (ft)*0.3048". Without a vertical speed
+the heights tell it.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.tools.judge_log import told
+from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog
+
+FORMAT = "table"
+#: What a column can be, and the headings (without case, signs, unit and _BESIDES) by which it is
+#: found, the best first.
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "time": ("time", "t", "ts", "flighttime", "timestamp", "elapsedtime", "met"),
+    "height": ("height", "altitude", "alt", "z"),
+    "vertical_speed": ("verticalspeed", "verticalvelocity", "speed", "velocity", "vz", "v"),
+    "pressure": ("pressure",),
+}
+#: Words of headings that say how or where, and not what.
+_BESIDES = frozenset({"agl", "filtered", "baro", "barometer", "kalman", "aprox", "est", "raw"})
+#: Units in headings: how many of ours one is.
+_UNITS = {
+    **dict.fromkeys(
+        ("", "s", "sec", "seconds", "m", "m/s", "m/s^2", "m/s2", "pa", "pascals"), 1.0
+    ),
+    **dict.fromkeys(("ft", "feet", "fps", "ft/s", "ft/sec", "ft/s^2", "ft/s2"), 0.3048),
+    "ms": 1e-3,
+    "us": 1e-6,
+    "hpa": 100.0,
+    "mbar": 100.0,
+    "kpa": 1e3,
+    "km": 1e3,
+    "mph": 0.44704,
+    "km/h": 1 / 3.6,
+}
+_HEADING = re.compile(r"([^(\[]*)(?:[(\[]([^)\]]*))?")
+_GIVEN = re.compile(r"(\w+)=(.+?)(?:\*([-+.\deE]+))?$")
+#: A speed by the heights of so long, s.
+_SLOPE = 0.5
+
+
+@dataclass(frozen=True)
+class Column:
+    """heading: as it stands in the file; factor: to SI units."""
+
+    heading: str
+    factor: float = 1.0
+
+
+def column(text: str) -> tuple[str, Column]:
+    """NAME=HEADING or NAME=HEADING*FACTOR; ValueError in words."""
+    match = _GIVEN.match(text)
+    if match is None or match[1] not in COLUMNS:
+        raise ValueError(f"{text}: need NAME=HEADING[*FACTOR] with one of {', '.join(COLUMNS)}")
+    factor = float(match[3]) if match[3] else 1.0
+    if not math.isfinite(factor) or not factor:
+        raise ValueError(f"{text}: the factor is not a number other than 0")
+    return match[1], Column(match[2].strip(), factor)
+
+
+def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
+    """The flight in this file; LogError if it has none."""
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise LogError(f"{path}: {error.strerror or error}") from None
+    dialect_of = ";" if text[:4000].count(";") > text[:4000].count(",") else ","
+    rows = [row for row in csv.reader(text.splitlines(), delimiter=dialect_of) if row]
+    begin, places = _places(path, rows, given)
+    values, bad = [], 0
+    for row in rows[begin:]:
+        one = {name: _number(row, place, factor) for name, (place, factor) in places.items()}
+        if math.isfinite(one["time"]) and math.isfinite(one["height"]):
+            values.append(one)
+        else:
+            bad += 1
+    values.sort(key=lambda one: one["time"])
+    if len(values) < 2:
+        raise LogError(f"{path}: no flight: it has {len(values)} rows with a time and a height")
+    remarks = [f"{bad} rows without a time or a height were left out"] if bad else []
+    headings = rows[begin - 1]
+    used = ", ".join(f"{name} from {headings[at].strip()!r}" for name, (at, _) in places.items())
+    messages = _told(values, remarks)
+    return FlightLog(
+        path,
+        FORMAT,
+        dialect.MAV_TYPE_ROCKET,
+        dialect.MAV_AUTOPILOT_GENERIC,
+        messages,
+        remarks=[*remarks, used],
+    )
+
+
+def _places(
+    path: Path, rows: Sequence[Sequence[str]], given: Mapping[str, Column]
+) -> tuple[int, dict[str, tuple[int, float]]]:
+    """The first row of numbers; name -> its column and factor."""
+    headings: list[str] = []
+    for number, row in enumerate(rows):
+        found = _found(row, given)
+        if "time" in found and "height" in found:
+            return number + 1, found
+        headings = headings or [one.strip() for one in row]
+    missing = [f"{one.heading!r} (for {name})" for name, one in given.items()]
+    told_of = f" (given: {', '.join(missing)})" if missing else ""
+    raise LogError(
+        f"{path}: no column for time and height{told_of}; its first line has "
+        f"{', '.join(headings[:12]) or 'nothing'}: name them by --column time=HEADING "
+        "--column height=HEADING*FACTOR"
+    )
+
+
+def _found(row: Sequence[str], given: Mapping[str, Column]) -> dict[str, tuple[int, float]]:
+    places: dict[str, tuple[int, float]] = {}
+    cells = [cell.strip().lstrip("#").strip() for cell in row]
+    for name, one in given.items():
+        if one.heading in cells:
+            places[name] = (cells.index(one.heading), one.factor)
+    parsed = [_meaning(cell) for cell in cells]
+    for name, known in COLUMNS.items():
+        for place in (parsed.index(one) for one in known if one in parsed):
+            places.setdefault(name, (place, _factor(cells[place])))
+    return places
+
+
+def _split(cell: str) -> tuple[list[str], str]:
+    """The words of a heading, and its unit; a unit that is not known is one of its words."""
+    match = _HEADING.match(cell.lower())
+    words = re.findall(r"[a-z]+", match[1] if match else "")
+    unit = (match[2] or "").strip() if match else ""
+    if unit not in _UNITS:
+        # As in "Ft-AGL".
+        parts = [one for one in re.split(r"[\s_-]+", unit) if one not in _BESIDES]
+        if len(parts) != 1 or parts[0] not in _UNITS:
+            return [*words, unit], ""
+        unit = parts[0]
+    if not unit and len(words) > 1 and words[-1] in _UNITS:
+        unit = words.pop()
+    return words, unit
+
+
+def _meaning(cell: str) -> str:
+    return "".join(one for one in _split(cell)[0] if one not in _BESIDES)
+
+
+def _factor(cell: str) -> float:
+    return _UNITS[_split(cell)[1]]
+
+
+def _told(values: Sequence[Mapping[str, float]], remarks: list[str]) -> list[tuple[float, object]]:
+    out = MessageLog()
+    ground = values[0]["height"]
+    beat = told.heartbeat(dialect.MAV_TYPE_ROCKET, dialect.MAV_AUTOPILOT_GENERIC, True)
+    beat_at = -math.inf
+    oldest = 0
+    for number, one in enumerate(values):
+        at, height = one["time"], one["height"] - ground
+        while values[oldest]["time"] < at - _SLOPE and oldest < number:
+            oldest += 1
+        speed = one.get("vertical_speed", math.nan)
+        span = at - values[oldest]["time"]
+        if math.isnan(speed) and span > 0.0:
+            speed = (one["height"] - values[oldest]["height"]) / span
+        if at - beat_at >= 1.0:
+            beat_at = at
+            out.add_change(at, beat)
+        out.add(
+            at, told.position(height, speed if math.isfinite(speed) else 0.0, *(math.nan,) * 3)
+        )
+        if math.isfinite(one.get("pressure", math.nan)):
+            out.add(at, told.pressure(one["pressure"]))
+    return out.in_order(remarks)
+
+
+def _number(row: Sequence[str], place: int, factor: float) -> float:
+    try:
+        return float(row[place]) * factor
+    except (ValueError, IndexError):
+        return math.nan

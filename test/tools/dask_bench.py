@@ -1,0 +1,69 @@
+"""A Dask cluster of processes on the loopback, started by the commands of the guide."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+_DASK = [sys.executable, "-m", "dask"]
+_PLACE = ("--host", "127.0.0.1", "--no-dashboard")
+
+
+@dataclass
+class DaskBench:
+    """address: of the scheduler; workers: of those that run, by their addresses."""
+
+    address: str
+    scheduler: subprocess.Popen[str]
+    workers: dict[str, subprocess.Popen[str]] = field(default_factory=dict)
+
+    def start_worker(self, *arguments: str, **environment: str) -> str:
+        """Until it is registered; its address."""
+        arguments = (self.address, *_PLACE, "--no-nanny", *(arguments or ("--nthreads", "1")))
+        process = _start("worker", *arguments, **environment)
+        address = _told(process, r"Start worker at: +(\S+)")
+        _told(process, "Registered to: ")
+        self.workers[address] = process
+        return address
+
+
+@contextlib.contextmanager
+def dask_bench(**environment: str) -> Iterator[DaskBench]:
+    """A scheduler without workers; at the end all are ended."""
+    scheduler = _start("scheduler", *_PLACE, "--port", "0", **environment)
+    bench = DaskBench(_told(scheduler, r"Scheduler at: +(\S+)"), scheduler)
+    try:
+        yield bench
+    finally:
+        for process in (*bench.workers.values(), scheduler):
+            process.kill()
+            process.communicate()
+
+
+def _start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*_DASK, *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, **environment},
+        # Python looks for packages where it is started, before anything else.
+        cwd="/",
+    )
+
+
+def _told(process: subprocess.Popen[str], pattern: str) -> str:
+    """The first group of the first line that matches."""
+    assert process.stderr is not None
+    lines = []
+    for line in process.stderr:
+        if found := re.search(pattern, line):
+            return found[found.lastindex or 0]
+        lines.append(line)
+    raise AssertionError(f"it ended: {''.join(lines)}")

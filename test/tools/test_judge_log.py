@@ -1,0 +1,289 @@
+"""judge_log over flights of the simulated autopilot, written in every format that it reads."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from log_bench import FAILS, FAILS_AT, FORMATS, LANDS, Told, flown
+
+from chute_ros.model import Action
+from chute_ros.tools.judge_log import command, formats, table
+from chute_ros.tools.judge_log.findings import ratings, unknown, verdict_of
+from chute_ros.tools.judge_log.flight_log import LogError
+from chute_ros.tools.judge_log.log_flight import Judged
+from chute_ros.tools.judge_log.page import flight_section, page
+from chute_ros.tools.judge_log.sweep import sweep
+
+EACH = pytest.mark.parametrize("name", FORMATS)
+
+
+@pytest.fixture(scope="module")
+def landed() -> list[Told]:
+    """It takes off to 60 m and lands."""
+    return flown(LANDS, 70.0)
+
+
+@pytest.fixture(scope="module")
+def fallen() -> list[Told]:
+    """A motor fails at FAILS_AT, at 60 m."""
+    return flown(FAILS, FAILS_AT + 6.0)
+
+
+def judged(path: Path, profile: str | None = None) -> Judged:
+    log = formats.read(path, {})
+    return command.flown(log, command.config_of(log, profile))
+
+
+def highest(one: Judged) -> float:
+    return max(state.height for _, state in one.vehicle if math.isfinite(state.height))
+
+
+# -- every format ------------------------------------------------------------------------------
+
+
+@EACH
+def test_a_flight_that_went_well_is_not_ended(name, landed, tmp_path):
+    one = judged(FORMATS[name](landed, tmp_path / name))
+    assert verdict_of(one).words == "nothing ended the flight"
+    assert 40.0 < one.flew < 67.0, "from its take-off to its landing"
+    assert highest(one) == pytest.approx(60.0, abs=0.5)
+    assert one.ended == pytest.approx(one.log.duration)
+
+
+@EACH
+def test_a_fall_is_ended_in_time(name, fallen, tmp_path):
+    one = judged(FORMATS[name](fallen, tmp_path / name))
+    # The log begins with its first message.
+    fails_at = FAILS_AT - fallen[0].at
+    kill, deploy = (at for at, _ in one.fired)
+    assert [decision.action for _, decision in one.fired] == [Action.KILL, Action.DEPLOY]
+    assert fails_at < kill < fails_at + 1.2
+    assert kill <= deploy < kill + 0.6
+    assert one.ended < one.log.duration, "what follows is no answer to the release"
+
+
+@EACH
+def test_the_attitude_and_the_force_are_those_of_the_flight(name, fallen, tmp_path):
+    one = judged(FORMATS[name](fallen, tmp_path / name))
+    falling = [state for at, state in one.vehicle if at > FAILS_AT + 0.5]
+    assert max(state.tilt for state in falling) > 1.0
+    assert min(state.acceleration for state in falling) < 3.0
+    before = [state for at, state in one.vehicle if FAILS_AT - 3.0 < at < FAILS_AT - 1.0]
+    assert all(state.acceleration == pytest.approx(9.8, abs=0.5) for state in before)
+    assert all(state.tilt < 0.05 for state in before)
+
+
+# -- what is damaged ---------------------------------------------------------------------------
+
+
+class Files(dict):
+    """Whose bytes nobody wants to read when a test fails."""
+
+    def __repr__(self) -> str:
+        return f"files {', '.join(self)}"
+
+
+@pytest.fixture(scope="module")
+def whole(fallen, tmp_path_factory) -> Files:
+    """The bytes of each format that is one file; 2 s of flight."""
+    folder = tmp_path_factory.mktemp("whole")
+    short = [one for one in fallen if abs(one.at - FAILS_AT) < 1.0]
+    files = [name for name in FORMATS if "." in name]
+    return Files({name: FORMATS[name](short, folder / name).read_bytes() for name in files})
+
+
+@given(data=st.data())
+@settings(
+    max_examples=150,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+def test_a_damaged_log_is_read_or_refused_in_words(data, whole, tmp_path):
+    name = data.draw(st.sampled_from(sorted(whole)))
+    damaged = bytearray(whole[name])
+    for _ in range(data.draw(st.integers(0, 8))):
+        place = data.draw(st.integers(0, len(damaged) - 1))
+        damaged[place] = data.draw(st.integers(0, 255))
+    del damaged[data.draw(st.integers(0, len(damaged))) :]
+    path = tmp_path / name
+    path.write_bytes(damaged)
+    # Anything but a LogError is raised.
+    with contextlib.suppress(LogError):
+        assert formats.read(path, {}).messages
+
+
+@pytest.mark.parametrize("name", [one for one in FORMATS if "." in one])
+def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
+    path = FORMATS[name](fallen, tmp_path / name)
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * 0.9)])
+    assert [one.action for _, one in judged(path).fired][:1] == [Action.KILL]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("empty.bin", b"", "it is empty"),
+        ("notes.txt", b"the flight went well\n", "no log of a known format (ArduPilot's .bin"),
+        ("noise.tlog", bytes(range(256)) * 20, "no log of a known format"),
+        ("table.csv", b"a,b\n1,2\n", "no column for time and height; its first line has a, b"),
+        ("table.csv", b"time,height\n1,x\n", "no flight: it has 0 rows with a time and a height"),
+        ("flight.mcap", b"\x89MCAP0\r\n", "no recording of ROS"),
+    ],
+)
+def test_what_is_no_log_is_refused(name, text, says, tmp_path):
+    path = tmp_path / name
+    path.write_bytes(text)
+    with pytest.raises(LogError) as caught:
+        formats.read(path, {})
+    assert says in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+# -- rockets -----------------------------------------------------------------------------------
+
+
+def rocket(sinks: float, time: str, height: str, unit: float) -> str:
+    """Up to 3,000 m, and down as fast as that, m/s."""
+    lines = [f"{time},{height}"]
+    lines += [f"{k / 10},{(150.0 * k / 10) / unit}" for k in range(200)]
+    lines += [f"{20 + k / 10},{(3000.0 - sinks * k / 10) / unit}" for k in range(300)]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("time", "height", "unit"),
+    [
+        ("time", "height", 1.0),
+        ("Time (s)", "Altitude (Ft-AGL)", 0.3048),
+        ("ts", "filtered_altitude_AGL", 1.0),
+        ("time_s", "altitude_ft", 0.3048),
+        ("#t [s]", "alt(km)", 1000.0),
+    ],
+)
+@pytest.mark.parametrize(("sinks", "fires"), [(25.0, False), (90.0, True)])
+def test_a_rocket_is_judged_by_its_table(time, height, unit, sinks, fires, tmp_path):
+    path = tmp_path / "rocket.csv"
+    path.write_text(rocket(sinks, time, height, unit))
+    one = judged(path)
+    assert one.config.profile.name == "rocket"
+    assert bool(one.fired) is fires
+    assert highest(one) == pytest.approx(3000.0, abs=20.0)
+
+
+def test_a_unit_that_is_not_known_is_not_guessed(tmp_path):
+    path = tmp_path / "rocket.csv"
+    path.write_text(rocket(25.0, "time", "height (furlong)", 1.0))
+    with pytest.raises(LogError, match="no column for time and height"):
+        judged(path)
+    columns = dict([table.column("height=height (furlong)*201.168")])
+    log = formats.read(path, columns)
+    assert log.remarks == ["height from 'height (furlong)', time from 'time'"]
+
+
+@pytest.mark.parametrize("text", ["height", "size=x", "height=x*0", "height=x*-", "=x"])
+def test_a_column_that_makes_no_sense_is_refused(text):
+    with pytest.raises(ValueError, match=r"need NAME=HEADING|could not convert|factor"):
+        table.column(text)
+
+
+# -- what is told ------------------------------------------------------------------------------
+
+
+def test_how_near_each_rule_came_is_told(fallen, tmp_path):
+    one = judged(FORMATS["flight.ulg"](fallen, tmp_path / "flight.ulg"))
+    first, *rest = ratings(one)
+    assert first.share == 1.0
+    full = {rating.told.name for rating in ratings(one) if rating.share == 1.0}
+    assert one.fired[0][1].rule in full
+    assert all(first.share >= other.share for other in rest)
+    assert any("tilt_deg" in text for rating in ratings(one) for text in rating.nearest)
+
+
+def test_what_was_missing_to_decide_is_told(landed, tmp_path):
+    """Given a radio link over which no attitude came."""
+    fewer = [one for one in landed if one.message.get_type() != "ATTITUDE"]
+    one = judged(FORMATS["flight.tlog"](fewer, tmp_path / "flight.tlog"))
+    told = {part.name: part for part in unknown(one)}
+    assert (told["tilt_deg"].share, told["tilt_deg"].why) == (1.0, "never received")
+    tilt = next(rating for rating in ratings(one) if rating.told.name == "excess tilt")
+    assert tilt.blind > 0.9
+
+
+def test_a_sweep_tells_which_threshold_would_have_kept_it_clean(fallen, tmp_path):
+    one = judged(FORMATS["flight.bin"](fallen, tmp_path / "flight.bin"))
+    tried = sweep(one)
+    rule = next(r for r in one.config.profile.rules if r.name == one.fired[0][1].rule)
+    assert {t.rule for t in tried} == {rule.name}
+    hold = next(t for t in tried if t.what == "for (s)")
+    assert hold.shipped == rule.hold
+    assert not hold.clean <= hold.shipped
+
+
+def test_the_page_has_every_log_and_nothing_of_it_raw(fallen, tmp_path):
+    path = FORMATS["flight.tlog"](fallen, tmp_path / "<script>.tlog")
+    one = judged(path)
+    one.log.remarks.append("<b>remark</b>\x1b[2J")
+    verdict = verdict_of(one)
+    part = flight_section(0, verdict, one, sweep(one))
+    text = page([(verdict, part)], [(tmp_path / "<i>", LogError("<u>no log</u>"))])
+    assert text.startswith("<!DOCTYPE html>")
+    for raw in ("<script>", "<b>remark", "<i>", "<u>", "\x1b"):
+        assert raw not in text
+    for part in ("KILL at", "Decisions", "How near each rule came", "not known", "clean from"):
+        assert part in text
+
+
+# -- the command -------------------------------------------------------------------------------
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "chute_ros.tools.judge_log", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120.0,
+        check=False,
+    )
+
+
+def complaints(ended: subprocess.CompletedProcess[str]) -> list[str]:
+    """Without what tells the progress."""
+    return [line for line in ended.stderr.splitlines() if not line.endswith(" %")]
+
+
+def test_the_exit_code_tells_whether_anything_would_have_left(landed, fallen, tmp_path):
+    well = FORMATS["flight.tlog"](landed, tmp_path / "well.tlog")
+    fell = FORMATS["flight.tlog"](fallen, tmp_path / "fell.tlog")
+    html = tmp_path / "judged.html"
+    clean = run(well, "--page", html)
+    assert (clean.returncode, complaints(clean)) == (0, [])
+    assert "nothing ended the flight" in clean.stdout
+    assert html.read_text().count("<svg") == 1
+    fired = run(well, fell, tmp_path / "none.bin", "--page", html)
+    assert fired.returncode == 1
+    assert "KILL at" in fired.stdout
+    assert complaints(fired) == [f"judge_log: {tmp_path}/none.bin: No such file or directory"]
+    assert run(tmp_path / "none.bin", "--page", html).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--profile", "helicopter"), "--profile helicopter: No such file or directory; shipped"),
+        (("--page", "/nowhere/judged.html"), "/nowhere/judged.html: No such file or directory"),
+        (("--column", "size=1"), "size=1: need NAME=HEADING"),
+    ],
+)
+def test_a_wrong_argument_ends_it_in_a_line(arguments, says, landed, tmp_path):
+    few = [one for one in landed if one.at < 3.0]
+    ended = run(FORMATS["flight.tlog"](few, tmp_path / "well.tlog"), *arguments)
+    assert ended.returncode == 2
+    assert says in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -1,0 +1,106 @@
+"""judge_log over flights whose outcome is known: which decisions were wrong, and the table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from log_bench import FAILS, FAILS_AT, LANDS, flown, tlog
+
+from chute_ros.errors import ChuteError
+from chute_ros.tools.judge_log import command, formats
+from chute_ros.tools.judge_log.findings import Verdict, verdict_of
+from chute_ros.tools.judge_log.flight_log import LogError, without_gaps
+from chute_ros.tools.judge_log.known import FLIES, Known, known_of, mistake, page
+
+HEAD = "file\tsource\treal\twhat_happened\tright\tfrom\tuntil"
+
+
+def judged(path: Path) -> Verdict:
+    log = formats.read(path, {})
+    return verdict_of(command.flown(log, command.config_of(log, None)))
+
+
+@pytest.fixture(scope="module")
+def landed(tmp_path_factory) -> Verdict:
+    return judged(tlog(flown(LANDS, 40.0), tmp_path_factory.mktemp("logs") / "well.tlog"))
+
+
+@pytest.fixture(scope="module")
+def fallen(tmp_path_factory) -> Verdict:
+    told = flown(FAILS, FAILS_AT + 4.0)
+    return judged(tlog(told, tmp_path_factory.mktemp("logs") / "fell.tlog"))
+
+
+def known(right: str, begin: float = 0.0, end: float = 0.0) -> Known:
+    return Known("", "", True, "", right, begin, end)
+
+
+def test_an_end_is_right_from_the_failure_on_until_it_is_too_late(landed, fallen):
+    at = fallen.first
+    assert mistake(known("ends", at - 1.0, at + 1.0), fallen) == ""
+    assert mistake(known("ends", at + 0.5, at + 1.0), fallen).startswith(
+        f"ended at {at:.1f} s, be"
+    )
+    assert mistake(known("ends", at - 2.0, at - 0.5), fallen).endswith(
+        f"later than {at - 0.5:g} s"
+    )
+    assert mistake(known("ends", 1.0, 2.0), landed) == "not ended"
+    assert mistake(known(FLIES), landed) == ""
+    assert mistake(known(FLIES), fallen) == f"ended at {at:.1f} s, and nothing asked for it"
+    assert mistake(known("either", at + 0.5), fallen).startswith(f"ended at {at:.1f} s, before")
+    assert mistake(known("either"), landed) == mistake(known("either"), fallen) == ""
+
+
+def test_the_table_has_what_happened_beside_what_was_decided(landed, fallen, tmp_path):
+    lines = [
+        HEAD,
+        "well.tlog\tsome/repo: a|b.tlog\tyes\tit takes off and lands\tflies\t\t",
+        f"fell.tlog\tsome/repo: c.tlog\tno\ta motor fails\tends\t{FAILS_AT}\t{FAILS_AT + 2}",
+        "none.bin\tsome/repo: none.bin\tyes\tempty\teither\t\t",
+    ]
+    tsv = tmp_path / "known.tsv"
+    tsv.write_text("\n".join(lines) + "\n")
+    unread = [(Path("none.bin"), LogError("none.bin: it is empty"))]
+    text = page([landed, fallen], unread, known_of(tsv))
+    assert "2 logs, 1 of them of real vehicles" in text
+    assert "1 were ended, 0 wrongly" in text
+    assert "| well.tlog | it takes off and lands |" in text
+    assert "a motor fails (simulated)" in text
+    height = text.partition("released at ")[2].partition(" m")[0]
+    assert 45 < int(height) < 60
+    assert "- none.bin: it is empty" in text
+    assert "- well.tlog: some/repo: a/b.tlog" in text
+    with pytest.raises(ChuteError, match=r"no line for well\.tlog"):
+        page([landed], [], {})
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "need the columns file, source"),
+        ("file\tright\nx\tflies\n", "need the columns file, source"),
+        (f"{HEAD}\nx\ty\tyes\tz\tperhaps\t\t\n", "x: right is 'perhaps': need flies, ends or"),
+        (f"{HEAD}\nx\ty\tyes\tz\tends\tsoon\t\n", "could not convert"),
+        (f"{HEAD}\nx\ty\n", ""),
+    ],
+)
+def test_a_table_that_is_none_is_refused(text, says, tmp_path):
+    tsv = tmp_path / "known.tsv"
+    tsv.write_text(text)
+    with pytest.raises(ChuteError) as caught:
+        known_of(tsv)
+    assert says in str(caught.value)
+    assert str(tsv) in str(caught.value)
+
+
+def test_a_time_that_is_years_away_costs_its_own_gap():
+    """Given one damaged time among many."""
+    remarks: list[str] = []
+    moments = [*(k * 0.1 for k in range(50)), 3e8, 3e8 + 1.0]
+    shortened = without_gaps([(at + 7.0, None) for at in moments], remarks)
+    assert shortened[0][0] == 0.0
+    assert shortened[49][0] == pytest.approx(4.9)
+    assert shortened[-2][0] == pytest.approx(604.9)
+    assert shortened[-1][0] == pytest.approx(605.9)
+    assert remarks == ["a gap of 299999995 s is shortened to 600 s, 5 s after its begin"]
