@@ -24,6 +24,9 @@ _HOVERS, _FOLLOWED, _FALLS = 1.0, 10.0, 30.0
 _HEIGHT_P, _PLACE_P, _UP_P, _UP_I, _ALONG_P = 1.0, 0.95, 4.0, 2.0, 1.8
 _MOST_TILT = math.radians(40.0)
 
+#: kg.
+_HEAVIEST_FLIP = 2.0
+
 MISSIONS = {
     "hover": 3,
     "climb": 2,
@@ -74,6 +77,8 @@ def _drawn(chance: random.Random, vehicle: FailingMultirotor) -> _Plan:
     mission = chance.choices(list(MISSIONS), list(MISSIONS.values()))[0]
     failure = chance.choices(list(FAILURES), list(FAILURES.values()))[0]
     if mission == "flip":
+        # What is heavier follows no such turn, and nobody flips it.
+        mission = "hover" if vehicle.mass > _HEAVIEST_FLIP else "flip"
         failure = "nothing"
     speeds = {"climb": (2.0, 8.0), "descent": (1.0, 6.0), "steps": (4.0, 12.0)}
     speed = round(chance.uniform(*speeds.get(mission, (5.0, 16.0))), 1)

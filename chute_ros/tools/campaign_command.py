@@ -227,7 +227,7 @@ class _Kept:
     """What was flown so far, in a file; None: nowhere."""
 
     def __init__(
-        self, path: Path | None, seed: int, profiles: Path, tapes: TapeFile | None
+        self, path: Path | None, seed: int, profiles: Path, tapes: TapeFile | None = None
     ) -> None:
         self._path, self._seed = path, seed
         more = () if tapes is None else (tapes.path,)
