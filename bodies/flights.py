@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -19,7 +20,9 @@ def flown(flights: Sequence[Flight], jobs: int) -> Iterator[Tape | str]:
     if jobs == 1:
         yield from map(_fly, flights)
         return
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+    # Ctrl-C reaches every process of a terminal: ours ends them.
+    ignores = (signal.SIGINT, signal.SIG_IGN)
+    with ProcessPoolExecutor(jobs, get_context("spawn"), signal.signal, ignores) as pool:
         try:
             yield from pool.map(_fly, flights, chunksize=4)
         except BaseException:
