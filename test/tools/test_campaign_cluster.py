@@ -48,7 +48,7 @@ def nothing_flies(monkeypatch):
 
 @pytest.fixture(scope="module")
 def by_one_process():
-    flown = flown_here(config_folder() / "profiles", SEEDS, 1)
+    flown = flown_here(flights.fly_bundle, config_folder() / "profiles", SEEDS, 1)
     return kept(flights.run(flown, lambda _: None, flights.Tally()))
 
 
