@@ -30,6 +30,10 @@ It stops the motors and releases the parachute on its own output. Each peer is w
 words from its documentation and source (`chute_ros/campaign/peers/`, each number with its source);
 it is not the peer's code."""
 
+_SHORT = """\
+In short, without any excuse (below): how many were saved of the flights that only a parachute
+could save, and how many of all were ended although they went well."""
+
 _RULES = """\
 What makes this fair, or not:
 
@@ -94,6 +98,8 @@ def page(lines: Sequence[Compared], run: Run, pictures: Sequence[str]) -> str:
         "# Beside what people use today",
         f"Written by `{command}`: {told}.",
         _INTRODUCTION,
+        _SHORT,
+        _short(plain),
         table(("guard", "settings, and what is scaled for the curves"), _guards()),
         _RULES,
         *_counted(plain),
@@ -125,6 +131,25 @@ _KEYS: tuple[tuple[str, Callable[[Compared], tuple[str, str]]], ...] = (
 
 def _guards() -> list[tuple[str, str]]:
     return [(one.name, one.about) for one in GUARDS]
+
+
+def _short(plain: Sequence[Compared]) -> str:
+    profiles = sorted({one.profile for one in plain})
+    rows = []
+    for guard in GUARDS:
+        cells = []
+        for profile in profiles:
+            of = [one for one in plain if (one.profile, one.guard) == (profile, guard.name)]
+            needed = [one for one in of if one.needed]
+            saved = sum(one.bare is Count.CORRECT for one in needed)
+            cells += [_share(saved, needed), _share(missed_and_false(of, guard.name)[1], of)]
+        rows.append((guard.name, *cells))
+    head = (f"{profile}: {what}" for profile in profiles for what in ("saved", "false"))
+    return table(("guard", *head), rows)
+
+
+def _share(number: int, whole: Sequence[Compared]) -> str:
+    return f"{number} of {len(whole)} ({100.0 * number / max(1, len(whole)):.1f} %)"
 
 
 def _counted(plain: Sequence[Compared]) -> list[str]:
@@ -228,12 +253,12 @@ def shares(
 
 def _table_of_better(plain: Sequence[Compared]) -> str:
     rows: list[tuple[str, ...]] = []
-    for _, key in _KEYS:
+    for title, key in _KEYS:
         for (profile, name), of in by_class(plain, key):
             for guard in GUARDS:
                 one = better(of, guard.name) if guard is not OURS else None
                 if one is not None:
-                    rows.append((f"{profile}: {name}", guard.name, *_cells(one)))
+                    rows.append((f"{profile}, {title}: {name}", guard.name, *_cells(one)))
     if not rows:
         return "None."
     head = ("class", "peer", "missed or late: peer, ours", "false: peer, ours")

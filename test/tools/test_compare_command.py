@@ -149,7 +149,10 @@ def test_the_page_counts_and_compares() -> None:
     assert "`make compare FLIGHTS=20 SEED=8`: 8 flights of aircraft with each guard" in text
     assert "| chute_ros | 7 | 1 | 0 | 0 |" in text
     assert f"| {PEER} | 2 | 0 | 5 | 1 |" in text
-    assert f"| multirotor: a motor fails | {PEER} | 5, 1 | 1, 0 | **0.70 s, 1.00 s** | 9 |" in text
+    fails = "multirotor, what fails: a motor fails"
+    assert f"| {fails} | {PEER} | 5, 1 | 1, 0 | **0.70 s, 1.00 s** | 9 |" in text
+    # Of 8 flights one was ended falsely, and 7 needed it.
+    assert f"| {PEER} | 2 of 7 (28.6 %) | 1 of 8 (12.5 %) |" in text
     assert "| multirotor | a motor fails | 8 | 1 / 0 | 8 / 0 |" in text
     # One flight of the curve: PX4's is false as soon as its limits move.
     assert f"| multirotor, {PEER} | 0.0 / 100.0 | 0.0 / 100.0 | 0.0 / 0.0 |" in text
