@@ -41,6 +41,11 @@ EACH ?=
 PYPY ?=
 SCHEDULER ?=
 CAMPAIGN_ARGS ?=
+# Where make tapes writes, how many flights of each kind it flies; and the file of tapes that make
+# campaign flies (empty: none).
+TAPES_FOLDER ?= tapes
+TAPES_ARGS ?=
+TAPES ?=
 WITHOUT_ARGS ?=
 COMPARE_ARGS ?=
 
@@ -60,7 +65,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long pictures newcomer bench campaign compare without hosts soak sitl build lint docs explore mutate fuzz site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign compare without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -94,7 +99,16 @@ campaign: build ## fly FLIGHTS flights in virtual time from SEED on (EACH=n: n o
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
 	    -m chute_ros.tools.campaign --flights $(FLIGHTS) --seed $(SEED) \
 	    $(if $(SCHEDULER),--scheduler $(SCHEDULER)) $(CAMPAIGN_ARGS) \
-	    $(if $(EACH),--each $(EACH) --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md)
+	    $(if $(TAPES),--tapes "$(TAPES)" --tapes-only --page docs/evidence/bodies.md,$(if $(EACH),--each $(EACH) \
+	    --page docs/evidence/campaign_of_each.md,--page docs/evidence/campaign.md))
+
+tapes: .venv-bodies/done ## record multirotors of RotorPy and aeroplanes of JSBSim in TAPES_FOLDER, for make campaign TAPES=...
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 exec .venv-bodies/bin/python -m bodies $(TAPES_FOLDER) $(TAPES_ARGS)
+
+.venv-bodies/done: requirements/bodies.lock
+	@rm -rf .venv-bodies && "$(PYTHON)" -m venv .venv-bodies \
+	    && .venv-bodies/bin/pip install --quiet --disable-pip-version-check --only-binary :all: \
+	        --require-hashes -r requirements/bodies.lock && touch $@
 
 compare: build ## fly FLIGHTS flights from SEED on with this product, ArduPilot's and PX4's checks and a threshold, write docs/evidence/compare.*
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \

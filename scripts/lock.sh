@@ -24,3 +24,4 @@ pin installer.lock installer.in
 pin mutate.lock mutate.in
 pin fuzz.lock fuzz.in
 pin docs.lock docs.in
+pin bodies.lock bodies.in

@@ -6,13 +6,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from chute_ros.campaign.bus import MAVLINK, Bus, Plug
 from chute_ros.campaign.estimator import EstimatorFault
 from chute_ros.campaign.rig import Rig
 from chute_ros.campaign.scenario import Failure, Fault, HomeMove, Scenario
 from chute_ros.campaign.shipped import Shipped
-from chute_ros.campaign.truth import SOFT, observe
+from chute_ros.campaign.taped import RealSensors, TapedAutopilot, TapedModel, truth_of
+from chute_ros.campaign.truth import SOFT, Truth, observe
 from chute_ros.campaign.vehicle import CampaignAutopilot, Nature, WindyModel
 from chute_ros.model import Action
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -63,9 +65,14 @@ class Aircraft(Rig):
 
     def __init__(self, scenario: Scenario, shipped: Shipped) -> None:
         super().__init__(scenario, shipped)
-        self.model = WindyModel(
-            fall_speed=scenario.fall_speed, gusts=scenario.gusts, chance=self.chance("wind")
-        )
+        air: dict[str, Any] = {"gusts": scenario.gusts, "chance": self.chance("wind")}
+        taped = scenario.tape
+        if taped is None:
+            self.model = WindyModel(fall_speed=scenario.fall_speed, **air)
+        else:
+            tape = shipped.tape(taped.name)
+            self.model = TapedModel(fall_speed=scenario.fall_speed, tape=tape, **air)
+            self.sensors = self.sensors_of[""] = RealSensors(self.chance("sensors"), self.model)
         self.model.descent, self.model.unheld = scenario.descent, scenario.unheld
         self.model.canopy_speed = scenario.canopy.speed
         self.model.canopy_opening_time = scenario.canopy.opens
@@ -90,6 +97,8 @@ class Aircraft(Rig):
 
     def make_autopilot(self, kind: AutopilotKind) -> CampaignAutopilot:
         """The one that flies it."""
+        if isinstance(self.model, TapedModel):
+            return TapedAutopilot(self.model, self.sensors, kind)
         return CampaignAutopilot(self.model, self.sensors, kind)
 
     # -- the flight ------------------------------------------------------------------------------
@@ -111,6 +120,17 @@ class Aircraft(Rig):
         manoeuvre = self.scenario.manoeuvre
         if manoeuvre is not None:
             self.world.post(up + manoeuvre.begin, self._begin_manoeuvre)
+        taped, model = self.scenario.tape, self.model
+        if taped is not None and isinstance(model, TapedModel):
+            self.world.post(up, lambda _: model.begin())
+            if taped.is_lost:
+                truth = truth_of(model, up)
+                self.world.post(truth.at, lambda _: self._lose(truth))
+
+    def _lose(self, truth: Truth) -> None:
+        """As on its tape, unless our side acted before: then it is observed."""
+        if not self.truth.falls and math.isnan(self.released):
+            self.truth = truth
 
     def _begin_manoeuvre(self, now: float) -> None:
         self.model.manoeuvre, self.model.flown_for = self.scenario.manoeuvre, 0.0
@@ -138,7 +158,7 @@ class Aircraft(Rig):
         model = self.model
         if self.feeling:
             motion = Motion(
-                model.height, model.vertical_speed, abs(model.roll), model.acceleration
+                model.height, model.vertical_speed, abs(model.lean), model.acceleration
             )
             for feel in self.feeling:
                 feel(motion)

@@ -109,7 +109,7 @@ def _turns_like_one_that_flies(scenario: Scenario) -> bool:
 def _until_it_sinks(scenario: Scenario) -> float:
     """How long it comes down no faster than softly, as what is flown may, s."""
     way = scenario.descent or scenario.unheld
-    if way is None or way.sink <= SOFT:
+    if way is None or way.sink <= SOFT or scenario.tape is not None:
         return 0.0
     return -way.settles * math.log(1.0 - SOFT / way.sink)
 
@@ -230,7 +230,10 @@ def _one_against_one(scenario: Scenario, up: float) -> list[_Hidden]:
     """Where a descent is told by the estimator and by the pressure alone, as its attitude and its
     force are those of one that flies, and one of the two tells what is not so. Virtual s."""
     way = scenario.descent if scenario.failure in (Failure.SINK, Failure.STALL) else None
-    if way is None or way.tilt > _TELLING_TILT or abs(way.force - GRAVITY) > _TELLING_FORCE:
+    sinks_level = way is not None and (
+        way.tilt <= _TELLING_TILT and abs(way.force - GRAVITY) <= _TELLING_FORCE
+    )
+    if not (sinks_level if scenario.tape is None else scenario.tape.level):
         return []
     return [
         _Hidden(

@@ -16,6 +16,7 @@ from chute_ros.campaign.flight import Flown, fly
 from chute_ros.campaign.judge import WRONG, Count, Judged, judge
 from chute_ros.campaign.scenario import Failure, Scenario
 from chute_ros.campaign.shipped import Shipped
+from chute_ros.campaign.tapes import TapeFile
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Line:
     faults: tuple[str, ...] = ()
     #: Who tells of an aircraft besides its autopilot; empty: nobody.
     second: str = ""
+    #: Whose physics flew it, and what failed on its tape; empty: the small model.
+    body: str = ""
 
 
 @dataclass
@@ -49,6 +52,8 @@ class Tally:
     faults: Counter[str] = field(default_factory=Counter)
     #: Of aircraft whose autopilot lost its power: (who tells besides it, count) -> flights.
     powerless: Counter[tuple[str, Count]] = field(default_factory=Counter)
+    #: Of flights on tapes: (body and its failure, other faults were drawn, count) -> flights.
+    by_body: Counter[tuple[str, bool, Count]] = field(default_factory=Counter)
     wrong: list[Line] = field(default_factory=list)
     lines: list[Line] = field(default_factory=list)
     #: s, of all that flew at the same time.
@@ -67,6 +72,8 @@ class Tally:
         self.faults.update(line.faults)
         if line.failure == Failure.POWER.value:
             self.powerless[line.second, line.count] += 1
+        if line.body:
+            self.by_body[line.body, bool(line.faults), line.count] += 1
         if line.count is Count.NOT_TOLD:
             self.reasons[line.why] += 1
         if line.count in WRONG:
@@ -79,27 +86,39 @@ class Tally:
 shipped = functools.cache(Shipped)
 
 
-def fly_here(folder: Path, scenario: Scenario) -> tuple[Flown, Judged]:
+def drawn(folder: Path, seed: int, tapes: TapeFile | None = None) -> Scenario:
+    """The flight of a seed; tapes: some fly one of these."""
+    scenario, given = draw(seed), shipped(folder, tapes).tapes
+    return scenario if given is None else given.drawn(scenario)
+
+
+def fly_here(
+    folder: Path, scenario: Scenario, tapes: TapeFile | None = None
+) -> tuple[Flown, Judged]:
     """One flight, and what it is counted as."""
-    flown = fly(scenario, shipped(folder))
+    flown = fly(scenario, shipped(folder, tapes))
     return flown, judge(flown)
 
 
-def fly_bundle(folder: Path, seeds: Sequence[int]) -> list[Line]:
-    """One flight for each seed, in this process. folder: of the profiles."""
-    return [_line(folder, seed) for seed in seeds]
+def fly_bundle(folder: Path, seeds: Sequence[int], tapes: TapeFile | None = None) -> list[Line]:
+    """One flight for each seed, in this process. folder: of the profiles; tapes: bodies that some
+    of them fly."""
+    return [_line(folder, seed, tapes) for seed in seeds]
 
 
-def _line(folder: Path, seed: int) -> Line:
-    scenario = draw(seed)
+def _line(folder: Path, seed: int, tapes: TapeFile | None) -> Line:
+    scenario = drawn(folder, seed, tapes)
     faults = tuple(type(one).__name__ for one in scenario.faults)
-    who = (seed, scenario.vehicle, scenario.profile, scenario.failure.value)
-    drawn = (faults, ", ".join(sorted(scenario.second_sources)))
+    taped = scenario.tape
+    failure = f"{taped.failed} ({taped.name})" if taped else scenario.failure.value
+    who = (seed, scenario.vehicle, scenario.profile, failure)
+    body = f"{taped.body}: {taped.failed}" if taped else ""
+    more = (faults, ", ".join(sorted(scenario.second_sources)), body)
     try:
-        flown, judged = fly_here(folder, scenario)
+        flown, judged = fly_here(folder, scenario, tapes)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
-        return Line(*who, Count.BROKEN, why, math.nan, math.nan, *drawn)
+        return Line(*who, Count.BROKEN, why, math.nan, math.nan, *more)
     at = flown.truth.at
     return Line(
         *who,
@@ -107,7 +126,7 @@ def _line(folder: Path, seed: int) -> Line:
         judged.why,
         flown.released - at,
         flown.truth.height - flown.release_height,
-        *drawn,
+        *more,
     )
 
 

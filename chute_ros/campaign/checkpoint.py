@@ -38,10 +38,11 @@ def parts_that_fly(profiles: Path) -> dict[str, str]:
     }
 
 
-def code_that_flies(profiles: Path) -> str:
-    """A sum of all these parts: flights of two sums cannot be counted together."""
+def code_that_flies(profiles: Path, *more: Path) -> str:
+    """A sum of all these parts, and of more files: flights of two sums cannot be counted
+    together."""
     total = hashlib.sha256()
-    for part in parts_that_fly(profiles).values():
+    for part in (*parts_that_fly(profiles).values(), *([_sum(more)] if more else [])):
         total.update(bytes.fromhex(part))
     return total.hexdigest()
 
@@ -66,6 +67,9 @@ def text_of(tally: Tally, seed: int, code: str) -> str:
         "reasons": tally.reasons,
         "faults": tally.faults,
         "powerless": [[second, count.name, n] for (second, count), n in tally.powerless.items()],
+        "by_body": [
+            [body, faulty, count.name, n] for (body, faulty, count), n in tally.by_body.items()
+        ],
         "by_vehicle": [
             [vehicle, profile, count.name, n]
             for (vehicle, profile, count), n in tally.by_vehicle.items()
@@ -95,6 +99,9 @@ def tally_of(text: str, seed: int, code: str, named: str) -> Tally:
             faults=Counter(values["faults"]),
             powerless=Counter(
                 {(second, Count[name]): n for second, name, n in values["powerless"]}
+            ),
+            by_body=Counter(
+                {(body, faulty, Count[name]): n for body, faulty, name, n in values["by_body"]}
             ),
             by_vehicle=Counter(
                 {

@@ -138,6 +138,8 @@ class Flight:
             if scenario.person is not None:
                 happens.append(scenario.person.at)
             quiet = self.up + max(happens) + _FOLLOWED
+            if scenario.tape is not None:
+                quiet = self.up + scenario.tape.lasts
             rig.world.run(quiet + _FALLS, lambda: self._over(quiet))
         return self._flown()
 

@@ -141,16 +141,17 @@ def _fallen(flown: Flown) -> Judged | None:
         or flown.landing_speed <= soft
     ):
         return None
-    enough = enough_time(scenario)
-    if not truth.leeway >= enough:
-        return Judged(Count.NO_TIME, f"{truth.leeway:.2f} s were left (need {enough:g} s)")
-    need = Need(truth.at, truth.latest)
+    enough, hidden = enough_time(scenario), scenario.tape.shows_after if scenario.tape else 0.0
+    left = truth.leeway - hidden
+    if not left >= enough:
+        return Judged(Count.NO_TIME, f"{left:.2f} s were left (need {enough:g} s)")
+    need = Need(truth.at + hidden, truth.latest)
     if blind := blinded(scenario, flown.up, need, _seen(flown)):
         return Judged(Count.NOT_TOLD, blind)
     if flown.refused <= truth.latest:
         return Judged(Count.NOT_TOLD, _REFUSED)
     if math.isnan(flown.released):
-        return Judged(Count.MISSED, f"{truth.leeway:.2f} s were left")
+        return Judged(Count.MISSED, f"{left:.2f} s were left")
     return Judged(Count.LATE, f"{flown.released - truth.latest:.2f} s after the last moment")
 
 

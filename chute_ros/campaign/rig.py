@@ -25,10 +25,10 @@ from chute_ros.campaign.sensors import SensorFault, Sensors
 from chute_ros.campaign.shipped import Shipped
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.truth import Course
+from chute_ros.campaign.vehicle import WindyModel
 from chute_ros.campaign.virtual_node import Acted, VirtualNode
 from chute_ros.campaign.world import World
 from chute_ros.runtime.arming import Answered
-from chute_ros.sim.flight import FlightModel
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.machine import Stage
 
@@ -84,7 +84,7 @@ class Rig(Course, ABC):
         self._restart[node.name] = node.start_again
         self.world.add(node)
 
-    def add_source(self, name: str, model: FlightModel) -> None:
+    def add_source(self, name: str, model: WindyModel) -> None:
         """A source of the vehicle's picture besides the autopilot, which senses model."""
         sensors = self.sensors_of[name] = Sensors(self.chance(f"sensors of {name}"))
         source = SecondSource(self.process(name), self.ros, model, sensors)

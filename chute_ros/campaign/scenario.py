@@ -37,6 +37,7 @@ class Failure(enum.Enum):
     GLIDE = "its motor stops, and it glides"
     STALL = "it stalls, spins or dives, and does not recover"
     NO_DROGUE = "the drogue does not come by itself at the apogee"
+    TAPE = "its tape's failure"
     FAULT = "the flight computer goes to Fault"
     COMPUTER_REBOOT = "the flight computer starts anew"
     COMPUTER_POWER = "the flight computer has no power any more"
@@ -197,6 +198,24 @@ class Autopilot:
 
 
 @dataclass(frozen=True)
+class Taped:
+    """The tape that is its flight, by its name in a file that is given with it.
+
+    body, failed: as on its label; lasts: s; is_lost: it gets out of control, at failure_at;
+    shows_after: so long after that it shows, s; ends_hard, level: as on its label.
+    """
+
+    name: str
+    body: str
+    failed: str
+    lasts: float
+    is_lost: bool
+    shows_after: float
+    ends_hard: bool
+    level: bool
+
+
+@dataclass(frozen=True)
 class Scenario:
     """Times are s after an aircraft has stood at its height for 0.3 s, or a rocket was launched.
     Nothing goes wrong before that height or launch: what was drawn earlier (a negative time)
@@ -231,6 +250,8 @@ class Scenario:
     unheld: Descent | None = None
     canopy: Canopy = Canopy()
     autopilot: Autopilot = Autopilot()
+    #: What flies instead of the small model, until our side acts.
+    tape: Taped | None = None
 
     @property
     def stands(self) -> bool:

@@ -17,6 +17,7 @@ from chute_ros.campaign.scenario import (
     Fault,
     Person,
     Scenario,
+    Taped,
     WayFault,
     flown_vehicles,
 )
@@ -35,6 +36,7 @@ _PARTS: dict[str, type[Any]] = {
     "unheld": Descent,
     "canopy": Canopy,
     "autopilot": Autopilot,
+    "tape": Taped,
 }
 
 

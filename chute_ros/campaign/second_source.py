@@ -5,8 +5,8 @@ from __future__ import annotations
 from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.sensor_messages import Imu, Odometry, Vector, odometry, rolled
 from chute_ros.campaign.sensors import Sensors
+from chute_ros.campaign.vehicle import WindyModel
 from chute_ros.protocol.vehicle_merge import IMU, ODOMETRY
-from chute_ros.sim.flight import FlightModel
 
 #: As such drivers are delivered, Hz.
 _RATES = {IMU: 50.0, ODOMETRY: 30.0}
@@ -15,7 +15,7 @@ _RATES = {IMU: 50.0, ODOMETRY: 30.0}
 class SecondSource:
     """process: named as the source in vehicle_sources."""
 
-    def __init__(self, process: Process, ros: Ros, model: FlightModel, sensors: Sensors) -> None:
+    def __init__(self, process: Process, ros: Ros, model: WindyModel, sensors: Sensors) -> None:
         self.process, self._ros, self._model, self._sensors = process, ros, model, sensors
         self._interval = 1.0 / _RATES[process.name]
         self._at = 0.0
@@ -37,7 +37,7 @@ class SecondSource:
 
     def _message(self, now: float) -> Imu | Odometry:
         model, read = self._model, self._sensors.read
-        roll = read("tilt", model.roll, now)
+        roll = read("tilt", model.lean, now)
         if self.process.name == IMU:
             # Which of its axes feels it does not matter: its length is told.
             return Imu(rolled(roll), Vector(z=read("force", model.acceleration, now)))

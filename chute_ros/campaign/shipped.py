@@ -1,4 +1,4 @@
-"""What every flight of a process shares: the settings of supervisors, read once."""
+"""What every flight of a process shares: the settings of supervisors and the tapes, read once."""
 
 from __future__ import annotations
 
@@ -6,16 +6,21 @@ from dataclasses import replace
 from pathlib import Path
 
 from chute_ros.campaign.scenario import flown_vehicles, part
+from chute_ros.campaign.tapes import TapeFile, Tapes
+from chute_ros.errors import RecordError
 from chute_ros.links.registered import vehicles
+from chute_ros.sim.tape import Tape
 from chute_ros.supervisor.config import Rung, SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
 
 
 class Shipped:
-    """folder: of the profiles."""
+    """folder: of the profiles; tapes: of bodies; None: none are flown. RecordError: it is no file
+    of tapes."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, tapes: TapeFile | None = None) -> None:
         self._folder = folder
+        self.tapes = None if tapes is None else Tapes(tapes)
         self._configs: dict[tuple[str, str], SupervisorConfig] = {}
 
     def config(self, vehicle: str, profile: str, standby: bool, rank: int) -> SupervisorConfig:
@@ -33,6 +38,12 @@ class Shipped:
             )
             self._configs[key] = replace(plain, profile=read_profile(text, profile, plain.links))
         return replace(self._configs[key], standby=standby, rank=rank)
+
+    def tape(self, name: str) -> Tape:
+        """The tape with this name. RecordError: there is none."""
+        if self.tapes is None:
+            raise RecordError(f"no file with the tape {name!r} was given (--tapes)")
+        return self.tapes.named(name)
 
     def read_all(self) -> None:
         """Now, before processes part that share it."""

@@ -29,6 +29,11 @@ class WindyModel(GustyModel):
     manoeuvre: Manoeuvre | None = None
     flown_for: float = 0.0
 
+    @property
+    def lean(self) -> float:
+        """From upright, as if it rolled, rad."""
+        return self.roll
+
     def step(self, dt: float) -> None:
         """Move on."""
         flown = self._manoeuvre(dt)

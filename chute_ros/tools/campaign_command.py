@@ -14,21 +14,23 @@ import sys
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from chute_ros.campaign import campaign, checkpoint
-from chute_ros.campaign.draw import draw
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.pool import flown_here
 from chute_ros.campaign.rare import OfEach, rare
 from chute_ros.campaign.scenario import Scenario, outlives
 from chute_ros.campaign.scenario_text import scenario_of, text_of
+from chute_ros.campaign.tapes import TapeFile, Tapes
 from chute_ros.errors import CampaignError, RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
+from chute_ros.tools.campaign_bodies import page_of_bodies
 from chute_ros.tools.campaign_page import page
 from chute_ros.tools.campaign_picture import picture
 from chute_ros.tools.campaign_plan import plan
@@ -94,6 +96,15 @@ def main() -> None:
         help="save the flights there each minute; continue from it if it exists",
     )
     options.add_argument(
+        "--tapes",
+        type=tapes,
+        metavar="FILE",
+        help="let half of the aircraft fly what other physics recorded (make tapes)",
+    )
+    options.add_argument(
+        "--tapes-only", action="store_true", help="fly no flight but those on tapes"
+    )
+    options.add_argument(
         "--replay", type=scenario, metavar="SEED|FILE", help="show one flight step by step"
     )
     options.add_argument(
@@ -111,23 +122,37 @@ def main() -> None:
     # `ros2 run` adds arguments for nodes, which this is none of.
     chosen, _ = options.parse_known_args()
     profiles = config_folder() / "profiles"
+    if chosen.tapes_only and chosen.tapes is None:
+        options.error("argument --tapes-only: name the file with --tapes")
+    if chosen.tapes is not None and chosen.scheduler is not None:
+        options.error("argument --tapes: the workers of a cluster have no such file: fly here")
+    file = None if chosen.tapes is None else TapeFile(chosen.tapes, chosen.tapes_only)
+    drawn = partial(campaign.drawn, profiles, tapes=file)
     if chosen.replay is not None:
-        _replay(profiles, chosen.replay)
+        given = chosen.replay
+        try:
+            _replay(profiles, drawn(given) if isinstance(given, int) else given, file)
+        except RecordError as error:
+            options.error(f"argument --replay: {error}")
         return
     if chosen.each and chosen.resume:
         options.error("argument --each: a campaign of each kind cannot be interrupted (--resume)")
     seeds: Sequence[int] = range(chosen.seed, chosen.seed + chosen.flights)
     if chosen.each:
         seeds = rare(seeds, chosen.each)
+    if chosen.tapes_only:
+        # A rocket has none, nor has a profile of which no tape was recorded.
+        seeds = [seed for seed in seeds if drawn(seed).tape is not None]
+    if len(seeds) < chosen.flights:
         print(f"{len(seeds)} of {chosen.flights} seeds are flown", file=sys.stderr, flush=True)
-    kept = _Kept(chosen.resume, chosen.seed, profiles)
+    kept = _Kept(chosen.resume, chosen.seed, profiles, file)
     try:
         tally = kept.tally()
     except RecordError as error:
         options.error(f"argument --resume: {error}")
-    progress = _Progress(len(seeds), chosen.failures, kept)
+    progress = _Progress(len(seeds), chosen.failures, kept, drawn)
     before, took_before, broken = tally.flights, tally.took, ""
-    with _flyers(chosen.scheduler, profiles, chosen.jobs) as flyers:
+    with _flyers(chosen.scheduler, profiles, chosen.jobs, file) as flyers:
         try:
             campaign.run(flyers.flown(seeds[tally.flights :]), progress.look, tally)
         except CampaignError as error:
@@ -144,7 +169,11 @@ def main() -> None:
         print(f"saved in {chosen.failures}; --replay FILE shows one step by step")
     if chosen.page and tally.flights:
         of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
-        _write(tally, chosen.page, chosen.seed, flyers.how, of_each)
+        if file is None:
+            _write(tally, chosen.page, chosen.seed, flyers.how, of_each)
+        else:
+            command = f"FLIGHTS={chosen.flights} SEED={chosen.seed}"
+            chosen.page.write_text(page_of_bodies(tally, Tapes(file), command, flyers.how))
     flown = tally.flights - before
     if chosen.plan and flown:
         rate = flown / (tally.took - took_before) / flyers.number
@@ -159,13 +188,14 @@ def main() -> None:
 
 
 @contextmanager
-def _flyers(scheduler: str | None, profiles: Path, jobs: int) -> Iterator[_Flyers]:
+def _flyers(
+    scheduler: str | None, profiles: Path, jobs: int, tapes: TapeFile | None
+) -> Iterator[_Flyers]:
     """On the cluster of a scheduler, or here. Exit code 2: there is none, or it differs."""
     if scheduler is None:
         how = f"{jobs} at a time on {machine()}"
-        yield _Flyers(
-            jobs, how, lambda seeds: flown_here(campaign.fly_bundle, profiles, seeds, jobs)
-        )
+        bundle = partial(campaign.fly_bundle, tapes=tapes)
+        yield _Flyers(jobs, how, lambda seeds: flown_here(bundle, profiles, seeds, jobs))
         return
     try:
         # Here: no other campaign needs it.
@@ -196,9 +226,12 @@ def _told(line: campaign.Line) -> str:
 class _Kept:
     """What was flown so far, in a file; None: nowhere."""
 
-    def __init__(self, path: Path | None, seed: int, profiles: Path) -> None:
+    def __init__(
+        self, path: Path | None, seed: int, profiles: Path, tapes: TapeFile | None = None
+    ) -> None:
         self._path, self._seed = path, seed
-        self._code = "" if path is None else checkpoint.code_that_flies(profiles)
+        more = () if tapes is None else (tapes.path,)
+        self._code = "" if path is None else checkpoint.code_that_flies(profiles, *more)
         self._due = time.monotonic() + _KEEP_EVERY
 
     def tally(self) -> campaign.Tally:
@@ -233,8 +266,11 @@ class _Progress:
     """A line each few seconds, on the terminal's second channel, and one for each flight that must
     not be, which is saved at once: others may take hours."""
 
-    def __init__(self, flights: int, failures: Path, kept: _Kept) -> None:
+    def __init__(
+        self, flights: int, failures: Path, kept: _Kept, drawn: Callable[[int], Scenario]
+    ) -> None:
         self._flights, self._failures, self._kept = flights, failures, kept
+        self._drawn = drawn
         self._told_at = time.monotonic()
         self._wrong = 0
         #: Why a flight that must not be could not be saved; empty: all were.
@@ -259,7 +295,7 @@ class _Progress:
         )
 
     def _save(self, line: campaign.Line) -> None:
-        text = text_of(draw(line.seed), f"{line.count.name}: {line.why}")
+        text = text_of(self._drawn(line.seed), f"{line.count.name}: {line.why}")
         try:
             self._failures.mkdir(parents=True, exist_ok=True)
             (self._failures / f"{line.seed}.json").write_text(text, encoding="utf-8")
@@ -309,16 +345,25 @@ def writable(text: str) -> Path:
     return path
 
 
-def scenario(text: str) -> Scenario:
-    """Of a seed, or in a file that was saved."""
+def scenario(text: str) -> int | Scenario:
+    """A seed, or what is in a file that was saved."""
     if text.removeprefix("-").isdecimal():
-        return draw(int(text))
+        return int(text)
     try:
         return scenario_of(Path(text).read_text(encoding="utf-8"), text)[0]
     except (OSError, UnicodeDecodeError) as error:
         raise argparse.ArgumentTypeError(f"{text}: need a seed, or a file: {error}") from None
     except RecordError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def tapes(text: str) -> Path:
+    """A file of them."""
+    try:
+        Tapes(TapeFile(Path(text)))
+    except RecordError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return Path(text)
 
 
 def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEach | None) -> None:
@@ -329,9 +374,9 @@ def _write(tally: campaign.Tally, path: Path, seed: int, how: str, of_each: OfEa
     path.write_text(page(tally, seed, how, names, of_each))
 
 
-def _replay(profiles: Path, scenario: Scenario) -> None:
+def _replay(profiles: Path, scenario: Scenario, tapes: TapeFile | None) -> None:
     """What was drawn, what happened, what it is counted as."""
-    flown, judged = campaign.fly_here(profiles, scenario)
+    flown, judged = campaign.fly_here(profiles, scenario, tapes)
     print("\n".join(text_of(scenario, "").splitlines()[3:-1]))
     up, truth, person, flies = flown.up, flown.truth, scenario.person, scenario.manoeuvre
     lines = [(at, f"said: {text}") for at, text in flown.said]
@@ -361,6 +406,8 @@ def _replay(profiles: Path, scenario: Scenario) -> None:
 
 def _failure(scenario: Scenario) -> str:
     """What fails, and who tells of the vehicle without its autopilot."""
+    if scenario.tape is not None:
+        return f"{scenario.tape.name}: {scenario.tape.failed}"
     if not outlives(scenario):
         return scenario.failure.value
     return f"{scenario.failure.value}, outlived by: {', '.join(scenario.second_sources)}"

@@ -23,6 +23,8 @@ from chute_ros.campaign.scenario_text import scenario_of, text_of
 from chute_ros.tools import campaign_command as campaign
 from chute_ros.tools.machine import machine
 
+TAPES = str(Path(__file__).parents[1] / "campaign" / "tapes" / "bodies.tapes")
+
 
 def run(monkeypatch, *arguments):
     monkeypatch.setattr(sys, "argv", ["campaign", *arguments])
@@ -52,6 +54,13 @@ def run(monkeypatch, *arguments):
         (["--core-hour-price", "nan"], "--core-hour-price: nan: need a number, 0 or more"),
         (["--page", "/nowhere/x.md"], "argument --page: /nowhere/x.md: no file can be written"),
         (["--page", "/tmp"], "argument --page: /tmp: no file can be written there"),
+        (["--tapes", "/nowhere"], "argument --tapes: /nowhere: No such file or directory"),
+        (["--tapes", __file__], "test_campaign_command.py: no file of tapes: it does not begin"),
+        (
+            ["--tapes", TAPES, "--scheduler", "tcp://127.0.0.1:1"],
+            "argument --tapes: the workers of a cluster have no such file: fly here",
+        ),
+        (["--tapes-only"], "argument --tapes-only: name the file with --tapes"),
         (["--replay", "/nowhere"], "argument --replay: /nowhere: need a seed, or a file: "),
         (["--replay", __file__], "is no scenario of a campaign: JSONDecodeError"),
     ],
@@ -95,6 +104,20 @@ def test_of_each_kind_it_flies_the_first(monkeypatch, tmp_path, capsys):
     text = page.read_text()
     assert "`make campaign FLIGHTS=30 SEED=100 EACH=2`: " in text
     assert "Of 30 seeds these are 4 flights: the first 2 of each kind" in text
+
+
+def test_bodies_made_by_others_have_a_page_of_their_own(monkeypatch, tmp_path, capsys):
+    page, failures = tmp_path / "bodies.md", str(tmp_path / "failures")
+    given = ("--tapes", TAPES, "--tapes-only", "--jobs", "1", "--failures", failures)
+    run(monkeypatch, "--flights", "4", "--page", str(page), *given)
+    told = capsys.readouterr()
+    assert "2 of 4 seeds are flown" in told.err
+    text = page.read_text()
+    assert "`make campaign TAPES=FILE FLIGHTS=4 SEED=0`: 2 flights on 26 tapes" in text
+    assert "| body: what fails | correct | missed | late | false" in text
+    assert "0 flights." in text
+    run(monkeypatch, "--replay", "1", *given)
+    assert '"tape": {' in capsys.readouterr().out
 
 
 def fly_on(monkeypatch, tmp_path, flights, seed=40):

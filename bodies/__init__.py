@@ -1,0 +1,1 @@
+"""Vehicles that other people's physics flies, recorded as tapes for the fault campaign."""

@@ -1,0 +1,127 @@
+"""make tapes: flies multirotors in RotorPy and aeroplanes in JSBSim, drawn from seeds, and writes
+what they did to FOLDER/bodies.tapes, for make campaign TAPES=FOLDER/bodies.tapes."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+from bodies.recorder import UnflyableError
+from chute_ros.sim.tape import MAGIC, Tape, written
+
+_NAME = "bodies.tapes"
+_TELL_EVERY = 5.0  # s
+
+
+def main() -> None:
+    """Exit code 1: not one flight could be flown."""
+    options = argparse.ArgumentParser("bodies", description=__doc__)
+    options.add_argument("folder", type=Path, help="for the file; made if it is not there")
+    for kind in ("multirotors", "aeroplanes"):
+        options.add_argument(f"--{kind}", type=number, default=300, help="flights (default: 300)")
+    options.add_argument("--seed", type=int, default=0, help="of the first of each (default: 0)")
+    options.add_argument("--jobs", type=number, default=os.cpu_count() or 1, help="processes")
+    given = options.parse_args()
+    if not given.jobs:
+        options.error("argument --jobs: need 1 at least")
+    flights = [("multirotor", given.seed + one) for one in range(given.multirotors)]
+    flights += [("aeroplane", given.seed + one) for one in range(given.aeroplanes)]
+    if not flights:
+        options.error("no flight: need --multirotors or --aeroplanes of 1 or more")
+    try:
+        given.folder.mkdir(parents=True, exist_ok=True)
+        sys.exit(_record(flights, given.folder / _NAME, given.jobs))
+    except OSError as error:
+        sys.exit(f"bodies: {error.filename}: {error.strerror}")
+    except KeyboardInterrupt:
+        sys.exit("bodies: interrupted, nothing was written")
+
+
+def number(text: str) -> int:
+    """0 or more."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"{text}: need a whole number, 0 or more")
+    return int(text)
+
+
+def _record(flights: list[tuple[str, int]], path: Path, jobs: int) -> int:
+    counts: Counter[tuple[str, str, str]] = Counter()
+    unflyable, part, told_at = [], path.with_suffix(".part"), time.monotonic()
+    try:
+        with part.open("wb") as file:
+            file.write(MAGIC)
+            every = zip(flights, _all(flights, jobs), strict=True)
+            for done, (flight, outcome) in enumerate(every, 1):
+                if isinstance(outcome, str):
+                    unflyable.append(f"{flight[0]} {flight[1]}: {outcome}")
+                else:
+                    file.write(written(outcome))
+                    counts[outcome.label.body, outcome.label.failed, _end(outcome)] += 1
+                if time.monotonic() - told_at >= _TELL_EVERY or done == len(flights):
+                    told_at = time.monotonic()
+                    print(f"{done} of {len(flights)} flights", file=sys.stderr, flush=True)
+        if counts:
+            part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    for (body, failed, end), flown in sorted(counts.items()):
+        print(f"{flown:6d}  {body}: {failed}: {end}")
+    for line in unflyable:
+        print(f"left out: {line}")
+    print(f"{counts.total()} tapes, {len(unflyable)} flights left out")
+    if counts:
+        print(f"{path}: {path.stat().st_size} bytes")
+    return 0 if counts else 1
+
+
+def _end(tape: Tape) -> str:
+    label = tape.label
+    if label.ends_hard:
+        return "comes down hard"
+    if math.isnan(label.lost_at):
+        return "flies or lands softly"
+    return "is lost, and softly down or in the air at the end"
+
+
+def _all(flights: list[tuple[str, int]], jobs: int) -> Iterator[Tape | str]:
+    """Each flight's tape, or why there is none, in their order."""
+    if jobs == 1:
+        yield from map(_fly, flights)
+        return
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        try:
+            yield from pool.map(_fly, flights, chunksize=4)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _fly(flight: tuple[str, int]) -> Tape | str:
+    kind, seed = flight
+    try:
+        return _flyer(kind)(seed)
+    except UnflyableError as error:
+        return str(error)
+
+
+def _flyer(kind: str) -> Callable[[int], Tape]:
+    # One process may fly multirotors alone, and JSBSim takes a second to be imported.
+    if kind == "multirotor":
+        from bodies.multirotor_flight import fly
+
+        return fly
+    from bodies.aeroplane_flight import fly as fly_aeroplane
+
+    return fly_aeroplane
+
+
+if __name__ == "__main__":
+    main()
