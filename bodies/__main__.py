@@ -9,12 +9,10 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
-from bodies.recorder import UnflyableError
+from bodies.flights import Flight, flown
 from chute_ros.sim.tape import MAGIC, Tape, written
 
 _NAME = "bodies.tapes"
@@ -26,9 +24,9 @@ def main() -> None:
     options = argparse.ArgumentParser("bodies", description=__doc__)
     options.add_argument("folder", type=Path, help="for the file; made if it is not there")
     for kind in ("multirotors", "aeroplanes"):
-        options.add_argument(f"--{kind}", type=number, default=300, help="flights (default: 300)")
+        options.add_argument(f"--{kind}", type=whole, default=300, help="flights (default: 300)")
     options.add_argument("--seed", type=int, default=0, help="of the first of each (default: 0)")
-    options.add_argument("--jobs", type=number, default=os.cpu_count() or 1, help="processes")
+    options.add_argument("--jobs", type=whole, default=os.cpu_count() or 1, help="processes")
     given = options.parse_args()
     if not given.jobs:
         options.error("argument --jobs: need 1 at least")
@@ -41,24 +39,26 @@ def main() -> None:
         sys.exit(_record(flights, given.folder / _NAME, given.jobs))
     except OSError as error:
         sys.exit(f"bodies: {error.filename}: {error.strerror}")
+    except BrokenProcessPool:
+        sys.exit("bodies: a process ended by itself (for want of memory?); nothing was written")
     except KeyboardInterrupt:
         sys.exit("bodies: interrupted, nothing was written")
 
 
-def number(text: str) -> int:
+def whole(text: str) -> int:
     """0 or more."""
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"{text}: need a whole number, 0 or more")
     return int(text)
 
 
-def _record(flights: list[tuple[str, int]], path: Path, jobs: int) -> int:
+def _record(flights: list[Flight], path: Path, jobs: int) -> int:
     counts: Counter[tuple[str, str, str]] = Counter()
     unflyable, part, told_at = [], path.with_suffix(".part"), time.monotonic()
     try:
         with part.open("wb") as file:
             file.write(MAGIC)
-            every = zip(flights, _all(flights, jobs), strict=True)
+            every = zip(flights, flown(flights, jobs), strict=True)
             for done, (flight, outcome) in enumerate(every, 1):
                 if isinstance(outcome, str):
                     unflyable.append(f"{flight[0]} {flight[1]}: {outcome}")
@@ -72,8 +72,8 @@ def _record(flights: list[tuple[str, int]], path: Path, jobs: int) -> int:
             part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-    for (body, failed, end), flown in sorted(counts.items()):
-        print(f"{flown:6d}  {body}: {failed}: {end}")
+    for (body, failed, end), number in sorted(counts.items()):
+        print(f"{number:6d}  {body}: {failed}: {end}")
     for line in unflyable:
         print(f"left out: {line}")
     print(f"{counts.total()} tapes, {len(unflyable)} flights left out")
@@ -89,38 +89,6 @@ def _end(tape: Tape) -> str:
     if math.isnan(label.lost_at):
         return "flies or lands softly"
     return "is lost, and softly down or in the air at the end"
-
-
-def _all(flights: list[tuple[str, int]], jobs: int) -> Iterator[Tape | str]:
-    """Each flight's tape, or why there is none, in their order."""
-    if jobs == 1:
-        yield from map(_fly, flights)
-        return
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        try:
-            yield from pool.map(_fly, flights, chunksize=4)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _fly(flight: tuple[str, int]) -> Tape | str:
-    kind, seed = flight
-    try:
-        return _flyer(kind)(seed)
-    except UnflyableError as error:
-        return str(error)
-
-
-def _flyer(kind: str) -> Callable[[int], Tape]:
-    # One process may fly multirotors alone, and JSBSim takes a second to be imported.
-    if kind == "multirotor":
-        from bodies.multirotor_flight import fly
-
-        return fly
-    from bodies.aeroplane_flight import fly as fly_aeroplane
-
-    return fly_aeroplane
 
 
 if __name__ == "__main__":

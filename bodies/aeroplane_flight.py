@@ -14,6 +14,9 @@ from chute_ros.sim.tape import STEP, Tape
 #: its failure, or if nothing fails, s.
 _SETTLES, _LEVEL, _FALLS, _FOLLOWED = 25.0, 1.0, 60.0, 12.0
 
+#: Sink of a glide and of a dive with 20 degrees, in parts of the cruise.
+_GLIDES, _DIVES = 0.12, 0.4
+
 MISSIONS = {"cruise": 3, "climb": 2, "descent": 2, "hard turn": 2, "dive": 1, "slow flight": 1}
 FAILURES = {
     "nothing": 6,
@@ -81,6 +84,7 @@ class _Flight:
         self._controller = Controller(plane)
         self._command = Command(0.0, plan.height, kind.cruise, not kind.motor)
         self._recorder = Recorder()
+        self._told_height = plan.height
 
     def tape(self) -> Tape:
         plan, plane, recorder = self._plan, self._plane, self._recorder
@@ -160,14 +164,22 @@ class _Flight:
 
     def _told(self, throttle: float) -> dict[str, float]:
         _, _, yaw = self._plane.angles
-        controller, glides = self._controller, self._command.glides
+        controller, kind = self._controller, self._kind
+        speed, height = controller.vertical_speed, self._command.height
+        if self._command.glides or controller.dives is not None:
+            # Where no height is held, a sink as of the glide or the dive is as it was told, and no
+            # faster one.
+            fastest = (_GLIDES if self._command.glides else _DIVES) * kind.cruise
+            speed = max(self._plane.vertical_speed, -fastest)
+            height = max(self._plane.height, self._told_height - fastest * STEP)
+        self._told_height = height
         return {
             "commanded_roll": controller.roll,
             "commanded_pitch": controller.pitch,
             # Autopilots of aeroplanes command no heading of the nose: it is where it is.
             "commanded_yaw": yaw,
-            "commanded_height": self._plane.height if glides else self._command.height,
-            "commanded_vertical_speed": controller.vertical_speed,
+            "commanded_height": height,
+            "commanded_vertical_speed": speed,
             "commanded_thrust": throttle,
         }
 
