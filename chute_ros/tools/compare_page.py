@@ -42,13 +42,15 @@ What makes this fair, or not:
   features of parachutes, not of guards. Two parachutes on two links are flown by this product
   alone; a peer has one.
 - Faults on networks, buses, cables, nodes and the supervisor's process exist for this product
-  only. They are harmless to a peer in the autopilot. Vehicles with an IMU or odometry besides
+  only. They are harmless to a peer in the autopilot; the judge excuses them for everybody. Vehicles with an IMU or odometry besides
   the autopilot have it for this product only; a peer does not read it.
 - A wrong `disarmed` in a heartbeat is a fault of the telemetry, and harmless to a peer. A wrong
   `landed` is the land detector's, and reaches a peer as well.
 - Flips and dives of 45 degrees and more are flown in ArduCopter's FLIP or ACRO mode and PX4's Acro
   mode, where their attitude checks are off; after a failure they are on at once. The threshold
   does not know the mode.
+- Banks of more than 45 degrees are flown in flips and dives alone. An aeroplane that banks so in
+  turns would make a bare limit of the tilt false; here it costs PX4 nothing.
 - PX4 only disarms within 4 s of its arming (COM_LKDOWN_TKO, COM_SPOOLUP_TIME). The climb, which
   the campaign shortens, counts as if flown at 6 m/s. PX4's source does not ask the land detector
   before a termination. Disarming after a landing (COM_DISARM_LAND), which a wrong `landed` would
@@ -252,13 +254,16 @@ def shares(
 
 
 def _table_of_better(plain: Sequence[Compared]) -> str:
-    rows: list[tuple[str, ...]] = []
+    # What two peers are better in to the same extent is one row.
+    found: dict[tuple[str, Better], list[str]] = {}
     for title, key in _KEYS:
         for (profile, name), of in by_class(plain, key):
             for guard in GUARDS:
                 one = better(of, guard.name) if guard is not OURS else None
                 if one is not None:
-                    rows.append((f"{profile}, {title}: {name}", guard.name, *_cells(one)))
+                    where = f"{profile}, {title}: {name}"
+                    found.setdefault((where, one), []).append(guard.name)
+    rows = [(where, "; ".join(who), *_cells(one)) for (where, one), who in found.items()]
     if not rows:
         return "None."
     head = ("class", "peer", "missed or late: peer, ours", "false: peer, ours")
