@@ -15,6 +15,7 @@ from chute_ros.tools.compare_classes import (
     Better,
     better,
     by_class,
+    excused_and_saved,
     missed_and_false,
     paired_delays,
 )
@@ -42,8 +43,9 @@ What makes this fair, or not:
   features of parachutes, not of guards. Two parachutes on two links are flown by this product
   alone; a peer has one.
 - Faults on networks, buses, cables, nodes and the supervisor's process exist for this product
-  only. They are harmless to a peer in the autopilot; the judge excuses them for everybody. Vehicles with an IMU or odometry besides
-  the autopilot have it for this product only; a peer does not read it.
+  only. They are harmless to a peer in the autopilot, but the judge excuses everybody for them.
+  Vehicles with an IMU or odometry besides the autopilot have it for this product only; a peer does
+  not read it.
 - A wrong `disarmed` in a heartbeat is a fault of the telemetry, and harmless to a peer. A wrong
   `landed` is the land detector's, and reaches a peer as well.
 - Flips and dives of 45 degrees and more are flown in ArduCopter's FLIP or ACRO mode and PX4's Acro
@@ -70,6 +72,9 @@ Every class in which a peer has fewer missed or late or fewer false flights than
 without any excuse, or releases earlier: the median over the flights in which both released, of
 five at least. Seeds: flights that the peer ends well and this product does not, or those in which
 the peer is earliest. A guard that never acts has no false flight."""
+_EXCUSED = """\
+Flights that the campaign counts as "no time" or "not told" for this product, and that a peer ends
+well: the excuse is not one of physics."""
 _DELAYS = """\
 Of the flights that only a parachute could save. The last two columns: medians over the flights in
 which both the peer and this product released."""
@@ -78,6 +83,10 @@ _CURVES = f"""\
 One of {CURVE_OF} flights was flown again with the limits of each guard scaled by {_SCALES} (the
 first table says which). Missed or late in percent of the flights that only a parachute could save;
 false in percent of all. The large dot: not scaled."""
+
+
+#: So many seeds of flights are named.
+_MOST_NAMED = 8
 
 
 class Run(NamedTuple):
@@ -119,6 +128,9 @@ def page(lines: Sequence[Compared], run: Run, pictures: Sequence[str]) -> str:
         "## Where others are better",
         _BETTER,
         _table_of_better(plain),
+        "## Excused, and saved by a peer",
+        _EXCUSED,
+        _excused(plain),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -268,6 +280,18 @@ def _table_of_better(plain: Sequence[Compared]) -> str:
         return "None."
     head = ("class", "peer", "missed or late: peer, ours", "false: peer, ours")
     return table((*head, "median delay: peer, ours", "seeds"), rows)
+
+
+def _excused(plain: Sequence[Compared]) -> str:
+    rows = []
+    for (profile, failure), of in by_class(plain, lambda one: (one.profile, one.failure)):
+        for guard in GUARDS:
+            if seeds := excused_and_saved(of, guard.name):
+                named = ", ".join(str(seed) for seed in seeds[:_MOST_NAMED])
+                rows.append((profile, failure, guard.name, str(len(seeds)), named))
+    if not rows:
+        return "None."
+    return table(("profile", "what fails", "peer", "flights", "seeds"), rows)
 
 
 def _cells(one: Better) -> tuple[str, ...]:
