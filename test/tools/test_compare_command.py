@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -161,7 +162,17 @@ def test_the_page_counts_and_compares() -> None:
 
 def test_where_nobody_is_better_the_page_says_so() -> None:
     good = [line for n in range(3) for line in flight(n, (Count.CORRECT, 0.5), (Count.LATE, 0.9))]
-    assert page(good, RUN, ["c.svg", "d.svg"]).endswith("None.\n")
+    text = page(good, RUN, ["c.svg", "d.svg"])
+    assert text.count("\n\nNone.\n") == 2
+
+
+def test_what_the_judge_excuses_and_a_peer_saves_is_named() -> None:
+    excused = [
+        replace(one, count=Count.NO_TIME) if one.guard == OURS.name else one
+        for one in flight(9, (Count.LATE, 1.3), (Count.CORRECT, 0.9))
+    ]
+    text = page(excused, RUN, ["c.svg", "d.svg"])
+    assert text.endswith(f"| multirotor | a motor fails | {PEER} | 1 | 9 |\n")
 
 
 @pytest.mark.parametrize("picture", [curves, delays])
