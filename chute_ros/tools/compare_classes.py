@@ -72,6 +72,13 @@ def better(lines: Sequence[Compared], guard: str) -> Better | None:
     return found if is_better else None
 
 
+def excused_and_saved(lines: Sequence[Compared], guard: str) -> list[int]:
+    """Return the seeds of flights that a peer ends well and that the judge excuses us for."""
+    excused = (Count.NO_TIME, Count.NOT_TOLD)
+    ours = {one.seed for one in lines if one.guard == OURS.name and one.count in excused}
+    return [seed for seed in _saved_by_it_alone(lines, guard) if seed in ours]
+
+
 def _paired(lines: Sequence[Compared], guard: str) -> list[tuple[int, tuple[float, float]]]:
     ours = {one.seed: one.delay for one in lines if one.guard == OURS.name}
     return [

@@ -15,63 +15,24 @@ from chute_ros.tools.compare_classes import (
     Better,
     better,
     by_class,
+    excused_and_saved,
     missed_and_false,
     paired_delays,
 )
+from chute_ros.tools.compare_words import (
+    BETTER,
+    CLASSES,
+    CURVES,
+    DELAYS,
+    EXCUSED,
+    INTRODUCTION,
+    RULES,
+    SHORT,
+)
 from chute_ros.tools.pages import table
 
-_INTRODUCTION = """\
-The flights of the [fault campaign](campaign.md), flown again for each guard in one run and counted
-by the same judge from the same truth. A guard is who decides about motors and parachute: this
-product, or one of its peers. A peer runs in the autopilot itself, 50 times a second (the step of
-the flight model), on what that autopilot's own sensors and estimator say, with the scenario's
-faults of both. The peer is dead or hung while the autopilot is, and begins again when it restarts.
-It stops the motors and releases the parachute on its own output. Each peer is written in our own
-words from its documentation and source (`chute_ros/campaign/peers/`, each number with its source);
-it is not the peer's code."""
-
-_RULES = """\
-What makes this fair, or not:
-
-- Rockets are left out: no peer flies them. Nobody orders anything: no arming, kill or deploy by a
-  person. No parachute releases itself, and every canopy carries and opens in 1.2 s: these are
-  features of parachutes, not of guards. Two parachutes on two links are flown by this product
-  alone; a peer has one.
-- Faults on networks, buses, cables, nodes and the supervisor's process exist for this product
-  only. They are harmless to a peer in the autopilot. Vehicles with an IMU or odometry besides
-  the autopilot have it for this product only; a peer does not read it.
-- A wrong `disarmed` in a heartbeat is a fault of the telemetry, and harmless to a peer. A wrong
-  `landed` is the land detector's, and reaches a peer as well.
-- Flips and dives of 45 degrees and more are flown in ArduCopter's FLIP or ACRO mode and PX4's Acro
-  mode, where their attitude checks are off; after a failure they are on at once. The threshold
-  does not know the mode.
-- PX4 only disarms within 4 s of its arming (COM_LKDOWN_TKO, COM_SPOOLUP_TIME). The climb, which
-  the campaign shortens, counts as if flown at 6 m/s. PX4's source does not ask the land detector
-  before a termination. Disarming after a landing (COM_DISARM_LAND), which a wrong `landed` would
-  cause in the air, is not modelled.
-- A vehicle takes off when this product's supervisor, or at once when the peer, lets it. Gusts and
-  the noise of sensors are of the same strength, but not the same sample by sample.
-- The judge's excuses are the campaign's, for every guard: too little time (2 s and more), sensors
-  that were wrong in pairs, ways and processes that failed. The second count excuses nothing: it
-  asks only whether the vehicle was saved and whether one that flew well was left alone. Flights
-  that no release could save stay "no time" there."""
-
-_CLASSES = """\
-In each cell: missed or late / false, without any excuse."""
-
-_BETTER = """\
-Every class in which a peer has fewer missed or late or fewer false flights than this product,
-without any excuse, or releases earlier: the median over the flights in which both released, of
-five at least. Seeds: flights that the peer ends well and this product does not, or those in which
-the peer is earliest. A guard that never acts has no false flight."""
-_DELAYS = """\
-Of the flights that only a parachute could save. The last two columns: medians over the flights in
-which both the peer and this product released."""
-_SCALES = ", ".join(f"{one:g}" for one in FACTORS)
-_CURVES = f"""\
-One of {CURVE_OF} flights was flown again with the limits of each guard scaled by {_SCALES} (the
-first table says which). Missed or late in percent of the flights that only a parachute could save;
-false in percent of all. The large dot: not scaled."""
+#: So many seeds of flights are named.
+_MOST_NAMED = 8
 
 
 class Run(NamedTuple):
@@ -93,24 +54,29 @@ def page(lines: Sequence[Compared], run: Run, pictures: Sequence[str]) -> str:
     parts = [
         "# Beside what people use today",
         f"Written by `{command}`: {told}.",
-        _INTRODUCTION,
+        INTRODUCTION,
+        SHORT,
+        _short(plain),
         table(("guard", "settings, and what is scaled for the curves"), _guards()),
-        _RULES,
+        RULES,
         *_counted(plain),
         "## From the failure to the release",
         f"![delays]({delays})",
-        _DELAYS,
+        DELAYS,
         _delays(plain),
         "## By class",
-        _CLASSES,
+        CLASSES,
         *(_classes(plain, title, key) for title, key in _KEYS),
         "## False against missed",
         f"![curves]({curves})",
-        _CURVES,
+        CURVES,
         _curve(lines),
         "## Where others are better",
-        _BETTER,
+        BETTER,
         _table_of_better(plain),
+        "## Excused, and saved by a peer",
+        EXCUSED,
+        _excused(plain),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -125,6 +91,25 @@ _KEYS: tuple[tuple[str, Callable[[Compared], tuple[str, str]]], ...] = (
 
 def _guards() -> list[tuple[str, str]]:
     return [(one.name, one.about) for one in GUARDS]
+
+
+def _short(plain: Sequence[Compared]) -> str:
+    profiles = sorted({one.profile for one in plain})
+    rows = []
+    for guard in GUARDS:
+        cells = []
+        for profile in profiles:
+            of = [one for one in plain if (one.profile, one.guard) == (profile, guard.name)]
+            needed = [one for one in of if one.needed]
+            saved = sum(one.bare is Count.CORRECT for one in needed)
+            cells += [_share(saved, needed), _share(missed_and_false(of, guard.name)[1], of)]
+        rows.append((guard.name, *cells))
+    head = (f"{profile}: {what}" for profile in profiles for what in ("saved", "false"))
+    return table(("guard", *head), rows)
+
+
+def _share(number: int, whole: Sequence[Compared]) -> str:
+    return f"{number} of {len(whole)} ({100.0 * number / max(1, len(whole)):.1f} %)"
 
 
 def _counted(plain: Sequence[Compared]) -> list[str]:
@@ -227,17 +212,32 @@ def shares(
 
 
 def _table_of_better(plain: Sequence[Compared]) -> str:
-    rows: list[tuple[str, ...]] = []
-    for _, key in _KEYS:
+    # What two peers are better in to the same extent is one row.
+    found: dict[tuple[str, Better], list[str]] = {}
+    for title, key in _KEYS:
         for (profile, name), of in by_class(plain, key):
             for guard in GUARDS:
                 one = better(of, guard.name) if guard is not OURS else None
                 if one is not None:
-                    rows.append((f"{profile}: {name}", guard.name, *_cells(one)))
+                    where = f"{profile}, {title}: {name}"
+                    found.setdefault((where, one), []).append(guard.name)
+    rows = [(where, "; ".join(who), *_cells(one)) for (where, one), who in found.items()]
     if not rows:
         return "None."
     head = ("class", "peer", "missed or late: peer, ours", "false: peer, ours")
     return table((*head, "median delay: peer, ours", "seeds"), rows)
+
+
+def _excused(plain: Sequence[Compared]) -> str:
+    rows = []
+    for (profile, failure), of in by_class(plain, lambda one: (one.profile, one.failure)):
+        for guard in GUARDS:
+            if seeds := excused_and_saved(of, guard.name):
+                named = ", ".join(str(seed) for seed in seeds[:_MOST_NAMED])
+                rows.append((profile, failure, guard.name, str(len(seeds)), named))
+    if not rows:
+        return "None."
+    return table(("profile", "what fails", "peer", "flights", "seeds"), rows)
 
 
 def _cells(one: Better) -> tuple[str, ...]:

@@ -25,21 +25,23 @@ def curves(lines: Sequence[Compared]) -> str:
     """As SVG: a point for each factor, a panel for each profile."""
     panels = []
     for number, profile in enumerate(_profiles(lines)):
+        told = [
+            [(k, one) for k in FACTORS if (one := shares(lines, profile, guard.name, k))]
+            for guard in GUARDS
+        ]
+        falsest = max((one[1] for points in told for _, one in points), default=0.0)
+        most = next(percent for percent in _PERCENTS if percent >= max(10.0, falsest))
         panel = _Panel(f"{profile}: limits scaled by {FACTORS[0]:g} to {FACTORS[-1]:g}", number)
         for percent in _PERCENTS:
-            at = math.sqrt(percent / 100.0)
-            panel.tick_x(at, f"{percent:g}")
-            panel.tick_y(at, f"{percent:g}")
+            panel.tick_y(math.sqrt(percent / 100.0), f"{percent:g}")
+            if percent <= most:
+                panel.tick_x(math.sqrt(percent / most), f"{percent:g}")
         panel.axes("false, % of all flights", "missed or late, % of those in need")
-        for guard, colour in zip(GUARDS, _COLOURS, strict=True):
-            told = [(k, shares(lines, profile, guard.name, k)) for k in FACTORS]
-            points = [
-                (math.sqrt(one[1] / 100.0), math.sqrt(one[0] / 100.0), k)
-                for k, one in told
-                if one is not None
-            ]
-            panel.line([(x, y) for x, y, _ in points], colour, guard is OURS)
-            for x, y, factor in points:
+        # Ours is on top.
+        for guard, colour, points in reversed(list(zip(GUARDS, _COLOURS, told, strict=True))):
+            at = [(math.sqrt(f / most), math.sqrt(m / 100.0)) for _, (m, f) in points]
+            panel.line(at, colour, guard is OURS)
+            for (x, y), (factor, _) in zip(at, points, strict=True):
                 panel.dot(x, y, colour, 5.0 if factor == 1.0 else 2.5)
         panels += panel.parts
     return _svg(panels, len(_profiles(lines)))
@@ -57,7 +59,7 @@ def delays(lines: Sequence[Compared]) -> str:
         for percent in range(0, 101, 20):
             panel.tick_y(percent / 100.0, f"{percent}")
         panel.axes("s from the failure to the release", "released, %")
-        for guard, colour in zip(GUARDS, _COLOURS, strict=True):
+        for guard, colour in reversed(list(zip(GUARDS, _COLOURS, strict=True))):
             of = [one for one in plain if (one.profile, one.guard) == (profile, guard.name)]
             panel.line(_steps(of), colour, guard is OURS)
         panels += panel.parts

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -28,6 +29,7 @@ class DaskBench:
         process = _start("worker", *arguments, **environment)
         address = _told(process, r"Start worker at: +(\S+)")
         _told(process, "Registered to: ")
+        _drain(process)
         self.workers[address] = process
         return address
 
@@ -37,12 +39,13 @@ def dask_bench(**environment: str) -> Iterator[DaskBench]:
     """A scheduler without workers; at the end all are ended."""
     scheduler = _start("scheduler", *_PLACE, "--port", "0", **environment)
     bench = DaskBench(_told(scheduler, r"Scheduler at: +(\S+)"), scheduler)
+    _drain(scheduler)
     try:
         yield bench
     finally:
         for process in (*bench.workers.values(), scheduler):
             process.kill()
-            process.communicate()
+            process.wait()
 
 
 def _start(*arguments: str, **environment: str) -> subprocess.Popen[str]:
@@ -67,3 +70,14 @@ def _told(process: subprocess.Popen[str], pattern: str) -> str:
             return found[found.lastindex or 0]
         lines.append(line)
     raise AssertionError(f"it ended: {''.join(lines)}")
+
+
+def _drain(process: subprocess.Popen[str]) -> None:
+    """What it tells from now on is nobody's, but must not fill the pipe."""
+
+    def read() -> None:
+        with process.stderr as lines:  # type: ignore[union-attr]
+            for _ in lines:
+                pass
+
+    threading.Thread(target=read, daemon=True).start()

@@ -48,7 +48,7 @@ def nothing_flies(monkeypatch):
 
 @pytest.fixture(scope="module")
 def by_one_process():
-    flown = flown_here(config_folder() / "profiles", SEEDS, 1)
+    flown = flown_here(flights.fly_bundle, config_folder() / "profiles", SEEDS, 1)
     return kept(flights.run(flown, lambda _: None, flights.Tally()))
 
 
@@ -204,12 +204,12 @@ def test_a_worker_that_comes_later_and_differs_ends_it(cluster, tmp_path):
 
 
 def test_a_scheduler_without_workers_is_told_with_the_remedy(nothing_flies, monkeypatch, capsys):
-    monkeypatch.setattr(campaign_cluster, "_PATIENCE", 1.0)
+    monkeypatch.setattr(campaign_cluster, "_PATIENCE", 5.0)
     with dask_bench() as bench:
         assert run(monkeypatch, "--scheduler", bench.address) == 2
     told = capsys.readouterr().err
     assert told == (
-        f"campaign: the scheduler at {bench.address} has no workers after 1 s: start some with "
+        f"campaign: the scheduler at {bench.address} has no workers after 5 s: start some with "
         f"`dask worker {bench.address} --nthreads 1 --nworkers N` (docs/guide/cluster.md)\n"
     )
 

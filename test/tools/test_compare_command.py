@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -149,7 +150,10 @@ def test_the_page_counts_and_compares() -> None:
     assert "`make compare FLIGHTS=20 SEED=8`: 8 flights of aircraft with each guard" in text
     assert "| chute_ros | 7 | 1 | 0 | 0 |" in text
     assert f"| {PEER} | 2 | 0 | 5 | 1 |" in text
-    assert f"| multirotor: a motor fails | {PEER} | 5, 1 | 1, 0 | **0.70 s, 1.00 s** | 9 |" in text
+    fails = "multirotor, what fails: a motor fails"
+    assert f"| {fails} | {PEER} | 5, 1 | 1, 0 | **0.70 s, 1.00 s** | 9 |" in text
+    # Of 8 flights one was ended falsely, and 7 needed it.
+    assert f"| {PEER} | 2 of 7 (28.6 %) | 1 of 8 (12.5 %) |" in text
     assert "| multirotor | a motor fails | 8 | 1 / 0 | 8 / 0 |" in text
     # One flight of the curve: PX4's is false as soon as its limits move.
     assert f"| multirotor, {PEER} | 0.0 / 100.0 | 0.0 / 100.0 | 0.0 / 0.0 |" in text
@@ -158,7 +162,17 @@ def test_the_page_counts_and_compares() -> None:
 
 def test_where_nobody_is_better_the_page_says_so() -> None:
     good = [line for n in range(3) for line in flight(n, (Count.CORRECT, 0.5), (Count.LATE, 0.9))]
-    assert page(good, RUN, ["c.svg", "d.svg"]).endswith("None.\n")
+    text = page(good, RUN, ["c.svg", "d.svg"])
+    assert text.count("\n\nNone.\n") == 2
+
+
+def test_what_the_judge_excuses_and_a_peer_saves_is_named() -> None:
+    excused = [
+        replace(one, count=Count.NO_TIME) if one.guard == OURS.name else one
+        for one in flight(9, (Count.LATE, 1.3), (Count.CORRECT, 0.9))
+    ]
+    text = page(excused, RUN, ["c.svg", "d.svg"])
+    assert text.endswith(f"| multirotor | a motor fails | {PEER} | 1 | 9 |\n")
 
 
 @pytest.mark.parametrize("picture", [curves, delays])
