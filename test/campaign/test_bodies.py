@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from pathlib import Path
 
 import pytest
@@ -47,3 +48,17 @@ def test_each_is_released_in_time_or_left_alone(tape: Tape) -> None:
     judged = judge(fly(on_tape(plain, tape, _Calm()), SHIPPED))
     told = f"{tape.label.failed}, {tape.label.parameters}: {judged.why}"
     assert judged.count is OTHERWISE.get(tape.label.name, Count.CORRECT), told
+
+
+@pytest.mark.parametrize("name", ["multirotor 4", "aeroplane 4"])
+def test_with_rules_that_take_a_minute_the_same_tapes_are_missed(
+    name: str, tmp_path: Path
+) -> None:
+    for profile in ("multirotor", "fixed_wing"):
+        text = (FOLDER / f"{profile}.yaml").read_text(encoding="utf-8")
+        slow = re.sub(r"^    for: .*$", "    for: 60.0", text, flags=re.MULTILINE)
+        (tmp_path / f"{profile}.yaml").write_text(slow, encoding="utf-8")
+    shipped = Shipped(tmp_path, TapeFile(STORED, only=True))
+    tape = shipped.tape(name)
+    plain = scenario(Failure.NOTHING, profile=tape.label.profile)
+    assert judge(fly(on_tape(plain, tape, _Calm()), shipped)).count is Count.MISSED
