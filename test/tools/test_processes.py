@@ -30,8 +30,8 @@ def module(folder, name, text):
 
 WAITS = """
     import signal, sys
-    print("ready with", sys.argv[1:], flush=True)
     try:
+        print("ready with", sys.argv[1:], flush=True)
         signal.pause()
     except KeyboardInterrupt:
         print("ended", flush=True)
@@ -54,7 +54,7 @@ FAILS = """
 def test_one_runs_until_it_is_told_to_end(folder, processes, await_until):
     module(folder, "waits", WAITS)
     processes.start("mine", "waits", "--one", "two")
-    await_until(lambda: "ready" in processes.log("mine").read_text(), "it runs")
+    await_until(lambda: "]\n" in processes.log("mine").read_text(), "it runs")
     processes.check()
     assert processes.names() == ["mine"]
     processes.end()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import serial
-from test_command_line import Simulator
+from printing_process import PrintingProcess
 
 from chute_ros.links.umbilical.layout_files import load_layouts
 
@@ -31,7 +31,7 @@ def start(link, await_until):
     def begin(*arguments):
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         more = ("--telem-path", FOLDER, "--link", str(link), *arguments)
-        one = Simulator(MODULE, environment, *more)
+        one = PrintingProcess(MODULE, *more, environment=environment)
         started.append(one)
         await_until(lambda: os.path.lexists(link), "the link is there")
         return one
