@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from chute_ros.campaign.truth import SOFT
+from chute_ros.protocol.rotation import tilt_of
 from chute_ros.sim.flight import GRAVITY
 from chute_ros.sim.tape import GRAINS, STEP, Label, Tape, pack
 
@@ -47,7 +48,7 @@ class Row:
     @property
     def tilt(self) -> float:
         """From upright, rad."""
-        return math.acos(max(-1.0, min(1.0, math.cos(self.roll) * math.cos(self.pitch))))
+        return tilt_of(self.roll, self.pitch)
 
     @property
     def disobeys(self) -> float:

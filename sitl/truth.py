@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from chute_ros.protocol.rotation import tilt_of
 from sitl.record import Seen
 
 #: Below it the vehicle is on the ground, m.
@@ -102,4 +103,4 @@ def truth_of(record: Iterable[Seen], ports: Sequence[int]) -> Truth:
 
 
 def _tilt(roll: float, pitch: float) -> float:
-    return math.degrees(math.acos(max(-1.0, min(1.0, math.cos(roll) * math.cos(pitch)))))
+    return math.degrees(tilt_of(roll, pitch))

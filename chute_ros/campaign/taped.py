@@ -11,6 +11,7 @@ from typing import Any
 from chute_ros.campaign.sensors import Sensors
 from chute_ros.campaign.truth import SOFT, Truth, touchdown_speed
 from chute_ros.campaign.vehicle import CampaignAutopilot, WindyModel
+from chute_ros.protocol.rotation import quaternion_of, tilt_of
 from chute_ros.sim.flight import GRAVITY, FlightModel
 from chute_ros.sim.tape import STEP, Tape
 
@@ -47,7 +48,7 @@ class TapedModel(WindyModel):
 
     @property
     def lean(self) -> float:
-        return math.copysign(_tilt(self.roll, self.pitch), self.roll)
+        return math.copysign(tilt_of(self.roll, self.pitch), self.roll)
 
     def step(self, dt: float) -> None:
         """Move on: the tape has a row for each step of nature."""
@@ -96,7 +97,7 @@ def truth_of(model: TapedModel, begun: float) -> Truth:
             canopy_opening_time=model.canopy_opening_time,
             height=columns["height"][row],
             vertical_speed=columns["vertical_speed"][row],
-            roll=_tilt(roll, pitch),
+            roll=tilt_of(roll, pitch),
             unheld=model.unheld,
         )
         return touchdown_speed(body, 0.0) <= SOFT
@@ -179,7 +180,7 @@ class TapedAutopilot(CampaignAutopilot):
             return super()._attitude_target()
         angles = (model.commanded(one) for one in ("roll", "pitch", "yaw"))
         message: Any = super()._attitude_target()
-        message.q, message.thrust = _quaternion(*angles), model.commanded("thrust")
+        message.q, message.thrust = list(quaternion_of(*angles)), model.commanded("thrust")
         return message
 
     def _position_target(self) -> Any:
@@ -199,20 +200,3 @@ class TapedAutopilot(CampaignAutopilot):
 
     def _commanded_height(self) -> float:
         return self.model.commanded("height") if self.model.plays else super()._commanded_height()
-
-
-def _tilt(roll: float, pitch: float) -> float:
-    return math.acos(max(-1.0, min(1.0, math.cos(roll) * math.cos(pitch))))
-
-
-def _quaternion(roll: float, pitch: float, yaw: float) -> list[float]:
-    """w, x, y, z."""
-    cr, sr = math.cos(roll / 2.0), math.sin(roll / 2.0)
-    cp, sp = math.cos(pitch / 2.0), math.sin(pitch / 2.0)
-    cy, sy = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
-    return [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ]

@@ -14,6 +14,7 @@ from dataclasses import replace
 from chute_ros.model import DeploymentTrigger
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.protocol.mavlink.frames import Frame
+from chute_ros.protocol.rotation import tilt_of
 from chute_ros.sim.mavlink_device import MavlinkDevice
 from chute_ros.sim.motion import Motion
 from chute_ros.transport.address import parse_address
@@ -75,8 +76,7 @@ class VehicleSense(MavlinkDevice):
             told = {"height": message.relative_alt / 1000.0, "vertical_speed": -message.vz / 100.0}
         elif kind == "ATTITUDE":
             self._heard = self.now
-            upright = math.cos(message.roll) * math.cos(message.pitch)
-            told = {"tilt": math.acos(max(-1.0, min(1.0, upright)))}
+            told = {"tilt": tilt_of(message.roll, message.pitch)}
         elif kind == "SCALED_IMU":
             length = math.hypot(message.xacc, message.yacc, message.zacc)
             told = {"acceleration": length * _MILLI_G}

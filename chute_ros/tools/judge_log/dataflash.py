@@ -17,6 +17,7 @@ from typing import Any
 from pymavlink import DFReader
 
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.rotation import quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
 
@@ -201,7 +202,7 @@ class _Teller:
             return
         thrust = self._thrust()
         yaw = math.radians(getattr(entry, "DesYaw", math.degrees(angles[2])))
-        turned = told.quaternion_of(roll, pitch, yaw)
+        turned = quaternion_of(roll, pitch, yaw)
         self._out.add(self._at, told.attitude_target(turned, thrust))
 
     def _thrust(self) -> float:

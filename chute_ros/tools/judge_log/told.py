@@ -122,27 +122,5 @@ def home(altitude: float, latitude: float, longitude: float, below_origin: float
     )
 
 
-def quaternion_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
-    """w, x, y, z."""
-    (cr, sr), (cp, sp), (cy, sy) = (
-        (math.cos(angle / 2.0), math.sin(angle / 2.0)) for angle in (roll, pitch, yaw)
-    )
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-
-
-def angles_of(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """roll, pitch, yaw."""
-    return (
-        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x)))),
-        math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-    )
-
-
 def _whole(value: float, most: int) -> int:
     return round(max(-most, min(most, value))) if math.isfinite(value) else 0

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.rotation import angles_of, quaternion_of
 from chute_ros.tools.judge_log import told
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError, MessageLog, reason
 
@@ -105,13 +106,13 @@ class _Teller:
         for at, row in self._rows("vehicle_attitude"):
             turned = [row[f"q[{k}]"] for k in range(4)]
             if all(map(math.isfinite, turned)):
-                self._out.add(at, told.attitude(*told.angles_of(*turned)))
+                self._out.add(at, told.attitude(*angles_of(*turned)))
         for at, row in self._rows("vehicle_attitude_setpoint"):
             if "q_d[0]" in row and row.get("q_d_valid", 1):
                 turned = [row[f"q_d[{k}]"] for k in range(4)]
             else:
                 names = ("roll_body", "pitch_body", "yaw_body")
-                turned = list(told.quaternion_of(*(row.get(n, math.nan) for n in names)))
+                turned = list(quaternion_of(*(row.get(n, math.nan) for n in names)))
             thrust = row.get("thrust", -row.get("thrust_body[2]", math.nan))
             if all(map(math.isfinite, turned)):
                 self._out.add(at, told.attitude_target(turned, thrust))

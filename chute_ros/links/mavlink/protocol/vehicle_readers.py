@@ -17,6 +17,7 @@ from chute_ros.links.mavlink.protocol.sensors import Accelerometers, Barometers
 from chute_ros.links.mavlink.protocol.targets import Targets, vertical_axis
 from chute_ros.model import LandedState
 from chute_ros.protocol.boot_clock import BootClock
+from chute_ros.protocol.rotation import angles_of
 
 #: ALTITUDE's altitude differs from GLOBAL_POSITION_INT's: it counts where that is silent, s.
 _POSITION_SILENCE = 1.0
@@ -98,10 +99,7 @@ class VehicleReaders:
         length = math.sqrt(w * w + x * x + y * y + z * z)
         if not 0.5 < length < 2.0:
             return
-        w, x, y, z = w / length, x / length, y / length, z / length
-        roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-        pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-        self._turned(roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)), now)
+        self._turned(*angles_of(w / length, x / length, y / length, z / length), now)
 
     def _turned(self, roll: float, pitch: float, yaw: float, now: float) -> None:
         self._readings.set("roll", roll, now)
