@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import active_children, get_context
 
 from bodies.recorder import UnflyableError
+from chute_ros.campaign.pool import processes
 from chute_ros.sim.tape import Tape
 
 #: Kind and seed.
@@ -20,16 +18,8 @@ def flown(flights: Sequence[Flight], jobs: int) -> Iterator[Tape | str]:
     if jobs == 1:
         yield from map(_fly, flights)
         return
-    # Ctrl-C reaches every process of a terminal: ours ends them.
-    ignores = (signal.SIGINT, signal.SIG_IGN)
-    pool = ProcessPoolExecutor(jobs, get_context("spawn"), signal.signal, ignores)
-    try:
+    with processes(jobs, "spawn") as pool:
         yield from pool.map(_fly, flights, chunksize=4)
-    finally:
-        # Nobody waits for what they fly now.
-        for process in active_children():
-            process.kill()
-        pool.shutdown(cancel_futures=True)
 
 
 def _fly(flight: Flight) -> Tape | str:

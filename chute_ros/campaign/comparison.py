@@ -94,7 +94,8 @@ def _with_each(folder: Path, seed: int) -> list[Compared]:
 
 
 @functools.cache
-def _shipped(folder: Path, factor: float) -> Shipped:
+def shipped(folder: Path, factor: float) -> Shipped:
+    """The shipped settings, with this product's hold times scaled; read once in each process."""
     return Shipped(folder) if factor == 1.0 else ScaledShipped(folder, factor)
 
 
@@ -105,7 +106,7 @@ def _one(folder: Path, scenario: Scenario, guard: Guard, factor: float) -> Compa
     )
     try:
         peer = None if guard.peer is None else guard.peer(scenario.profile, factor)
-        flown = fly(scenario, _shipped(folder, factor if peer is None else 1.0), peer)
+        flown = fly(scenario, shipped(folder, factor if peer is None else 1.0), peer)
     except Exception as error:  # noqa: BLE001 - whatever it is, it must not have happened
         why = f"{type(error).__name__}: {error}"
         return Compared(*flight, Count.BROKEN, Count.BROKEN, why, False)

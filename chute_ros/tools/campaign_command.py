@@ -169,11 +169,12 @@ def main() -> None:
         print(f"saved in {chosen.failures}; --replay FILE shows one step by step")
     if chosen.page and tally.flights:
         of_each = OfEach(chosen.flights, chosen.each) if chosen.each else None
-        if file is None:
+        flown_tapes = campaign.shipped(profiles, file).tapes
+        if flown_tapes is None:
             _write(tally, chosen.page, chosen.seed, flyers.how, of_each)
         else:
             command = f"FLIGHTS={chosen.flights} SEED={chosen.seed}"
-            chosen.page.write_text(page_of_bodies(tally, Tapes(file), command, flyers.how))
+            chosen.page.write_text(page_of_bodies(tally, flown_tapes, command, flyers.how))
     flown = tally.flights - before
     if chosen.plan and flown:
         rate = flown / (tally.took - took_before) / flyers.number
@@ -194,8 +195,9 @@ def _flyers(
     """On the cluster of a scheduler, or here. Exit code 2: there is none, or it differs."""
     if scheduler is None:
         how = f"{jobs} at a time on {machine()}"
-        bundle = partial(campaign.fly_bundle, tapes=tapes)
-        yield _Flyers(jobs, how, lambda seeds: flown_here(bundle, profiles, seeds, jobs))
+        bundle = partial(campaign.fly_bundle, profiles, tapes=tapes)
+        shared = campaign.shipped(profiles, tapes)
+        yield _Flyers(jobs, how, lambda seeds: flown_here(bundle, shared, seeds, jobs))
         return
     try:
         # Here: no other campaign needs it.

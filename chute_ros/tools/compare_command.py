@@ -11,9 +11,10 @@ import os
 import sys
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
-from chute_ros.campaign.comparison import Compared, compare
+from chute_ros.campaign.comparison import Compared, compare, shipped
 from chute_ros.campaign.guards import GUARDS
 from chute_ros.campaign.judge import Count
 from chute_ros.campaign.pool import flown_here
@@ -41,9 +42,11 @@ def main() -> None:
     chosen = options.parse_args()
     begun, lines, seeds, ended = time.monotonic(), [], 0, ""
     progress = _Progress(chosen.flights)
+    profiles = config_folder() / "profiles"
     numbers = range(chosen.seed, chosen.seed + chosen.flights)
     try:
-        for flight in flown_here(compare, config_folder() / "profiles", numbers, chosen.jobs):
+        bundle, shared = partial(compare, profiles), shipped(profiles, 1.0)
+        for flight in flown_here(bundle, shared, numbers, chosen.jobs):
             seeds += 1
             lines += flight
             progress.look(seeds)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import pytest
 from campaign_bench import FOLDER, SHIPPED, fired, flown, rocket, scenario
@@ -35,6 +36,7 @@ from chute_ros.sim.home import Homing
 
 AIRCRAFT = ("mavlink", "upf", "both")
 UNBRAKED = (Failure.NO_DROGUE, Failure.FAULT, Failure.COMPUTER_REBOOT)
+BUNDLE = partial(campaign.fly_bundle, FOLDER)
 
 
 @pytest.mark.parametrize("vehicle", AIRCRAFT)
@@ -238,7 +240,7 @@ def test_every_world_is_drawn() -> None:
 def test_a_campaign_counts_every_flight_once() -> None:
     tallies = []
     tally = campaign.run(
-        flown_here(campaign.fly_bundle, FOLDER, range(100, 106), 2),
+        flown_here(BUNDLE, SHIPPED, range(100, 106), 2),
         lambda one: tallies.append(one.flights),
         campaign.Tally(),
     )
@@ -254,7 +256,7 @@ def test_an_exception_in_a_flight_is_counted_and_ends_nothing(monkeypatch) -> No
 
     monkeypatch.setattr(campaign, "fly", broken)
     tally = campaign.run(
-        flown_here(campaign.fly_bundle, FOLDER, range(2), 1), lambda _: None, campaign.Tally()
+        flown_here(BUNDLE, SHIPPED, range(2), 1), lambda _: None, campaign.Tally()
     )
     assert tally.counts[Count.BROKEN] == 2
     assert tally.wrong[0].why == "ValueError: the rig fell apart"

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ import chute_ros
 from chute_ros.campaign import campaign as flights
 from chute_ros.campaign.checkpoint import text_of
 from chute_ros.campaign.pool import flown_here
+from chute_ros.campaign.shipped import Shipped
 from chute_ros.errors import CampaignError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.tools import campaign_cluster, campaign_command
@@ -48,7 +50,8 @@ def nothing_flies(monkeypatch):
 
 @pytest.fixture(scope="module")
 def by_one_process():
-    flown = flown_here(flights.fly_bundle, config_folder() / "profiles", SEEDS, 1)
+    profiles = config_folder() / "profiles"
+    flown = flown_here(partial(flights.fly_bundle, profiles), Shipped(profiles), SEEDS, 1)
     return kept(flights.run(flown, lambda _: None, flights.Tally()))
 
 
