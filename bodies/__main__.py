@@ -4,7 +4,6 @@ what they did to FOLDER/bodies.tapes, for make campaign TAPES=FOLDER/bodies.tape
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 import time
@@ -13,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 from bodies.flights import Flight, flown
-from chute_ros.sim.tape import MAGIC, Tape, written
+from chute_ros.sim.tape import MAGIC, written
 
 _NAME = "bodies.tapes"
 _TELL_EVERY = 5.0  # s
@@ -64,7 +63,8 @@ def _record(flights: list[Flight], path: Path, jobs: int) -> int:
                     unflyable.append(f"{flight[0]} {flight[1]}: {outcome}")
                 else:
                     file.write(written(outcome))
-                    counts[outcome.label.body, outcome.label.failed, _end(outcome)] += 1
+                    label = outcome.label
+                    counts[label.body, label.failed, label.end] += 1
                 if time.monotonic() - told_at >= _TELL_EVERY or done == len(flights):
                     told_at = time.monotonic()
                     print(f"{done} of {len(flights)} flights", file=sys.stderr, flush=True)
@@ -80,15 +80,6 @@ def _record(flights: list[Flight], path: Path, jobs: int) -> int:
     if counts:
         print(f"{path}: {path.stat().st_size} bytes")
     return 0 if counts else 1
-
-
-def _end(tape: Tape) -> str:
-    label = tape.label
-    if label.ends_hard:
-        return "comes down hard"
-    if math.isnan(label.lost_at):
-        return "flies or lands softly"
-    return "is lost, and softly down or in the air at the end"
 
 
 if __name__ == "__main__":

@@ -71,6 +71,15 @@ class Label:
     fall_speed: float = 25.0
     parameters: Mapping[str, Any] = field(default_factory=dict)
 
+    @property
+    def end(self) -> str:
+        """What becomes of it, in words."""
+        if self.ends_hard:
+            return "lost, comes down hard"
+        return (
+            "flies" if math.isnan(self.lost_at) else "lost, softly down or in the air at the end"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Tape:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 
 from chute_ros.campaign.campaign import Tally
@@ -95,20 +94,13 @@ def page_of_bodies(tally: Tally, tapes: Tapes, seeds: str, how: str) -> str:
 def _tapes(tapes: Tapes) -> str:
     counts: Counter[tuple[str, str, str]] = Counter()
     for label in tapes.labels:
-        end = _end(not math.isnan(label.lost_at), label.ends_hard)
-        counts[label.body, label.failed, end] += 1
+        counts[label.body, label.failed, label.end] += 1
     ends = sorted({end for *_, end in counts})
     rows = [
         (body, failed, *(str(counts[body, failed, end]) for end in ends))
         for body, failed in sorted({(body, failed) for body, failed, _ in counts})
     ]
     return table(("body", "what fails", *ends), rows)
-
-
-def _end(is_lost: bool, ends_hard: bool) -> str:
-    if ends_hard:
-        return "lost, comes down hard"
-    return "lost, softly down or in the air at the end" if is_lost else "flies"
 
 
 def _counts(tally: Tally, faulty: bool) -> str:
