@@ -19,7 +19,7 @@ from chute_ros.tools.timeline import escaped
 from chute_ros.tools.timeline_rows import OUTCOME_TONES
 from chute_ros.tools.timeline_rows import STYLE as TIMELINE_STYLE
 
-STYLE = """
+_STYLE = """
 :root { color-scheme: light dark; --page:#f4f6f8; --card:#ffffff; --text:#1c2733; --dim:#5b6b7b;
   --edge:#dfe5ea; --good:#2f9e5b; --warn:#b97d0c; --bad:#cc3d3d; --quiet:#7c8a97;
   --plain:#2f74c0; --act:#8a4fc4; }
@@ -74,10 +74,15 @@ def page(
         section("Log of the supervisor", _log(story)),
         section("Settings", _settings(recording)),
     ]
+    return document(title, parts)
+
+
+def document(title: str, parts: Sequence[str]) -> str:
+    """A whole page with these parts, which needs nothing else. title: plain."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escaped(title)}</title>\n<style>{STYLE}{TIMELINE_STYLE}</style>\n</head>\n"
+        f"<title>{escaped(title)}</title>\n<style>{_STYLE}{TIMELINE_STYLE}</style>\n</head>\n"
         f"<body>\n<main>\n{''.join(parts)}</main>\n</body>\n</html>\n"
     )
 

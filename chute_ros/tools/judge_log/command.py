@@ -19,7 +19,7 @@ from chute_ros.plain_text import plain
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.tools.judge_log import formats, known, table
-from chute_ros.tools.judge_log.findings import Verdict, ratings, unknown, verdict_of
+from chute_ros.tools.judge_log.findings import Verdict, verdict_of
 from chute_ros.tools.judge_log.flight_log import FlightLog, LogError
 from chute_ros.tools.judge_log.log_flight import Judged, fly
 from chute_ros.tools.judge_log.page import flight_section, page
@@ -148,21 +148,20 @@ def _tell(verdict: Verdict, one: Judged, tried: Sequence[Tried]) -> None:
     log = one.log
     lines = [
         f"{log.path}: {log.format}, profile {one.config.profile.name}",
-        f"  {log.duration:.0f} s, {one.flew:.0f} s in flight",
+        f"  {log.duration:.0f} s, {verdict.flew:.0f} s in flight",
         f"  {verdict.words}",
     ]
     lines += [f"    {'; '.join(d.reasons)}" for _, d in one.fired]
-    near = [r for r in ratings(one) if r.share > 0.0][:3]
     lines += [
         f"  nearest: {r.told.name} {r.told.peak:.2f} of {r.told.hold:g} s, {r.told.peak_at:.1f} s"
-        for r in near
+        for r in verdict.moved[:3]
     ]
     lines += [
         f"  not known: {u.name} for {100.0 * u.share:.0f} % of the flight ({u.why})"
-        for u in unknown(one)
+        for u in verdict.unknown
         if u.share >= _TOLD
     ]
-    blind = [r for r in ratings(one) if r.blind >= _TOLD]
+    blind = [r for r in verdict.ratings if r.blind >= _TOLD]
     if blind:
         shares = ", ".join(f"{r.told.name} {100.0 * r.blind:.0f} %" for r in blind)
         lines.append(f"  rules blind for a share of the flight: {shares}")

@@ -47,7 +47,7 @@ class Rating:
 class Verdict:
     """A judged log in a few words, without what was seen of it. first: when it was ended, s of the
     log, NaN: it was not; release_height: where a parachute was released, m, NaN: none was, or
-    nobody knew."""
+    nobody knew; ratings: of its rules, the nearest first; unknown: the longest first."""
 
     path: Path
     format: str
@@ -55,9 +55,21 @@ class Verdict:
     duration: float
     flew: float
     words: str
-    nearest: str
     first: float
     release_height: float
+    ratings: tuple[Rating, ...]
+    unknown: tuple[Unknown, ...]
+
+    @property
+    def moved(self) -> list[Rating]:
+        """Of the rules whose counters moved."""
+        return [one for one in self.ratings if one.share > 0.0]
+
+    @property
+    def nearest(self) -> str:
+        """Which rule, and how near it came, in words."""
+        near = next(iter(self.moved), None)
+        return f"{near.told.name}: {100.0 * near.share:.0f} %" if near else "none moved"
 
     @property
     def ended(self) -> bool:
@@ -68,8 +80,6 @@ class Verdict:
 def verdict_of(judged: Judged) -> Verdict:
     """Of this log."""
     released = [at for at, one in judged.fired if one.action is Action.DEPLOY]
-    nearest = next((r for r in ratings(judged) if r.share > 0.0), None)
-    near = f"{nearest.told.name}: {100.0 * nearest.share:.0f} %" if nearest else "none moved"
     return Verdict(
         judged.log.path,
         judged.log.format,
@@ -77,9 +87,10 @@ def verdict_of(judged: Judged) -> Verdict:
         judged.log.duration,
         judged.flew,
         _words(judged),
-        near,
         judged.fired[0][0] if judged.fired else math.nan,
         height_at(judged, released[0]) if released else math.nan,
+        ratings(judged),
+        unknown(judged),
     )
 
 
@@ -97,7 +108,7 @@ def height_at(judged: Judged, at: float) -> float:
     return known[-1] if known else math.nan
 
 
-def ratings(judged: Judged) -> list[Rating]:
+def ratings(judged: Judged) -> tuple[Rating, ...]:
     """Of each rule that may end a flight, the nearest first."""
     told = {one.name: one for one in rules_of(judged.pictures)}
     near = judged.nearest
@@ -106,10 +117,10 @@ def ratings(judged: Judged) -> list[Rating]:
         for rule in judged.config.profile.rules
         if rule.action >= Action.KILL and rule.name in told
     ]
-    return sorted(found, key=lambda one: -one.share)
+    return tuple(sorted(found, key=lambda one: -one.share))
 
 
-def unknown(judged: Judged) -> list[Unknown]:
+def unknown(judged: Judged) -> tuple[Unknown, ...]:
     """What of the vehicle could not be used in flight, the longest first."""
     in_flight = [one for _, one in judged.pictures if one.state == Stage.IN_FLIGHT]
     reasons: dict[str, Counter[str]] = {}
@@ -123,7 +134,7 @@ def unknown(judged: Judged) -> list[Unknown]:
         Unknown(name, sum(whys.values()) / len(in_flight), newest[name])
         for name, whys in reasons.items()
     ]
-    return sorted(found, key=lambda one: -one.share)
+    return tuple(sorted(found, key=lambda one: -one.share))
 
 
 def blocked(judged: Judged) -> list[str]:

@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from chute_ros.supervisor.machine import Stage
-from chute_ros.tools.judge_log.findings import Verdict, blocked, height_at, ratings, unknown
+from chute_ros.tools.judge_log.findings import Rating, Unknown, Verdict, blocked, height_at
 from chute_ros.tools.judge_log.flight_log import LogError
 from chute_ros.tools.judge_log.log_flight import Judged
 from chute_ros.tools.judge_log.sweep import Tried
-from chute_ros.tools.report_page import STYLE
+from chute_ros.tools.report_page import document
 from chute_ros.tools.report_parts import cell, listing, number, section, table, words
 from chute_ros.tools.state_rows import state_rows
 from chute_ros.tools.timeline import close_up, draw, escaped
 from chute_ros.tools.timeline_rows import ACTION_TONES, Curve, Mark, Marks, Row, Window
-from chute_ros.tools.timeline_rows import STYLE as TIMELINE_STYLE
 
 #: What of the vehicle is drawn: attribute of its state, label, unit, factor.
 _CURVES = (
@@ -43,12 +42,7 @@ def page(flights: Sequence[tuple[Verdict, str]], unread: Sequence[tuple[Path, Lo
         section("Flights", _overview(verdicts, unread)),
         *(text for _, text in flights),
     ]
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escaped(title)}</title>\n<style>{STYLE}{TIMELINE_STYLE}</style>\n</head>\n"
-        f"<body>\n<main>\n{''.join(parts)}</main>\n</body>\n</html>\n"
-    )
+    return document(title, parts)
 
 
 def _overview(verdicts: Sequence[Verdict], unread: Sequence[tuple[Path, LogError]]) -> str:
@@ -82,9 +76,9 @@ def flight_section(place: int, verdict: Verdict, one: Judged, tried: Sequence[Tr
         "<h3>Decisions</h3>",
         _decisions(one),
         "<h3>How near each rule came</h3>",
-        _ratings(one),
+        _ratings(verdict.ratings),
         "<h3>What was not known in flight</h3>",
-        _unknown(one),
+        _unknown(one, verdict.unknown),
     ]
     if reasons := blocked(one):
         inner += ["<h3>Flight was blocked as it took off</h3>", listing(reasons)]
@@ -147,7 +141,7 @@ def _height(one: Judged, at: float) -> str:
     return f"{height:.1f}" if math.isfinite(height) else ""
 
 
-def _ratings(one: Judged) -> str:
+def _ratings(ratings: Sequence[Rating]) -> str:
     heads = ("rule", "action", "highest counter, s", "of, s", "at, s", "blind, %")
     return table(
         (*heads, "nearest values", "conditions at the highest counter"),
@@ -162,19 +156,19 @@ def _ratings(one: Judged) -> str:
                 words(listing(r.nearest)),
                 words(listing(r.told.conditions) if r.told.peak else ""),
             )
-            for r in ratings(one)
+            for r in ratings
         ),
     )
 
 
-def _unknown(one: Judged) -> str:
+def _unknown(one: Judged, unknown: Sequence[Unknown]) -> str:
     if not any(p.state == Stage.IN_FLIGHT for _, p in one.pictures):
         return '<p class="dim">it was never in flight</p>'
     return table(
         ("measurement", "share of the flight, %", "reason, the newest"),
         (
             (cell(escaped(u.name)), number(f"{100.0 * u.share:.0f}"), words(escaped(u.why)))
-            for u in unknown(one)
+            for u in unknown
         ),
     )
 
