@@ -47,6 +47,14 @@ def pilot(rig):
     one.close()
 
 
+def opened(rig, panel, open_page):
+    """The page of the vehicle, found from the page of the fleet, its parachute plugged in."""
+    rig.start_parachute()
+    page = open_page(f"{panel.address}/fleet")
+    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    return page
+
+
 def answered(page, text):
     """Wait until an answer to an order is shown."""
     expect(page.locator(".answers")).to_contain_text(text, timeout=PATIENCE)
@@ -109,9 +117,7 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path,
 
 def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_path, await_until):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
-    rig.start_parachute()
-    page = open_page(f"{panel.address}/fleet")
-    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    page = opened(rig, panel, open_page)
     log_in(page)
     word(page, "READY")
     hold(page, "Arm parachutes")
@@ -152,9 +158,7 @@ def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_pat
 @pytest.mark.parametrize("rig", ["both"], indirect=True)
 def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_path):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
-    rig.start_parachute()
-    page = open_page(f"{panel.address}/fleet")
-    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    page = opened(rig, panel, open_page)
     log_in(page)
     word(page, "READY")
     # Then each parachute has a card, with who its device says it is,
@@ -187,9 +191,7 @@ def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(
     rig, start_panel, open_page, await_until
 ):
     panel = start_panel()
-    rig.start_parachute()
-    page = open_page(f"{panel.address}/fleet")
-    page.locator(f'a[href="/vehicle{rig.namespace}"]').click(timeout=PATIENCE)
+    page = opened(rig, panel, open_page)
     word(page, "READY")
     assert page.locator(".orders").count() == 0
     # When the supervisor falls silent, then its word is not shown as if it were now.

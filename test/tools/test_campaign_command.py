@@ -1,17 +1,16 @@
 """The command line of the campaign: mistakes are said before any flight, results are kept."""
 
-import contextlib
 import json
 import os
 import re
 import signal
-import subprocess
-import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from command_bench import assert_refused, call, flying, interrupted
 
 from chute_ros.campaign import campaign as flights
 from chute_ros.campaign import checkpoint
@@ -26,9 +25,7 @@ from chute_ros.tools.machine import machine
 TAPES = str(Path(__file__).parents[1] / "campaign" / "tapes" / "bodies.tapes")
 
 
-def run(monkeypatch, *arguments):
-    monkeypatch.setattr(sys, "argv", ["campaign", *arguments])
-    campaign.main()
+run = partial(call, campaign)
 
 
 @pytest.mark.parametrize(
@@ -66,12 +63,7 @@ def run(monkeypatch, *arguments):
     ],
 )
 def test_a_mistake_is_said_at_once(arguments, words, monkeypatch, capsys):
-    with pytest.raises(SystemExit) as ended:
-        run(monkeypatch, *arguments)
-    assert ended.value.code == 2
-    told = capsys.readouterr()
-    assert words in told.err
-    assert told.out == ""
+    assert_refused(campaign, monkeypatch, capsys, arguments, words)
 
 
 def test_it_writes_its_page_and_its_pictures(monkeypatch, tmp_path, capsys):
@@ -291,40 +283,17 @@ def test_a_folder_that_cannot_be_written_is_said(all_missed, monkeypatch, tmp_pa
     assert "not saved (name another folder with --failures): " in capsys.readouterr().out
 
 
-@contextlib.contextmanager
-def flying(*arguments):
-    """A campaign of hours that has begun, in processes of its own; none of them is left."""
-    command = [sys.executable, "-m", "chute_ros.tools.campaign", "--flights", "100000"]
-    with subprocess.Popen(
-        [*command, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
-        try:
-            yield process
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-
-
 def flown_by(out):
     return int(re.search(r"^(\d+) of 100000 flights in ", out, re.M)[1])
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
-    """As in a terminal, where every process of the command gets the signal."""
     page = tmp_path / "campaign.md"
     options = ("--jobs", str(jobs), "--page", str(page), "--failures", str(tmp_path))
-    with flying(*options) as process:
-        first = process.stderr.readline()
-        os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=60.0)
-    assert process.returncode == 130, err
+    with flying("campaign", *options) as process:
+        first, out, err = interrupted(process)
     assert err.splitlines()[-1] == "campaign: interrupted"
-    assert "Traceback" not in err
     flown = flown_by(out)
     assert flown >= int(first.split()[0]) > 0
     assert f"`make campaign FLIGHTS={flown} SEED=0`" in page.read_text()
@@ -333,7 +302,8 @@ def test_what_was_flown_until_ctrl_c_is_written(jobs, tmp_path):
 def test_a_process_of_it_that_dies_ends_it_with_what_was_flown(tmp_path):
     """As the system does that has no memory left."""
     kept = tmp_path / "kept.json"
-    with flying("--jobs", "2", "--failures", str(tmp_path), "--resume", str(kept)) as process:
+    options = ("--jobs", "2", "--failures", str(tmp_path), "--resume", str(kept))
+    with flying("campaign", *options) as process:
         process.stderr.readline()
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         os.kill(int(children[0]), signal.SIGKILL)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-import signal
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
+from command_bench import assert_refused, call, flying, interrupted
 
 from chute_ros.campaign.comparison import CURVE_OF, FACTORS, Compared, comparable
 from chute_ros.campaign.draw import draw
@@ -25,9 +23,7 @@ from chute_ros.tools.compare_picture import curves, delays
 PEER = GUARDS[3].name
 
 
-def run(monkeypatch, *arguments: str) -> None:
-    monkeypatch.setattr(sys, "argv", ["compare", *arguments])
-    compare.main()
+run = partial(call, compare)
 
 
 @pytest.mark.parametrize(
@@ -42,12 +38,7 @@ def run(monkeypatch, *arguments: str) -> None:
     ],
 )
 def test_a_mistake_is_said_at_once(arguments, words, monkeypatch, capsys) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run(monkeypatch, *arguments)
-    assert ended.value.code == 2
-    told = capsys.readouterr()
-    assert words in told.err
-    assert told.out == ""
+    assert_refused(compare, monkeypatch, capsys, arguments, words)
 
 
 def test_two_flights_make_a_page_with_pictures(monkeypatch, tmp_path, capsys) -> None:
@@ -78,19 +69,9 @@ def test_of_rockets_alone_nothing_is_written(monkeypatch, tmp_path, capsys) -> N
 
 def test_ctrl_c_writes_what_was_flown_until_then(tmp_path) -> None:
     path = tmp_path / "compare.md"
-    command = [sys.executable, "-m", "chute_ros.tools.compare", "--flights", "100000"]
-    started = subprocess.Popen(
-        [*command, "--jobs", "1", "--page", str(path)],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ},
-    )
-    assert started.stderr is not None
-    assert "flights, " in started.stderr.readline()
-    started.send_signal(signal.SIGINT)
-    out, err = started.communicate(timeout=120)
-    assert started.returncode == 130, err
+    with flying("compare", "--jobs", "1", "--page", str(path)) as process:
+        first, out, err = interrupted(process)
+    assert "flights, " in first
     assert "of 100000 seeds in" in out
     assert err.splitlines()[-1] == "compare: interrupted"
     assert path.read_text(encoding="utf-8").startswith("# Beside what people use today")

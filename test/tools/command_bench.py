@@ -1,0 +1,59 @@
+"""The commands that fly campaigns: called here, or in processes of their own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from types import ModuleType
+
+import pytest
+
+
+def call(command: ModuleType, monkeypatch, *arguments: str) -> None:
+    """With these arguments, as from a terminal."""
+    monkeypatch.setattr(sys, "argv", [command.__name__, *arguments])
+    command.main()
+
+
+def assert_refused(command: ModuleType, monkeypatch, capsys, arguments, words: str) -> None:
+    """A mistake is said at once, and nothing is begun."""
+    with pytest.raises(SystemExit) as ended:
+        call(command, monkeypatch, *arguments)
+    assert ended.value.code == 2
+    told = capsys.readouterr()
+    assert words in told.err
+    assert told.out == ""
+
+
+@contextlib.contextmanager
+def flying(name: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A campaign of hours that has begun, in processes of its own; none of them is left."""
+    command = [sys.executable, "-m", f"chute_ros.tools.{name}", "--flights", "100000"]
+    with subprocess.Popen(
+        [*command, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def interrupted(process: subprocess.Popen[str]) -> tuple[str, str, str]:
+    """Its first line of progress, and all that it wrote after a Ctrl-C: out and err. As in a
+    terminal, where every process of the command gets the signal."""
+    assert process.stderr is not None
+    first = process.stderr.readline()
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=120.0)
+    assert process.returncode == 130, err
+    assert "Traceback" not in err
+    return first, out, err
