@@ -69,15 +69,18 @@ def _begin(turn: Turn) -> None:
     if passed > turn.config.late_after:
         late = turn.now - next_deadline(turn.config, state, state.own.updated_at)
         if late > turn.config.late_after:
-            _was_late(turn, late)
+            _was_late(turn, late, passed)
             passed -= late
     count_rules(turn, passed)
 
 
-def _was_late(turn: Turn, late: float) -> None:
-    """While nobody listened, nobody was silent: what was sent meanwhile is still to come."""
+def _was_late(turn: Turn, late: float, passed: float) -> None:
+    """While nobody listened, nobody was silent: what was sent meanwhile is still to come, and has
+    as long for it as an update may be late. It comes one by one, and the first is not everybody's.
+    """
+    unheard = min(late + turn.config.late_after, passed)
     heard = {
-        link: replace(evidence, heard=evidence.heard + late)
+        link: replace(evidence, heard=evidence.heard + unheard)
         for link, evidence in turn.heard.links.items()
     }
     rules = dict(turn.state.rules)

@@ -6,6 +6,8 @@ from types import MappingProxyType
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from story import (
     FLYING,
     IDLING,
@@ -26,7 +28,7 @@ from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.conditions.device import DeviceCondition, DeviceFact
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.counter import RuleEvidence
-from chute_ros.supervisor.link_evidence import LinkEvidence, LinkLimits
+from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement, LinkLimits
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import Measured
 from chute_ros.supervisor.measurements import STANDARD_LIMITS
@@ -151,13 +153,20 @@ def counting() -> Story:
     return story
 
 
+def judged(story: Story, link: str) -> LinkJudgement:
+    """What it thinks of this link in its newest update."""
+    evidence = story.state.heard.links[link]
+    return evidence.judged(story.config.limits(link), story.state.own.updated_at)
+
+
 def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_it() -> None:
-    """The first deadline is at 0.5: until then a heartbeat is young."""
+    """The first deadline is at 0.5: until then a heartbeat is young. What still waits to be read
+    has the limit of 0.25 s to come."""
     story = counting()
     story._update((), 0.8125)
     assert {link: one.heard for link, one in story.state.heard.links.items()} == {
-        LINK: START + 0.3125,
-        UPF: START + 0.3125,
+        LINK: START + 0.5625,
+        UPF: START + 0.5625,
     }
     assert story.state.rule("tested").level == pytest.approx(0.5)
     assert story.state.own.late_count == 1
@@ -166,6 +175,30 @@ def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_i
     ]
     story._update((), 4.0)
     assert story.state.own.late_count == 2
+
+
+@given(hang=st.floats(1.0, 3.0), beat=st.floats(0.0, 0.09))
+def test_after_a_hang_of_its_own_the_first_word_of_one_makes_no_other_stale(
+    hang: float, beat: float
+) -> None:
+    """Given two links that are heard, when it hangs and reads what waits: one word after another."""
+    story = counting()
+    story.at(beat, story.heartbeat())
+    story.at(0.1, story.heartbeat(UPF))
+    story._update((story.told(vertical_speed=0.0),), 0.1 + hang)
+    assert [judged(story, one) for one in (LINK, UPF)] == [LinkJudgement.OK] * 2
+    story.at(0.11 + hang, story.heartbeat(UPF))
+    story.at(0.12 + hang, story.heartbeat())
+    assert [judged(story, one) for one in (LINK, UPF)] == [LinkJudgement.OK] * 2
+
+
+def test_after_a_hang_of_its_own_who_stays_silent_is_stale_as_soon_as_it_had_the_time() -> None:
+    story = counting()
+    story._update((story.heartbeat(UPF),), 3.0)
+    story.at(3.2, story.heartbeat(UPF))
+    assert judged(story, LINK) is LinkJudgement.OK
+    story.at(3.3, story.heartbeat(UPF))
+    assert judged(story, LINK) is LinkJudgement.STALE
 
 
 def test_one_that_is_as_late_as_allowed_is_not_late() -> None:
