@@ -151,6 +151,9 @@ class VehicleMerge:
             source = self._source(part, now)
             if source is None:
                 continue
+            # What tells how far a home has moved is of the source whose home it is.
+            if part == "altitude" and self._source("height", now) not in (None, source):
+                continue
             givers.add(source)
             word = self._words[source][part]
             # Of one accelerometer nobody tells by how much another differs.

@@ -110,13 +110,14 @@ def battery(message: Any) -> Parts:
 
 
 def position(message: Any) -> Parts:
-    """sensor_msgs/NavSatFix: latitude and longitude in degrees, WGS 84."""
+    """sensor_msgs/NavSatFix: latitude and longitude in degrees, WGS 84, and the altitude, m: above
+    the ellipsoid, which no home moves either, and of which changes alone count."""
     found = _finite(message.latitude, message.longitude)
     # Below 0 there is no fix; 0, 0 is what receivers send before they know.
     if found is None or message.status.status < 0 or found == (0.0, 0.0):
-        return {"position": None}
+        return {"position": None, "altitude": None}
     inside = abs(message.latitude) <= 90.0 and abs(message.longitude) <= 180.0
-    return {"position": found if inside else None}
+    return {"position": found if inside else None, "altitude": _finite(message.altitude)}
 
 
 def relative_altitude(message: Any) -> Parts:

@@ -67,7 +67,8 @@ class VehicleSettings(Settings):
         "sensor_msgs/BatteryState of source mavros: voltage, remaining charge",
     )
     mavros_position_topic: str = parameter(
-        "mavros/global_position/global", "sensor_msgs/NavSatFix of source mavros: position"
+        "mavros/global_position/global",
+        "sensor_msgs/NavSatFix of source mavros: position, altitude",
     )
     mavros_height_topic: str = parameter(
         "mavros/global_position/rel_alt",

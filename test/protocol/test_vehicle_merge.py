@@ -161,6 +161,17 @@ def test_when_all_are_old_the_newest_counts_and_who_does_not_know_any_more_gives
     assert math.isnan(one.state(30.02).attitude_age)
 
 
+def test_an_altitude_counts_beside_the_height_of_its_own_source_alone():
+    """What home has moved by is the difference of the two."""
+    both = ("mavros", "height", (12.0,), 10.0), ("mavros", "altitude", (512.0,), 10.0)
+    one = hear_all(merge("odometry", "mavros"), *both)
+    assert one.state(10.0).altitude == 512.0
+    one.hear("odometry", {"height": (3.0,)}, 10.0)
+    assert (one.state(10.0).height, math.isnan(one.state(10.0).altitude)) == (3.0, True)
+    other = hear_all(merge("mavros", "odometry"), *both, ("odometry", "height", (3.0,), 10.0))
+    assert (other.state(10.0).height, other.state(10.0).altitude) == (12.0, 512.0)
+
+
 def test_the_ages_that_vehicle_state_brings_grow_by_the_time_since():
     one = merge()
     told = VehicleState(

@@ -168,9 +168,11 @@ def test_position():
         (0, 91.0, 8.5, False),
         (0, 47.4, -181.0, False),
     ):
-        message = NavSatFix(latitude=latitude, longitude=longitude)
+        message = NavSatFix(latitude=latitude, longitude=longitude, altitude=512.5)
         message.status.status = status
         expected = {"position": (latitude, longitude) if known else None}
+        fixed = status >= 0 and (latitude, longitude) != (0.0, 0.0) and latitude == latitude
+        expected["altitude"] = (512.5,) if fixed else None
         assert readings.position(message) == expected, (status, latitude, longitude)
 
 
@@ -235,7 +237,7 @@ def test_no_content_raises_and_what_is_known_is_finite(orientation, z, vector, c
 def test_no_content_of_mavros_raises(one, other, status, number, connected):
     readings.battery(SimpleNamespace(voltage=one, percentage=other))
     readings.relative_altitude(SimpleNamespace(data=one))
-    fix = SimpleNamespace(latitude=one, longitude=other, status=SimpleNamespace(status=status))
-    readings.position(fix)
+    fix = {"latitude": one, "longitude": other, "altitude": other}
+    readings.position(SimpleNamespace(**fix, status=SimpleNamespace(status=status)))
     readings.mavros_extended_state(SimpleNamespace(landed_state=number))
     readings.mavros_state(SimpleNamespace(connected=connected, armed=True, system_status=number))

@@ -33,10 +33,7 @@ _READERS: dict[str, Callable[[Any], readings.Parts]] = {
     "local_position/odom": readings.odometry,
     "local_position/pose": lambda message: {"height": (message.pose.position.z,)},
     "local_position/velocity_local": lambda message: {"vertical_speed": (message.twist.linear.z,)},
-    "global_position/global": lambda message: {
-        **readings.position(message),
-        "altitude": (message.altitude,),
-    },
+    "global_position/global": readings.position,
     "imu/data": readings.imu,
     "imu/static_pressure": lambda message: {"pressure": (message.fluid_pressure,)},
     "battery": readings.battery,
