@@ -21,7 +21,8 @@ _COMPLAIN_EACH = 1.0
 
 class DecisionCarrier:
     """Lets decisions through the one gate to carry_out, and reports how far they got. age: how
-    old (s) what came is, by the wall clock here less its stamp (s)."""
+    old (s) what came is, by the wall clock here less its stamp (s). for_others is told of those
+    that others carry out."""
 
     def __init__(
         self,
@@ -30,9 +31,11 @@ class DecisionCarrier:
         shell: Shell,
         age: Callable[[float], float],
         carry_out: Callable[[Decision], None],
+        for_others: Callable[[Decision], None],
     ) -> None:
         self._gate = DecisionGate(name, max_decision_age)
         self._shell, self._age, self._carry_out = shell, age, carry_out
+        self._for_others = for_others
         #: The newest report on each of the newest decisions.
         self._reports: dict[tuple[int, int], ActionTold] = {}
         #: How many of those that came were judged so.
@@ -74,6 +77,8 @@ class DecisionCarrier:
             self._carry_out(decision)
             why = f"({decision.rule}): {'; '.join(decision.reasons)}"
             self._log(Severity.WARNING, f"{_name(decision)} {why}")
+        elif verdict is Verdict.NOT_ADDRESSED and self._gate.counts(decision, age):
+            self._for_others(decision)
         elif verdict is Verdict.REPEATED:
             # The supervisor has not heard our report, perhaps because it was not there yet.
             told = self._reports.get((decision.epoch, decision.id))

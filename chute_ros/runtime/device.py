@@ -137,7 +137,8 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
         self._details = details
         self.watch = SupervisorWatch(settings.max_decision_age, settings.supervisor_lost_after)
         self.decisions = DecisionCarrier(
-            name, settings.max_decision_age, shell, self.watch.age, self.carry_out
+            *(name, settings.max_decision_age, shell, self.watch.age),
+            *(self.carry_out, self.decided_for_others),
         )
         self.desk = RequestTracker(shell, self.decisions.report)
         #: The newest answer of the link; None: none came yet.
@@ -158,6 +159,9 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
     @abstractmethod
     def carry_out(self, decision: Decision) -> None:
         """Do what the gate let through."""
+
+    def decided_for_others(self, decision: Decision) -> None:
+        """Another node carries this out; it may come again."""
 
     def failed_end(self, token: int, text: str) -> Any:
         """The end of a request that could not be begun."""

@@ -86,6 +86,11 @@ class DecisionGate:
         self.acted.append(order)
         return Verdict.ACT
 
+    def counts(self, decision: Decision, age: float) -> bool:
+        """One for others, judged before, is of who leads now, meant, and new enough to be acted on
+        there."""
+        return not decision.shadow and self._young(age) and decision.epoch == self.newest_epoch
+
     def _young(self, age: float) -> bool:
         return -self.max_decision_age <= age <= self.max_decision_age
 

@@ -17,7 +17,9 @@ class Log:
 
 def test_kills_and_deploys_are_found_with_their_epochs_in_their_order() -> None:
     log = Log()
-    carrier = DecisionCarrier("mavlink_parachute", 0.5, log, lambda age: age, lambda _: None)
+    carrier = DecisionCarrier(
+        *("mavlink_parachute", 0.5, log, lambda age: age), lambda _: None, lambda _: None
+    )
     for number, action in ((3, Action.FLIGHT_BLOCK_RELEASE), (4, Action.KILL), (5, Action.DEPLOY)):
         targets = ("mavlink_parachute",)
         decision = Decision(12, number, action, "tips over", ("tilt 61 deg",), targets)

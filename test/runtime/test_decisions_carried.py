@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 from runtime_shell import Shell
 
+from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.protocol.events import Severity
 from chute_ros.runtime.decisions import MOST_REPORTS, DecisionCarrier
@@ -16,12 +20,18 @@ class Carried:
     def __init__(self, shell: Shell) -> None:
         self.done: list[int] = []
         self.shell = shell
-        self.carrier = DecisionCarrier("upf_can", 0.5, shell, lambda age: age, self._carry_out)
+        self.others: list[int] = []
+        self.carrier = DecisionCarrier(
+            "upf_can", 0.5, shell, lambda age: age, self._carry_out, self._for_others
+        )
 
     def _carry_out(self, decision: Decision) -> None:
         if decision.action is Action.NONE:
             raise ZeroDivisionError
         self.done.append(decision.id)
+
+    def _for_others(self, decision: Decision) -> None:
+        self.others.append(decision.id)
 
     def hear(self, *told: tuple[int, Action], age: float = 0.01, epoch: int = 8) -> None:
         waiting = [(decision(number, action, epoch), age) for number, action in told]
@@ -88,3 +98,31 @@ def test_reports_of_long_ago_are_forgotten(shell: Shell) -> None:
         node.hear((number, Action.FLIGHT_BLOCK))
         node.carrier.report(decision(number, Action.FLIGHT_BLOCK), Outcome.CONFIRMED, "told")
     assert set(node.carrier._reports) == {(8, number) for number in numbers[1:]}
+
+
+def test_what_others_carry_out_is_told_if_it_is_young_meant_and_of_who_leads(shell: Shell) -> None:
+    node = Carried(shell)
+
+    def told(number: int, epoch: int = 8, age: float = 0.01, shadow: bool = False) -> list[int]:
+        one = replace(
+            decision(number, Action.DEPLOY, epoch), targets=("umbilical",), shadow=shadow
+        )
+        node.carrier.heard([(one, age)], shell.now)
+        return node.others
+
+    assert told(1) == [1]
+    assert told(2, age=0.6) == [1], "too late"
+    assert told(3, shadow=True) == [1], "only said"
+    assert told(4, epoch=7) == [1], "of one that led before"
+    assert told(5, epoch=9) == [1, 5]
+    assert node.done == []
+
+
+def test_the_autopilots_node_is_told_of_a_deploy_on_another_link(shell: Shell) -> None:
+    """PX4 refuses to disarm in flight; it may be terminated once a deploy is decided."""
+    told: list[float] = []
+    shell.link = SimpleNamespace(deploy_decided=told.append)
+    node = MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=False), shell)
+    for number, action in ((1, Action.KILL), (2, Action.FLIGHT_BLOCK), (3, Action.DEPLOY)):
+        node.heard_decisions([(decision(number, action), 0.01)], shell.now)
+    assert told == [shell.now]

@@ -85,6 +85,10 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
             blocked = _DISARMED if undone else _LEFT_ALONE
             self.carry_out_flight_block(decision, blocked, "a vehicle that arms is left alone")
 
+    def decided_for_others(self, decision: Decision) -> None:
+        if decision.action is Action.DEPLOY:
+            self.shell.in_link(lambda link, now: link.deploy_decided(now))
+
 
 def _why_unhealthy(one: ParachuteTracker, now: float) -> list[str]:
     """In words that say what a person can do; empty: it is healthy."""

@@ -125,6 +125,12 @@ class MavlinkLink:
         select = triggers or int(self.config.default_triggers)
         self.set_triggers(token, select if arm else 0, select, "", now)
 
+    def deploy_decided(self, now: float) -> None:
+        """A parachute is released, on whatever link: a kill that is under way, or comes in this
+        flight, may go a way that releases as well."""
+        self._deploy_decided_in = self._devices.arming_count()
+        self.update(now)
+
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
         self._deploy_decided_in = self._devices.arming_count()
@@ -174,7 +180,7 @@ class MavlinkLink:
         goal = goals.kill(
             autopilot,
             lambda: self._care.plan_of(autopilot),
-            self._deploy_decided,
+            self._release_allowed,
             self.config.commands.ack_timeout,
             now,
         )
@@ -277,7 +283,7 @@ class MavlinkLink:
             if ack.result == results.ACCEPTED:
                 self._devices.accepted(ack, now)
 
-    def _deploy_decided(self) -> bool:
+    def _release_allowed(self) -> bool:
         """In this flight: one begins as the autopilot is armed."""
         return self._deploy_decided_in == self._devices.arming_count()
 

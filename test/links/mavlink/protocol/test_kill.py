@@ -92,6 +92,16 @@ def test_px4_is_terminated_only_once_a_deploy_was_decided(method):
     assert "kill (forced_disarm): temporarily rejected" in end.message
 
 
+def test_a_deploy_that_another_link_carries_out_allows_it_as_well():
+    """Given a parachute on DroneCAN: the autopilot refuses to disarm, and the canopy opens."""
+    bench = flying(copter)
+    kill(bench)
+    bench.at(1.1).hear(PILOT, ack(DISARM, NOT_NOW))
+    assert ways(bench) == [(0.0, DISARM)]
+    bench.at(1.15).call("deploy_decided")
+    assert (0.15, TERMINATE) in ways(bench), "without waiting for anything more"
+
+
 def test_a_deploy_of_the_flight_before_allows_nothing_in_this_one():
     bench = flying(copter).hear(CHUTE, heartbeat(), status()).call("deploy", 2, False)
     bench.hear(PILOT, copter(False)).at(1.5).hear(PILOT, copter(True))
