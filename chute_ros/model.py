@@ -175,11 +175,15 @@ class ParachuteStatus:
 
     @property
     def healthy(self) -> bool:
-        """The device was heard in time, is whole, and its parachute can still be released."""
+        """The device was heard in time, is whole, and its parachute can still be released: one
+        that is LAUNCHED and not deployed has a drogue out before it."""
+        if self.state is ParachuteState.LAUNCHED and self.deployed:
+            return False
         return self.link_state is LinkState.OK and self.state in (
             ParachuteState.READY,
             ParachuteState.TAKEOFF,
             ParachuteState.ARMED,
+            ParachuteState.LAUNCHED,
         )
 
 

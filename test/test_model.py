@@ -73,7 +73,10 @@ HEALTHY = {model.ParachuteState.READY, model.ParachuteState.TAKEOFF, model.Parac
 @pytest.mark.parametrize("link", list(model.LinkState))
 def test_healthy_is_heard_in_time_and_still_able_to_release(link, state):
     status = model.ParachuteStatus("1/161", link, state)
-    assert status.healthy == (link is model.LinkState.OK and state in HEALTHY)
+    drogue_out = state is model.ParachuteState.LAUNCHED
+    assert status.healthy == (link is model.LinkState.OK and (state in HEALTHY or drogue_out))
+    released = model.ParachuteStatus("1/161", link, state, deployed=True)
+    assert released.healthy == (link is model.LinkState.OK and state in HEALTHY)
 
 
 def test_reading_never_received_has_no_age():

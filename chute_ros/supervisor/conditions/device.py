@@ -23,6 +23,8 @@ class DeviceFact(enum.Enum):
     ASKS_FOR_KILL = "asks_for_kill"
     DEPLOYED = "deployed"
     ABNORMAL = "abnormal"
+    #: No canopy at all, a drogue included, as far as anybody has told in this flight.
+    NOTHING_OUT = "nothing_out"
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,15 @@ class DeviceCondition(Condition):
                 return f"{who}: its own status says deployed" if out else "no parachute is out"
 
             return Finding(bool(out), tell)
+        if self.fact is DeviceFact.NOTHING_OUT:
+            # What came out stays out, however old the word is.
+            canopies = [
+                f"{name} {device} says LAUNCHED"
+                for name in names
+                for device, status in state.evidence(name).devices.items()
+                if status.deployed or status.state is ParachuteState.LAUNCHED
+            ]
+            return Finding(not canopies, lambda: "; ".join(canopies) or "no canopy is out")
         wrong = [
             f"{name} {device} is ABNORMAL ({'; '.join(status.faults) or 'no reason given'})"
             for name in names

@@ -350,13 +350,16 @@ class FlightComputer:
         return faults
 
     def _state(self, now: float, pause: str) -> ParachuteState:
-        """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest."""
+        """Onto the UPF numbering. Deployed wins over all; a fault wins over the rest. Under a
+        drogue that is not the parachute it is LAUNCHED, and not deployed."""
         if self.deployed or self.landed:
             return ParachuteState.TOUCHDOWN if self.landed else ParachuteState.LAUNCHED
         if pause and self.liveness.state is LinkState.OK:
             return ParachuteState.NOT_READY
         if self._faults(now, pause):
             return ParachuteState.ABNORMAL
+        if self.flying and self.seen_out("drogue"):
+            return ParachuteState.LAUNCHED  # and the main, which is the parachute, is not out yet
         return ParachuteState.ARMED if self.armed else ParachuteState.READY
 
 

@@ -195,6 +195,20 @@ def test_what_is_deployed_stays_so_in_silence():
         assert (seen.state, seen.deployed) == (_LAUNCHED, True), pause
 
 
+def test_under_a_drogue_before_its_parachute_it_is_launched_and_not_deployed():
+    """Given the main as the parachute: the drogue is known to be out, and the main can be fired."""
+    rocket = Rocket(main_counts=True)
+    for at, mode in ((0.0, ASCENT), (1.0, COAST)):
+        rocket.says(at, mode)
+        assert status(rocket, at).state is _ARMED
+    end = rocket.descends(2.0, 1.0)
+    seen = status(rocket, end)
+    assert (seen.state, seen.deployed, seen.healthy) == (_LAUNCHED, False, True)
+    end = rocket.descends(end + 0.1, 1.0, MAIN)
+    seen = status(rocket, end)
+    assert (seen.state, seen.deployed, seen.healthy) == (_LAUNCHED, True, False)
+
+
 def test_it_has_landed_when_its_altitude_rests_for_five_seconds_after_a_deployment():
     rocket = Rocket()
     end = rocket.descends(0.0, 10.0)

@@ -13,8 +13,8 @@ ON_PAD = {"ssa_drogue_deployed": "0", "ssa_main_deployed": "0", "fix_type": "3"}
 class Rocket:
     """A flight computer that started 100 s before time 0."""
 
-    def __init__(self):
-        self.computer = FlightComputer(LIMITS)
+    def __init__(self, main_counts=False):
+        self.computer = FlightComputer(LIMITS, main_counts)
         self.started = -100.0
 
     def says(self, at, mode, **texts):
