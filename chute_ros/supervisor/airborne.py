@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.contradictions import felt_fall
 from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
 from chute_ros.supervisor.orders import armed_since, note_released
 from chute_ros.supervisor.quick_replace import replace
@@ -15,6 +16,8 @@ from chute_ros.supervisor.turn import Turn
 
 #: Off the ground for so long it was seen to be up, on it to be down, s; no look counts for more.
 _UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 0.5, 1.0, 0.2
+#: A fall that was felt gave it so much, m/s: 0.6 s of free fall.
+_FELL = 6.0
 
 
 def check_vehicle(turn: Turn) -> None:
@@ -28,7 +31,7 @@ def check_vehicle(turn: Turn) -> None:
         if stage in (Stage.STARTUP, Stage.BLOCKED, Stage.KILLING):
             turn.alarm(f"in the air although {stage.name}")
         turn.move(Event.TAKEN_OFF)
-        _took_off(turn, anew=stage is not Stage.LANDED)
+        _took_off(turn, anew=stage is not Stage.LANDED, armed=stage is Stage.ARMED)
     elif in_air and _falls_since_kill(turn):
         turn.alarm("it falls since the kill, although it said that it stood")
         turn.flight = replace(turn.flight, airborne=True, airborne_since=turn.now)
@@ -87,10 +90,10 @@ def note_down(turn: Turn) -> None:
 def _disarm_parachutes(turn: Turn) -> None:
     """After a flight nobody is to carry an armed one; those that arm themselves disarm
     themselves."""
-    wanted = turn.config.disarm_after_landing and turn.flight.armed_by_us
+    wanted = turn.config.disarm_after_landing and turn.flight.armed_on_ground
     if wanted and turn.state.mode is i.Mode.ACTIVE:
         turn.outputs.append(i.ArmDevices(0, False, 0, turn.config.deploy_links))
-        turn.flight = replace(turn.flight, armed_by_us=False)
+        turn.flight = replace(turn.flight, armed_on_ground=False)
 
 
 def note_height(turn: Turn) -> None:
@@ -107,16 +110,19 @@ def note_height(turn: Turn) -> None:
     told = height if math.isnan(by_pressure) else by_pressure
     # Far below the take-off nobody knows the height above the ground.
     high = told >= minimum or (told <= -minimum and up_for >= _UP_TAKES)
+    # What stands feels no fall: two origins against a barometer that was clogged before.
+    felt = height >= minimum and felt_fall(state.heard.motion) <= -_FELL
     if math.isnan(told):
         # One that tells what cannot be is no silence: it may run away on the ground.
         wrong = now < state.measured("height").doubted_at + flight.HIGH_AFTER
         high = not wrong and now >= state.flight.airborne_since + flight.HIGH_AFTER
+    high |= felt
     since = state.heard.at_ground_since
     if not flight.at_ground(turn.config, state, by_pressure, now):
         since = math.nan
     elif math.isnan(since):
         since = now
-    down = now >= since + _DOWN_TAKES
+    down = now >= since + _DOWN_TAKES and not felt
     was_high, up_for = (state.flight.was_high or high) and not down, 0.0 if down else up_for
     if (was_high, up_for) != (state.flight.was_high, state.flight.up_for):
         turn.flight = replace(turn.flight, was_high=was_high, up_for=min(up_for, _UP_TAKES))
@@ -124,8 +130,9 @@ def note_height(turn: Turn) -> None:
         turn.heard = replace(turn.heard, at_ground_since=since)
 
 
-def _took_off(turn: Turn, anew: bool) -> None:
-    """anew: it stood disarmed before; otherwise it bounced, or was not down at all."""
+def _took_off(turn: Turn, anew: bool, armed: bool) -> None:
+    """anew: it stood disarmed before; otherwise it bounced, or was not down at all. armed: its
+    parachutes were."""
     vehicle, home = turn.heard.vehicle, None if anew else turn.flight.home
     here = (vehicle.latitude, vehicle.longitude)
     if home is None and on_earth(*here):
@@ -137,6 +144,7 @@ def _took_off(turn: Turn, anew: bool) -> None:
         turn.flight,
         flown=True,
         airborne=True,
+        armed_on_ground=turn.flight.armed_on_ground or armed,
         airborne_since=turn.now,
         was_high=False,
         up_for=0.0,

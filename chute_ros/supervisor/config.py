@@ -140,7 +140,7 @@ class SupervisorConfig(Settings):
         "m",
     )
     disarm_after_landing: bool = parameter(
-        True, "disarm the parachutes that safety/arm has armed after landing and disarming"
+        True, "disarm the parachutes that were armed on the ground after landing and disarming"
     )
     late_after: float = parameter(
         0.2,

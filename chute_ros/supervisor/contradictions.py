@@ -6,7 +6,8 @@ contradict is denied, with the reason:
 
 - a sink of the estimator, where the barometer tells none, or has not come down by what it takes to
   speed up so much since it was last heard; without a barometer, where no force was
-  missing while it is said to have speeded up;
+  missing while it is said to have speeded up. Where the accelerometer felt the fall, two origins
+  stand against a barometer that may be clogged;
 - a force as in a fall, where no speed follows from it (what is not carried by a force f speeds up
   downwards by 9.8 - f at least);
 - a tilt, where it is carried in full and does not speed up.
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from statistics import fmean
 from typing import NamedTuple
 
@@ -38,12 +40,17 @@ _GAP = 0.35
 _SINK_DIFFERS, _OF_SINK = 2.0, 0.5
 #: Two heights of a barometer that lives differ by no more than this from what they are, m.
 _BAROMETER_ERRS = 2.5
+#: Heights above the take-off differ by so much, m, and this part of them: a standard atmosphere is
+#: wrong by 4 % each 10 degrees, and the weather moves by some metres in a flight.
+_HEIGHTS_DIFFER, _OF_HEIGHT = 20.0, 0.3
 #: Speeded up by so much more than was felt, m/s, in this time at least, s.
 _NOT_FELT, _FELT_OVER = 4.0, 1.0
 #: Below this a force is that of a fall, m/s^2: half of what a body at rest feels.
 FREE_FALL = 4.9
 #: It must have been that for so long, s, and the speed be higher by so much, m/s.
 _FALLS_FOR, _NO_SPEED = 0.25, 2.0
+#: Of a sink that is told, so much was felt, and at least that, m/s.
+_OF_FELT, _FELT = 0.5, 4.0
 #: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
 #: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
 _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
@@ -118,8 +125,9 @@ def commanded(
     if sink_beyond_target <= _SINKS_AS_TOLD:
         beyond = f"{sink_beyond_target:+.1f} m/s beyond that, limit {_SINKS_AS_TOLD:g}"
         told[VERTICAL_SPEED] = f"it was commanded ({beyond})"
-        # So is the force that is missing while it does so, of one that lies as it shall.
-        if not attitude_error > _FOLLOWS:
+        # So is the force that is missing while it does so, of one that lies as it shall; not where
+        # another origin tells of a sink that nobody commanded.
+        if not attitude_error > _FOLLOWS and not climb_beyond_target > _SINKS_AS_TOLD:
             told[ACCELERATION] = told[VERTICAL_SPEED]
     if climb_beyond_target <= _SINKS_AS_TOLD:
         told[CLIMB_RATE] = f"it was commanded ({climb_beyond_target:+.1f} m/s beyond that)"
@@ -146,7 +154,29 @@ def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str
         return _not_fallen(motion, drop) or _not_felt(motion)
     if barometer.rate - told <= max(_SINK_DIFFERS, _OF_SINK * abs(told)):
         return ""
+    if felt_fall(motion) <= min(-_FELT, _OF_FELT * motion[-1][1]):
+        return ""
     return f"the barometer tells {barometer.rate:+.1f} m/s where it tells {told:+.1f}"
+
+
+def felt_fall(motion: tuple[Moment, ...]) -> float:
+    """The vertical speed that a fall has given it lately, as its accelerometer felt it, m/s: 0, or
+    negative. Whichever way up it is: no attitude is asked."""
+    fell = [one[2] for one in motion if one[2] < FREE_FALL]
+    if len(fell) < 3 or max(fell) - min(fell) < _FORCE_LIVES:
+        return 0.0
+    steps = [(after[0] - before[0], after[2]) for before, after in pairwise(motion)]
+    return sum([(f - GRAVITY) * dt for dt, f in steps if f < FREE_FALL and dt <= _GAP])
+
+
+def height_denied(height: float, by_pressure: float) -> str:
+    """Why a height above the take-off, m, is not so, by the barometer's; empty: nothing denies it.
+    Which of the two is wrong nobody can tell."""
+    if not abs(height - by_pressure) > max(_HEIGHTS_DIFFER, _OF_HEIGHT * abs(height)):
+        return ""
+    return (
+        f"the barometer tells {by_pressure:.0f} m above the take-off where it tells {height:.0f}"
+    )
 
 
 def least_drop(sink: float, passed: float) -> float:

@@ -119,11 +119,12 @@ def above_its_ground(state: State, height: float) -> float:
 
 def moving(config: SupervisorConfig, state: State, now: float) -> str:
     """How the vehicle moves as nothing on the ground does, in words; empty: it does not."""
-    speed = measured(config, state, VERTICAL_SPEED, now)
+    speed, rate = measured(config, state, VERTICAL_SPEED, now), pressure_rate(config, state, now)
     limit = config.profile.moving_speed
-    if abs(speed) > limit and not (speed < 0.0 and VERTICAL_SPEED in state.heard.denied):
+    # A climb decides nothing but this, and the barometer alone is asked.
+    denied = VERTICAL_SPEED in state.heard.denied if speed < 0.0 else abs(rate) <= _STANDS_BELOW
+    if abs(speed) > limit and not denied:
         return f"vertical_speed {speed:.1f} m/s (nothing on the ground beyond {limit:g})"
-    rate = pressure_rate(config, state, now)
     if VERTICAL_SPEED in state.heard.denied and abs(rate) > limit:
         return f"climb_rate {rate:.1f} m/s (nothing on the ground beyond {limit:g})"
     force = measured(config, state, ACCELERATION, now)
@@ -151,9 +152,10 @@ def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: f
 
 
 def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool:
-    """After a kill or a deploy it has not moved for a while: the autopilot of a vehicle that has
-    crashed may say for ever that it is in the air."""
-    return state.stage in _ENDED and now >= state.heard.still_since + STILL_FOR
+    """After a kill or a deploy, or with its motors off, it has not moved for a while: the
+    autopilot of a vehicle that has crashed may say for ever that it is in the air."""
+    off = armed(config, state, now) is Armed.DISARMED
+    return (off or state.stage in _ENDED) and now >= state.heard.still_since + STILL_FOR
 
 
 def is_still(config: SupervisorConfig, state: State, now: float) -> bool:
@@ -168,7 +170,8 @@ def low_as_at_take_off(config: SupervisorConfig, state: State, now: float) -> bo
     height = measured(config, state, HEIGHT, now) - state.flight.armed_height
     by_pressure = pressure_height(config, state, now)
     limit = config.takeoff_height
-    return height <= limit and not by_pressure > limit and not moving(config, state, now)
+    low = height <= limit or (math.isnan(height) and by_pressure <= limit)
+    return low and not by_pressure > limit and not moving(config, state, now)
 
 
 def fresh(config: SupervisorConfig, state: State, age: float, now: float) -> bool:

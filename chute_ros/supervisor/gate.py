@@ -65,7 +65,7 @@ def against_any_rule(config: SupervisorConfig, state: State, now: float) -> str:
     # Under a canopy that does not carry the next one may be released.
     if not in_flight and not (state.stage is Stage.DEPLOYED and state.flight.airborne):
         return f"the vehicle is {state.stage.name}, not in flight"
-    if state.killing.kill_only and state.stage is Stage.KILLING:
+    if state.stage is Stage.KILLING and _killed_alone(state):
         return "a person asked for the kill alone; safety/deploy releases"
     killed = _killed(state, now)
     if flight.down_undisputed(config, state, now) and not killed:
@@ -112,6 +112,14 @@ def too_low(config: SupervisorConfig, state: State, now: float) -> str:
     if profile.minimum_height > 0.0 and not state.flight.was_high:
         return f"it was never seen at the minimum height, {profile.minimum_height:g} m"
     return ""
+
+
+def _killed_alone(state: State) -> bool:
+    """A person asked for the kill under way alone. One that came to nothing has stopped no motors,
+    and what falls later does not fall by it."""
+    kill = state.killing.kill
+    in_vain = kill is not None and kill.given_up and not kill.confirmed
+    return state.killing.kill_only and not in_vain
 
 
 def _killed(state: State, now: float) -> bool:

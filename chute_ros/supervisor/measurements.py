@@ -60,13 +60,15 @@ HEIGHT, VERTICAL_SPEED = "height", "vertical_speed"
 #: What tells of a fall whichever way up it is.
 FALL_SIGNS = ("vertical_speed", "acceleration")
 PRESSURE_ALTITUDE, ACCELERATION, TILT = "pressure_altitude", "acceleration", "tilt_deg"
-#: From the barometer's heights of the last second (where it tells none from the estimator's), and
-#: from the vertical speeds of the last second, m/s^2. On these conditions can rest as on the
-#: measurements that tell them.
+#: From the barometer's heights of the last second (where it tells none from the estimator's), from
+#: the vertical speeds of the last second, m/s^2, and from the accelerations of the last three
+#: seconds, m/s. On these conditions can rest as on the measurements that tell them.
 CLIMB_RATE, VERTICAL_ACCELERATION = "climb_rate", "vertical_acceleration"
+FELT_FALL = "felt_fall"
 DERIVED: dict[str, tuple[str, ...]] = {
     CLIMB_RATE: (HEIGHT, PRESSURE_ALTITUDE),
     VERTICAL_ACCELERATION: (VERTICAL_SPEED,),
+    FELT_FALL: (ACCELERATION,),
 }
 
 

@@ -7,7 +7,7 @@ from chute_ros.model import Action, Armed, Outcome
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_reached, end_kill
-from chute_ros.supervisor.gate import OPERATOR, out_already
+from chute_ros.supervisor.gate import OPERATOR, out_already, too_low
 from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
 from chute_ros.supervisor.pending import Pending
 from chute_ros.supervisor.quick_replace import replace
@@ -103,6 +103,7 @@ def _to_killing(turn: Turn, why: str) -> None:
                 kill_only=False,
                 killed_in_flight=turn.flight.airborne,
                 killed_standing=stood,
+                killed_low=bool(too_low(turn.config, turn.state, turn.now)),
                 killed_at=turn.now,
                 killed_height=readings.measured(turn.config, turn.state, "height", turn.now),
                 killed_sinking=max(sinking, 0.0),

@@ -8,9 +8,11 @@ from itertools import pairwise
 from statistics import fmean, median
 from typing import TYPE_CHECKING
 
-from chute_ros.supervisor.contradictions import NO_DROP, NOT_TOLD, Drop, Rise
+from chute_ros.supervisor.contradictions import NO_DROP, NOT_TOLD, Drop, Rise, felt_fall
 from chute_ros.supervisor.measurements import (
+    ACCELERATION,
     CLIMB_RATE,
+    FELT_FALL,
     HEIGHT,
     PRESSURE_ALTITUDE,
     VERTICAL_ACCELERATION,
@@ -39,6 +41,9 @@ def reading(config: SupervisorConfig, state: State, name: str, now: float) -> tu
         return math.nan, _HEIGHT_LOST
     if name == VERTICAL_ACCELERATION:
         return _vertical_acceleration(config, state, now)
+    if name == FELT_FALL:
+        why = unusable(config, state, ACCELERATION, now)
+        return (math.nan, why) if why else (felt_fall(state.heard.motion), "")
     known = state.measured(name)
     why = state.heard.unfit.get(name) or known.unusable(config.profile.limits[name], now)
     if not why:
@@ -135,9 +140,9 @@ def _estimated_rate(config: SupervisorConfig, state: State, now: float) -> tuple
 def _vertical_acceleration(
     config: SupervisorConfig, state: State, now: float
 ) -> tuple[float, str]:
-    """Of the last second of vertical speeds, m/s^2, or NaN and why there is none."""
-    known = state.measured(VERTICAL_SPEED)
-    if why := known.unusable(config.profile.limits[VERTICAL_SPEED], now):
+    """Of the last second of vertical speeds, m/s^2, or NaN and why there is none. Where no speed
+    is told, of those that the heights tell."""
+    if why := unusable(config, state, VERTICAL_SPEED, now):
         return math.nan, why
     newest = state.heard.motion[-1][0] if state.heard.motion else math.nan
     told = [(one[0], one[1]) for one in state.heard.motion if newest - one[0] <= 1.0]

@@ -44,7 +44,7 @@ def arm_done(turn: Turn, one: i.ArmDone) -> None:
     if one.success and listed(turn.state.stage, event):
         turn.move(event)
     if one.success:
-        turn.flight = replace(turn.flight, armed_by_us=one.arm)
+        turn.flight = replace(turn.flight, armed_on_ground=one.arm)
     elif not one.token:
         turn.alarm(f"the parachutes are not disarmed after the flight: {one.message}")
     turn.finish(one.token, one.success, one.success, one.message)
@@ -114,8 +114,15 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
     in_air = flight.in_air(turn.config, turn.state, turn.now)
     if in_air and flight.says_air_in_vain(turn.config, turn.state, turn.now):
         in_air = False
-    if in_air or stage is Stage.IN_FLIGHT:
-        turn.finish(one.token, False, False, "refused: the vehicle is in the air")
+    if in_air or (in_air is None and stage is Stage.IN_FLIGHT):
+        why = (
+            "is in the air" if in_air else "was in the air, and nothing fresh says that it is down"
+        )
+        text = f"refused: the vehicle {why}"
+        if in_air is None or flight.is_still(turn.config, turn.state, turn.now):
+            text += "; if it lies still: safety/kill (kill_only), and this again after "
+            text += f"{flight.STILL_FOR:g} s"
+        turn.finish(one.token, False, False, text)
     elif in_air is None and turn.deploying.deploy_rule:
         text = "refused: a deploy is under way and nothing fresh says that it is on the ground"
         turn.finish(one.token, False, False, text)

@@ -34,6 +34,8 @@ class Killing:
     killed_sinking: float = math.nan
     #: A person asked for the kill under way alone: no deploy follows it by itself.
     kill_only: bool = False
+    #: That kill was decided lower than a deploy needs, as far as anybody knew.
+    killed_low: bool = False
     #: It said before that kill that it stands, or is disarmed: that is not the kill's effect.
     killed_standing: bool = False
 
@@ -87,8 +89,8 @@ class ThisFlight:
     ground_pressure_altitude: float = math.nan
     #: (link, device) that were released before the flight: they say nothing of what happens in it.
     released_before: frozenset[tuple[str, str]] = frozenset()
-    #: `safety/arm` has armed the parachutes: after the flight they are disarmed again.
-    armed_by_us: bool = False
+    #: The parachutes were armed before it, by whomever: after the flight they are disarmed again.
+    armed_on_ground: bool = False
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from chute_ros.model import Armed, VehicleState
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.contradictions import commanded, denials, noted
+from chute_ros.supervisor.contradictions import commanded, denials, height_denied, noted
 from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import (
@@ -159,6 +159,8 @@ def _note_contradictions(turn: Turn) -> None:
         readings.pressure_change(turn.config, state, now),
         readings.pressure_drop(turn.config, state, now),
     )
+    if why := _height_denied(turn):
+        denied = {**denied, HEIGHT: why}
     tilt, error, beyond, rate = (
         readings.measured(turn.config, state, name, now)
         for name in (TILT, "attitude_error", "sink_beyond_target", CLIMB_RATE)
@@ -181,6 +183,16 @@ def _note_contradictions(turn: Turn) -> None:
         if state.flight.airborne and last < begun + CONTRADICTED_FOR <= now:
             turn.warn(f"{name} is contradicted: {denied[name]}")
     _note_fitness(turn)
+
+
+def _height_denied(turn: Turn) -> str:
+    """In flight, where a barometer that is clogged withholds a deploy as much as an estimator that
+    is wrong would release one: a person is told of both."""
+    if not turn.flight.airborne:
+        return ""
+    height = readings.measured(turn.config, turn.state, HEIGHT, turn.now)
+    by_pressure = readings.pressure_height(turn.config, turn.state, turn.now)
+    return height_denied(flight.above_its_ground(turn.state, height), by_pressure)
 
 
 def _note_fitness(turn: Turn) -> None:

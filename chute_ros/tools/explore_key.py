@@ -65,7 +65,7 @@ LEFT_OUT = frozenset(
         "denied_since",
         "unfit",
         "fitness_since",
-        "armed_by_us",  # after a flight, of devices that the explorer does not look at
+        "armed_on_ground",  # after a flight, of devices that the explorer does not look at
     }
 )
 _MEASURED = ("height", "vertical_speed", "tilt_deg", "acceleration", "battery_remaining")
@@ -101,6 +101,7 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         math.isnan(state.flight.landed_at),
         state.flight.reboots_before,
         state.killing.killed_standing,
+        state.killing.killed_low,
         _left(flight.height_since_kill(config, state, now), config.profile.minimum_height),
         _known(state.killing.killed_sinking),
         _until(flight.low_at(config, state, True, now), now),

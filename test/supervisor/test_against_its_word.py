@@ -244,7 +244,7 @@ def test_without_a_vertical_speed_the_heights_tell_the_sink() -> None:
         told = {"height": 1000.0 - 80.0 * step * 0.05, "vertical_speed": math.nan}
         story.at(2.0 + step * 0.05, story.heartbeat(), story.told(tilt=170.0, **told))
     assert story.fired()[:2] == ["KILL", "DEPLOY"]
-    assert "vertical_speed -80.00 (below -30)" in story.newest(K).reasons
+    assert "vertical_speed -80.00 (below -60)" in story.newest(K).reasons
 
 
 def test_what_goes_wrong_again_and_again_does_not_grow_it() -> None:

@@ -21,7 +21,7 @@ STANDS = {"height": 0.0, "vertical_speed": 0.0, **DOWN}
 
 def killed(profile: str = "multirotor", outcome: Outcome = Outcome.CONFIRMED) -> Story:
     """A person has stopped the motors 9 m above the ground."""
-    story = Story(shipped(profile)).ready().fly(3.0, height=40.0)
+    story = Story(shipped(profile)).ready().fly(2.0, height=12.0).fly(3.0, height=9.0)
     story.at(
         3.05,
         story.heartbeat(),
@@ -96,7 +96,7 @@ def test_one_that_a_deploy_follows_has_not_come_down_for_it() -> None:
         story.state,
         deploying=replace(story.state.deploying, deploy_rule="falling", deploy_due=START + 100.0),
     )
-    story.fly(20.0, **STANDS)
+    story.fly(20.0, **{**STANDS, "height": math.nan})  # too low for one, as far as it is known
     assert story.state.killing.killed_in_flight
 
 

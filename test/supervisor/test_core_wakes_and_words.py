@@ -181,7 +181,7 @@ def test_a_late_update_holds_no_silence_against_anybody_and_counts_nothing_for_i
 def test_after_a_hang_of_its_own_the_first_word_of_one_makes_no_other_stale(
     hang: float, beat: float
 ) -> None:
-    """Given two links that are heard, when it hangs and reads what waits: one word after another."""
+    """Given two links that are heard, when it hangs and reads what waits, one after another."""
     story = counting()
     story.at(beat, story.heartbeat())
     story.at(0.1, story.heartbeat(UPF))

@@ -258,7 +258,7 @@ def leader(clock: float) -> State:
             home_altitude=480.0,
             ground_pressure_altitude=490.0,
             up_for=1.0,
-            armed_by_us=True,
+            armed_on_ground=True,
             flown=True,
             airborne=True,
             down_since=clock - 3.0,
@@ -280,6 +280,7 @@ def leader(clock: float) -> State:
             killed_height=80.0,
             killed_sinking=1.5,
             killed_standing=True,
+            killed_low=True,
         ),
         alarming=Alarms(canopy_fails=True, alarms=("beware",), alarm_at=clock + 2.0),
         deploying=DeployUnderWay(

@@ -31,6 +31,7 @@ EXPECTED = {
         "RESET STARTUP",
     ),
     "IN_FLIGHT": (
+        "RESET STARTUP",
         "LANDED LANDED",
         "KILL KILLING",
         "PARACHUTE_OPEN DEPLOYED",

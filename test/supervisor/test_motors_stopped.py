@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from story import Story, falling, shipped
+from story import DOWN, Story, falling, pressure_at, shipped
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
 from chute_ros.supervisor import inputs as i
@@ -65,6 +65,49 @@ def test_a_person_may_ask_for_the_kill_alone() -> None:
     story.at(3.85, i.KillRequest(2, "operator", "it falls"))
     story.at(3.9, story.report(Action.KILL, Outcome.CONFIRMED))
     assert story.fired()[-1] == "DEPLOY"
+
+
+@pytest.mark.parametrize("failed", [True, False])
+def test_a_kill_alone_that_came_to_nothing_holds_back_no_deploy_of_a_later_fall(
+    failed: bool,
+) -> None:
+    """Given an autopilot that refuses the kill, or never answers; it hovers on, and falls."""
+    story = Story(shipped("multirotor")).ready().fly(2.0, height=60.0)
+    story.at(2.0, i.KillRequest(1, "operator", "flies away", kill_only=True))
+    if failed:
+        story.at(2.1, story.report(Action.KILL, Outcome.FAILED))
+    story.fly(12.0, height=60.0)
+    assert story.fired() == ["KILL"]
+    for k in range(20):
+        story.fly(story.t + 0.05, **{**falling(0.05 * k, 60.0), "tilt": 100.0})
+    assert "DEPLOY" in story.fired()
+
+
+UNKNOWN = math.nan
+
+
+@pytest.mark.parametrize(
+    ("height", "by_pressure"), [(UNKNOWN, 60.0), (UNKNOWN, UNKNOWN), (-55.0, -55.0), (3.0, 60.0)]
+)
+def test_whatever_tells_that_it_is_high_the_deploy_follows_a_confirmed_kill_at_once(
+    height: float, by_pressure: float
+) -> None:
+    """Given no estimated height, a valley below the take-off, or an estimator that is wrong."""
+    story = Story(shipped("multirotor"))
+    known = not math.isnan(by_pressure)
+    story.ready()
+    if known:
+        story.at(0.0, story.told(**DOWN, height=0.0, pressure=pressure_at(0.0)))
+    for k in range(240):
+        up = by_pressure * min(0.05 * k / 6.0, 1.0)
+        parts = {"pressure": pressure_at(up)} if known else {}
+        told = height if math.isnan(height) else min(height, up) if height > 0.0 else up
+        story.fly(story.t + 0.05, height=told, **parts)
+    begun = story.t
+    story.at(begun, i.KillRequest(1, "operator", "flies away"))
+    story.at(begun + 0.05, story.report(Action.KILL, Outcome.CONFIRMED))
+    assert story.fired() == ["KILL", "DEPLOY"]
+    assert story.newest(D).rule == "motors stopped in flight"
 
 
 @pytest.mark.parametrize("profile", ["multirotor", "fixed_wing"])

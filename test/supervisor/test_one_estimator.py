@@ -336,6 +336,19 @@ def test_one_wrong_sensor_in_a_descent_that_is_flown_ends_no_flight(
 # -- a landing that is not believed ----------------
 
 
+def test_in_the_air_without_a_height_a_blocked_one_stays_blocked_by_its_barometer() -> None:
+    """Given a take-off that is not allowed: IN_AIR comes with the order, and no height at all."""
+    from chute_ros.supervisor import inputs as i
+
+    teller, unknown = told_to("multirotor"), {"height": math.nan, "true_height": 0.0}
+    teller.stand(2.0, **unknown)
+    story = teller.story
+    story.at(story.t + 0.01, i.BlockRequest("mavlink_parachute", "1/161", True, "unhappy"))
+    says = {"armed": Armed.ARMED, "landed_state": LandedState.IN_AIR}
+    teller.stand(2.0, **unknown, **says)
+    assert story.state.stage is Stage.BLOCKED
+
+
 def test_in_the_air_for_ever_after_a_crash_a_person_may_reset() -> None:
     """Given a kill in flight; the wreck lies still, and its autopilot says IN_AIR for ever."""
     from chute_ros.supervisor import inputs as i
@@ -353,6 +366,60 @@ def test_in_the_air_for_ever_after_a_crash_a_person_may_reset() -> None:
         teller.tell(**lies, vertical_speed=teller.noise(0.1), tilt=80.0, force=9.8)
     story.at(story.t + 0.01, i.ResetRequest(3))
     assert story.answer(3).success
+
+
+@pytest.mark.parametrize("speed", [3.0, 6.0, -3.0])
+def test_an_estimator_that_drifts_after_the_landing_keeps_nobody_in_flight(speed: float) -> None:
+    """Given one that stands, says so and is disarmed; its estimator climbs or sinks for ever."""
+    teller = told_to("multirotor")
+    teller.hover(4.0, 20.0, true_height=20.0)
+    for k in range(110):
+        low = max(20.0 - 0.2 * k, 0.0)
+        teller.tell(height=low, vertical_speed=-2.0, tilt=3.0, force=9.8, true_height=low)
+    for _ in range(100):
+        drifts = {"height": 0.0, "vertical_speed": speed + teller.noise(0.1)}
+        teller.tell(**DOWN, **drifts, tilt=1.0, force=9.8, true_height=0.0)
+    assert teller.story.state.stage in (Stage.BLOCKED, Stage.READY)
+    assert teller.story.fired() == []
+
+
+def test_in_the_air_for_ever_with_its_motors_off_a_person_may_reset_in_flight() -> None:
+    """Given a crash that nobody saw: it lies still, and its autopilot says IN_AIR for ever."""
+    from chute_ros.supervisor import inputs as i
+
+    teller = told_to("multirotor")
+    teller.hover(4.0, 20.0, true_height=20.0)
+    lies = {"landed_state": LandedState.IN_AIR, "height": 0.0, "tilt": 20.0, "force": 9.8}
+    story = teller.story
+    for _ in range(120):
+        speed = teller.noise(0.1)
+        teller.tell(**lies, armed=Armed.ARMED, vertical_speed=speed, true_height=0.0)
+    story.at(story.t + 0.01, i.ResetRequest(1))
+    assert not story.answer(1).success, "it may hover"
+    assert "if it lies still: safety/kill (kill_only), and this again" in story.answer(1).message
+    for _ in range(5):
+        speed = teller.noise(0.1)
+        teller.tell(**lies, armed=Armed.DISARMED, vertical_speed=speed, true_height=0.0)
+    story.at(story.t + 0.01, i.ResetRequest(2))
+    assert story.answer(2).success
+    for _ in range(20):
+        speed = teller.noise(0.1)
+        teller.tell(**lies, armed=Armed.DISARMED, vertical_speed=speed, true_height=0.0)
+    assert story.state.stage in (Stage.BLOCKED, Stage.READY)
+
+
+def test_a_sink_that_the_barometer_tells_is_not_commanded_by_an_estimator_that_hovers() -> None:
+    """Given an estimator that stays at the hover that it was told, as its vehicle falls flat."""
+    teller = told_to("multirotor")
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(4.0, 150.0, true_height=150.0)
+    for k in range(30):
+        fall = falling(EVERY * k, 150.0)
+        hovers = {"height": 150.0, "vertical_speed": teller.noise(0.2), "tilt": 3.0}
+        target = {"target_vertical_speed": 0.0, "attitude_error": 1.0}
+        force = fall["acceleration"]
+        teller.tell(**hovers, **target, force=force, true_height=fall["height"])
+    assert deployed(teller)
 
 
 def test_no_force_is_missing_on_command_of_one_that_lies_otherwise_than_it_shall() -> None:

@@ -327,6 +327,20 @@ def test_after_the_flight_the_parachutes_that_were_armed_are_disarmed() -> None:
     assert any("not disarmed after the flight" in one for one in story.alarms())
 
 
+@pytest.mark.parametrize("armed", [True, False])
+def test_so_are_those_that_somebody_else_has_armed_on_the_ground(armed: bool) -> None:
+    """By ~/arm, from a ground station, or before a restart of the supervisor."""
+    story = Story(shipped("multirotor")).ready()
+    status = replace(GOOD, state=ParachuteState.ARMED, armed=True) if armed else GOOD
+    for _ in range(30):
+        told = story.told(**DOWN, height=0.0), i.ParachuteReport(LINK, status)
+        story.at(story.t + 0.1, story.heartbeat(), *told)
+    story.fly(story.t + 2.0, height=30.0)
+    story.fly(story.t + 10.0, height=0.0, vertical_speed=0.0, **DOWN)
+    orders = [one for _, one in story.outputs if isinstance(one, i.ArmDevices)]
+    assert [(one.token, one.arm) for one in orders] == ([(0, False)] if armed else [])
+
+
 def test_in_flight_a_fault_whose_figure_changes_is_one_alarm_and_another_fault_another() -> None:
     story = Story(shipped("multirotor")).flying().fly(1.0)
     for tenths in range(6, 30):

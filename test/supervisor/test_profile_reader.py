@@ -487,7 +487,7 @@ def test_what_a_mistake_stands_for_meanwhile_is_no_second_mistake() -> None:
 
 
 FACTS = "lost or rebooted or disarmed or emergency or killed_aloft or motors_stopped"
-MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate", "vertical_acceleration")
+MEASUREMENTS = (*STANDARD_LIMITS, "climb_rate", "vertical_acceleration", "felt_fall")
 JUDGEMENTS = "NEVER_SEEN, OK, STALE, LOST, REGAINED, UNMONITORED"
 PROFILE_KEYS = (
     "profile, minimum_height, below_minimum, low_height, moving_speed, landed_hold, "
@@ -613,7 +613,10 @@ KINDS = "needs one of measurement, link, autopilot, device; it has"
         ),
         (
             "device: abnormal -> device: 7",
-            "19: device in rule 'falls' is 7: need asks_for_kill or deployed or abnormal",
+            (
+                "19: device in rule 'falls' is 7: need asks_for_kill or deployed or abnormal or "
+                "nothing_out"
+            ),
         ),
         (
             "link: upf_can -> link: 7",

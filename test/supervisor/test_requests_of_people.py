@@ -344,9 +344,11 @@ def test_in_shadow_a_deploy_is_decided_in_words_and_nothing_is_sent() -> None:
 def test_a_reset_is_refused_while_it_is_not_known_to_be_down() -> None:
     story = flying()
     story.at(20.0, i.ResetRequest(2))
-    assert story.answer(2) == refused(2, "the vehicle is in the air")
+    lies = "if it lies still: safety/kill (kill_only), and this again after 10 s"
+    why = "the vehicle was in the air, and nothing fresh says that it is down"
+    assert story.answer(2) == refused(2, f"{why}; {lies}")
     story.at(20.1, story.told(), i.KillRequest(3, "operator", "stop"), i.ResetRequest(4))
-    assert story.answer(4) == refused(4, "the vehicle is in the air")
+    assert story.answer(4) == refused(4, f"the vehicle is in the air; {lies}")
     story = flying()
     story.at(3.0, FALLS, i.ResetRequest(2))
     why = "a deploy is under way and nothing fresh says that it is on the ground"

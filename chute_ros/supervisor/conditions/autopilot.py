@@ -19,7 +19,7 @@ from chute_ros.supervisor.yaml_lines import Where
 
 if TYPE_CHECKING:
     from chute_ros.supervisor.config import SupervisorConfig
-    from chute_ros.supervisor.state import State
+    from chute_ros.supervisor.state import Killing, State
 
 _EMERGENCY = (6, 8)  # MAV_STATE_EMERGENCY, MAV_STATE_FLIGHT_TERMINATION
 
@@ -121,16 +121,21 @@ def _killed_aloft(config: SupervisorConfig, state: State, now: float) -> Finding
 
 
 def _motors_stopped(config: SupervisorConfig, state: State, now: float) -> Finding:
-    known, minimum = state.killing, config.profile.minimum_height
+    known = state.killing
     ours = state.stage is Stage.KILLING and known.killed_in_flight and not known.killed_standing
     stopped = ours and known.kill is not None and known.kill.confirmed
     return Finding(
-        stopped and known.killed_height >= minimum,
+        stopped and not known.killed_low,
         lambda: (
-            "its motors were stopped in flight, as its own state confirms, at "
-            f"{known.killed_height:.1f} m (minimum {minimum:g} m)"
+            "its motors were stopped in flight, as its own state confirms, "
+            f"{'too low' if known.killed_low else 'high enough'}: {_at_kill(config, known)}"
         ),
     )
+
+
+def _at_kill(config: SupervisorConfig, known: Killing) -> str:
+    height = "unknown" if math.isnan(known.killed_height) else f"{known.killed_height:.1f} m"
+    return f"height {height} (minimum {config.profile.minimum_height:g} m)"
 
 
 def _disarmed(config: SupervisorConfig, state: State, now: float) -> Finding:

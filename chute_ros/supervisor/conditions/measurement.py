@@ -16,6 +16,7 @@ from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
     DERIVED,
+    FELT_FALL,
     STANDARD_LIMITS,
     TILT,
     VERTICAL_ACCELERATION,
@@ -184,10 +185,15 @@ class MeasurementCondition(Condition):
                 return Finding(True, tell, presumed=True)
             return Finding(None, tell, samples)
         doubt = readings.doubt(state, name, value, now)
-        if name == CLIMB_RATE or value != known.value:
+        speed = state.measured(VERTICAL_SPEED)
+        if name == FELT_FALL:
+            samples = state.measured(ACCELERATION).count
+        elif name == VERTICAL_ACCELERATION and not speed.unusable(
+            config.profile.limits[VERTICAL_SPEED], now
+        ):
+            samples = speed.count
+        elif name == CLIMB_RATE or value != known.value:
             samples = readings.rate_count(config, state, now)  # told by heights instead
-        if name == VERTICAL_ACCELERATION:
-            samples = state.measured(VERTICAL_SPEED).count
         holds = self.holds_at(value)
         denied = self._denied(config, state, now) if holds else ""
         if holds and self.unless_dived:

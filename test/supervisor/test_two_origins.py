@@ -1,0 +1,125 @@
+"""Two origins that agree stand against the third: one wrong sensor hides no fall."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from story import DOWN
+from test_one_estimator import AIRCRAFT, EVERY, Teller, deployed, told_to
+
+from chute_ros.supervisor.contradictions import FREE_FALL, GRAVITY, felt_fall, height_denied
+
+HIGH = 150.0
+
+
+def falling_flat(t: float, fastest: float) -> tuple[float, float, float]:
+    """Height lost, m, vertical speed, m/s, and force, m/s^2, after t s; at last fastest, m/s."""
+    speed = fastest * math.tanh(GRAVITY * t / fastest)
+    lost = fastest**2 / GRAVITY * math.log(math.cosh(GRAVITY * t / fastest))
+    return lost, -speed, GRAVITY * (speed / fastest) ** 2
+
+
+def up(profile: str, barometer_stops: float = math.inf) -> Teller:
+    """It hovers at HIGH; its barometer tells no more than this, m, with the noise of one that
+    lives."""
+    teller = told_to(profile)
+    teller.stand(1.0, true_height=0.0)
+    height = 0.0
+    while height < HIGH:
+        height = min(HIGH, height + 0.8)
+        told = min(height, barometer_stops)
+        teller.tell(height=height, vertical_speed=8.0, tilt=3.0, force=9.8, true_height=told)
+    told = min(HIGH, barometer_stops)
+    for _ in range(40):
+        speed = teller.noise(0.2)
+        teller.tell(height=HIGH, vertical_speed=speed, tilt=3.0, force=9.8, true_height=told)
+    return teller
+
+
+def fall(teller: Teller, fastest: float, **wrong: Any) -> float:
+    """It falls flat, and tells what is wrong so; how long it took to the deploy, s, or NaN."""
+    begun = teller.story.t
+    for k in range(60):
+        lost, speed, force = falling_flat(EVERY * k, fastest)
+        parts = {"height": HIGH - lost, "vertical_speed": speed, "tilt": 3.0, "force": force}
+        noisy = {"vertical_speed": wrong.get("vertical_speed", speed) + teller.noise(0.2)}
+        teller.tell(**{**parts, "true_height": HIGH - lost, **wrong, **noisy})
+        if deployed(teller):
+            return teller.story.t - begun
+    return math.nan
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("fastest", [14.0, 20.0, 35.0, 60.0])
+@pytest.mark.parametrize("target", [True, False])
+def test_an_estimator_that_hovers_on_hides_no_fall_from_force_and_barometer(
+    profile: str, fastest: float, target: bool
+) -> None:
+    hovers: dict[str, Any] = {"height": HIGH, "vertical_speed": 0.0}
+    if target:
+        hovers |= {"target_vertical_speed": 0.0, "attitude_error": 1.0}
+    took = fall(up(profile), fastest, **hovers)
+    assert took <= (2.1 if profile == "multirotor" else 2.7)
+
+
+@pytest.mark.parametrize("stops", [0.0, 5.0, 80.0, HIGH])
+@pytest.mark.parametrize("fastest", [14.0, 20.0, 60.0])
+def test_a_barometer_that_is_clogged_hides_no_fall_from_estimator_and_force(
+    fastest: float, stops: float
+) -> None:
+    """Given one that stopped in the hover, on the way up, or was never free; it goes on to tell
+    the noise of one that lives."""
+    teller = up("multirotor", stops)
+    assert fall(teller, fastest, true_height=stops) <= 1.5
+
+
+def test_a_height_that_the_barometer_denies_is_told_in_flight() -> None:
+    teller = up("multirotor", barometer_stops=0.0)
+    told = [one for one in teller.story.alarms() if one.startswith("height is contradicted")]
+    assert len(told) == 1
+    assert "above the take-off where it tells" in told[0]
+
+
+def test_heights_that_differ_as_weather_and_warmth_make_them_are_not() -> None:
+    assert height_denied(120.0, 90.0) == ""
+    assert height_denied(3.0, 20.0) == ""
+    assert height_denied(math.nan, 90.0) == height_denied(90.0, math.nan) == ""
+    assert height_denied(80.0, 0.3) == (
+        "the barometer tells 0 m above the take-off where it tells 80"
+    )
+
+
+@settings(max_examples=25)
+@given(st.lists(st.floats(-8.0, 8.0), min_size=3, max_size=6))
+def test_whatever_an_estimator_tells_on_the_ground_no_fall_is_felt(pushes: list[float]) -> None:
+    """Given a barometer that was never free, so that it denies nothing of a take-off."""
+    teller, height, speed = told_to("multirotor"), 0.0, 0.0
+    teller.stand(1.0, true_height=0.0)
+    flies = {key: value for key, value in DOWN.items() if key not in ("landed_state", "armed")}
+    for push in pushes:
+        for _ in range(15):
+            speed += EVERY * push
+            height += EVERY * speed
+            told = {"height": height, "vertical_speed": speed, "tilt": 3.0, "force": 9.8}
+            teller.tell(**flies, **told, true_height=0.0)
+    assert not deployed(teller)
+
+
+MOMENTS = [(0.1 * k, -0.98 * k, 0.05 * (k % 2), 1.0) for k in range(11)]
+
+
+def test_a_fall_is_felt_as_long_as_its_force_is_less_than_half_of_the_weight() -> None:
+    assert felt_fall(tuple(MOMENTS)) == pytest.approx(-GRAVITY, abs=0.1)
+    assert felt_fall(tuple((t, v, FREE_FALL, c) for t, v, _, c in MOMENTS)) == 0.0
+
+
+def test_what_is_stuck_or_was_not_told_feels_nothing() -> None:
+    assert felt_fall(tuple((t, v, 0.0, c) for t, v, _, c in MOMENTS)) == 0.0
+    assert felt_fall(tuple((t, v, math.nan, c) for t, v, _, c in MOMENTS)) == 0.0
+    # One word in ten: nobody knows what was felt meanwhile.
+    assert felt_fall(tuple((10.0 * t, v, f, c) for t, v, f, c in MOMENTS)) == 0.0
+    assert felt_fall(()) == 0.0
