@@ -26,6 +26,7 @@ from chute_ros.runtime.vehicle_hearing import VehicleHearing
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.lease import LeaseConfig
+from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.resume import SavedState, dump, load, worth_saving
 from chute_ros.supervisor.state import State
 
@@ -123,6 +124,8 @@ class SupervisorHost:
                 tuple(state.device_blocks),
                 message.supervisor,
                 message.stamps,
+                state.alarming.alarms,
+                state.stage is Stage.DEPLOYED,
             )
         elif isinstance(message, Decision):
             number = (message.epoch, message.id)

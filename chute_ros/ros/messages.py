@@ -126,6 +126,8 @@ def safety_picture(message: SafetyState) -> SafetyPicture:
         tuple(message.device_blocks),
         message.supervisor,
         dict(zip(message.links, stamps, strict=False)),
+        tuple(message.alarms),
+        message.state == SafetyState.DEPLOYED,
     )
 
 

@@ -71,6 +71,9 @@ class SafetyPicture:
     #: Whose it is, and the stamp of the newest heartbeat of each link, ns.
     supervisor: str
     stamps: Mapping[str, int]
+    alarms: tuple[str, ...] = ()
+    #: A parachute is out, by whomever.
+    released: bool = False
 
 
 @dataclass(frozen=True)

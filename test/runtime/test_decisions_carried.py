@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 from runtime_shell import Shell
@@ -12,6 +11,7 @@ from chute_ros.links.mavlink.runtime import MavlinkRuntime, MavlinkSettings
 from chute_ros.model import Action, Decision, Outcome
 from chute_ros.protocol.events import Severity
 from chute_ros.runtime.decisions import MOST_REPORTS, DecisionCarrier
+from chute_ros.runtime.topics import SafetyPicture
 
 
 class Carried:
@@ -118,11 +118,40 @@ def test_what_others_carry_out_is_told_if_it_is_young_meant_and_of_who_leads(she
     assert node.done == []
 
 
+class GroundStation:
+    """A MAVLink link that notes what it is told."""
+
+    def __init__(self) -> None:
+        self.decided: list[float] = []
+        self.texts: list[str] = []
+        self.deploy_decided = self.decided.append
+        self.announce = self.texts.append
+
+
+def autopilots_node(shell: Shell) -> MavlinkRuntime:
+    shell.link = GroundStation()
+    return MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=False), shell)
+
+
 def test_the_autopilots_node_is_told_of_a_deploy_on_another_link(shell: Shell) -> None:
-    """PX4 refuses to disarm in flight; it may be terminated once a deploy is decided."""
-    told: list[float] = []
-    shell.link = SimpleNamespace(deploy_decided=told.append)
-    node = MavlinkRuntime("mavlink_parachute", MavlinkSettings(expect_parachute=False), shell)
-    for number, action in ((1, Action.KILL), (2, Action.FLIGHT_BLOCK), (3, Action.DEPLOY)):
+    """PX4 refuses to disarm in flight; it may be terminated once a deploy is decided. The pilot
+    reads of it, whose only way is this node's."""
+    node = autopilots_node(shell)
+    told = [(1, Action.KILL), (2, Action.FLIGHT_BLOCK), (3, Action.DEPLOY), (3, Action.DEPLOY)]
+    for number, action in told:
         node.heard_decisions([(decision(number, action), 0.01)], shell.now)
-    assert told == [shell.now]
+    assert shell.link.decided == [shell.now]
+    assert shell.link.texts == ["DEPLOY by upf_can ordered: a rule"]
+    picture = SafetyPicture(False, (), "safety_supervisor", {})
+    for one in (picture, *[replace(picture, released=True)] * 3):
+        node.heard_picture(one, 0.01, shell.now)
+    assert shell.link.texts[1:] == ["DEPLOY by upf_can confirmed"]
+
+
+def test_the_pilot_reads_each_alarm_of_the_supervisor_once(shell: Shell) -> None:
+    node = autopilots_node(shell)
+    picture = SafetyPicture(False, (), "safety_supervisor", {})
+    told = [("a",), ("a",), ("a", "b"), (), ("b",)]
+    for alarms in told:
+        node.heard_picture(replace(picture, alarms=alarms), 0.01, shell.now)
+    assert shell.link.texts == ["a", "b", "b"], "after a reset it is a new one"

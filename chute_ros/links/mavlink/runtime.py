@@ -10,6 +10,7 @@ from chute_ros.links.mavlink.protocol.link import MavlinkLink
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import NAN, Action, Armed, Decision, LinkState, VehicleState
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
+from chute_ros.runtime.topics import SafetyPicture
 from chute_ros.settings import nested, parameter
 
 #: How a flight block is reported by a node that must leave arming alone.
@@ -49,6 +50,12 @@ class MavlinkSettings(DeviceSettings):
 class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
     """Its link is a MavlinkLink."""
 
+    #: Of the newest deploy that is another node's: its number, and who releases, until it is out.
+    _deploy_number = (0, 0)
+    _releases = ""
+    #: Those of the supervisor that were announced.
+    _alarms: tuple[str, ...] = ()
+
     def summarise(self, link: MavlinkLink, now: float) -> Summary:
         vehicle = link.vehicle_state(now)
         # Doubt about which devices are ours forbids take-off, but takes nothing back in flight.
@@ -86,8 +93,25 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
             self.carry_out_flight_block(decision, blocked, "a vehicle that arms is left alone")
 
     def decided_for_others(self, decision: Decision) -> None:
-        if decision.action is Action.DEPLOY:
-            self.shell.in_link(lambda link, now: link.deploy_decided(now))
+        number = (decision.epoch, decision.id)
+        if decision.action is not Action.DEPLOY or number == self._deploy_number:
+            return
+        self._deploy_number, self._releases = number, ", ".join(decision.targets)
+        self.shell.in_link(lambda link, now: link.deploy_decided(now))
+        self._announce(f"DEPLOY by {self._releases} ordered: {decision.rule}")
+
+    def picture(self, one: SafetyPicture) -> None:
+        new = [text for text in one.alarms if text not in self._alarms]
+        self._alarms = one.alarms
+        for text in new:
+            self._announce(text)
+        if self._releases and one.released:
+            self._announce(f"DEPLOY by {self._releases} confirmed")
+            self._releases = ""
+
+    def _announce(self, text: str) -> None:
+        """To the ground station, whose only way is this link."""
+        self.shell.in_link(lambda link, now: link.announce(text))
 
 
 def _why_unhealthy(one: ParachuteTracker, now: float) -> list[str]:

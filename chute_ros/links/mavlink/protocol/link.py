@@ -125,6 +125,10 @@ class MavlinkLink:
         select = triggers or int(self.config.default_triggers)
         self.set_triggers(token, select if arm else 0, select, "", now)
 
+    def announce(self, text: str) -> None:
+        """Have the ground station read this."""
+        self._announcements.say(text)
+
     def deploy_decided(self, now: float) -> None:
         """A parachute is released, on whatever link: a kill that is under way, or comes in this
         flight, may go a way that releases as well."""
