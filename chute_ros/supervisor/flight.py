@@ -33,7 +33,7 @@ _LANDED_HOLD_ALOFT = 5.0
 #: kill, and a steady fall is taken for standing still where nothing tells its speed for a moment.
 _DOWN_AFTER_KILL = 10.0
 #: For so long after a landing a vehicle may turn out not to have landed, s.
-_FLIGHT_JUST_BEFORE = 60.0
+FLIGHT_JUST_BEFORE = 60.0
 #: A vehicle whose motors were stopped is seen to fall so long after it, s.
 _FALLS_AFTER = 1.0
 #: A vehicle was heard until a kill if it was at most so long before it, s.
@@ -235,7 +235,7 @@ def _falls_against_its_word(
     height = measured(config, state, "height", now) - state.flight.armed_height
     high = height > max(config.takeoff_height, config.profile.minimum_height)
     if stands_off:
-        return falls and sinks and high and now < state.flight.landed_at + _FLIGHT_JUST_BEFORE
+        return falls and sinks and high and now < state.flight.landed_at + FLIGHT_JUST_BEFORE
     return falls and (sinks or high)
 
 

@@ -98,7 +98,8 @@ def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
     known = state.measured(PRESSURE_ALTITUDE)
     passed = known.measured_at - state.heard.pressure_before[0]
     told = known.usable(config.profile.limits[PRESSURE_ALTITUDE], now)
-    if known.doubt(PRESSURE_ALTITUDE, now) or not passed <= _DROP_WITHIN:
+    unfit = PRESSURE_ALTITUDE in state.heard.unfit
+    if unfit or known.doubt(PRESSURE_ALTITUDE, now) or not passed <= _DROP_WITHIN:
         return NO_DROP
     return Drop(state.heard.pressure_before[1] - told, passed)
 
@@ -106,7 +107,7 @@ def pressure_drop(config: SupervisorConfig, state: State, now: float) -> Drop:
 def pressure_height(config: SupervisorConfig, state: State, now: float) -> float:
     """Height above the take-off by the barometer, m; NaN: not known, or in doubt."""
     known = state.measured(PRESSURE_ALTITUDE)
-    if known.has_jumped(now):
+    if known.has_jumped(now) or PRESSURE_ALTITUDE in state.heard.unfit:
         return math.nan
     usable = known.usable(
         config.profile.limits[PRESSURE_ALTITUDE], _newest_word(config, state, now)
@@ -153,13 +154,22 @@ def _vertical_acceleration(
 
 
 def _rate_of(config: SupervisorConfig, state: State, name: str, now: float) -> tuple[float, str]:
+    if why := state.heard.unfit.get(name):
+        return math.nan, why
+    rate = told_rate(config, state, name, now)
+    return rate, "too few heights that can be used" if math.isnan(rate) else ""
+
+
+def told_rate(config: SupervisorConfig, state: State, name: str, now: float) -> float:
+    """Vertical speed from these heights of the last second, m/s, whether they are fit to be used
+    or not; NaN: there are too few."""
     heights = state.heard.heights if name == HEIGHT else state.heard.pressure_heights
     height = state.measured(name)
     if height.unusable(config.profile.limits[name], now) or not _enough(
         heights, height.measured_at
     ):
-        return math.nan, "too few heights that can be used"
-    return _rate(heights), ""
+        return math.nan
+    return _rate(heights)
 
 
 @lru_cache(maxsize=16)  # each picture of the vehicle asks for it several times

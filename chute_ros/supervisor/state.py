@@ -129,8 +129,8 @@ class HeardHere:
     commanded: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     #: Measurement -> what it told that cannot be; it is not used until it tells what can.
     unfit: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    #: Since when an accelerometer on the ground tells otherwise of its fitness, monotonic s.
-    fitness_since: float = math.nan
+    #: Since when it tells otherwise of its fitness on the ground, monotonic s.
+    fitness_since: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     #: By the barometer on the height of its take-off, and not moving, since, monotonic s.
     at_ground_since: float = math.nan
     #: Nothing has moved since, whatever the autopilot says of being in the air, monotonic s.

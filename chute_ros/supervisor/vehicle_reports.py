@@ -33,8 +33,8 @@ _OF_NEWEST = 0.1
 _SILENCE = 0.5
 #: No force without any speed is that of a fall for so long, s.
 _NEVER_FALLS_FOR = 3.0
-#: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); it is found
-#: fit or unfit by the samples of so long, s.
+#: An accelerometer at rest feels gravity, m/s^2 (with its bias, and motors that idle); a sensor is
+#: found fit or unfit by the samples of so long, s.
 _AT_REST, _FITNESS_TAKES = (7.8, 11.8), 1.0
 #: A vehicle that was not heard as it was killed may be so much later, s.
 _HEARD_AFTER_KILL = 1.0
@@ -196,35 +196,72 @@ def _height_denied(turn: Turn) -> str:
 
 
 def _note_fitness(turn: Turn) -> None:
-    """An accelerometer that tells on the ground what it cannot feel there, or without any
-    speed of a fall, is not used until it tells on the ground what it must."""
+    """What tells on the ground what cannot be there, or a fall of which no speed follows, is not
+    used until it tells on the ground what it must."""
     state, now = turn.state, turn.now
-    unfit = dict(state.heard.unfit)
+    unfit, since = dict(state.heard.unfit), {}
     begun = state.heard.denied_since.get(ACCELERATION, math.nan)
     if now >= begun + _NEVER_FALLS_FOR:
         unfit.setdefault(ACCELERATION, f"it reports a fall, but {turn.heard.denied[ACCELERATION]}")
-    since = math.nan
-    stands = not state.flight.airborne and flight.says_down(turn.config, state, now) is True
-    speeds = (
-        readings.measured(turn.config, state, name, now) for name in (VERTICAL_SPEED, CLIMB_RATE)
-    )
-    stands = stands and not any(abs(s) > turn.config.profile.moving_speed for s in speeds)
+    for name, wrong in _judged_at_rest(turn).items():
+        if bool(wrong) != (name in unfit):
+            since[name] = begun = state.heard.fitness_since.get(name, now)
+            if now >= begun + _FITNESS_TAKES:
+                unfit.pop(name, None)
+                if wrong:
+                    unfit[name] = f"it reports {wrong}"
+    if unfit != state.heard.unfit or since != state.heard.fitness_since:
+        turn.heard = replace(
+            turn.heard, unfit=MappingProxyType(unfit), fitness_since=MappingProxyType(since)
+        )
+
+
+def _judged_at_rest(turn: Turn) -> dict[str, str]:
+    """Measurement of a vehicle that stands -> what it tells that cannot be, in words; empty:
+    nothing."""
+    state, config, now = turn.state, turn.config, turn.now
+    if state.flight.airborne or flight.says_down(config, state, now) is not True:
+        return {}
+    limit, judged = config.profile.moving_speed, {}
     known = state.measured(ACCELERATION)
-    force = known.usable(turn.config.profile.limits[ACCELERATION], now)
-    if stands and not math.isnan(force):
-        least, most = _AT_REST
-        fits = least <= force <= most
-        if fits == (ACCELERATION in unfit):
-            since = now if math.isnan(state.heard.fitness_since) else state.heard.fitness_since
-            if now >= since + _FITNESS_TAKES:
-                unfit.pop(ACCELERATION, None)
-                if not fits:
-                    unfit[ACCELERATION] = (
-                        f"it reports {force:.1f} m/s^2 while the vehicle stands (need {least:g} "
-                        f"to {most:g}; a driver that removes gravity reports 0)"
-                    )
-    if unfit != state.heard.unfit or since is not state.heard.fitness_since:
-        turn.heard = replace(turn.heard, unfit=MappingProxyType(unfit), fitness_since=since)
+    force = known.usable(config.profile.limits[ACCELERATION], now)
+    known = state.measured(VERTICAL_SPEED)
+    speed = known.usable(config.profile.limits[VERTICAL_SPEED], now)
+    rate = readings.told_rate(config, state, PRESSURE_ALTITUDE, now)
+    moves = abs(speed) > limit or abs(rate) > limit
+    least, most = _AT_REST
+    if not (moves or math.isnan(force)):
+        judged[ACCELERATION] = "" if least <= force <= most else _no_gravity(force)
+    for value, names in ((speed, (VERTICAL_SPEED, HEIGHT)), (rate, (PRESSURE_ALTITUDE,))):
+        if _cannot_move(turn, force, value):
+            wrong = _moves(value, limit) if abs(value) > limit else ""
+            judged |= dict.fromkeys(names, wrong)
+    return judged
+
+
+def _cannot_move(turn: Turn, force: float, speed: float) -> bool:
+    """One that says that it stands cannot be so fast, m/s, as it stands on the ground by its
+    force, m/s^2, or with its motors off. One that is armed may have left the ground."""
+    (least, most), now = _AT_REST, turn.now
+    if math.isnan(speed) or force < least:
+        return False
+    off = flight.armed(turn.config, turn.state, now) is Armed.DISARMED
+    # One that has just flown may fall, and say that it stands.
+    if off and not now < turn.state.flight.landed_at + flight.FLIGHT_JUST_BEFORE:
+        return True
+    return least <= force <= most and speed <= turn.config.profile.moving_speed
+
+
+def _no_gravity(force: float) -> str:
+    least, most = _AT_REST
+    return (
+        f"{force:.1f} m/s^2 while the vehicle stands (need {least:g} to {most:g}; a driver that "
+        "removes gravity reports 0)"
+    )
+
+
+def _moves(speed: float, limit: float) -> str:
+    return f"{speed:+.1f} m/s while the vehicle stands (need at most {limit:g})"
 
 
 def _note_faults(turn: Turn, faults: tuple[str, ...]) -> None:

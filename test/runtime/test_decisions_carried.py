@@ -151,7 +151,7 @@ def test_the_autopilots_node_is_told_of_a_deploy_on_another_link(shell: Shell) -
 def test_the_pilot_reads_each_alarm_of_the_supervisor_once(shell: Shell) -> None:
     node = autopilots_node(shell)
     picture = SafetyPicture(False, (), "safety_supervisor", {})
-    told = [("a",), ("a",), ("a", "b"), (), ("b",)]
+    told = [("a 1.5 s",), ("a 1.6 s",), ("a 1.7 s", "b"), (), ("b",)]
     for alarms in told:
         node.heard_picture(replace(picture, alarms=alarms), 0.01, shell.now)
-    assert shell.link.texts == ["a", "b", "b"], "after a reset it is a new one"
+    assert shell.link.texts == ["a 1.5 s", "b", "b"], "after a reset it is a new one"

@@ -94,7 +94,9 @@ def test_a_barometer_that_drifts_at_start_up_deploys_nothing_on_the_ground(
         told = {"height": height, "vertical_speed": speed}
         story.fly(story.t + 0.05, armed=armed, landed_state=GROUND, **told)
     assert story.fired() == []
-    assert story.state.stage is Stage.READY
+    # It is named, and nobody takes off with it.
+    assert story.state.stage is Stage.BLOCKED
+    assert "vertical_speed cannot be used: it reports" in story.said()
 
 
 def test_a_land_detector_that_believes_the_drift_deploys_nothing_while_disarmed() -> None:

@@ -336,6 +336,51 @@ def test_one_wrong_sensor_in_a_descent_that_is_flown_ends_no_flight(
 # -- a landing that is not believed ----------------
 
 
+@AIRCRAFT
+@pytest.mark.parametrize("armed", [Armed.DISARMED, Armed.ARMED])
+def test_what_sinks_on_the_ground_is_named_and_counts_for_nothing(
+    profile: str, armed: Armed
+) -> None:
+    """Given a barometer that runs away on the bench and draws its estimator along, as in a
+    recorded log: 14 m/s down, until it says IN_AIR."""
+    teller = told_to(profile)
+    story = teller.story
+    for k in range(300):
+        runs = {"height": -1.4 * k, "true_height": -1.4 * k, "tilt": 2.0, "force": 9.8}
+        speed = -14.0 + teller.noise(0.3)
+        teller.tell(**runs, vertical_speed=speed, **({**DOWN, "armed": armed} if k < 200 else {}))
+        if k == 100:
+            assert story.state.stage is Stage.BLOCKED
+            assert "vertical_speed cannot be used: it reports -1" in story.said()
+            assert set(story.state.heard.unfit) == {
+                *("vertical_speed", "height", "pressure_altitude")
+            }
+    assert story.fired() == []
+
+
+def test_what_was_moved_as_it_stood_is_used_again_once_it_stands() -> None:
+    """In a lift, or on a car that drives up a hill."""
+    teller = told_to("multirotor")
+    for k in range(100):
+        up = 0.3 * k
+        teller.tell(**DOWN, height=up, vertical_speed=3.0, tilt=1.0, force=9.8, true_height=up)
+    assert "vertical_speed" in teller.story.state.heard.unfit
+    teller.stand(3.0, height=30.0, true_height=30.0)
+    assert teller.story.state.heard.unfit == {}
+    assert teller.story.state.stage is Stage.READY
+
+
+def test_one_that_climbs_before_it_says_so_is_believed() -> None:
+    """Given a landed state that comes once in two seconds, and says ON_GROUND until then."""
+    teller = told_to("multirotor")
+    teller.stand(3.0, true_height=0.0)
+    says = {"armed": Armed.ARMED, "landed_state": LandedState.ON_GROUND}
+    for k in range(20):
+        up = 0.4 * k
+        teller.tell(**says, height=up, vertical_speed=4.0, tilt=3.0, force=10.0, true_height=up)
+    assert teller.story.state.heard.unfit == {}
+
+
 def test_in_the_air_without_a_height_a_blocked_one_stays_blocked_by_its_barometer() -> None:
     """Given a take-off that is not allowed: IN_AIR comes with the order, and no height at all."""
     from chute_ros.supervisor import inputs as i

@@ -117,7 +117,48 @@ def test_one_that_lies_otherwise_or_flat_or_tells_no_command_is(
 ) -> None:
     story = aeroplane_sinks(tilt, attitude_error)
     assert story.fired()[:1] == ["KILL"]
-    assert story.newest(Action.KILL).rule == "critical sink"
+    off = attitude_error > 45.0
+    assert story.newest(Action.KILL).rule == ("off its command" if off else "critical sink")
+
+
+def spiral(attitude_error: float, barometer_sinks: bool = True) -> Story:
+    """An aeroplane banks to 70 degrees and goes down with 15 m/s after 3 s, at 2.3 times its
+    weight; how far it is from its command, degrees."""
+    story, true, height = Story(shipped("fixed_wing")).ready(), 300.0, 300.0
+    for k in range(80):
+        t = max(EVERY * (k - 20), 0.0)
+        speed = -min(5.0 * t, 15.0)
+        true += EVERY * speed * barometer_sinks
+        height += EVERY * speed
+        bank = min(70.0 * t, 70.0)
+        parts = {"height": height, "vertical_speed": speed}
+        parts |= {"tilt": bank + 0.1 * (k % 3), "attitude_error": min(attitude_error, bank)}
+        turns = bool(t) and barometer_sinks
+        parts["acceleration"] = (22.0 if turns else 9.8) + 0.1 * (k % 3)
+        parts["pressure"] = pressure_at(true + 0.1 * (k % 3))
+        story.at(story.t + EVERY, story.heartbeat(), story.told(**parts))
+        if story.fired():
+            break
+    return story
+
+
+def test_an_aeroplane_that_is_far_from_its_command_and_sinks_is_deployed_before_it_is_fast() -> (
+    None
+):
+    story = spiral(attitude_error=68.0)
+    assert story.fired() == ["KILL"]
+    assert story.newest(Action.KILL).rule == "off its command"
+    assert story.when(Action.KILL) - 2.0 < 3.0
+
+
+@pytest.mark.parametrize(
+    "but",
+    [{"attitude_error": 20.0}, {"barometer_sinks": False}],
+    ids=["a dive that is commanded", "an estimator that is wrong alone"],
+)
+def test_by_less_than_that_none_is(but: dict[str, float]) -> None:
+    story = spiral(**{"attitude_error": 68.0, **but})
+    assert "off its command" not in {one.rule for one in story.decisions()}
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from chute_ros.model import NAN, Action, Armed, Decision, LinkState, VehicleStat
 from chute_ros.runtime.device import DeviceRuntime, DeviceSettings, Summary
 from chute_ros.runtime.topics import SafetyPicture
 from chute_ros.settings import nested, parameter
+from chute_ros.supervisor.kinds import kind
 
 #: How a flight block is reported by a node that must leave arming alone.
 _LEFT_ALONE = "noted; a vehicle that arms is not disarmed (disarm_when_blocked is false)"
@@ -101,10 +102,11 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         self._announce(f"DEPLOY by {self._releases} ordered: {decision.rule}")
 
     def picture(self, one: SafetyPicture) -> None:
-        new = [text for text in one.alarms if text not in self._alarms]
+        known = {kind(text) for text in self._alarms}
         self._alarms = one.alarms
-        for text in new:
-            self._announce(text)
+        for text in one.alarms:
+            if kind(text) not in known:
+                self._announce(text)
         if self._releases and one.released:
             self._announce(f"DEPLOY by {self._releases} confirmed")
             self._releases = ""

@@ -196,7 +196,7 @@ def test_what_is_deployed_stays_so_in_silence():
 
 
 def test_under_a_drogue_before_its_parachute_it_is_launched_and_not_deployed():
-    """Given the main as the parachute: the drogue is known to be out, and the main can be fired."""
+    """Given the main as the parachute: the drogue is out, and the main can be fired."""
     rocket = Rocket(main_counts=True)
     for at, mode in ((0.0, ASCENT), (1.0, COAST)):
         rocket.says(at, mode)
