@@ -14,6 +14,7 @@ import os
 import re
 import secrets
 import shlex
+import shutil
 import signal
 import socket
 import sys
@@ -222,7 +223,8 @@ def _play(
     for one in actions:
         print(f"    {one.name:<24}{one.title}")
     print(f"\n  in another terminal:\n    {_environment()}")
-    print(f"    python3 -m chute_ros.tools.chute --namespace {namespace} watch")
+    chute = "chute" if shutil.which("chute") else "python3 -m chute_ros.tools.chute"
+    print(f"    {chute} --namespace {namespace} watch")
     (begin,) = [one.name for one in actions if one.leaves_ground]
     print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do {begin}")
     print("\n  Ctrl-C ends it all.\n", flush=True)
