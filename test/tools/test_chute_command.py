@@ -76,7 +76,7 @@ def test_a_ready_vehicle_is_well(ready):
     assert (code, err) == (0, "")
     lines = soon(out).splitlines()
     assert lines[0] == "READY"
-    assert "  mavlink_parachute  OK, device healthy, <1 s ago" in lines
+    assert "  mavlink_parachute  OK, device healthy, device <1 s ago, node <1 s ago" in lines
     assert "  motors             DISARMED, <1 s ago" in lines
     assert "  height             never received" in lines
 

@@ -41,8 +41,9 @@ class Heard:
 
 @dataclass
 class Picture:
-    """All that was received of one vehicle."""
+    """All that was received of one vehicle since began, monotonic s."""
 
+    began: float
     #: By the supervisor's name; by link; by link and device.
     states: dict[str, Heard] = field(default_factory=dict)
     heartbeats: dict[str, Heard] = field(default_factory=dict)
@@ -104,7 +105,9 @@ class Picture:
         return max(0.0, now - min(sent, heard.received))
 
     def parachute_age(self, heard: Heard, now: float) -> float:
-        """Since its device was received by its node, s."""
+        """Since its device was received by its node, s; NaN: it never was."""
+        if stamp_seconds(heard.message) == 0.0:
+            return math.nan
         sent = self._sent(heard.message.link, stamp_seconds(heard.message))
         return now - (heard.received if math.isnan(sent) else min(sent, heard.received))
 

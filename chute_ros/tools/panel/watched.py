@@ -50,7 +50,7 @@ class Watched:
         self.namespace = namespace
         self._node, self._around = node, around
         self._lock = Lock()
-        self._picture = Picture()
+        self._picture = Picture(time.monotonic())
         self._tasks = DiagnosticTasks(namespace)
         self._telem: tuple[Any, float] | None = None
         self._trace = Trace()
@@ -106,10 +106,8 @@ class Watched:
         parts = {
             "banner": sections.banner(picture),
             "blocks": sections.blocks(picture),
-            "parachutes": sections.parachutes(
-                picture.parachutes, self._identities, datetime.date.today()
-            ),
-            "vehicle": sections.vehicle(picture.vehicle),
+            "parachutes": sections.parachutes(picture, self._identities, datetime.date.today()),
+            "vehicle": sections.vehicle(picture),
             "links": sections.links(picture.links, is_old(picture.age)),
             "rules": sections.rules(picture.rules, is_old(picture.age)),
             "decisions": sections.decisions(picture.decisions),
