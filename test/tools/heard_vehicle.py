@@ -89,7 +89,7 @@ class Heard:
     """A picture, and what it shows."""
 
     def __init__(self):
-        self.picture = Picture(NOW)
+        self.picture = Picture()
 
     def hears(self, message, at=0.0):
         """A message is received at t+at."""

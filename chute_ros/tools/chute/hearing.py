@@ -41,9 +41,9 @@ class Heard:
 
 @dataclass
 class Picture:
-    """All that was received of one vehicle since began, monotonic s."""
+    """All that was received of one vehicle. began: when its first state was, monotonic s."""
 
-    began: float
+    began: float = math.nan
     #: By the supervisor's name; by link; by link and device.
     states: dict[str, Heard] = field(default_factory=dict)
     heartbeats: dict[str, Heard] = field(default_factory=dict)
@@ -57,6 +57,8 @@ class Picture:
 
     def hear_state(self, message: Any, now: float, wall: float) -> None:
         """safety/state. now: monotonic s; wall: Unix s; as in all below."""
+        if math.isnan(self.began):
+            self.began = now
         _remember(self.states, message.supervisor, message, now, wall)
 
     def hear_heartbeat(self, message: Any, now: float, wall: float) -> None:

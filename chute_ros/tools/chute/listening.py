@@ -53,7 +53,7 @@ class Listening:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.picture = Picture(time.monotonic())
+        self.picture = Picture()
         subscribe(session.node, session.namespace, self.picture)
 
     def view(self) -> VehiclePicture | None:

@@ -125,8 +125,8 @@ class DecisionView:
 
 @dataclass(frozen=True)
 class VehiclePicture:
-    """Everything. age: since the supervisor's last word, s. listened: since the listener began, s;
-    what was said before was not received here, unless it was said again. well: a state of WELL
+    """Everything. age: since the supervisor's last word, s. listened: since the first one, s; what
+    was said before was not received here, unless it was said again. well: a state of WELL
     that is not old, in mode ACTIVE, without an alarm."""
 
     namespace: str

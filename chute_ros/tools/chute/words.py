@@ -40,8 +40,8 @@ def span_text(seconds: float) -> str:
 
 
 def not_here(listened: float) -> str:
-    """Of what was not received since the listener began, so long ago (s): it may have been before,
-    and by others."""
+    """Of what was not received since the listener heard its first word, so long ago (s): it may
+    have been before, and by others."""
     return f"not received here within {span_text(listened)}"
 
 

@@ -51,7 +51,7 @@ class Watched:
         self.namespace = namespace
         self._node, self._around = node, around
         self._lock = Lock()
-        self._picture = Picture(time.monotonic())
+        self._picture = Picture()
         self._tasks = DiagnosticTasks(namespace)
         self._telem: tuple[Any, float] | None = None
         self._trace = Trace()
