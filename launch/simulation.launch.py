@@ -105,7 +105,7 @@ def _simulator(package: str, executable: str, *arguments: str) -> ExecuteProcess
 def _look(context: LaunchContext) -> list:
     """Before the defaults are set: what is there was given."""
     known = [one.name for one in _arguments()]
-    checked("simulation.launch.py", lambda: check_arguments(context.launch_configurations, known))
+    checked("simulation.launch.py", lambda: check_arguments(context, known))
     return []
 
 

@@ -20,6 +20,7 @@ from chute_ros.tools.launch_checks import (
     check_arguments,
     check_connections,
     check_file,
+    check_links,
     checked,
 )
 from launch import LaunchContext, LaunchDescription
@@ -39,11 +40,12 @@ def _nodes(context: LaunchContext) -> list:
     # An enclave has the name of its node, with the namespace.
     place = "/".join(["", *filter(None, namespace.split("/"))])
     kinds = [links()[link] for link in vehicles()[parachute].links]
-    connections = {
-        kind.name: text
-        for kind in kinds
-        if (text := LaunchConfiguration(kind.argument.name).perform(context))
+    given = {
+        link: LaunchConfiguration(kind.argument.name).perform(context)
+        for link, kind in links().items()
     }
+    checked("vehicle.launch.py", lambda: check_links(context, parachute, given))
+    connections = {kind.name: given[kind.name] for kind in kinds if given[kind.name]}
     checked("vehicle.launch.py", lambda: check_connections(connections))
     names = [*(kind.name for kind in kinds), SUPERVISOR]
     checked("vehicle.launch.py", lambda: check_file(Path(config), place, names, connections))
@@ -84,7 +86,7 @@ def _range() -> str:
 def _look(context: LaunchContext) -> list:
     """Before the defaults are set: what is there was given."""
     known = [one.name for one in _arguments()]
-    checked("vehicle.launch.py", lambda: check_arguments(context.launch_configurations, known))
+    checked("vehicle.launch.py", lambda: check_arguments(context, known))
     return []
 
 

@@ -230,11 +230,10 @@ class Maker:
                 include = wheels.fetch_headers(self.venv, version, self.run)
             wheels.rewrite_exports(self.venv, include, self.site_packages)
         lines = underlay(self.mode, self.venv)
-        overlay = shlex.quote(str(ROOT / f"install-{self.mode.name}" / "local_setup.sh"))
         (self.venv / "local_setup.sh").write_text("\n".join(lines) + "\n")
         for shell in ("bash", "zsh"):
             (self.venv / ("local_setup." + shell)).symlink_to("local_setup.sh")
-        lines += [f"if [ -f {overlay} ]; then", f"    . {overlay}", "fi"]
+        lines += overlay(ROOT / f"install-{self.mode.name}")
         (self.venv / "env.sh").write_text("\n".join(lines) + "\n")
 
     def check(self):
@@ -260,6 +259,19 @@ def underlay(mode, venv):
             'export CHUTE_ROS_LIBRARIES LD_LIBRARY_PATH="$CHUTE_ROS_LIBRARIES"',
         ]
     return lines
+
+
+def overlay(install):
+    """The same for our own packages, once they are built there; chute, report and the others are
+    commands then. They come last in PATH: a command of the system keeps its name."""
+    setup = shlex.quote(str(install / "local_setup.sh"))
+    commands = shlex.quote(str(install / "chute_ros" / "lib" / "chute_ros"))
+    return [
+        f"if [ -f {setup} ]; then",
+        f"    . {setup}",
+        f'    case ":$PATH:" in *:{commands}:*) ;; *) export PATH="$PATH":{commands} ;; esac',
+        "fi",
+    ]
 
 
 def set_up(wanted_distro):

@@ -162,6 +162,53 @@ def test_a_failed_installer_is_explained_in_one_line(output, what):
     assert "\n" not in text
 
 
+# What a shell has that sourced the environment
+
+#: What a person runs, by the name under which setup.py installs it.
+COMMANDS = ["chute", "panel", "report", "replay", "to_rosbag2", "judge_log", "demo", "campaign"]
+NEEDS_ENVIRONMENT = pytest.mark.skipif(
+    not os.environ.get("CHUTE_ROS_ENV"), reason="not in an environment of make"
+)
+
+
+def shell(script, path=os.defpath):
+    """What a new shell prints."""
+    clean = {"PATH": path, "HOME": os.environ.get("HOME", "/")}
+    command = ["sh", "-ec", script]
+    done = subprocess.run(command, env=clean, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+@NEEDS_ENVIRONMENT
+def test_the_commands_of_a_person_are_found_once_the_environment_is_sourced():
+    venv = Path(os.environ["VIRTUAL_ENV"])
+    installed = venv.parent / f"install-{os.environ['CHUTE_ROS_ENV']}/chute_ros/lib/chute_ros"
+    found = shell(f". {venv}/env.sh; for one in {' '.join(COMMANDS)}; do command -v $one; done")
+    assert found == [str(installed / one) for one in COMMANDS]
+
+
+@NEEDS_ENVIRONMENT
+def test_chute_runs_as_the_command_that_the_guide_names():
+    said = shell(f". {os.environ['VIRTUAL_ENV']}/env.sh; chute --help")
+    assert said[0].startswith("usage: chute ")
+
+
+def test_a_command_of_the_system_keeps_its_name(tmp_path):
+    install, system = tmp_path / "in stall", tmp_path / "system"
+    ours = install / "chute_ros" / "lib" / "chute_ros"
+    for folder, names in ((ours, ("chute", "report")), (system, ("report",))):
+        folder.mkdir(parents=True)
+        for name in names:
+            (folder / name).write_text("#!/bin/sh\n")
+            (folder / name).chmod(0o755)
+    lines = "\n".join(set_up.overlay(install))
+    path = f"{system}:{os.defpath}"
+    assert shell(f"{lines}\necho $PATH", path) == [path], "before it is built"
+    (install / "local_setup.sh").touch()
+    found = shell(f"{lines}\n{lines}\ncommand -v chute; command -v report; echo $PATH", path)
+    assert found == [str(ours / "chute"), str(system / "report"), f"{path}:{ours}"]
+
+
 # The environment's folder
 
 

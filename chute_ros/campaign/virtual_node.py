@@ -15,9 +15,8 @@ from chute_ros.model import Decision
 from chute_ros.protocol.dronecan.allocation import KeepTable
 from chute_ros.protocol.events import Notice
 from chute_ros.runtime.device import DeviceRuntime
-from chute_ros.runtime.topics import SafetyPicture, SupervisorBeat
+from chute_ros.runtime.topics import ParachuteTold, SafetyPicture, SupervisorBeat
 from chute_ros.supervisor.decision_gate import Verdict
-from chute_ros.supervisor.inputs import ParachuteReport
 
 _HEARTBEAT_INTERVAL = 0.1  # s
 
@@ -89,7 +88,8 @@ class VirtualNode(Plug):
 
     def publish(self, message: Any) -> int:
         """On its topic, or where it is kept."""
-        if isinstance(message, ParachuteReport):
+        if isinstance(message, ParachuteTold):
+            message = message.report
             self.knows_release |= message.status.deployed
         elif isinstance(message, KeepTable):
             self.link.table_kept(message.number, self._ros.world.now)

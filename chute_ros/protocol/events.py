@@ -21,9 +21,11 @@ class Severity(enum.IntEnum):
 
 @dataclass(frozen=True)
 class ParachuteChanged:
-    """A parachute of ours said something, or its silence grew too long."""
+    """A parachute of ours said something, or its silence grew too long. received: when its newest
+    data was, monotonic s; NaN: never."""
 
     status: ParachuteStatus
+    received: float
 
 
 @dataclass(frozen=True)

@@ -140,6 +140,12 @@ class DeviceTracker:
         self._timeout = timeout
         self._overdue = False
 
+    @property
+    def received(self) -> float:
+        """When its newest data was received, monotonic s; NaN: never."""
+        times = (self.liveness.last_heard, self.status_received)
+        return max((one for one in times if not math.isnan(one)), default=math.nan)
+
     def status_came(self, now: float) -> None:
         """Its newest status."""
         self.status_interval, self.status_received = now - self.status_received, now

@@ -6,6 +6,7 @@ Events go to the executor, which is the runtime's owner, through an inbox and a 
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -36,9 +37,14 @@ from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.ros.suite_node import SuiteNode
 from chute_ros.runtime.device import OWNER_SILENCE, DeviceRuntime, Summary
 from chute_ros.runtime.requests import Begin
-from chute_ros.runtime.topics import ActionTold, DeviceBeat, DeviceRequest, SupervisorBeat
+from chute_ros.runtime.topics import (
+    ActionTold,
+    DeviceBeat,
+    DeviceRequest,
+    ParachuteTold,
+    SupervisorBeat,
+)
 from chute_ros.settings import Parameter
-from chute_ros.supervisor.inputs import ParachuteReport
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
@@ -81,7 +87,7 @@ class DeviceNode(SuiteNode, ABC):
             SafetyRequest, "safety/request", qos.STATUS
         )
         self.follow(DeviceRequest, self._request)
-        self.follow(ParachuteReport, self._parachute)
+        self.follow(ParachuteTold, self._parachute)
         self._person_requests = PersonRequests(self)
 
     def carry(self, runtime: DeviceRuntime[Any]) -> None:
@@ -149,6 +155,12 @@ class DeviceNode(SuiteNode, ABC):
     def follow(self, kind: type, follower: Callable[[Any, Time], None]) -> None:
         """Have follower(it, its stamp) called with what the runtime publishes of this kind."""
         self._followers[kind] = follower
+
+    def receipt(self, received: float, stamp: Time) -> Time:
+        """When data was received (monotonic s), by the wall clock; NaN, never: 0. stamp: of now."""
+        if math.isnan(received):
+            return Time()
+        return messages.before(stamp, time.monotonic() - received)
 
     def rate(self, received: int) -> float:
         """How often something counted came since this was last asked, 1/s."""
@@ -261,9 +273,10 @@ class DeviceNode(SuiteNode, ABC):
     def _request(self, one: DeviceRequest, stamp: Time) -> None:
         self._request_publisher.publish(messages.device_request(one, stamp))
 
-    def _parachute(self, report: ParachuteReport, stamp: Time) -> None:
-        self.statuses[report.status.device] = report.status
-        message = messages.parachute_status(report.status, report.link, stamp)
+    def _parachute(self, one: ParachuteTold, stamp: Time) -> None:
+        status, at = one.report.status, self.receipt(one.received, stamp)
+        self.statuses[status.device] = status
+        message = messages.parachute_status(status, one.report.link, at)
         self._status_publisher.publish(message)
 
     # -- time -----------------------------------------------------------------------------------

@@ -42,6 +42,11 @@ def nanoseconds(stamp: Time) -> int:
     return int(stamp.sec) * 10**9 + int(stamp.nanosec)
 
 
+def before(stamp: Time, age: float) -> Time:
+    """The stamp of age seconds before."""
+    return stamp_of(nanoseconds(stamp) - round(age * 1e9))
+
+
 def device_beat(one: DeviceBeat, stamp: Time) -> LinkHeartbeat:
     """As it is published on safety/heartbeat."""
     message = LinkHeartbeat(
@@ -193,12 +198,16 @@ def parachute_status(status: model.ParachuteStatus, link: str, stamp: Time) -> P
 
 
 def vehicle_state(state: model.VehicleState, stamp: Time) -> VehicleState:
-    """As it is published on vehicle/state."""
+    """As it is published on vehicle/state. stamp: when the picture was made."""
     message = VehicleState()
-    message.header.stamp = stamp
+    ages = []
     for field in dataclasses.fields(state):
         value = getattr(state, field.name)
+        if field.name.endswith("_age") and not math.isnan(value):
+            ages.append(value)
         setattr(message, field.name, int(value) if isinstance(value, enum.IntEnum) else value)
+    if ages:
+        message.header.stamp = before(stamp, min(ages))
     return message
 
 

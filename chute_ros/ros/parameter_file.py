@@ -13,6 +13,8 @@ from chute_ros.errors import ParameterError
 
 #: Names of nodes and parts of them in one file, at most.
 _MOST_NAMES = 1000
+#: Parameters that ROS gives every node, by what is before their first dot.
+_EVERY_NODE_HAS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
 
 def given_in(
@@ -21,12 +23,7 @@ def given_in(
     """Parameter, nested ones with dots -> value of what the file has for this node, the later over
     the earlier. node: its whole name; also: another that counts as it. ParameterError: the file
     cannot be read, or has nothing for it: ROS would start the node on its defaults."""
-    try:
-        whole = load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ParameterError(f"{path}: {error.strerror or error}") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ParameterError(f"{path} cannot be read: {' '.join(str(error).split())}") from None
+    whole = _read(path, load)
     found: dict[str, Any] = {}
     names = {True: set[str](), False: set[str]()}
     for name, section in _sections(path, whole):
@@ -44,15 +41,43 @@ def given_in(
     return found
 
 
+def named_in(path: Path, node: str) -> list[str]:
+    """The parameters in sections of this node alone, whose last name has no wildcard. What a
+    section of several nodes has may be for another. ParameterError as given_in has it."""
+    return [
+        name
+        for pattern, section in _sections(path, _read(path, yaml.safe_load))
+        if "*" not in pattern.rpartition("/")[2] and _matches(pattern, node)
+        for name, _ in _flat(section)
+    ]
+
+
+def of_every_node(parameter: str) -> bool:
+    """ROS gives it to every node."""
+    return parameter.partition(".")[0] in _EVERY_NODE_HAS
+
+
 def files_of(arguments: Sequence[str]) -> list[Path]:
     """The parameter files among the arguments of a process, in their order."""
-    files, ours = [], False
+    return [Path(one) for one in _options(arguments, "--params-file")]
+
+
+def assigned(arguments: Sequence[str]) -> Iterator[tuple[str, str, str]]:
+    """Each -p among the arguments of a process: it, the node before its colon (empty: every node
+    of the process) and the parameter."""
+    for one in _options(arguments, "-p", "--param"):
+        node, _, parameter = one.partition(":=")[0].rpartition(":")
+        yield one, node, parameter
+
+
+def _options(arguments: Sequence[str], *flags: str) -> Iterator[str]:
+    """What follows these flags where arguments are ROS's."""
+    ours = False
     for before, one in zip(("", *arguments), arguments, strict=False):
         if one in ("--ros-args", "--"):
             ours = one == "--ros-args"
-        elif ours and before == "--params-file":
-            files.append(Path(one))
-    return files
+        elif ours and before in flags:
+            yield one
 
 
 def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iterable[str]) -> str:
@@ -68,6 +93,15 @@ def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iter
     if left:
         parts.insert(-1, f"{len(left)} from the command line")
     return f"{len(every)} parameters: {', '.join(parts)}"
+
+
+def _read(path: Path, load: Callable[[str], Any]) -> Any:
+    try:
+        return load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror or error}") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ParameterError(f"{path} cannot be read: {' '.join(str(error).split())}") from None
 
 
 def _flat(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -19,7 +19,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 
 from chute_ros.errors import ParameterError
-from chute_ros.ros.parameter_file import taken
+from chute_ros.ros.parameter_file import assigned, files_of, named_in, of_every_node, taken
 from chute_ros.settings import Parameter
 
 
@@ -76,13 +76,35 @@ def declare(node: Node, parameters: tuple[Parameter, ...]) -> Mapping[str, Any]:
 
 def settings_taken(node: Node, names: Iterable[str], arguments: Sequence[str]) -> str:
     """How many of its parameters a node takes from where, in words. arguments: of its process.
-    ParameterError: a file has nothing for it."""
-    return taken(arguments, node.get_fully_qualified_name(), names, node._parameter_overrides)
+    ParameterError: a file has nothing for it, or what is given cannot be for it."""
+    own, known = node.get_fully_qualified_name(), list(names)
+    text = taken(arguments, own, known, node._parameter_overrides)
+    for one, other, name in assigned(arguments):
+        if other and f"/{other}" != own:
+            raise ParameterError(
+                f"'-p {one}' is for a node /{other}, this one is {own}: leave '{other}:' out"
+            )
+        check_names([name], known, f"'-p {one}': {own}")
+    for path in files_of(arguments):
+        check_names(named_in(path, own), known, f"{path}: {own}")
+    return text
+
+
+def check_names(given: Iterable[str], known: Iterable[str], node: str) -> None:
+    """given: parameters that are for this node alone. ParameterError: it has none of a name, and
+    whoever set it relies on it."""
+    known = list(known)
+    for name in given:
+        if name not in known and not of_every_node(name):
+            hint = what_was_meant(name, known)
+            raise ParameterError(
+                f"{node} has no parameter {name}{hint or ': correct its name, or leave it out'}"
+            )
 
 
 def _tell_unknown(node: Node, known: list[str]) -> None:
     for name in node._parameter_overrides:
-        if node.has_parameter(name) or name.startswith("qos_overrides."):
+        if node.has_parameter(name) or of_every_node(name):
             continue
         if near := nearest(name, known, MISSPELT):
             # Whoever set it relies on it: the default may be the opposite.

@@ -28,7 +28,7 @@ from chute_ros.protocol.events import (
 from chute_ros.runtime.decisions import DecisionCarrier
 from chute_ros.runtime.requests import Begin, CallFailed, RequestTracker
 from chute_ros.runtime.shell import Shell
-from chute_ros.runtime.topics import DeviceBeat, SafetyPicture, SupervisorBeat
+from chute_ros.runtime.topics import DeviceBeat, ParachuteTold, SafetyPicture, SupervisorBeat
 from chute_ros.runtime.watch import SupervisorWatch
 from chute_ros.settings import Settings, parameter
 from chute_ros.supervisor.inputs import ParachuteReport, VehicleReport
@@ -209,7 +209,8 @@ class DeviceRuntime(ABC, Generic[SettingsT]):
         if isinstance(event, Summary):
             self._publish_beat(event, now)
         elif isinstance(event, ParachuteChanged):
-            self.shell.publish(ParachuteReport(self.name, event.status))
+            picture = ParachuteReport(self.name, event.status)
+            self.shell.publish(ParachuteTold(picture, event.received))
         elif isinstance(event, VehicleChanged):
             self.shell.publish(VehicleReport(event.state))
         elif isinstance(event, RequestReport):

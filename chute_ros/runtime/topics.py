@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from chute_ros.model import Action, LinkState
 from chute_ros.protocol.events import Ask
-from chute_ros.supervisor.inputs import ActionReport
+from chute_ros.supervisor.inputs import ActionReport, ParachuteReport
 from chute_ros.supervisor.lease import Claim
 from chute_ros.supervisor.state import State
 
@@ -25,6 +25,15 @@ class DeviceBeat:
     reasons: tuple[str, ...]
     #: For how long what came may have waited, s.
     behind: float
+
+
+@dataclass(frozen=True)
+class ParachuteTold:
+    """A device node's picture of a parachute (parachute/status). received: when the newest data of
+    the device was, monotonic s; NaN: never."""
+
+    report: ParachuteReport
+    received: float
 
 
 @dataclass(frozen=True)

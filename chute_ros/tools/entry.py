@@ -31,13 +31,19 @@ def run(name: str, module: str) -> None:
         main()
     except (KeyboardInterrupt, Exception) as error:
         # In the middle of a conversion rclpy's binding makes an error of its own of it.
-        if not ctrl_c.came and not isinstance(error, KeyboardInterrupt):
+        if not (ctrl_c.came or isinstance(error, KeyboardInterrupt) or _shut_down(error)):
             raise
         _tell(name)
         sys.exit(INTERRUPTED)
     finally:
         # All is ended; a second Ctrl-C would only tell where in the interpreter it was.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _shut_down(error: BaseException) -> bool:
+    """A signal has shut ROS down: a script's background job has no SIGINT but rclpy's own."""
+    rclpy = sys.modules.get("rclpy.executors")
+    return rclpy is not None and isinstance(error, rclpy.ExternalShutdownException)
 
 
 def _tell(name: str) -> None:

@@ -7,17 +7,18 @@ on settings that nobody gave.
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from chute_ros.errors import ChuteError, ParameterError
 from chute_ros.links.api import SUPERVISOR, load
-from chute_ros.links.registered import links
-from chute_ros.ros.parameter_file import given_in
-from chute_ros.ros.parameters import MISSPELT, nearest
+from chute_ros.links.registered import links, vehicles
+from chute_ros.ros.parameter_file import given_in, named_in
+from chute_ros.ros.parameters import MISSPELT, check_names, nearest
 from chute_ros.ros.supervisor_parameters import SupervisorParameters
 from chute_ros.settings import Settings, parameters_of, settings_from
 from chute_ros.sim.bench_actions import (
@@ -47,6 +48,8 @@ FAILURES = {
     "umbilical": "cut_umbilical",
     "refuse": "refuse_to_open",
 }
+#: Arguments that `ros2 launch` itself adds to those of a launch file, for its options.
+_OF_LAUNCH = ("launch-prefix", "launch-prefix-filter")
 #: Two more follow it, and there is none above 65535.
 _LAST_PORT = 65533
 
@@ -64,12 +67,49 @@ def _refuse(text: str) -> NoReturn:
     sys.exit(2)
 
 
-def check_arguments(given: Iterable[str], known: Iterable[str]) -> None:
-    """given: all launch arguments, others' as well. ParameterError: one of ours is misspelt."""
+def given_to(context: Any) -> list[str]:
+    """The arguments that a user gave the launch file that now begins (a LaunchContext), by name;
+    none where another launch file includes it: what is in the context then is that one's too."""
+    inside = context.get_locals_as_dict()
+    # What is launched is itself included, by the description that the launch began with.
+    began = getattr(inside.get("event"), "launch_description", None)
+    for entity in began.describe_sub_entities() if began else ():
+        source = getattr(entity, "launch_description_source", None)
+        place = os.path.abspath(source.location) if source else ""
+        if source and place == inside.get("current_launch_file_path"):
+            return [name for name, _ in entity.launch_arguments if isinstance(name, str)]
+    return []
+
+
+def check_arguments(context: Any, known: Iterable[str]) -> None:
+    """context: a LaunchContext before the defaults are set. ParameterError: an argument is given
+    that the launch file does not have; of an including file's only one that is ours misspelt."""
     known = list(known)
-    for name in given:
+    for name in given_to(context):
+        if name not in (*known, *_OF_LAUNCH):
+            near = nearest(name.lower(), known, MISSPELT)
+            hint = f"did you mean {near}?" if near else f"need one of {', '.join(known)}"
+            raise ParameterError(f"there is no launch argument {name}: {hint}")
+    for name in context.launch_configurations:
         if name not in known and (near := nearest(name, known, MISSPELT)):
             raise ParameterError(f"there is no launch argument {name}: did you mean {near}?")
+
+
+def check_links(context: Any, parachute: str, connections: Mapping[str, str]) -> None:
+    """connections: device node -> what the argument of its link is given, empty: nothing.
+    ParameterError: it is given for a link that this parachute does not start, which would be
+    passed over. Of an including file, whose own argument it may be, that is only told."""
+    for node, text in connections.items():
+        if not text or node in vehicles()[parachute].links:
+            continue
+        name = links()[node].argument.name
+        fits = " or ".join(
+            f"parachute:={one}" for one in vehicles() if node in vehicles()[one].links
+        )
+        told = f"launch argument {name} is {text!r}, and parachute:={parachute} starts no {node}"
+        if name in given_to(context):
+            raise ParameterError(f"{told}: need {fits}, or leave {name} out")
+        print(f"{told}: it is not used", file=sys.stderr)
 
 
 def check_port(text: str) -> int:
@@ -196,6 +236,7 @@ def check_file(
                 raise ParameterError(
                     f"{path}: {name} has no parameter {other}: did you mean {near}?"
                 )
+        check_names(named_in(path, f"{namespace}/{name}"), known, f"{path}: {name}")
         try:
             settings_from(kind, {one: given[one] for one in known if one in given})
         except ParameterError as error:

@@ -6,15 +6,13 @@ from pathlib import Path
 
 from chute_ros import plain_yaml
 from chute_ros.errors import ParameterError
-from chute_ros.ros.parameter_file import given_in
+from chute_ros.ros.parameter_file import given_in, of_every_node
 from chute_ros.ros.parameters import what_was_meant
 from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.replaying import Other
 
 NODE = "safety_supervisor"
-#: What ROS gives every node.
-_EVERYWHERE = {"use_sim_time", "start_type_description_service", "qos_overrides"}
 
 
 def other_from(path: Path, node: str) -> Other:
@@ -23,7 +21,7 @@ def other_from(path: Path, node: str) -> Other:
     given = given_in(path, node, f"/{NODE}", plain_yaml.load)
     known = {one.name: one for one in PARAMETERS}
     for name in given:
-        if name.partition(".")[0] not in {*known, *_EVERYWHERE}:
+        if name not in known and not of_every_node(name):
             hint = what_was_meant(name, known)
             raise ParameterError(f"{path}: {NODE} has no parameter {name}{hint}")
     for name, parameter in known.items():

@@ -30,10 +30,10 @@ class Processes:
     #: How a log is opened: "ab" goes on where the last of this name ended.
     log_mode = "wb"
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, ros_home: Path | None = None) -> None:
         self._folder = folder
         #: Where the children keep what outlives them: allocation tables, black boxes.
-        self.ros_home = folder / "ros_home"
+        self.ros_home = ros_home or folder / "ros_home"
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, module: str, *arguments: str, on: Sequence[str] = ()) -> None:

@@ -14,10 +14,12 @@ import os
 import re
 import secrets
 import shlex
+import shutil
 import signal
 import socket
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from hashlib import sha256
 from importlib.metadata import entry_points
@@ -28,7 +30,8 @@ from chute_ros.links.api import SUPERVISOR, Sockets
 from chute_ros.links.registered import module_of, vehicles
 from chute_ros.plain_text import plain
 from chute_ros.ros.middleware import RANGE
-from chute_ros.ros.private_files import open_new
+from chute_ros.ros.private_files import make_folder, open_new
+from chute_ros.ros.ros_home import ros_home
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.bench_call import call_action
@@ -43,6 +46,8 @@ DRONES, ROCKET = ("mavlink", "upf", "both", "relay"), "umbilical"
 #: How long the supervisor may take until it is READY, s.
 _READY_WITHIN = 60.0
 _PASSWORD = "password"
+#: In what the nodes keep.
+_BLACK_BOX = Path("chute_ros/black_box")
 #: What the panel writes once it does.
 _LISTENS = "panel at http"
 
@@ -62,7 +67,7 @@ def main() -> None:
             sys.exit(f"sim: {chosen.do}: {error}")
         return
     with tempfile.TemporaryDirectory(prefix="chute_ros_sim_") as scratch:
-        processes = Processes(Path(scratch))
+        processes = Processes(Path(scratch), _new_home())
         # As a Ctrl-C does, of which the entry knows that it came.
         at_ctrl_c = signal.getsignal(signal.SIGINT)
         signal.signal(signal.SIGTERM, at_ctrl_c if callable(at_ctrl_c) else _end)
@@ -80,6 +85,7 @@ def main() -> None:
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.SIG_IGN)
             processes.end()
+            _tell_kept(processes.ros_home)
 
 
 def _options() -> argparse.ArgumentParser:
@@ -156,6 +162,33 @@ def _alone(namespace: str) -> Iterator[None]:
         yield
 
 
+def _new_home() -> Path:
+    """What the nodes of this run keep. Of its own: a vehicle of a run before may be without its
+    parachute."""
+    began = time.strftime("%Y%m%d_%H%M%S")
+    folder = ros_home() / "simulations" / f"{began}_{os.getpid()}"
+    try:
+        make_folder(folder)
+    except OSError as error:
+        print(f"sim: {folder}: {error.strerror or error}: set ROS_HOME", file=sys.stderr)
+        sys.exit(2)
+    return folder
+
+
+def _tell_kept(home: Path) -> None:
+    """Where the black box is; without one nothing of the run is kept."""
+    box = home / _BLACK_BOX
+    if any(box.glob("*")):
+        print(f"\n  black box   {box}\n  see it with {_command('report')} {box}", flush=True)
+    else:
+        shutil.rmtree(home, ignore_errors=True)
+
+
+def _command(name: str) -> str:
+    """How a shell runs this tool."""
+    return name if shutil.which(name) else f"python3 -m chute_ros.tools.{name}"
+
+
 def _vehicle(chosen: argparse.Namespace) -> str:
     return ROCKET if chosen.vehicle == "rocket" else str(chosen.parachute)
 
@@ -211,7 +244,7 @@ def _play(
     kind, namespace = _vehicle(chosen), chosen.namespace
     print(f"\n  nodes       {', '.join([*vehicles()[kind].links, SUPERVISOR, 'sim_bench'])}")
     print(f"  simulators  {', '.join(simulators_of(kind))}")
-    print(f"  black box   {processes.ros_home}/chute_ros/black_box")
+    print(f"  black box   {processes.ros_home / _BLACK_BOX} (stays)")
     if not chosen.no_panel:
         told = processes.log("panel")
         director.until("the panel listens", _READY_WITHIN, lambda: _LISTENS in told.read_text())
@@ -222,7 +255,7 @@ def _play(
     for one in actions:
         print(f"    {one.name:<24}{one.title}")
     print(f"\n  in another terminal:\n    {_environment()}")
-    print(f"    python3 -m chute_ros.tools.chute --namespace {namespace} watch")
+    print(f"    {_command('chute')} --namespace {namespace} watch")
     (begin,) = [one.name for one in actions if one.leaves_ground]
     print(f"    python3 -m chute_ros.tools.sim --namespace {namespace} --do {begin}")
     print("\n  Ctrl-C ends it all.\n", flush=True)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from chute_msgs.msg import SafetyState, SafetySummary
-from heard_vehicle import state
+from chute_msgs.msg import ParachuteStatus, SafetyState, SafetySummary
+from heard_vehicle import parachute, state
 from panel_bench import log_in
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from chute_ros.model import LinkState
 from chute_ros.ros import qos
 
 
@@ -20,6 +21,7 @@ class Vehicles(Node):
         super().__init__("vehicles", namespace=base)
         self.resets = []
         self._told = []
+        self._names = list(stages)
         for name, stage in stages.items():
             self._add(name, stage)
         self.create_timer(0.5, self._tell)
@@ -41,6 +43,22 @@ class Vehicles(Node):
             publisher = self.create_publisher(kind, f"{name}/{topic}", qos.LATCHED)
             self._told.append((publisher, message))
         self.create_service(Trigger, f"{name}/safety/reset", self._reset)
+
+    def lose_links(self):
+        """Every parachute is out of reach."""
+        self._links(LinkState.LOST)
+
+    def find_links(self):
+        """And is back, with a word of itself."""
+        self._links(LinkState.OK)
+        for name in self._names:
+            publisher = self.create_publisher(ParachuteStatus, f"{name}/parachute/status", 10)
+            self._told.append((publisher, parachute()))
+
+    def _links(self, link_state):
+        for _, message in self._told:
+            if isinstance(message, SafetyState):
+                message.link_states = [int(link_state)]
 
     def _tell(self):
         for publisher, message in self._told:

@@ -63,6 +63,24 @@ def test_one_who_logged_out_elsewhere_orders_nothing(
     assert "by='Ben at 127.0.0.1 (panel)'" in panel.log()
 
 
+def test_beside_the_button_stands_that_no_parachute_can_be_reached(
+    fly, namespace, start_panel, open_page, tmp_path
+):
+    vehicles = fly({"drone1": Stage.IN_FLIGHT})
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
+    log_in(page)
+    note = page.get_by_role("alert").filter(has_text="PARACHUTE")
+    # Given a link that lives, and a parachute that says nothing for long,
+    until(fly, lambda: "NO PARACHUTE IS RECEIVED" in "".join(note.all_inner_texts()), page)
+    # when the link is lost as well, then that is the reason, and what DEPLOY does all the same.
+    vehicles.lose_links()
+    told = "NO PARACHUTE CAN BE REACHED (mavlink_parachute LOST): DEPLOY: the motors will STOP"
+    until(fly, lambda: told in "".join(note.all_inner_texts()), page)
+    vehicles.find_links()
+    until(fly, lambda: not note.is_visible(), page)
+
+
 def test_an_order_that_waited_for_a_cut_connection_is_not_obeyed(
     fly, namespace, start_panel, open_page, tmp_path
 ):

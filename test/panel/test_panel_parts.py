@@ -9,7 +9,7 @@ import re
 
 import pytest
 from chute_msgs.msg import ActionReport, RuleState, SafetyDecision, SafetyState, Telem
-from heard_vehicle import Heard, parachute, stamped, state, vehicle
+from heard_vehicle import Heard, heartbeat, parachute, stamped, state, vehicle
 
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.chute.diagnostic_tasks import Task
@@ -60,7 +60,7 @@ def test_a_mode_that_does_not_fire_stands_out_and_so_does_an_alarm():
 
 def parachute_part(at=0.0, identities=None, **fields):
     heard = Heard().hears(stamped(state())).hears(stamped(parachute(**fields)))
-    return sections.parachutes(heard.view(at).parachutes, identities or {}, TODAY)
+    return sections.parachutes(heard.view(at), identities or {}, TODAY)
 
 
 def test_a_parachute_with_all_that_is_known_of_it():
@@ -103,11 +103,25 @@ def test_the_day_of_packing_and_its_age(date, told):
 def test_each_measurement_of_the_vehicle_has_its_age():
     heard = Heard().hears(stamped(state()))
     heard.hears(vehicle(roll=0.1, pitch=0.0, yaw=math.pi, tilt=0.1, attitude_age=5.0))
-    part = sections.vehicle(heard.view().vehicle)
+    part = sections.vehicle(heard.view())
     assert "height 61.2 m <1 s ago" in text_of(part)
     assert '<div class="row old"><span>tilt</span><span>6 ° <small>OLD: 5 s ago' in part
     assert "battery 15.8 V, 87 % 1 s ago" in text_of(part)
-    assert "never received" in text_of(sections.vehicle(None))
+
+
+def test_what_was_not_received_since_the_page_listens_is_not_told_to_have_never_been():
+    """Its supervisor may have lost it a second before."""
+    picture = Heard().hears(stamped(state())).view(4.0)
+    for part in (sections.vehicle(picture), sections.parachutes(picture, {}, TODAY)):
+        assert "not received here within 4 s" in text_of(part)
+        assert "never" not in text_of(part)
+
+
+def test_the_ages_of_a_node_and_of_its_device_are_told_apart():
+    heard = Heard().hears(stamped(state(link_states=[3], devices_healthy=[False])))
+    heard.hears(stamped(heartbeat(age=7.9)))
+    part = text_of(sections.links(heard.view().links, False))
+    assert "LOST, device NOT healthy, device OLD: 8 s ago, node <1 s ago" in part
 
 
 def test_rules_are_bars_that_fill():
@@ -206,9 +220,9 @@ def test_no_text_from_the_network_becomes_a_part_of_the_page():
         (
             sections.banner(picture),
             sections.blocks(picture),
-            sections.parachutes(picture.parachutes, {f"{HOSTILE} {HOSTILE}": HOSTILE}, TODAY),
+            sections.parachutes(picture, {f"{HOSTILE} {HOSTILE}": HOSTILE}, TODAY),
             sections.links(picture.links, False),
-            sections.vehicle(picture.vehicle),
+            sections.vehicle(picture),
             sections.rules(picture.rules, False),
             sections.decisions(picture.decisions),
             sections.diagnostics([task]),

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from chute_msgs.srv import UmbilicalCommand
 from panel_bench import PATIENCE, hold, log_in, password_file, picture, watch_words, word
 from playwright.sync_api import expect
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
+from rocket_operator import commands_to
 
 from chute_ros.tools.processes import Processes
 from chute_ros.tools.rocket_rig import RocketRig
@@ -31,20 +29,7 @@ def rig(namespace, tmp_path):
 @pytest.fixture
 def command(namespace):
     """command(name): as the operator's own tools send it to the flight computer."""
-    executor, node = SingleThreadedExecutor(), Node("operator", namespace=namespace)
-    executor.add_node(node)
-    client = node.create_client(UmbilicalCommand, "umbilical/command")
-
-    def send(name, force=False):
-        assert client.wait_for_service(timeout_sec=PATIENCE / 1000)
-        request = UmbilicalCommand.Request(command=name, force=force, reason="test")
-        future = client.call_async(request)
-        executor.spin_until_future_complete(future, timeout_sec=PATIENCE / 1000)
-        return future.result()
-
-    yield send
-    executor.shutdown()
-    node.destroy_node()
+    yield from commands_to(namespace)
 
 
 def test_a_rocket_from_the_cable_to_the_main(

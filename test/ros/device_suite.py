@@ -27,6 +27,7 @@ from simulated_device import SimulatedDevice
 
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
 from chute_ros.ros import link_log, qos
+from chute_ros.ros.messages import seconds
 
 #: Parameters of every device node, quickened.
 HEARTBEAT_RATE = 50.0
@@ -374,6 +375,30 @@ class DeviceSuite(NodeSuite):
         assert told[-1] == LinkState.OK or self.bench.until(
             lambda: self.statuses[-1].link_state == LinkState.OK, "the status is back, too"
         )
+
+    def test_the_stamp_of_its_status_is_that_of_its_newest_data(
+        self, device: SimulatedDevice
+    ) -> None:
+        """Given a device that falls silent: its node goes on, and its word gets no younger."""
+        self.plugged(device)
+        self.bench.until(lambda: self.statuses, "its status is told")
+
+        def told(state: LinkState) -> float:
+            one = self.bench.until(
+                lambda: next((s for s in self.statuses if s.link_state == state), None),
+                f"its status is {state.name}",
+            )
+            return seconds(one.header.stamp)
+
+        def now() -> float:
+            return seconds(self.bench.client.get_clock().now().to_msg())
+
+        assert now() - seconds(self.statuses[-1].header.stamp) < 20.0
+        self.statuses.clear()
+        device.fall_silent()
+        stale, lost = told(LinkState.STALE), told(LinkState.LOST)
+        assert now() - lost >= 0.8, "the limit of LOST is that old"
+        assert lost == pytest.approx(stale, abs=0.01), "both are of its last word"
 
     def test_a_device_that_breaks_down_is_not_healthy(self, device: SimulatedDevice) -> None:
         self.plugged(device)

@@ -42,11 +42,34 @@ def loaded(file, monkeypatch):
     return space
 
 
-def made_by(file, monkeypatch, **arguments):
-    """What the function of a launch file makes."""
+class Context:
+    """Stands for a LaunchContext as `ros2 launch` makes it: launched has these arguments of the
+    user, and may include file, which now begins."""
+
+    def __init__(self, file, arguments, launched=None):
+        self.launch_configurations = dict(arguments)
+        include = types.SimpleNamespace(
+            launch_description_source=types.SimpleNamespace(location=str(launched or file)),
+            launch_arguments=tuple(arguments.items()),
+        )
+        began = types.SimpleNamespace(describe_sub_entities=lambda: [include])
+        self.inside = {
+            "event": types.SimpleNamespace(launch_description=began),
+            "current_launch_file_path": str(file),
+        }
+
+    def get_locals_as_dict(self):
+        return self.inside
+
+
+def made_by(file, monkeypatch, launched=None, **arguments):
+    """What a launch file makes of a user's arguments; launched: what includes it."""
     space = loaded(file, monkeypatch)
+    context = Context(file, arguments, launched)
+    Recorded.made.clear()
+    space["_look"](context)
     Recorded.made.clear()
     monkeypatch.setattr(Recorded, "chosen", {"port": "14600", **arguments})
     function = space.get("_nodes") or space["_vehicle"]
-    function(context=None)
+    function(context=context)
     return list(Recorded.made)

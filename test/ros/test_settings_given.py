@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.util
 import itertools
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import pytest
-from launch_files import LAUNCH, Recorded, loaded, made_by
+from launch_files import LAUNCH, Recorded, made_by
 
 from chute_ros.errors import ParameterError
 from chute_ros.links.registered import module_of
 from chute_ros.ros.parameter_file import files_of, given_in, taken
+from chute_ros.ros.safety_supervisor_node import SafetySupervisorNode
 
 ROOTED = "upf_can:\n  ros__parameters:\n    call_tries: 4\n"
 
@@ -48,12 +51,17 @@ def start(node: str, *arguments: str) -> tuple[int, list[str]]:
         (("-r", "word"), "Couldn't parse remap rule: '-r word'"),
         (("-p", "call_tries"), "Couldn't parse parameter override rule: '-p call_tries'"),
         (("--params-file", "FOLDER/other.yaml"), "other.yaml has no ros__parameters for /"),
+        (("-p", "nobody:mode:=SHADOW"), "'-p nobody:mode:=SHADOW' is for a node /nobody, this"),
+        (("-p", "url:=x"), "'-p url:=x': /"),
+        (("--param", "url:=x"), "has no parameter url: correct its name, or leave it out"),
+        (("--params-file", "FOLDER/unknown.yaml"), "has no parameter url: correct its name, or"),
     ],
 )
 def test_a_node_does_not_start_on_what_cannot_be_read_or_is_not_for_it(
     node: str, arguments: tuple[str, ...], words: str, tmp_path: Path
 ) -> None:
     (tmp_path / "broken.yaml").write_text("upf_can: [")
+    (tmp_path / "unknown.yaml").write_text(f"/**/{node}:\n  ros__parameters:\n    url: x\n")
     (tmp_path / "other.yaml").write_text("somebody:\n  ros__parameters:\n    call_tries: 4\n")
     code, said = start(node, *(one.replace("FOLDER", str(tmp_path)) for one in arguments))
     assert code == 2
@@ -71,6 +79,35 @@ def test_a_name_without_its_namespace_is_told_with_the_fix(tmp_path: Path) -> No
         f"upf_can: {path} has no ros__parameters for /drone1/upf_can (it has some for /upf_can): "
         "need for example '/**/upf_can:' with 'ros__parameters:' below"
     )
+
+
+def test_a_node_named_without_its_namespace_gets_no_parameter_and_it_is_told() -> None:
+    """ROS knows no namespace there."""
+    code, (line,) = start("upf_can", "-p", "upf_can:call_tries:=4", "-r", "__ns:=/drone1")
+    assert code == 2
+    assert line == (
+        "upf_can: '-p upf_can:call_tries:=4' is for a node /upf_can, this one is /drone1/upf_can: "
+        "leave 'upf_can:' out"
+    )
+
+
+def test_what_a_file_has_for_others_or_for_all_and_what_is_ros_own_does_not_stop_a_start(
+    bench, tmp_path: Path, capfd
+) -> None:
+    path = tmp_path / "settings.yaml"
+    path.write_text(
+        "/**/safety_supervisor:\n  ros__parameters:\n    mode: SHADOW\n    use_sim_time: false\n"
+        "    qos_overrides: {/safety/state: {publisher: {depth: 1}}}\n"
+        "/**:\n  ros__parameters:\n    of_all: 1\n"
+        "/**/somebody:\n  ros__parameters:\n    url: x\n"
+    )
+    arguments = ["--ros-args", "--params-file", str(path), "-p", "use_sim_time:=false"]
+    started = partial(SafetySupervisorNode, cli_args=arguments, started_with=arguments)
+    node = bench.add(started)
+    assert node.values["mode"] == "SHADOW"
+    told = capfd.readouterr().err
+    assert "has no parameter of_all, its value is not used" in told
+    assert "url" not in told
 
 
 def test_what_a_node_takes_from_where_is_told(tmp_path: Path) -> None:
@@ -116,12 +153,30 @@ GOOD = "/**/mavlink_parachute:\n  ros__parameters:\n    {}\n/**/safety_superviso
 GOOD += "  ros__parameters:\n    mode: SHADOW\n"
 
 
+AS_ROS2_LAUNCH = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+source = AnyLaunchDescriptionSource(sys.argv[1])
+given = [tuple(one.split(":=", 1)) for one in sys.argv[2:]]
+service = LaunchService(argv=sys.argv[2:])
+include = IncludeLaunchDescription(source, launch_arguments=given)
+service.include_launch_description(LaunchDescription([include]))
+sys.exit(service.run())
+"""
+
+
+def nodes_of(made: list[Recorded]) -> list[Recorded]:
+    return [one for one in made if "executable" in one.options]
+
+
 def refused(monkeypatch, capsys, file: str, **arguments: str) -> str:
     """What a launch file says that starts nothing."""
     with pytest.raises(SystemExit) as ended:
         made_by(LAUNCH / file, monkeypatch, **arguments)
     assert ended.value.code == 2
-    assert not [one for one in Recorded.made if "executable" in one.options]
+    assert not nodes_of(Recorded.made)
     (line,) = capsys.readouterr().err.splitlines()
     return line.removeprefix(f"{file}: ")
 
@@ -177,7 +232,7 @@ def test_a_connection_in_a_file_is_looked_at_unless_an_argument_overrides_it(
     line = refused(monkeypatch, capsys, VEHICLE, **given)
     assert line.startswith(f"{path}: mavlink_parachute: connection 'to be filled in' is not")
     made = made_by(LAUNCH / VEHICLE, monkeypatch, **given, connection="udpin:0.0.0.0:1")
-    assert len([one for one in made if "executable" in one.options]) == 2
+    assert len(nodes_of(made)) == 2
 
 
 def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> None:
@@ -185,7 +240,7 @@ def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> No
     path.write_text(GOOD.format("connection: udpin:0.0.0.0:1"))
     given = {"parachute": "mavlink", "namespace": "drone1", "config": str(path)}
     made = made_by(LAUNCH / VEHICLE, monkeypatch, **given)
-    assert len([one for one in made if "executable" in one.options]) == 2
+    assert len(nodes_of(made)) == 2
 
 
 @pytest.mark.parametrize(
@@ -199,18 +254,75 @@ def test_with_a_file_that_is_for_it_it_starts(tmp_path: Path, monkeypatch) -> No
 def test_a_launch_argument_that_is_misspelt_is_told(
     file: str, name: str, meant: str, monkeypatch, capsys
 ) -> None:
-    space = loaded(LAUNCH / file, monkeypatch)
+    foreign = {"launched": "/parent.launch.py", "somebody_elses": "too", "parachute": "mavlink"}
+    told = f"there is no launch argument {name}: did you mean {meant}?"
+    assert refused(monkeypatch, capsys, file, **{name: "given"}) == told
+    assert refused(monkeypatch, capsys, file, **{name: "given"}, **foreign) == told
+    assert nodes_of(made_by(LAUNCH / file, monkeypatch, **foreign))
 
-    class Context:
-        launch_configurations = {name: "given", "somebody_elses": "too"}  # noqa: RUF012
 
-    with pytest.raises(SystemExit) as ended:
-        space["_look"](Context)
-    assert ended.value.code == 2
-    text = f"{file}: there is no launch argument {name}: did you mean {meant}?\n"
-    assert capsys.readouterr().err == text
-    Context.launch_configurations = {meant: "given", "somebody_elses": "too"}
-    assert space["_look"](Context) == []
+@pytest.mark.parametrize("file", [VEHICLE, SIMULATION])
+@pytest.mark.parametrize(
+    "name", ["config_file", "params_file", "conn", "ns", "cfg", "use_sim_time", "x"]
+)
+def test_a_launch_argument_that_it_does_not_have_is_told_with_those_it_has(
+    file: str, name: str, monkeypatch, capsys
+) -> None:
+    line = refused(monkeypatch, capsys, file, **{name: "given"})
+    assert line.startswith(f"there is no launch argument {name}: need one of ")
+    assert {"namespace", "parachute"} < {one.strip(",") for one in line.split()}
+
+
+def test_capitals_do_not_hide_what_was_meant(monkeypatch, capsys) -> None:
+    line = refused(monkeypatch, capsys, VEHICLE, CONFIG="my.yaml")
+    assert line == "there is no launch argument CONFIG: did you mean config?"
+
+
+def test_what_ros2_launch_adds_for_its_own_options_is_let_by(monkeypatch) -> None:
+    given = {"parachute": "mavlink", "launch-prefix": "gdb", "launch-prefix-filter": "x"}
+    assert nodes_of(made_by(LAUNCH / VEHICLE, monkeypatch, **given))
+
+
+@pytest.mark.parametrize(
+    ("parachute", "argument", "node", "fits"),
+    [
+        ("mavlink", "bus", "upf_can", "parachute:=upf or parachute:=both"),
+        ("mavlink", "cable", "umbilical", "parachute:=umbilical"),
+        ("upf", "output", "relay", "parachute:=relay"),
+        ("umbilical", "connection", "mavlink_parachute", "parachute:=mavlink or "),
+    ],
+)
+def test_the_argument_of_a_link_that_is_not_started_is_told_with_the_fix(
+    parachute: str, argument: str, node: str, fits: str, monkeypatch, capsys
+) -> None:
+    """The vehicle would start without its parachute, on the defaults of another link."""
+    given = {"parachute": parachute, argument: "socketcan:can0"}
+    line = refused(monkeypatch, capsys, VEHICLE, **given)
+    told = f"launch argument {argument} is 'socketcan:can0', and parachute:={parachute} starts no "
+    assert line.startswith(f"{told}{node}: need {fits}")
+    assert line.endswith(f", or leave {argument} out")
+    # An argument of this name may be the including file's own.
+    assert nodes_of(made_by(LAUNCH / VEHICLE, monkeypatch, "/parent.launch.py", **given))
+    assert capsys.readouterr().err == f"{told}{node}: it is not used\n"
+
+
+HAS_LAUNCH = importlib.util.find_spec("launch.actions") is not None
+
+
+@pytest.mark.skipif(not HAS_LAUNCH, reason="`launch` is no wheel")
+@pytest.mark.parametrize("argument", ["ns:=drone1", "bus:=socketcan:can0"])
+def test_the_real_launch_ends_with_the_line(argument: str) -> None:
+    """As `ros2 launch` does it, with what is only where ROS is installed."""
+    done = subprocess.run(
+        [sys.executable, "-c", AS_ROS2_LAUNCH, str(LAUNCH / VEHICLE), argument],
+        capture_output=True,
+        text=True,
+        timeout=30.0,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert f"{VEHICLE}: " in done.stderr
+    assert "process started" not in done.stderr
 
 
 @pytest.mark.parametrize("port", ["abc", "", "0", "65534", "-1", "1.5"])

@@ -10,15 +10,18 @@ import threading
 
 class PrintingProcess:
     """A module with its arguments. errors: where its standard error goes, with the lines if not
-    given."""
+    given; before: is called in the new process."""
 
-    def __init__(self, module, *arguments, environment=None, errors=subprocess.STDOUT):
+    def __init__(
+        self, module, *arguments, environment=None, errors=subprocess.STDOUT, before=None
+    ):
         self.process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
             env=environment,
             stdout=subprocess.PIPE,
             stderr=errors,
             text=True,
+            preexec_fn=before,  # noqa: PLW1509
         )
         self.lines = []
         self._reader = threading.Thread(target=self._read)

@@ -19,7 +19,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 from supervisor_bench import Scene
 
-from chute_ros.model import Action, Outcome
+from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.ros import qos
 
 HOSTILE = "\x1b[2J\x1b]0;title\x07\u202eevil\r\n"
@@ -76,7 +76,7 @@ def test_a_ready_vehicle_is_well(ready):
     assert (code, err) == (0, "")
     lines = soon(out).splitlines()
     assert lines[0] == "READY"
-    assert "  mavlink_parachute  OK, device healthy, <1 s ago" in lines
+    assert "  mavlink_parachute  OK, device healthy, device <1 s ago, node <1 s ago" in lines
     assert "  motors             DISARMED, <1 s ago" in lines
     assert "  height             never received" in lines
 
@@ -215,6 +215,46 @@ def test_a_kill_alone(flying):
     assert out.startswith("kill: done: ")
     kill = flying.await_decision(Action.KILL)
     assert any("smoke" in reason for reason in kill.reasons)
+
+
+UNREACHED = "NO PARACHUTE CAN BE REACHED (mavlink_parachute LOST): the motors will STOP"
+
+
+@pytest.fixture
+def cut_off(flying):
+    """In flight, and the only parachute is lost."""
+    flying.link.state, flying.link.healthy = LinkState.LOST, False
+
+    def lost():
+        return flying.states[-1].link_states[0] == LinkState.LOST
+
+    flying.bench.until(lost, "the supervisor takes it for lost")
+    return flying
+
+
+@pytest.mark.parametrize("order", ["deploy", "kill"])
+def test_that_no_parachute_can_be_reached_is_told_before_the_word_is_typed(
+    cut_off, terminal, order
+):
+    asked = terminal(order)
+    asked.reads("anything else to leave it: ")
+    assert UNREACHED in " ".join(asked.shown.split())
+    asked.types("no\n")
+    assert asked.end() == 1
+    assert ordered(cut_off) == []
+
+
+def test_and_with_yes_it_is_told_although_it_is_ordered(cut_off):
+    cut_off.link.outcomes = [Outcome.SENT, Outcome.ACCEPTED, Outcome.FAILED]
+    code, out, err = run(cut_off.bench, "deploy", "--yes", "--json")
+    assert (code, json.loads(out)["success"]) == (1, False)
+    (line,) = err.splitlines()
+    assert line.startswith(f"chute: deploy: {UNREACHED} all the same")
+
+
+def test_a_kill_alone_needs_no_parachute(cut_off):
+    code, _, err = run(cut_off.bench, "kill", "--only", "--yes")
+    assert (code, err) == (0, "")
 
 
 @pytest.mark.parametrize("order", ["deploy", "kill"])

@@ -24,6 +24,11 @@ def heard():
     return Heard()
 
 
+def parachute_line(text):
+    (line,) = [one for one in text if " 1/161 " in one]
+    return line
+
+
 def test_a_vehicle_in_flight(heard):
     rules = [
         RuleState(
@@ -49,7 +54,7 @@ def test_a_vehicle_in_flight(heard):
         "  cannot be used     tilt_deg: stuck",
         "  not measured       attitude_error, age",
         "links",
-        "  mavlink_parachute  OK, device healthy, <1 s ago",
+        "  mavlink_parachute  OK, device healthy, node <1 s ago",
         "parachutes",
         "  mavlink_parachute 1/161  ARMED, armed, not deployed, link OK, <1 s ago",
         "vehicle 1/1, link OK",
@@ -81,7 +86,9 @@ def test_a_vehicle_that_may_not_fly_tells_why(heard):
         link_ages=[math.nan],
         link_states=[0],
     )
-    heard.hears(stamped(blocked)).hears(stamped(heartbeat(reasons=["voltage 2 (above 3)"])))
+    heard.hears(stamped(blocked)).hears(
+        stamped(heartbeat(age=math.nan, reasons=["voltage 2 (above 3)"]))
+    )
     assert heard.text() == [
         "BLOCKED",
         "  vehicle            /drone1, supervisor safety_supervisor, <1 s ago",
@@ -92,11 +99,12 @@ def test_a_vehicle_that_may_not_fly_tells_why(heard):
         "                     blocked by device upf_can 33",
         "  ALARM              the canopy was packed in 1999",
         "links",
-        "  mavlink_parachute  NEVER_SEEN, device NOT healthy, never received: voltage 2 (above 3)",
+        "  mavlink_parachute  NEVER_SEEN, device NOT healthy, device never received, node never "
+        "received: voltage 2 (above 3)",
         "parachutes",
-        "  never received",
+        "  not received here within 0 s",
         "vehicle",
-        "  never received",
+        "  not received here within 0 s",
         "rules: 0 of 0 active, none counting",
         "newest decision: none yet",
     ]
@@ -145,7 +153,7 @@ def test_what_is_old_is_not_shown_as_if_it_were_now(heard):
     assert heard.text(at=2.0)[0] == "READY"
     text = heard.text(at=14.0)
     assert text[0] == "NOT KNOWN NOW (was READY, last word 14 s ago)"
-    assert "  mavlink_parachute  OK, device healthy, OLD: 14 s ago" in text
+    assert "  mavlink_parachute  OK, device healthy, node OLD: 14 s ago" in text
     assert "  motors             ARMED, OLD: 14 s ago" in text
     assert "  mavlink_parachute 1/161  ARMED, armed, not deployed, link OK, OLD: 14 s ago" in text
     assert not heard.view(14.0).well
@@ -166,6 +174,26 @@ def test_a_status_that_its_node_repeats_has_the_age_of_the_device(heard):
     heard.hears(stamped(heartbeat(), at=40.0, clock=-3600.0), at=40.0)
     heard.hears(stamped(parachute(link_state=3), at=0.0, clock=-3600.0), at=40.0)
     assert heard.view(40.0).parachutes[0].age == pytest.approx(40.0)
+
+
+def test_the_ages_of_a_node_and_of_its_silent_device_are_told_apart(heard):
+    lost = {"link_states": [3], "devices_healthy": [False], "link_ages": [0.1]}
+    heard.hears(stamped(state(**lost))).hears(stamped(heartbeat(age=7.9)))
+    heard.hears(stamped(parachute(link_state=3), at=-7.9))
+    text = heard.text(at=0.5)
+    told = "LOST, device NOT healthy, device OLD: 8 s ago, node <1 s ago"
+    assert f"  mavlink_parachute  {told}" in text
+    assert parachute_line(text).endswith("link LOST, OLD: 8 s ago")
+
+
+def test_an_output_that_says_nothing_is_told_to_be_written_and_not_received(heard):
+    heard.hears(stamped(state())).hears(stamped(parachute(link_state=5)))
+    assert parachute_line(heard.text()).endswith("link UNMONITORED, written <1 s ago")
+
+
+def test_a_status_without_a_stamp_is_of_a_device_that_was_never_received(heard):
+    heard.hears(stamped(state())).hears(parachute(link_state=0))
+    assert parachute_line(heard.text()).endswith("link NEVER_SEEN, never received")
 
 
 def test_a_late_heartbeat_does_not_make_a_status_younger(heard):
@@ -277,6 +305,7 @@ def test_json_has_null_for_what_is_no_number(heard):
             "name": "mavlink_parachute",
             "state": "OK",
             "age": None,
+            "device_age": None,
             "device_healthy": True,
             "reasons": [],
         }

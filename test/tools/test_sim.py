@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger
 from chute_ros.ros import qos
 
 PAGE = (Path(__file__).parents[2] / "docs/guide/simulation.md").read_text()
+TUTORIAL = (Path(__file__).parents[2] / "docs/guide/tutorial.md").read_text()
 #: So high it is after a take-off, m.
 HEIGHT = 59.0
 STATES = ("READY", "BLOCKED", "IN_FLIGHT", "DEPLOYED", "FAULT")
@@ -24,13 +25,18 @@ STATES = ("READY", "BLOCKED", "IN_FLIGHT", "DEPLOYED", "FAULT")
 class Simulation(PrintingProcess):
     """The tool as a process."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, before=None):
         super().__init__(
             "chute_ros.tools.sim",
             *arguments,
             environment={**os.environ, "PYTHONUNBUFFERED": "1"},
             errors=subprocess.PIPE,
+            before=before,
         )
+
+    def box(self):
+        """The folder of the black box, as it was told last."""
+        return [one.split()[2] for one in self.lines if "  black box   " in one][-1]
 
     def children(self):
         """Command lines of its children by their process ids."""
@@ -182,8 +188,30 @@ def test_the_tutorial_is_flown_by_services_alone_as_it_is_told(start, bench):  #
     assert simulation.said("DEPLOY REFUSED")
     children = simulation.children()
     assert len(children) == 5
+    begun = simulation.box()
     assert simulation.end() == (130, "sim: interrupted\n")
     assert not [one for one in children if Path(f"/proc/{one}").exists()]
+    # The last step of docs/guide/tutorial.md, with the folder that the terminal names.
+    box = simulation.box()
+    assert box == begun
+    assert Path(box).stat().st_mode & 0o777 == 0o700
+    assert "\nreport FOLDER " in TUTORIAL
+    report = [sys.executable, "-m", "chute_ros.tools.report", box]
+    done = subprocess.run(report, capture_output=True, text=True, timeout=120.0, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    page = Path(done.stdout.strip()).read_text()
+    assert "DEPLOY" in page
+    assert "free fall" in page
+
+
+def test_one_that_is_ended_as_the_background_job_of_a_script_says_so(bench):  # noqa: F811
+    """Its shell has taken SIGINT from it; rclpy takes it all the same."""
+    simulation = Simulation(
+        *("--no-panel", "--namespace", bench.namespace),
+        before=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+    )
+    bench.until(lambda: simulation.said("Ctrl-C ends it all"), "READY", 60.0)
+    assert simulation.end() == (130, "sim: interrupted\n")
 
 
 @pytest.mark.parametrize(

@@ -41,8 +41,9 @@ class Heard:
 
 @dataclass
 class Picture:
-    """All that was received of one vehicle."""
+    """All that was received of one vehicle. began: when its first state was, monotonic s."""
 
+    began: float = math.nan
     #: By the supervisor's name; by link; by link and device.
     states: dict[str, Heard] = field(default_factory=dict)
     heartbeats: dict[str, Heard] = field(default_factory=dict)
@@ -56,6 +57,8 @@ class Picture:
 
     def hear_state(self, message: Any, now: float, wall: float) -> None:
         """safety/state. now: monotonic s; wall: Unix s; as in all below."""
+        if math.isnan(self.began):
+            self.began = now
         _remember(self.states, message.supervisor, message, now, wall)
 
     def hear_heartbeat(self, message: Any, now: float, wall: float) -> None:
@@ -104,7 +107,9 @@ class Picture:
         return max(0.0, now - min(sent, heard.received))
 
     def parachute_age(self, heard: Heard, now: float) -> float:
-        """Since its device was received by its node, s."""
+        """Since its device was received by its node, s; NaN: it never was."""
+        if stamp_seconds(heard.message) == 0.0:
+            return math.nan
         sent = self._sent(heard.message.link, stamp_seconds(heard.message))
         return now - (heard.received if math.isnan(sent) else min(sent, heard.received))
 

@@ -11,12 +11,18 @@ from chute_ros.tools.chute.options import DONE, NOT_WELL, Chosen
 NO_REASON = "no reason given"
 #: Where the supervisor's services are.
 SUPERVISOR = "safety"
+#: Of a deploy that reaches no parachute: the kill before it does not wait for one.
+STOPS_ALL_THE_SAME = (
+    "the motors will STOP all the same where the supervisor kills before a deploy, and nothing "
+    "will open"
+)
 
 
 @dataclass(frozen=True)
 class Order:
     """service: relative to the namespace; kind: its type; word: to be typed first, empty: not
-    asked for; does: what will be done, for the person who is asked."""
+    asked for; does: what will be done, for the person who is asked; link: of whom, past the
+    supervisor; unreached: what it does where no parachute can be reached, empty: it needs none."""
 
     name: str
     kind: str
@@ -24,6 +30,8 @@ class Order:
     fields: Mapping[str, object] = field(default_factory=dict)
     word: str = ""
     does: str = ""
+    link: str = ""
+    unreached: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,9 @@ def deploy(reason: str, force: bool = False, link: str | None = None) -> Order:
     if force:
         does += ", also where a check forbids it (--force)"
     fields = {"force": force, "reason": reason}
-    return Order("deploy", "Deploy", f"{link or SUPERVISOR}/deploy", fields, "DEPLOY", does)
+    unreached = "nothing will open" if link else STOPS_ALL_THE_SAME
+    service = f"{link or SUPERVISOR}/deploy"
+    return Order("deploy", "Deploy", service, fields, "DEPLOY", does, link or "", unreached)
 
 
 def kill(reason: str, only: bool = False) -> Order:
@@ -78,7 +88,9 @@ def kill(reason: str, only: bool = False) -> Order:
     does = "STOPS the motors, on the ground and in the air"
     does += ", and nothing else (--only)" if only else ", and deploys after it where that helps"
     fields = {"force": False, "kill_only": only, "reason": reason}
-    return Order("kill", "Kill", f"{SUPERVISOR}/kill", fields, "KILL", does)
+    unreached = "" if only else "the motors will STOP, and nothing will open"
+    service = f"{SUPERVISOR}/kill"
+    return Order("kill", "Kill", service, fields, "KILL", does, unreached=unreached)
 
 
 def reset() -> Order:

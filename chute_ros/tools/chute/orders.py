@@ -19,11 +19,14 @@ from chute_ros.tools.chute.order import (
     not_answered,
     order_of,
 )
+from chute_ros.tools.chute.reach import warning
 from chute_ros.tools.chute.session import Session, opened
 from chute_ros.tools.chute.status_text import order_lines
 
 #: A person who is asked does not wait longer for the state, nor for a node of it, s.
 _SHOWN_WITHIN = 2.0
+#: An order with --yes is held up no longer for the state, from which its giver may be warned, s.
+_WARNED_WITHIN = 0.3
 
 
 def main(chosen: Chosen) -> int:
@@ -34,19 +37,24 @@ def main(chosen: Chosen) -> int:
         require_terminal(order.name)
     with opened(chosen.namespace) as session:
         call = Call(session, order)
-        listening = Listening(session) if asks else None
-        within = chosen.wait()
+        listening = Listening(session) if asks or order.unreached else None
+        within, warned = chosen.wait(), asks
         if not session.until(call.found, within):
             what = f"{order.name}: {order.service} is not offered"
             raise session.not_heard(what, within, _other_way(session, order))
-        if listening is not None:
+        if asks and listening is not None:
             _ask(session, listening, order)
+        elif listening is not None:
+            session.until(listening.view, _WARNED_WITHIN)
+            warned = _warn(order, listening)
         try:
             answer = call.send(chosen.wait(ANSWER))
         except KeyboardInterrupt:
             told = not_answered(order, "before it was interrupted")
             print(f"\nchute: {told}", file=sys.stderr)
             raise
+        if listening is not None and not (warned or answer.success):
+            _warn(order, listening)
     if chosen.json:
         print(json_text(_told(order, chosen.namespace, answer)))
     else:
@@ -58,7 +66,15 @@ def _ask(session: Session, listening: Listening, order: Order) -> None:
     """A vehicle that says nothing can be ordered all the same."""
     session.until(listening.view, _SHOWN_WITHIN)
     picture = listening.settle(_SHOWN_WITHIN) if listening.view() else None
-    ask(order.name, order.word, order_lines(session.namespace, picture, order.does))
+    lines = order_lines(session.namespace, picture, order.does)
+    ask(order.name, order.word, [*lines, *filter(None, [warning(order, picture)])])
+
+
+def _warn(order: Order, listening: Listening) -> bool:
+    """Whether it was told that no parachute is reached."""
+    if told := warning(order, listening.view()):
+        print(f"chute: {order.name}: {told}", file=sys.stderr)
+    return bool(told)
 
 
 def _told(order: Order, namespace: str, answer: Answer) -> dict[str, object]:

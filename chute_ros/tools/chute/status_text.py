@@ -13,9 +13,8 @@ from chute_ros.tools.chute.view import (
     ParachuteView,
     RuleView,
     VehiclePicture,
-    VehicleView,
 )
-from chute_ros.tools.chute.words import age_text, is_old, span_text, value_text
+from chute_ros.tools.chute.words import age_text, is_old, not_here, span_text, value_text
 from chute_ros.tools.timeline_rows import ACTION_TONES, LINK_TONES, STAGE_TONES
 
 #: Name of a state of the vehicle, or of a link -> its tone (timeline_rows.py).
@@ -56,8 +55,8 @@ def body_lines(picture: VehiclePicture) -> list[Line]:
         *([] if picture.links else [Line("  none required")]),
         Line("parachutes", "head"),
         *(line for one in picture.parachutes for line in _parachute(one)),
-        *([] if picture.parachutes else [Line("  never received", "warn")]),
-        *_vehicle(picture.vehicle),
+        *([] if picture.parachutes else [Line(f"  {not_here(picture.listened)}", "warn")]),
+        *_vehicle(picture),
         *_rules(picture.rules),
     ]
 
@@ -81,7 +80,7 @@ def order_lines(namespace: str, picture: VehiclePicture | None, does: str) -> li
     lines = [f"{namespace}: {headline(picture).text}"]
     if picture.state_text != picture.state:
         lines.append(_named("why", picture.state_text))
-    lines += [line.text for line in _vehicle(picture.vehicle)]
+    lines += [line.text for line in _vehicle(picture)]
     lines += [line.text for one in picture.parachutes for line in _parachute(one)]
     return [*lines, f"this {does}"]
 
@@ -110,15 +109,26 @@ def _why(picture: VehiclePicture) -> Iterator[Line]:
             yield Line(_named("not measured", ", ".join(picture.never_given)), "plain")
 
 
+def link_text(one: LinkView) -> str:
+    """Its state and its two ages: the node may live while its device is silent."""
+    parts = [one.state, "device healthy" if one.device_healthy else "device NOT healthy"]
+    if one.device_age is not None:
+        parts.append(f"device {age_text(one.device_age)}")
+    text = ", ".join([*parts, f"node {age_text(one.age)}"])
+    return f"{text}: {'; '.join(one.reasons)}" if one.reasons else text
+
+
+def parachute_age_text(one: ParachuteView) -> str:
+    """Of an output that says nothing it is known only when it was written."""
+    written = "written " if one.link_state == LinkState.UNMONITORED.name else ""
+    return f"{written}{age_text(one.age)}"
+
+
 def _link(one: LinkView) -> Line:
-    healthy = "device healthy" if one.device_healthy else "device NOT healthy"
-    text = f"{one.state}, {healthy}, {age_text(one.age)}"
-    if one.reasons:
-        text += f": {'; '.join(one.reasons)}"
     tone = LINK_TONE.get(one.state, "warn")
     if one.state == LinkState.OK.name and not one.device_healthy:
         tone = "warn"
-    return Line(_named(one.name, text), tone)
+    return Line(_named(one.name, link_text(one)), tone)
 
 
 def _parachute(one: ParachuteView) -> Iterator[Line]:
@@ -130,17 +140,18 @@ def _parachute(one: ParachuteView) -> Iterator[Line]:
     ]
     if one.backup_voltage == one.backup_voltage:
         parts.append(f"backup {one.backup_voltage:.1f} V")
-    parts.append(age_text(one.age))
+    parts.append(parachute_age_text(one))
     tone = "quiet" if is_old(one.age) else "act" if one.deployed else "plain"
     yield Line(_named(f"{one.link} {one.device}", ", ".join(parts)), tone)
     for fault in one.faults:
         yield Line(_named("", f"fault: {fault}"), "bad")
 
 
-def _vehicle(one: VehicleView | None) -> Iterator[Line]:
+def _vehicle(picture: VehiclePicture) -> Iterator[Line]:
+    one = picture.vehicle
     if one is None:
         yield Line("vehicle", "head")
-        yield Line("  never received", "warn")
+        yield Line(f"  {not_here(picture.listened)}", "warn")
         return
     yield Line(f"vehicle {one.source or 'of no known source'}, link {one.link_state}", "head")
     battery = value_text(one.battery_voltage, "V")

@@ -31,11 +31,14 @@ _NEVER_GIVEN = f": {NEVER}"
 
 @dataclass(frozen=True)
 class LinkView:
-    """One link as the supervisor judges it. age: since its heartbeat, s, NaN: never received."""
+    """One link as the supervisor judges it. age: since the heartbeat of its node, s, NaN: never
+    received. device_age: since its node received the device, s, NaN: never; None: not known, as no
+    heartbeat was received here."""
 
     name: str
     state: str
     age: float
+    device_age: float | None
     device_healthy: bool
     reasons: tuple[str, ...]
 
@@ -43,8 +46,8 @@ class LinkView:
 @dataclass(frozen=True)
 class ParachuteView:
     """One parachute. released_by: what released it, "NONE" if nothing did or it is not known;
-    height: m above take-off; packed_date: "YYYY-MM-DD" or empty; age: since its node received it,
-    s."""
+    height: m above take-off; packed_date: "YYYY-MM-DD" or empty; age: since its node received it
+    (of an output that says nothing: wrote it), s, NaN: never."""
 
     link: str
     device: str
@@ -122,8 +125,9 @@ class DecisionView:
 
 @dataclass(frozen=True)
 class VehiclePicture:
-    """Everything. age: since the supervisor's last word, s. well: a state of WELL that is not old,
-    in mode ACTIVE, without an alarm."""
+    """Everything. age: since the supervisor's last word, s. listened: since the first one, s; what
+    was said before was not received here, unless it was said again. well: a state of WELL
+    that is not old, in mode ACTIVE, without an alarm."""
 
     namespace: str
     supervisor: str
@@ -132,6 +136,7 @@ class VehiclePicture:
     state_text: str
     mode: str
     age: float
+    listened: float
     well: bool
     flight_blocked: bool
     block_reasons: tuple[str, ...]
@@ -165,6 +170,7 @@ def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
         state_text=message.state_text,
         mode=mode,
         age=age,
+        listened=now - picture.began,
         well=state in WELL and mode == Mode.ACTIVE.name and not alarms and not is_old(age),
         flight_blocked=message.flight_blocked,
         block_reasons=tuple(message.block_reasons),
@@ -176,7 +182,7 @@ def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
             for one in message.unusable
             if one.endswith(_NEVER_GIVEN)
         ),
-        links=_links(picture, message, age),
+        links=_links(picture, message, age, now),
         parachutes=tuple(
             _parachute(one.message, picture.parachute_age(one, now))
             for _, one in sorted(picture.parachutes.items())
@@ -188,7 +194,7 @@ def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
     )
 
 
-def _links(picture: Picture, message: Any, age: float) -> tuple[LinkView, ...]:
+def _links(picture: Picture, message: Any, age: float, now: float) -> tuple[LinkView, ...]:
     columns = (message.links, message.link_states, message.link_ages, message.devices_healthy)
     found = []
     for name, state, link_age, healthy in zip(*columns, strict=False):
@@ -198,11 +204,16 @@ def _links(picture: Picture, message: Any, age: float) -> tuple[LinkView, ...]:
                 name=name,
                 state="REGAINED" if state == _REGAINED else name_of(LinkState, state),
                 age=link_age + age,
+                device_age=_device_age(heartbeat, now) if heartbeat else None,
                 device_healthy=healthy,
                 reasons=tuple(heartbeat.message.reasons) if heartbeat and not healthy else (),
             )
         )
     return tuple(found)
+
+
+def _device_age(heartbeat: Heard, now: float) -> float:
+    return float(heartbeat.message.age) + (now - heartbeat.received)
 
 
 def _parachute(message: Any, age: float) -> ParachuteView:

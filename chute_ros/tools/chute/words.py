@@ -39,6 +39,12 @@ def span_text(seconds: float) -> str:
     return f"{seconds / 3600.0:.0f} h" if seconds < 172800.0 else f"{seconds / 86400.0:.0f} days"
 
 
+def not_here(listened: float) -> str:
+    """Of what was not received since the listener heard its first word, so long ago (s): it may
+    have been before, and by others."""
+    return f"not received here within {span_text(listened)}"
+
+
 def value_text(value: float, unit: str, digits: int = 1) -> str:
     """A measurement with its unit; NaN is not known."""
     # Without the sign of what rounds to zero.

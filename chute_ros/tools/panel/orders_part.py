@@ -45,6 +45,7 @@ class OrdersPart:
             return
         with ui.element("section").classes("card orders"):
             self._note = ui.label("").classes("note")
+            self._unreached = ui.label("").classes("note is-bad").props('role="alert"')
             self._all = ui.element("div")
             with self._all:
                 with ui.element("div").classes("buttons"):
@@ -66,8 +67,8 @@ class OrdersPart:
             self._answers = ui.element("div").classes("answers").props('aria-live="polite"')
         self.refresh()
 
-    def refresh(self) -> None:
-        """Whether the session still lasts."""
+    def refresh(self, unreached: str = "") -> None:
+        """Whether the session still lasts. unreached: why no parachute can be reached, if so."""
         if not self._node.settings.allow_commands:
             return
         person = self._person()
@@ -77,6 +78,8 @@ class OrdersPart:
             else "Log in to give orders."
         )
         self._all.set_visibility(person is not None)
+        self._unreached.set_text(f"{unreached}: DEPLOY: {orders.STOPS_ALL_THE_SAME}.")
+        self._unreached.set_visibility(person is not None and bool(unreached))
 
     def _button(self, text: str, tone: str, make: Callable[[str], Order]) -> None:
         async def held(event: Any) -> None:

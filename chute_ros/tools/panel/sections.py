@@ -9,16 +9,20 @@ from html import escape
 
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.diagnostic_tasks import Task
-from chute_ros.tools.chute.status_text import LINK_TONE, STAGE_TONE
+from chute_ros.tools.chute.status_text import (
+    LINK_TONE,
+    STAGE_TONE,
+    link_text,
+    parachute_age_text,
+)
 from chute_ros.tools.chute.view import (
     DecisionView,
     LinkView,
     ParachuteView,
     RuleView,
     VehiclePicture,
-    VehicleView,
 )
-from chute_ros.tools.chute.words import age_text, is_old, span_text, value_text
+from chute_ros.tools.chute.words import age_text, is_old, not_here, span_text, value_text
 from chute_ros.tools.panel.tones import TONES
 
 #: What a state means to a person, where the supervisor says no more than its name.
@@ -90,14 +94,14 @@ def blocks(picture: VehiclePicture) -> str:
 
 
 def parachutes(
-    those: Sequence[ParachuteView],
+    picture: VehiclePicture,
     identities: Mapping[str, str],
     today: datetime.date,
 ) -> str:
     """A card each. identities: by link and device, as their devices tell."""
-    if not those:
-        return _card("Parachutes", _row("", "never received", "warn"), True)
-    return "".join(_parachute(one, identities, today) for one in those)
+    if not picture.parachutes:
+        return _card("Parachutes", _row("", not_here(picture.listened), "warn"), True)
+    return "".join(_parachute(one, identities, today) for one in picture.parachutes)
 
 
 def links(those: Sequence[LinkView], old: bool) -> str:
@@ -106,10 +110,11 @@ def links(those: Sequence[LinkView], old: bool) -> str:
     return _card("Links", rows, old)
 
 
-def vehicle(one: VehicleView | None) -> str:
+def vehicle(picture: VehiclePicture) -> str:
     """Its measurements, each with its age."""
+    one = picture.vehicle
     if one is None:
-        return _card("Vehicle", _row("", "never received", "warn"), True)
+        return _card("Vehicle", _row("", not_here(picture.listened), "warn"), True)
     battery = value_text(one.battery_voltage, "V")
     if one.battery_remaining == one.battery_remaining:
         battery += f", {one.battery_remaining * 100.0:.0f} %"
@@ -194,7 +199,7 @@ def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetim
     identity = identities.get(f"{one.link} {one.device}", "not told")
     rows.append(_row("identity", identity, ""))
     rows += [_row("fault", fault, "bad") for fault in one.faults]
-    rows.append(_row("last word", age_text(one.age), "quiet" if is_old(one.age) else ""))
+    rows.append(_row("last word", parachute_age_text(one), "quiet" if is_old(one.age) else ""))
     return _card(f"Parachute {one.link} {one.device}", "".join(rows), is_old(one.age))
 
 
@@ -223,14 +228,10 @@ def _packed(date: str, today: datetime.date) -> str:
 
 
 def _link(one: LinkView, old: bool) -> str:
-    text = f"{one.state}, device {'healthy' if one.device_healthy else 'NOT healthy'}, "
-    text += age_text(one.age)
-    if one.reasons:
-        text += f": {'; '.join(one.reasons)}"
     tone = LINK_TONE.get(one.state, "warn")
     if tone == "good" and not one.device_healthy:
         tone = "warn"
-    return _row(one.name, text, "quiet" if old else tone)
+    return _row(one.name, link_text(one), "quiet" if old else tone)
 
 
 def _measured(name: str, value: str, age: float) -> str:

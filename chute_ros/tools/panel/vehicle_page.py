@@ -60,7 +60,7 @@ def register(node: PanelNode) -> None:
             parts = watched.parts()
             for name, element in shown.items():
                 element.set_content(parts.get(name, ""))
-            orders.refresh()
+            orders.refresh(parts.get("unreached", ""))
             if turns % _SLOWLY == 0:
                 curves.draw(*watched.drawn())
                 if bench is not None:

@@ -23,6 +23,7 @@ from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.tools.chute.diagnostic_tasks import DiagnosticTasks
 from chute_ros.tools.chute.hearing import Picture
 from chute_ros.tools.chute.listening import subscribe
+from chute_ros.tools.chute.reach import out_of_reach
 from chute_ros.tools.chute.view import VehiclePicture, view
 from chute_ros.tools.chute.words import is_old
 from chute_ros.tools.panel import sections
@@ -84,7 +85,7 @@ class Watched:
         self._ends.clear()
 
     def parts(self) -> Mapping[str, str]:
-        """Name -> HTML."""
+        """Name -> HTML; and unreached, in words: why no parachute can be reached, if so."""
         with self._lock:
             made_at, parts = self._made
             now = time.monotonic()
@@ -106,15 +107,15 @@ class Watched:
         parts = {
             "banner": sections.banner(picture),
             "blocks": sections.blocks(picture),
-            "parachutes": sections.parachutes(
-                picture.parachutes, self._identities, datetime.date.today()
-            ),
-            "vehicle": sections.vehicle(picture.vehicle),
+            "parachutes": sections.parachutes(picture, self._identities, datetime.date.today()),
+            "vehicle": sections.vehicle(picture),
             "links": sections.links(picture.links, is_old(picture.age)),
             "rules": sections.rules(picture.rules, is_old(picture.age)),
             "decisions": sections.decisions(picture.decisions),
             "diagnostics": sections.diagnostics(tasks),
         }
+        if why := out_of_reach(picture):
+            parts["unreached"] = why
         if self._telem is not None:
             telem, received = self._telem
             parts["rocket"] = rocket(telem, now - received, tasks)

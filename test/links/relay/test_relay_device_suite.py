@@ -7,6 +7,7 @@ from relay_bench import Board
 
 from chute_ros.model import Action, LinkState, Outcome, ParachuteState
 from chute_ros.ros import qos
+from chute_ros.ros.messages import seconds
 
 
 class TestRelay(NodeSuite):
@@ -44,6 +45,11 @@ class TestRelay(NodeSuite):
         device.pull_out()
         self.await_link(LinkState.LOST)
         assert "cannot be written" in self.beats[-1].reasons[0]
+        self.statuses.clear()
+        self.bench.until(lambda: len(self.statuses) >= 2, "its picture is told each second")
+        first, later = self.statuses[:2]
+        apart = seconds(later.header.stamp) - seconds(first.header.stamp)
+        assert abs(apart) < 0.01, "both have the time at which it was last written"
         device.plug_in()
         self.await_link(LinkState.UNMONITORED)
 

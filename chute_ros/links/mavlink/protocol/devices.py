@@ -190,7 +190,7 @@ class Devices(EventLog):
             changes, picture_changed = parachute.update(now)
             self.link_changed(f"parachute {parachute.device}", changes)
             if picture_changed:
-                self._events.append(ParachuteChanged(parachute.status(now)))
+                self._events.append(ParachuteChanged(parachute.status(now), parachute.received))
         for autopilot in self.autopilots.all():
             changes = autopilot.liveness.update(now)
             self.link_changed(f"autopilot {autopilot.device}", changes)
@@ -220,7 +220,7 @@ class Devices(EventLog):
             parachute = self._unproven.pop(ids, None) or self._tracker(ids)
             self.parachutes.add(*ids, parachute)
         self.link_changed(f"parachute {parachute.device}", parachute.heartbeat(message, now))
-        self._events.append(ParachuteChanged(parachute.status(now)))
+        self._events.append(ParachuteChanged(parachute.status(now), parachute.received))
 
     def _tracker(self, ids: Ids) -> ParachuteTracker:
         return ParachuteTracker(*ids, self._config.parachute_liveness, self._config.status)
@@ -247,7 +247,7 @@ class Devices(EventLog):
             parachute.parachute_status(message, now)
             if parachute.reboot_count > reboots:
                 self.notice(Severity.ERROR, f"parachute {parachute.device} restarted")
-            self._events.append(ParachuteChanged(parachute.status(now)))
+            self._events.append(ParachuteChanged(parachute.status(now), parachute.received))
         elif kind == "COMPONENT_INFORMATION_BASIC":
             parachute.component_information(message)
 

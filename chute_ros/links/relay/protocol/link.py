@@ -95,6 +95,8 @@ class RelayLink(EventLog):
         #: Bytes that came, which nobody expects; pulses; when the newest one began, monotonic s.
         self.received = self.fired = 0
         self.fired_at = math.nan
+        #: When the output was last written, monotonic s: all that is ever known of it.
+        self.written_at = math.nan
         self._is_open = False
         #: Token of each deploy that was not written yet -> when it fails.
         self._waiting: dict[int, float] = {}
@@ -187,6 +189,7 @@ class RelayLink(EventLog):
     def _check_written(self) -> None:
         given, self._given = self._given, []
         if given:
+            self.written_at = self._now
             self._to(LinkState.UNMONITORED)
         if self.config.fire not in given or not self._waiting:
             return
@@ -210,7 +213,7 @@ class RelayLink(EventLog):
 
     def _picture(self, now: float) -> None:
         self._picture_at = now + _PICTURES
-        self._events.append(ParachuteChanged(ParachuteStatus(DEVICE, self.state)))
+        self._events.append(ParachuteChanged(ParachuteStatus(DEVICE, self.state), self.written_at))
 
     def _end(self, token: int, outcome: Outcome, text: str) -> None:
         self._events += ended(token, outcome, text)

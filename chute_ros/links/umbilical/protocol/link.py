@@ -285,7 +285,8 @@ class UmbilicalLink(EventLog):
         self.orders.judge_again(now)
 
     def _tell_picture(self, now: float) -> None:
-        self._events.append(ParachuteChanged(self.computer.status(now, self.pause)))
+        status, received = self.computer.status(now, self.pause), self.computer.liveness.last_heard
+        self._events.append(ParachuteChanged(status, received))
         self._events.append(VehicleChanged(self.computer.vehicle_state(now)))
 
     def _changed(self, changes: list[LinkChange]) -> None:

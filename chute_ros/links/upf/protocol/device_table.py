@@ -231,16 +231,18 @@ class DeviceTable(EventLog):
     def _controller_changed(self, controller: Controller, now: float) -> None:
         """Without a controller the trigger is the parachute, whoever else speaks."""
         if not (self._config.without_controller and self.triggers):
-            self._events.append(ParachuteChanged(self.picture_of(controller, now)))
+            self._events.append(
+                ParachuteChanged(self.picture_of(controller, now), controller.received)
+            )
 
     def _has_fired(self, trigger: Trigger, now: float) -> None:
         self._trigger_changed(trigger, now)
         self.notice(Severity.WARNING, f"trigger {trigger.node_id} has fired")
 
     def _trigger_changed(self, trigger: Trigger, now: float) -> None:
-        self._events.append(TriggerChanged(trigger_picture(trigger, now)))
+        self._events.append(TriggerChanged(trigger_picture(trigger, now), trigger.received))
         if self._config.without_controller:
-            self._events.append(ParachuteChanged(trigger.parachute_status(now)))
+            self._events.append(ParachuteChanged(trigger.parachute_status(now), trigger.received))
 
 
 def trigger_picture(trigger: Trigger, now: float) -> Mapping[str, Any]:

@@ -13,9 +13,11 @@ from chute_ros.protocol.events import AskSupervisor, Event
 
 @dataclass(frozen=True)
 class TriggerChanged:
-    """A trigger said something, or its silence grew too long. picture: see device table."""
+    """A trigger said something, or its silence grew too long. picture: see device table; received:
+    when its newest data was, monotonic s."""
 
     picture: Mapping[str, Any]
+    received: float
 
 
 @dataclass(frozen=True)
