@@ -37,7 +37,6 @@ from chute_ros.ros.supervisor_health import Health
 from chute_ros.ros.supervisor_inputs import SupervisorInputs
 from chute_ros.ros.supervisor_memory import Memory
 from chute_ros.ros.supervisor_messages import (
-    MODES,
     decisions_task,
     state_message,
     summary_message,
@@ -59,6 +58,7 @@ from chute_ros.runtime.supervisor import (
 )
 from chute_ros.runtime.topics import LeaseClaim, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
+from chute_ros.supervisor.state_text import MODES
 
 #: A turn so long (s) before a deadline of the core finds the processor awake and its caches filled
 #: when the deadline has come (docs/evidence/speed.md). It is seldom reached: what comes moves it

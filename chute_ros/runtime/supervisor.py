@@ -266,8 +266,7 @@ class SupervisorRuntime:
 
     def _changed(self) -> bool:
         before, now = self._published, self.state
-        told = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
-        return before is None or bool(told(before) != told(now))
+        return before is None or _told_at_once(before) != _told_at_once(now)
 
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL
@@ -275,6 +274,15 @@ class SupervisorRuntime:
         self._shell.publish(
             SafetyTold(self.lease.config.name, self.state, dict(self._stamps), now)
         )
+
+
+#: What a person is told at once.
+_AT_ONCE = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
+
+
+def _told_at_once(state: State) -> tuple[object, ...]:
+    acted_on = [name for name, evidence in state.rules.items() if evidence.latched]
+    return (*_AT_ONCE(state), acted_on)
 
 
 def _told(decision: Decision) -> str:

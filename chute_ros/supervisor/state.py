@@ -51,6 +51,8 @@ class DeployUnderWay:
     deploy_ladder: tuple[Rung, ...] = ()
     #: When it leaves at the latest. A kill that is decided again does not put it off.
     deploy_due: Time = math.nan
+    #: Where the vehicle was when a parachute was last seen to be out, m; NaN: not known.
+    released_height: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -172,7 +172,7 @@ def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_pa
     hold(page, "Arm parachutes")
     word(page, "ARMED")
     for card in (mavlink, upf):
-        expect(card).to_contain_text("armed▼ YES", timeout=PATIENCE)
+        expect(card).to_contain_text("armed◆ YES", timeout=PATIENCE)
     pilot.arm()
     vehicle = page.locator(".part-vehicle")
     expect(vehicle).to_contain_text("motorsARMED", timeout=PATIENCE)

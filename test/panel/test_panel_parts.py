@@ -41,7 +41,8 @@ def test_each_state_is_one_large_word_with_a_reason(stage):
 def test_the_supervisors_own_reason_comes_first():
     told = {"state": SafetyState.BLOCKED, "flight_blocked": True, "block_reasons": ["no fuel"]}
     assert "no fuel" in sections.banner(shown(state_text="BLOCKED", **told))
-    assert "BLOCKED: lost" in sections.banner(shown(state_text="BLOCKED: lost", **told))
+    part = sections.banner(shown(state_text="BLOCKED: lost", **told))
+    assert '<div class="why">lost</div>' in part, "the name of the state stands above it"
 
 
 def test_what_is_old_is_no_state():
@@ -56,6 +57,31 @@ def test_a_mode_that_does_not_fire_stands_out_and_so_does_an_alarm():
     assert "INHIBITED: it does nothing" in text_of(
         sections.banner(shown(mode=SafetyState.INHIBITED))
     )
+
+
+def test_a_vehicle_that_nobody_guards_is_no_calm_flight():
+    why = "no parachute can be reached: mavlink_parachute is LOST"
+    alarms = ["rule 'link lost' warns: a device is not heard", why]
+    part = sections.banner(shown(state_text=f"IN_FLIGHT, NOT GUARDED: {why}", alarms=alarms))
+    assert "tone-bad" in part
+    # Each is told once.
+    assert text_of(part) == f"✖ IN FLIGHT, NOT GUARDED {why} {alarms[0]}"
+    # What only warns takes the calm colour away.
+    part = sections.banner(shown(state_text=f"IN_FLIGHT: {alarms[0]}", alarms=alarms[:1]))
+    assert "tone-warn" in part
+    assert text_of(part) == f"■ IN FLIGHT {alarms[0]}"
+
+
+def test_a_fault_is_a_sentence_with_its_detail_below_it():
+    told = {"state": SafetyState.FAULT, "alarms": ["no parachute confirmed within 3 s: denied"]}
+    part = sections.banner(shown(state_text="FAULT: nothing came out, ordered by Anna", **told))
+    assert '<div class="why">nothing came out, ordered by Anna</div>' in part
+    assert part.count("denied") == 1
+
+
+def test_a_rule_that_only_warns_says_so():
+    rule = RuleState(name="link lost", alive=True, fulfilled=True, latched=True)
+    assert text_of(sections.rules(shown(rules=[rule]).rules, False)) == "Rules link lost warns"
 
 
 def parachute_part(at=0.0, identities=None, **fields):
@@ -74,7 +100,7 @@ def test_a_parachute_with_all_that_is_known_of_it():
         identities={"mavlink_parachute 1/161": "ACME, serial number 7, firmware 1.2"},
     )
     assert text_of(part) == (
-        "Parachute mavlink_parachute 1/161 armed ▼ YES: FC, OFFBOARD released ▼ YES, by MAVLINK "
+        "Parachute mavlink_parachute 1/161 armed ◆ YES: FC, OFFBOARD released ▼ YES, by MAVLINK "
         "state ● ARMED, link OK packed 2026-06-19, 12 days ago own supply 8.2 V own height 0.0 m "
         "identity ACME, serial number 7, firmware 1.2 fault ✖ low power last word <1 s ago"
     )

@@ -16,7 +16,7 @@ from heard_vehicle import Heard, heartbeat, parachute, stamped, state, vehicle
 
 from chute_ros.tools.chute.hearing import MOST_NAMES
 from chute_ros.tools.chute.json_text import json_text
-from chute_ros.tools.chute.status_text import decision_lines, order_lines
+from chute_ros.tools.chute.status_text import Line, decision_lines, headline, order_lines
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_a_vehicle_in_flight(heard):
         "  vertical speed     0.0 m/s, <1 s ago",
         "  battery            15.8 V, 87 %, 1 s ago",
         "rules: 2 of 3 active, 1 counting",
-        "  free fall: DEPLOY counting, 0.2 of 0.5 s",
+        "  free fall: DEPLOY, 0.2 of 0.5 s",
         "      [x] acceleration 0.65 (below 2)",
         "      [ ] tilt_deg 13.34 (above 45)",
         "  not counting: excess tilt",
@@ -86,7 +86,6 @@ def test_a_vehicle_that_may_not_fly_tells_why(heard):
         "BLOCKED",
         "  vehicle            /drone1, supervisor safety_supervisor, <1 s ago",
         "  mode               SHADOW",
-        "  why                BLOCKED: no fuel",
         "  flight             BLOCKED",
         "                     no fuel",
         "                     blocked by device upf_can 33",
@@ -283,3 +282,50 @@ def test_json_has_null_for_what_is_no_number(heard):
     ]
     assert told["vehicle"]["height"] is None
     assert told["well"] is True
+
+
+# What warns
+
+
+WARNS = RuleState(
+    name="link lost", action=SafetyDecision.NONE, alive=True, fulfilled=True, latched=True
+)
+
+
+def unguarded():
+    """It flies, its only link is lost, and its supervisor says so."""
+    why = "no parachute can be reached: mavlink_parachute is LOST"
+    return state(
+        state_text=f"IN_FLIGHT, NOT GUARDED: {why}",
+        alarms=["rule 'link lost' warns: a device is not heard", why],
+        rules=[WARNS],
+        link_states=[3],
+        devices_healthy=[False],
+    )
+
+
+def test_a_vehicle_that_nobody_guards_says_so_in_its_first_line_and_is_not_well(heard):
+    text = heard.hears(stamped(unguarded())).text()
+    assert text[0] == "IN_FLIGHT, NOT GUARDED"
+    assert text[3:6] == [
+        "  why                no parachute can be reached: mavlink_parachute is LOST",
+        "  flight             not blocked",
+        "  ALARM              rule 'link lost' warns: a device is not heard",
+    ]
+    assert "  link lost: warns" in text
+    picture = heard.view()
+    assert (picture.well, picture.unguarded) == (False, True)
+    assert [(one.action, one.does) for one in picture.rules] == [("ALARM", "warns")]
+
+
+def test_an_alarm_alone_takes_the_calm_colour_away(heard):
+    heard.hears(stamped(state(alarms=["rule 'battery dead' warns: it is empty"])))
+    assert headline(heard.view()) == Line("IN_FLIGHT", "warn")
+    heard.hears(stamped(unguarded(), at=0.1), at=0.1)
+    assert headline(heard.view(0.1)) == Line("IN_FLIGHT, NOT GUARDED", "bad")
+
+
+def test_the_mode_is_told_once(heard):
+    told = "SHADOW: reports its decisions and sends none; IN_FLIGHT"
+    text = heard.hears(stamped(state(state_text=told, mode=SafetyState.SHADOW))).text()
+    assert [line for line in text if "SHADOW" in line] == ["  mode               SHADOW"]

@@ -23,7 +23,7 @@ from chute_ros.tools.chute.watch_text import KEYS, Page
 #: The tones of timeline_rows.py in colours that the colour-blind can tell (Okabe and Ito).
 _COLOURS = {
     "good": "#009e73", "warn": "#e69f00", "bad": "#d55e00", "act": "#cc79a7", "plain": "#56b4e9",
-    "quiet": "#808080",
+    "quiet": "#808080", "live": "#f0e442",
 }  # fmt: skip
 _GREY = "#808080"
 #: So often all lines are sent (s): something else may have written to the terminal.

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from chute_ros.model import LinkState
+from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.state_text import UNGUARDED
 from chute_ros.tools.chute.view import (
     DecisionView,
     LinkView,
@@ -15,7 +17,7 @@ from chute_ros.tools.chute.view import (
     VehiclePicture,
     VehicleView,
 )
-from chute_ros.tools.chute.words import age_text, is_old, span_text, value_text
+from chute_ros.tools.chute.words import age_text, is_old, value_text
 from chute_ros.tools.timeline_rows import ACTION_TONES, LINK_TONES, STAGE_TONES
 
 #: Name of a state of the vehicle, or of a link -> its tone (timeline_rows.py).
@@ -39,7 +41,21 @@ def headline(picture: VehiclePicture) -> Line:
     if is_old(picture.age):
         text = f"NOT KNOWN NOW (was {picture.state}, last word {span_text(picture.age)} ago)"
         return Line(text, "quiet")
-    return Line(picture.state, STAGE_TONE.get(picture.state, "quiet"))
+    tone = state_tone(picture.state, picture.unguarded, bool(picture.alarms))
+    return Line(state_words(picture.state, picture.unguarded), tone)
+
+
+def state_words(state: str, unguarded: bool) -> str:
+    """What is shown in large."""
+    return f"{state}, {UNGUARDED}" if unguarded else state
+
+
+def state_tone(state: str, unguarded: bool, alarms: bool) -> str:
+    """No state is shown as if all were well while something warns."""
+    tone = STAGE_TONE.get(state, "quiet")
+    if unguarded:
+        return "bad"
+    return "warn" if alarms and tone in ("good", "plain", "quiet") else tone
 
 
 def status_lines(picture: VehiclePicture) -> list[Line]:
@@ -79,8 +95,8 @@ def order_lines(namespace: str, picture: VehiclePicture | None, does: str) -> li
     if picture is None:
         return [f"{namespace}: NOT KNOWN, no supervisor is received", f"this {does}"]
     lines = [f"{namespace}: {headline(picture).text}"]
-    if picture.state_text != picture.state:
-        lines.append(_named("why", picture.state_text))
+    if picture.why:
+        lines.append(_named("why", picture.why))
     lines += [line.text for line in _vehicle(picture.vehicle)]
     lines += [line.text for one in picture.parachutes for line in _parachute(one)]
     return [*lines, f"this {does}"]
@@ -92,15 +108,16 @@ def _why(picture: VehiclePicture) -> Iterator[Line]:
     yield Line(
         _named("mode", picture.mode), "plain" if picture.mode == Mode.ACTIVE.name else "bad"
     )
-    if picture.state_text != picture.state:
-        yield Line(_named("why", picture.state_text), STAGE_TONE.get(picture.state, "quiet"))
+    listed = picture.flight_blocked and picture.why == "; ".join(picture.block_reasons)
+    if picture.why and not listed:
+        yield Line(_named("why", picture.why), headline(picture).tone)
     flight = "BLOCKED" if picture.flight_blocked else "not blocked"
     yield Line(_named("flight", flight), "warn" if picture.flight_blocked else "plain")
     for reason in picture.block_reasons:
         yield Line(_named("", reason), "warn")
     for device in picture.device_blocks:
         yield Line(_named("", f"blocked by device {device}"), "warn")
-    for alarm in picture.alarms:
+    for alarm in picture.other_alarms:
         yield Line(_named("ALARM", alarm), "bad")
     if picture.state == "IN_FLIGHT":
         # On the ground a measurement that does not move is none, and that is no news.
@@ -131,7 +148,8 @@ def _parachute(one: ParachuteView) -> Iterator[Line]:
     if one.backup_voltage == one.backup_voltage:
         parts.append(f"backup {one.backup_voltage:.1f} V")
     parts.append(age_text(one.age))
-    tone = "quiet" if is_old(one.age) else "act" if one.deployed else "plain"
+    tone = "act" if one.deployed else "live" if one.armed else "plain"
+    tone = "quiet" if is_old(one.age) else tone
     yield Line(_named(f"{one.link} {one.device}", ", ".join(parts)), tone)
     for fault in one.faults:
         yield Line(_named("", f"fault: {fault}"), "bad")
@@ -166,9 +184,8 @@ def _rules(rules: Sequence[RuleView]) -> Iterator[Line]:
     told = f"{len(counting)} counting" if counting else "none counting"
     yield Line(f"rules: {active} of {len(rules)} active, {told}", "head")
     for one in counting:
-        state = "acted on" if one.acted_on else "fulfilled" if one.fulfilled else "counting"
-        text = f"{one.action} {state}, {one.level:.1f} of {one.hold:.1f} s"
-        yield Line(f"  {one.name}: {text}", _OF_ACTION.get(one.action, "plain"))
+        tone = "warn" if one.does == "warns" else _OF_ACTION.get(one.action, "plain")
+        yield Line(f"  {one.name}: {one.does}", tone)
         yield from (Line(f"      {condition}") for condition in one.conditions)
         if one.denied:
             yield Line(f"      not acted on: {one.denied}", "warn")

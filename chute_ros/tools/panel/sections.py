@@ -7,9 +7,10 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
+from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.diagnostic_tasks import Task
-from chute_ros.tools.chute.status_text import LINK_TONE, STAGE_TONE
+from chute_ros.tools.chute.status_text import LINK_TONE, headline
 from chute_ros.tools.chute.view import (
     DecisionView,
     LinkView,
@@ -18,7 +19,7 @@ from chute_ros.tools.chute.view import (
     VehiclePicture,
     VehicleView,
 )
-from chute_ros.tools.chute.words import age_text, is_old, span_text, value_text
+from chute_ros.tools.chute.words import age_text, is_old, value_text
 from chute_ros.tools.panel.tones import TONES
 
 #: What a state means to a person, where the supervisor says no more than its name.
@@ -26,7 +27,7 @@ MEANINGS = {
     "STARTUP": "The supervisor waits for the first word of its links.",
     "BLOCKED": "The vehicle must not take off.",
     "READY": "Nothing forbids the take-off; no parachute is armed.",
-    "ARMED": "Nothing forbids the take-off; the parachutes are armed.",
+    "ARMED": "The parachutes are armed: keep clear of them. Nothing forbids the take-off.",
     "IN_FLIGHT": "The vehicle flies, and is guarded.",
     "KILLING": "The motors are being stopped.",
     "DEPLOYING": "The parachute is being released.",
@@ -48,13 +49,13 @@ def banner(picture: VehiclePicture) -> str:
         why = f"It was {picture.state}; the last word came {span_text(picture.age)} ago."
         tone = "quiet"
     else:
-        word, why = picture.state.replace("_", " "), _why(picture)
-        tone = STAGE_TONE.get(picture.state, "quiet")
+        line = headline(picture)
+        word, tone, why = line.text.replace("_", " "), line.tone, _why(picture)
     mode = ""
     if picture.mode != Mode.ACTIVE.name:
         meant = _MODES.get(picture.mode, "what it does is not known")
         mode = f'<div class="mode">{_sign("bad")} {escape(picture.mode)}: {escape(meant)}</div>'
-    alarms = "".join(f"<li>{escape(one)}</li>" for one in picture.alarms)
+    alarms = "".join(f"<li>{escape(one)}</li>" for one in picture.other_alarms)
     return (
         f'<div class="banner tone-{tone}">'
         f'<div class="word">{_sign(tone)} {escape(word)}</div><div class="why">{escape(why)}</div>'
@@ -174,8 +175,8 @@ def diagnostics(tasks: Sequence[Task]) -> str:
 
 
 def _why(picture: VehiclePicture) -> str:
-    if picture.state_text and picture.state_text != picture.state:
-        return picture.state_text
+    if picture.why:
+        return picture.why
     if picture.state in ("STARTUP", "BLOCKED") and picture.block_reasons:
         return picture.block_reasons[0]
     return MEANINGS.get(picture.state, "")
@@ -183,7 +184,7 @@ def _why(picture: VehiclePicture) -> str:
 
 def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetime.date) -> str:
     rows = [
-        _row("armed", _armed(one), "act" if one.armed else ""),
+        _row("armed", _armed(one), "live" if one.armed else ""),
         _row("released", _released(one), "act" if one.deployed else ""),
         _row("state", f"{one.state}, link {one.link_state}", LINK_TONE.get(one.link_state, "")),
         _row("packed", _packed(one.packed_date, today), ""),
@@ -246,20 +247,13 @@ def _rule(one: RuleView) -> str:
     filled = 0.0 if not one.hold else min(1.0, one.level / one.hold)
     if one.fulfilled or one.acted_on:
         filled = 1.0
-    state = (
-        "acted on"
-        if one.acted_on
-        else "fulfilled"
-        if one.fulfilled
-        else f"{one.level:.1f} of {one.hold:.1f} s"
-    )
     lines = "".join(f"<li>{escape(line)}</li>" for line in one.conditions if one.counts)
     if one.denied:
         lines += f"<li>not acted on: {escape(one.denied)}</li>"
     percent = f"{filled * 100.0:.0f}"
     return (
         f'<div class="rule"><div class="row"><span>{escape(one.name)}</span>'
-        f"<span>{escape(one.action)}, {escape(state)}</span></div>"
+        f"<span>{escape(one.does)}</span></div>"
         f'<div class="bar" role="progressbar" aria-label="{escape(one.name)}" aria-valuemin="0" '
         f'aria-valuemax="100" aria-valuenow="{percent}"><i style="width:{percent}%"></i></div>'
         f"<ul>{lines}</ul></div>"
