@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from chute_ros.model import Action, LinkState
+from chute_ros.model import Action, Decision, LinkState
 from chute_ros.protocol.events import Ask
 from chute_ros.supervisor.inputs import ActionReport
 from chute_ros.supervisor.lease import Claim
@@ -25,6 +25,16 @@ class DeviceBeat:
     reasons: tuple[str, ...]
     #: For how long what came may have waited, s.
     behind: float
+
+
+@dataclass(frozen=True)
+class PastDecision:
+    """A kill or a deploy that was decided, for whoever comes late (safety/history). Nobody acts on
+    it."""
+
+    decision: Decision
+    #: Monotonic s.
+    decided_at: float
 
 
 @dataclass(frozen=True)

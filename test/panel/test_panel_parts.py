@@ -174,6 +174,15 @@ def test_decisions_the_newest_first_with_what_came_of_them():
     assert "→ mavlink_parachute SENT: sent" in part
 
 
+def test_flight_blocks_do_not_push_out_the_newest_kill():
+    heard = Heard().hears(stamped(state()))
+    heard.hears(stamped(SafetyDecision(epoch=7, id=1, action=3, rule="falling", reasons=["why"])))
+    for number in range(2, 12):
+        heard.hears(stamped(SafetyDecision(epoch=7, id=number, action=1, rule="links")))
+    part = text_of(sections.decisions(heard.view().decisions))
+    assert part.endswith("KILL by rule 'falling', 0 s ago why")
+
+
 def test_diagnostics_tell_what_is_not_ok():
     tasks = [
         Task("drone/upf_can: controller 33", "ERROR", "no power", {}, 0.1),

@@ -16,6 +16,8 @@ from chute_ros.model import (
     ParachuteState,
     TriggerFlags,
 )
+from chute_ros.plain_text import span_text
+from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.state_text import MODES, UNGUARDED
@@ -120,7 +122,8 @@ class RuleView:
 
 @dataclass(frozen=True)
 class DecisionView:
-    """A decision received since the listener began. outcomes: link and outcome, with detail."""
+    """A decision; kills and deploys also from before the listener began. outcomes: link and
+    outcome, with detail, received since."""
 
     epoch: int
     id: int
@@ -130,6 +133,13 @@ class DecisionView:
     reasons: tuple[str, ...]
     outcomes: tuple[str, ...]
     age: float
+
+    @property
+    def headline(self) -> str:
+        """What, by whom and when."""
+        shadow = " in SHADOW, not sent," if self.shadow else ""
+        by = "a person" if self.rule == OPERATOR else f"rule '{self.rule}'"
+        return f"{self.action}{shadow} by {by}, {span_text(self.age)} ago"
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from html import escape
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.diagnostic_tasks import Task
-from chute_ros.tools.chute.status_text import LINK_TONE, headline
+from chute_ros.tools.chute.status_text import LINK_TONE, headline, newest_fired
 from chute_ros.tools.chute.view import (
     DecisionView,
     LinkView,
@@ -146,15 +146,16 @@ def rules(those: Sequence[RuleView], old: bool) -> str:
 
 
 def decisions(those: Sequence[DecisionView]) -> str:
-    """What was decided since somebody looks, the newest first."""
+    """What was decided, the newest first: kills and deploys also before somebody looked."""
     rows = []
-    for one in list(reversed(those))[:_HISTORY]:
-        shadow = " (SHADOW: not sent)" if one.shadow else ""
+    newest = list(reversed(those))
+    # However often flight was blocked since.
+    fired = [one for one in newest_fired(those) if one not in newest[:_HISTORY]]
+    for one in [*newest[:_HISTORY], *reversed(fired)]:
         told = [*one.reasons, *(f"→ {outcome}" for outcome in one.outcomes)]
         lines = "".join(f"<li>{escape(line)}</li>" for line in told)
-        head = f"{one.action}{shadow} by rule '{one.rule}', {span_text(one.age)} ago"
-        rows.append(f'<div class="decision"><b>{escape(head)}</b><ul>{lines}</ul></div>')
-    return _card("Decisions received here", "".join(rows) or _row("", "none", ""), False)
+        rows.append(f'<div class="decision"><b>{escape(one.headline)}</b><ul>{lines}</ul></div>')
+    return _card("Decisions", "".join(rows) or _row("", "none", ""), False)
 
 
 def diagnostics(tasks: Sequence[Task]) -> str:
