@@ -100,8 +100,8 @@ def test_a_parachute_with_all_that_is_known_of_it():
         identities={"mavlink_parachute 1/161": "ACME, serial number 7, firmware 1.2"},
     )
     assert text_of(part) == (
-        "Parachute mavlink_parachute 1/161 armed ◆ YES: FC, OFFBOARD released ▼ YES, by MAVLINK "
-        "state ● ARMED, link OK packed 2026-06-19, 12 days ago own supply 8.2 V own height 0.0 m "
+        "Parachute mavlink_parachute 1/161 armed ◆ YES: FC, OFFBOARD released ▼ YES, by an order over MAVLink (MAVLINK) "
+        "state ◆ ARMED, link OK packed 2026-06-19, 12 days ago own supply 8.2 V own height 0.0 m "
         "identity ACME, serial number 7, firmware 1.2 fault ✖ low power last word <1 s ago"
     )
 

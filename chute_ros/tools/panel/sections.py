@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from html import escape
 
+from chute_ros.model import LinkState, ParachuteState
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.diagnostic_tasks import Task
@@ -34,6 +35,15 @@ MEANINGS = {
     "DEPLOYED": "A parachute was released.",
     "LANDED": "The vehicle has landed.",
     "FAULT": "What was ordered could not be done.",
+}
+#: What released a parachute, as itself says -> in words.
+_BY = {
+    "MANUAL": "hand (MANUAL)",
+    "ATS": "its own sensors (ATS)",
+    "DRONE": "an order over the vehicle's trigger (DRONE)",
+    "MAVLINK": "an order over MAVLink (MAVLINK)",
+    "GEOFENCE": "its geofence (GEOFENCE)",
+    "FTS_PRECHECKING": "its flight termination system (FTS_PRECHECKING)",
 }
 _HISTORY = 8
 _MODES = {"SHADOW": "it decides, and sends nothing", "INHIBITED": "it does nothing"}
@@ -155,7 +165,7 @@ def decisions(those: Sequence[DecisionView]) -> str:
         told = [*one.reasons, *(f"→ {outcome}" for outcome in one.outcomes)]
         lines = "".join(f"<li>{escape(line)}</li>" for line in told)
         rows.append(f'<div class="decision"><b>{escape(one.headline)}</b><ul>{lines}</ul></div>')
-    return _card("Decisions", "".join(rows) or _row("", "none", ""), False)
+    return _card("Decisions", "".join(rows) or _row("", "no kill, no deploy", ""), False)
 
 
 def diagnostics(tasks: Sequence[Task]) -> str:
@@ -187,7 +197,7 @@ def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetim
     rows = [
         _row("armed", _armed(one), "live" if one.armed else ""),
         _row("released", _released(one), "act" if one.deployed else ""),
-        _row("state", f"{one.state}, link {one.link_state}", LINK_TONE.get(one.link_state, "")),
+        _row("state", f"{one.state}, link {one.link_state}", _state_tone(one)),
         _row("packed", _packed(one.packed_date, today), ""),
         _row("own supply", value_text(one.backup_voltage, "V"), ""),
     ]
@@ -200,6 +210,13 @@ def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetim
     return _card(f"Parachute {one.link} {one.device}", "".join(rows), is_old(one.age))
 
 
+def _state_tone(one: ParachuteView) -> str:
+    """An armed parachute looks armed wherever that stands."""
+    if one.link_state == LinkState.OK.name and one.state == ParachuteState.ARMED.name:
+        return "live"
+    return LINK_TONE.get(one.link_state, "")
+
+
 def _armed(one: ParachuteView) -> str:
     if not one.armed:
         return "no"
@@ -209,7 +226,7 @@ def _armed(one: ParachuteView) -> str:
 def _released(one: ParachuteView) -> str:
     if not one.deployed:
         return "no"
-    return "YES" if one.released_by == "NONE" else f"YES, by {one.released_by}"
+    return f"YES, by {_BY[one.released_by]}" if one.released_by in _BY else "YES"
 
 
 def _packed(date: str, today: datetime.date) -> str:
