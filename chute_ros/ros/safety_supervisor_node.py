@@ -128,8 +128,8 @@ class SafetySupervisorNode(SuiteNode):
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().info(
-                f"rule '{rule}' is not used: it needs a source besides the autopilot (imu or "
-                "odometry in vehicle_sources)"
+                f"rule '{rule}' is active and cannot be fulfilled: it needs a source besides the "
+                "autopilot (imu or odometry in vehicle_sources)"
             )
         mode = self.runtime.state.mode
         if mode in MODES:

@@ -22,7 +22,7 @@ HOSTILE = "<script>alert(1)</script>&\"'"
 
 def text_of(part):
     """What a person reads of it."""
-    return " ".join(html.unescape(re.sub("<[^>]*>", " ", part)).split())
+    return " ".join(html.unescape(re.sub("<[^>]*>", " ", part.replace("<wbr>", ""))).split())
 
 
 def shown(at=0.0, **fields):
@@ -100,8 +100,9 @@ def test_a_parachute_with_all_that_is_known_of_it():
         identities={"mavlink_parachute 1/161": "ACME, serial number 7, firmware 1.2"},
     )
     assert text_of(part) == (
-        "Parachute mavlink_parachute 1/161 armed ◆ YES: FC, OFFBOARD released ▼ YES, by an order over MAVLink (MAVLINK) "
-        "state ◆ ARMED, link OK packed 2026-06-19, 12 days ago own supply 8.2 V own height 0.0 m "
+        "Parachute mavlink_parachute 1/161 armed ◆ YES: FC, OFFBOARD released ▼ YES, by an "
+        "order over MAVLink (MAVLINK) state ◆ ARMED, link OK packed 2026-06-19, 12 days ago own "
+        "supply 8.2 V own height 0.0 m "
         "identity ACME, serial number 7, firmware 1.2 fault ✖ low power last word <1 s ago"
     )
 
@@ -272,14 +273,13 @@ def test_a_rocket_with_its_valves_and_its_memory():
         blims_dist_to_target=320.0,
         blims_bearing_deg=45.0,
     )
-    memory = Task(
-        "rocket/umbilical: memory", "OK", "dump of flash", {"newest progress": "40 %"}, 0.1
-    )
+    memory = Task("rocket/umbilical: memory", "OK", "no dump", {"newest progress": "done"}, 0.1)
     assert text_of(rocket(telem, 0.2, [memory])) == (
-        "Rocket flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid valve OPEN "
-        "main valve closed drogue DEPLOYED main parachute not told air brake deployed, 25 % open "
+        "Rocket key ARMED flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid "
+        "valve OPEN main valve closed drogue DEPLOYED main parachute not told air brake deployed, "
+        "25 % open "
         "satellites 9 BLiMS target 320 m at 45 ° telemetry telem57, <1 s ago "
-        "memory dump of flash (40 %), <1 s ago"
+        "memory no dump (done), <1 s ago"
     )
     assert 'class="card old"' in rocket(telem, 3.0, [])
 
@@ -298,6 +298,38 @@ def test_what_a_rocket_does_not_tell_is_not_told():
         blims_dist_to_target=math.nan,
     )
     part = text_of(rocket(nothing, math.nan, []))
-    assert part.count("not told") == 7
+    assert part.count("not told") == 8
     assert part.count("not known") == 2
     assert "never received" in part
+
+
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [
+        (Telem.STARTUP, "key not armed"),
+        (Telem.STANDBY, "key ARMED"),
+        (Telem.COAST, "key ARMED"),
+        (Telem.FAULT, "key not told"),
+        (255, "key not told"),
+    ],
+)
+def test_of_the_key_is_said_what_the_mode_tells(mode, told):
+    assert told in text_of(rocket(Telem(flight_mode=mode), 0.1, []))
+
+
+def test_a_wipe_is_a_bar_that_fills_and_a_dump_one_that_moves():
+    values = {"newest progress": "wiping the flash: 3 of 4 sectors", "newest progress (%)": "75"}
+    wipe = Task("rocket/umbilical: memory", "WARN", "wipe flash is in progress", values, 0.1)
+    part = rocket(Telem(), 0.1, [wipe])
+    assert 'aria-valuenow="75"' in part
+    assert 'style="width:75%"' in part
+    values = {"newest progress": "dump flash: 262144 bytes", "newest progress (%)": ""}
+    dump = Task("rocket/umbilical: memory", "WARN", "dump flash is in progress", values, 0.1)
+    part = rocket(Telem(), 0.1, [dump])
+    assert '<i class="unknown">' in part
+    assert "aria-valuenow" not in part
+
+
+def test_a_long_name_is_broken_where_a_word_of_it_ends():
+    assert sections.broken("mavlink_parachute 1/161") == "mavlink_<wbr>parachute 1/<wbr>161"
+    assert sections.broken("<b>") == "&lt;b&gt;"

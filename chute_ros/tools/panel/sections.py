@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 
@@ -270,7 +271,7 @@ def _rule(one: RuleView) -> str:
         lines += f"<li>not acted on: {escape(one.denied)}</li>"
     percent = f"{filled * 100.0:.0f}"
     return (
-        f'<div class="rule"><div class="row"><span>{escape(one.name)}</span>'
+        f'<div class="rule"><div class="row"><span>{broken(one.name)}</span>'
         f"<span>{escape(one.does)}</span></div>"
         f'<div class="bar" role="progressbar" aria-label="{escape(one.name)}" aria-valuemin="0" '
         f'aria-valuemax="100" aria-valuenow="{percent}"><i style="width:{percent}%"></i></div>'
@@ -280,12 +281,17 @@ def _rule(one: RuleView) -> str:
 
 def _row(name: str, text: str, tone: str) -> str:
     sign = f"{_sign(tone)} " if tone else ""
-    told = f"<span>{escape(name)}</span><span>{sign}{escape(text)}</span>"
+    told = f"<span>{broken(name)}</span><span>{sign}{escape(text)}</span>"
     return f'<div class="row{f" is-{tone}" if tone else ""}">{told}</div>'
 
 
 def _card(title: str, rows: str, old: bool) -> str:
-    return f'<section class="card{" old" if old else ""}"><h2>{escape(title)}</h2>{rows}</section>'
+    return f'<section class="card{" old" if old else ""}"><h2>{broken(title)}</h2>{rows}</section>'
+
+
+def broken(name: str) -> str:
+    """A name as HTML, that on a narrow screen goes on in the next line after a _ or a /."""
+    return re.sub("([_/])", r"\1<wbr>", escape(name))
 
 
 def _sign(tone: str) -> str:

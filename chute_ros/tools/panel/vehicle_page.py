@@ -23,7 +23,7 @@ _EVERY = 0.25  # s
 #: A vehicle that is not found is looked for so often, s.
 _LOOKS = 1.0
 #: Of so many turns one draws the curves, and looks what the bench offers.
-_SLOWLY = 8
+_SLOWLY = 4
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 #: Parts of the page, in their order on a phone; wide screens have two columns.
 _LEFT = ("blocks", "parachutes", "vehicle")
