@@ -122,12 +122,12 @@ def press(page, name):
     raise AssertionError(f"{name} is not counted as held")
 
 
-def picture(page, name):
-    """Keep what is seen, where make pictures wants it for the docs."""
+def picture(page, name, whole=False):
+    """Keep what is seen, where make pictures wants it for the docs. whole: with what is below."""
     if folder := os.environ.get("CHUTE_PICTURES"):
         file = Path(folder) / name
         page.evaluate("window.scrollTo(0, 0)")
-        page.screenshot(path=file, type="jpeg", quality=70, animations="disabled")
+        page.screenshot(path=file, type="jpeg", quality=70, animations="disabled", full_page=whole)
 
 
 def fits(page):

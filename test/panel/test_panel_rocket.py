@@ -91,7 +91,7 @@ def test_a_rocket_from_the_cable_to_the_main(
         re.compile(r"height\d{3,4}\."), timeout=PATIENCE
     )
     expect(page.locator(".curves")).to_contain_text(re.compile(r"\d,\d{3}"), timeout=PATIENCE)
-    picture(page, "rocket.jpg")
+    picture(page, "rocket.jpg", whole=True)
     # When it falls past its apogee without a drogue, then the operator releases it on the page.
     expect(page.locator(".part-vehicle")).to_contain_text("vertical speed-", timeout=PATIENCE)
     hold(page, "DEPLOY")
