@@ -55,6 +55,14 @@ def test_one_that_flies_unguarded_comes_next_to_what_has_failed_and_looks_like_i
     assert "tone-warn" in fleet([("/a", one)], NOW)
 
 
+def test_a_parachute_that_is_armed_on_the_ground_looks_so_in_every_state():
+    for stage in (Stage.READY, Stage.LANDED, Stage.BLOCKED, Stage.ARMED):
+        page = fleet([("/a", summary(stage, armed=["upf_can 33"]))], NOW)
+        assert "tone-live" in page
+        assert text_of(page).startswith(f"/a ◆ {stage.name} ")
+    assert "tone-plain" in fleet([("/a", summary(Stage.IN_FLIGHT, armed=["upf_can 33"]))], NOW)
+
+
 def test_one_that_is_silent_is_not_shown_as_if_it_were_now():
     page = fleet([("/a", summary(Stage.IN_FLIGHT, at=-5.0))], NOW)
     assert text_of(page) == (

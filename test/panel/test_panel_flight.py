@@ -9,14 +9,18 @@ import subprocess
 import sys
 
 import pytest
+from chute_bench import AtTerminal
 from panel_bench import (
     PATIENCE,
     PHONE,
+    Patience,
     fits,
     hold,
     log_in,
     password_file,
     picture,
+    terminal_picture,
+    terminal_rows,
     watch_words,
     word,
 )
@@ -74,16 +78,10 @@ def answered(page, text):
     expect(page.locator(".answers")).to_contain_text(text, timeout=PATIENCE)
 
 
-def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path, await_until):
+def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
-    page = open_page(f"{panel.address}/", PHONE, has_touch=True)
-
     # Given a vehicle whose parachute is missing, when somebody looks, then it says why.
-    def found():
-        page.goto(f"{panel.address}/vehicle{rig.namespace}")
-        return page.locator(".part-banner").count()
-
-    await_until(found, "the vehicle is found")
+    page = open_page(f"{panel.address}/vehicle{rig.namespace}", PHONE, has_touch=True)
     word(page, "BLOCKED")
     expect(page.locator(".part-banner .why")).to_contain_text("mavlink_parachute")
     watch_words(page)
@@ -167,6 +165,7 @@ def test_a_flight_that_ends_well_on_a_phone(hangar, pilot, start_panel, open_pag
     word(page, "LANDED")
     # and says that the parachute is live all the same.
     expect(page.locator(".part-banner .why")).to_contain_text("ARMED all the same")
+    expect(page.locator(".part-banner .banner")).to_have_class(re.compile("tone-live"))
     assert fits(page)
     picture(page, "phone_landed.jpg")
     # When the motors stop, then the supervisor disarms the parachute.
@@ -285,6 +284,17 @@ def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_pa
     decisions = late.locator(".part-decisions")
     for text in ("KILL by rule", "DEPLOY by rule", "kill confirmed after"):
         expect(decisions).to_contain_text(text, timeout=PATIENCE)
+    # So does who has no more than a terminal of 24 rows.
+    terminal = AtTerminal(Patience(late, rig.namespace), "watch", rows=24, columns=80)
+    terminal.reads("DEPLOY by rule")
+    terminal.reads("OK, device NOT healthy")
+    terminal.reads("armed, DEPLOYED, link OK")
+    terminal.types("q")
+    assert terminal.end() == 0
+    shown = "\n".join(terminal_rows(terminal.shown).values())
+    for text in ("D E P L O Y E D", "released", "KILL by rule", "DEPLOY by rule"):
+        assert text in shown
+    terminal_picture(late, terminal.shown, "chute_watch.jpg")
 
 
 def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(

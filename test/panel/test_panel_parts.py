@@ -72,6 +72,13 @@ def test_a_vehicle_that_nobody_guards_is_no_calm_flight():
     assert text_of(part) == f"■ IN FLIGHT {alarms[0]}"
 
 
+def test_a_parachute_that_is_armed_on_the_ground_colours_every_state():
+    for stage in (Stage.READY, Stage.LANDED, Stage.BLOCKED):
+        heard = Heard().hears(stamped(state(state=int(stage), state_text=stage.name)))
+        assert "tone-live" not in sections.banner(heard.view())
+        assert "tone-live" in sections.banner(heard.hears(stamped(parachute())).view())
+
+
 def test_a_fault_is_a_sentence_with_its_detail_below_it():
     told = {"state": SafetyState.FAULT, "alarms": ["no parachute confirmed within 3 s: denied"]}
     part = sections.banner(shown(state_text="FAULT: nothing came out, ordered by Anna", **told))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from chute_ros.model import Action, LinkState
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.machine import ON_GROUND
 from chute_ros.supervisor.state_text import UNGUARDED
 from chute_ros.tools.chute.view import (
     DecisionView,
@@ -26,6 +27,7 @@ LINK_TONE = {state.name: tone for state, tone in LINK_TONES.items()}
 _OF_ACTION = {action.name: tone for action, tone in ACTION_TONES.items()}
 #: Columns of the name at the beginning of a line; and of one of two values in one.
 _NAME, _HALF = 19, 40
+_ON_GROUND = tuple(stage.name for stage in ON_GROUND)
 #: Decisions that stop motors or release a parachute.
 _FIRES = (Action.KILL.name, Action.DEPLOY.name)
 
@@ -45,7 +47,8 @@ def headline(picture: VehiclePicture) -> Line:
     if is_old(picture.age):
         text = f"NOT KNOWN NOW (was {picture.state}, last word {span_text(picture.age)} ago)"
         return Line(text, "quiet")
-    tone = state_tone(picture.state, picture.unguarded, bool(picture.alarms))
+    armed = any(one.armed and not is_old(one.age) for one in picture.parachutes)
+    tone = state_tone(picture.state, picture.unguarded, bool(picture.alarms), armed)
     return Line(state_words(picture.state, picture.unguarded), tone)
 
 
@@ -54,11 +57,14 @@ def state_words(state: str, unguarded: bool) -> str:
     return f"{state}, {UNGUARDED}" if unguarded else state
 
 
-def state_tone(state: str, unguarded: bool, alarms: bool) -> str:
-    """No state is shown as if all were well while something warns."""
+def state_tone(state: str, unguarded: bool, alarms: bool, armed: bool) -> str:
+    """No state is shown as if all were well while something warns, nor as if nothing could fire
+    while a parachute is armed beside people. armed: any is."""
     tone = STAGE_TONE.get(state, "quiet")
     if unguarded:
         return "bad"
+    if armed and state in _ON_GROUND:
+        return "live"
     return "warn" if alarms and tone in ("good", "plain", "quiet") else tone
 
 

@@ -281,7 +281,7 @@ def _rule(one: RuleView) -> str:
 
 def _row(name: str, text: str, tone: str) -> str:
     sign = f"{_sign(tone)} " if tone else ""
-    told = f"<span>{broken(name)}</span><span>{sign}{escape(text)}</span>"
+    told = f"<span>{broken(name)}</span><span>{sign}{broken(text)}</span>"
     return f'<div class="row{f" is-{tone}" if tone else ""}">{told}</div>'
 
 
