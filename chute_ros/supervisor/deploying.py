@@ -49,7 +49,7 @@ def check_parachutes(turn: Turn) -> None:
 def _note_open(turn: Turn, why: str) -> None:
     turn.move(Event.PARACHUTE_OPEN, why)
     height = readings.measured(turn.config, turn.state, "height", turn.now)
-    turn.deploying = replace(turn.deploying, released_height=height)
+    turn.deploying = replace(turn.deploying, deploy_height=height)
 
 
 def check_kill(turn: Turn) -> None:

@@ -67,8 +67,9 @@ def _faults(evidence: LinkEvidence) -> str:
     devices = sorted(evidence.devices.items())
     faults = [f"{name} {fault}" for name, status in devices for fault in status.faults]
     faults += [f"{device} is released" for device in sorted(evidence.deployed)]
-    # The same fault, told a moment later, has another age.
-    known = {kind(fault) for fault in faults}
+    # The same fault, told a moment later, has another age; and its node may not name the device.
+    unnamed = [fault for _, status in devices for fault in status.faults]
+    known = {kind(fault) for fault in (*faults, *unnamed)}
     faults += [reason for reason in evidence.reasons if kind(reason) not in known]
     return f" ({'; '.join(faults)})" if faults else ""
 

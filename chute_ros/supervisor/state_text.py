@@ -131,7 +131,7 @@ def _what_was_done(config: SupervisorConfig, state: State, now: float) -> str:
         return _what_is_out(config, state, now)
     if state.stage not in (Stage.DEPLOYING, Stage.FAULT) or not deploys:
         return ""
-    height = _at_height(state.killing.killed_height)
+    height = _at_height(state.deploying.deploy_height)
     by = _ordered(config, deploys[0].decision, deploys[0].decided_at, height, now)
     if state.stage is Stage.FAULT:
         return f"no parachute confirmed that it was released, {by}"
@@ -145,7 +145,7 @@ def _what_is_out(config: SupervisorConfig, state: State, now: float) -> str:
     confirmed = [one for one in state.deploying.deploys if one.confirmed]
     out = out or [_target(one.decision) for one in confirmed[-1:]]
     who = ", ".join(out) or "a parachute that is not received any more"
-    when = f"{span_text(now - state.stage_since)} ago{_at_height(state.deploying.released_height)}"
+    when = f"{span_text(now - state.stage_since)} ago{_at_height(state.deploying.deploy_height)}"
     if state.deploying.deploys:
         decision = state.deploying.deploys[0].decision
         return f"{who} released {when}, by {_whose(config, decision)}"

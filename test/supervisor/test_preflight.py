@@ -473,7 +473,7 @@ def test_a_fault_that_its_node_repeats_with_another_age_is_one() -> None:
     story = Story().ready()
     lost = ("heartbeat LOST: 7.6 s old",)
     beat = story.heartbeat(healthy=False, state=LinkState.LOST)
-    late = ("1/161 heartbeat LOST: 8.1 s old", "no autopilot")
+    late = ("1/161 heartbeat LOST: 8.1 s old", "heartbeat LOST: 8.2 s old", "no autopilot")
     story.at(0.1, parachute(faults=lost, alive=False), replace(beat, reasons=late))
     (reason,) = block_reasons(story.config, story.state, START + 0.1)
     assert reason == (

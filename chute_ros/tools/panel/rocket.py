@@ -10,6 +10,7 @@ from typing import Any
 from chute_ros.links.umbilical.protocol.modes import FlightMode
 from chute_ros.tools.chute.diagnostic_tasks import Task
 from chute_ros.tools.chute.words import age_text, is_old, name_of, value_text
+from chute_ros.tools.panel.sections import broken
 
 _AIR_BRAKE = {0: "idle", 1: "deployed", 2: "retracted"}
 _NOT_THERE = -1
@@ -43,7 +44,7 @@ def rocket(telem: Any, age: float, tasks: Iterable[Task]) -> str:
 
 
 def _row(name: str, text: str) -> str:
-    return f'<div class="row"><span>{escape(name)}</span><span>{escape(text)}</span></div>'
+    return f'<div class="row"><span>{escape(name)}</span><span>{broken(text)}</span></div>'
 
 
 def _key(mode: int) -> str:
