@@ -102,6 +102,7 @@ def _play(page: Page, password: str, step: Callable[[str], None]) -> None:
     hold(page, "Arm parachutes")
     word(page, "ARMED")
     step("logged in, and armed the parachute")
+    page.get_by_role("tab", name="Bench", exact=True).click()
     page.get_by_role("button", name="Take off", exact=True).click()
     word(page, "IN FLIGHT")
     expect(page.locator(".part-vehicle")).to_contain_text("60.0 m", timeout=PATIENCE)

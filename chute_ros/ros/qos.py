@@ -15,11 +15,19 @@ def reliable(depth: int) -> QoSProfile:
 STATUS = reliable(10)
 #: Volatile: a restarted node must never act on an old decision.
 DECISION = reliable(50)
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+
+
+def _latched(depth: int) -> QoSProfile:
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+
+
+LATCHED = _latched(1)
+#: Kills and deploys for whoever comes late; no node acts on them.
+HISTORY = _latched(20)
 
 
 def newest(profile: QoSProfile) -> QoSProfile:

@@ -37,7 +37,6 @@ from chute_ros.ros.supervisor_health import Health
 from chute_ros.ros.supervisor_inputs import SupervisorInputs
 from chute_ros.ros.supervisor_memory import Memory
 from chute_ros.ros.supervisor_messages import (
-    MODES,
     decisions_task,
     state_message,
     summary_message,
@@ -57,8 +56,9 @@ from chute_ros.runtime.supervisor import (
     Start,
     SupervisorRuntime,
 )
-from chute_ros.runtime.topics import LeaseClaim, SafetyTold, SupervisorBeat
+from chute_ros.runtime.topics import LeaseClaim, PastDecision, SafetyTold, SupervisorBeat
 from chute_ros.supervisor import inputs
+from chute_ros.supervisor.state_text import MODES
 
 #: A turn so long (s) before a deadline of the core finds the processor awake and its caches filled
 #: when the deadline has come (docs/evidence/speed.md). It is seldom reached: what comes moves it
@@ -99,6 +99,9 @@ class SafetySupervisorNode(SuiteNode):
         self._decision_publisher = self.create_publisher(
             SafetyDecision, "safety/decision", qos.DECISION
         )
+        self._history_publisher = self.create_publisher(
+            SafetyDecision, "safety/history", qos.HISTORY
+        )
         self._state_publisher = self.create_publisher(SafetyState, "safety/state", qos.LATCHED)
         self._summary_publisher = self.create_publisher(
             SafetySummary, "safety/summary", qos.LATCHED
@@ -106,6 +109,7 @@ class SafetySupervisorNode(SuiteNode):
         self._lease_publisher = self.create_publisher(SupervisorLease, "safety/lease", qos.STATUS)
         self._carriers: dict[type, Callable[[Any, Time], None]] = {
             model.Decision: self._publish_decision,
+            PastDecision: self._publish_past,
             SafetyTold: self._publish_state,
             SupervisorBeat: self._publish_beat,
             LeaseClaim: self._publish_claim,
@@ -124,8 +128,8 @@ class SafetySupervisorNode(SuiteNode):
         )
         for rule in blind_rules(self.config, self.values["vehicle_sources"]):
             self.get_logger().info(
-                f"rule '{rule}' is not used: it needs a source besides the autopilot (imu or "
-                "odometry in vehicle_sources)"
+                f"rule '{rule}' is active and cannot be fulfilled: it needs a source besides the "
+                "autopilot (imu or odometry in vehicle_sources)"
             )
         mode = self.runtime.state.mode
         if mode in MODES:
@@ -242,6 +246,12 @@ class SafetySupervisorNode(SuiteNode):
         message = messages.decision(decision, stamp)
         self._decision_publisher.publish(message)
         self._unrecorded.append(message)
+
+    def _publish_past(self, past: PastDecision, stamp: Time) -> None:
+        """With the stamp of when it was decided."""
+        ago = round(max(0.0, time.monotonic() - past.decided_at) * 1e9)
+        decided = messages.stamp_of(max(0, messages.nanoseconds(stamp) - ago))
+        self._history_publisher.publish(messages.decision(past.decision, decided))
 
     def _publish_beat(self, beat: SupervisorBeat, stamp: Time) -> None:
         message = LinkHeartbeat(

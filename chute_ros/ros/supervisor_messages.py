@@ -10,18 +10,13 @@ from chute_ros.ros import diagnostics, messages
 from chute_ros.runtime.topics import SafetyTold
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
-from chute_ros.supervisor.machine import ON_GROUND, Stage
+from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.policy import judge
 from chute_ros.supervisor.preflight import block_reasons, link_problem
 from chute_ros.supervisor.readings import doubt, measured, unusable
 from chute_ros.supervisor.rules import Rule
 from chute_ros.supervisor.state import State
-
-#: What the modes mean in which no vehicle is protected.
-MODES = {
-    Mode.SHADOW: "SHADOW: reports its decisions and sends none",
-    Mode.INHIBITED: "INHIBITED: decides nothing",
-}
+from chute_ros.supervisor.state_text import UNGUARDED, alarms, state_text
 
 
 def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> SafetyState:
@@ -33,12 +28,12 @@ def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> Sa
         supervisor=told.supervisor,
         epoch=state.epoch,
         state=int(state.stage),
-        state_text=_text(config, state, reasons),
+        state_text=state_text(config, state, reasons, now),
         mode=int(state.mode),
         flight_blocked=blocked,
         block_reasons=list(reasons) if blocked else [],
         device_blocks=sorted(state.device_blocks),
-        alarms=list(state.alarming.alarms),
+        alarms=list(alarms(config, state, now)),
     )
     message.header.stamp = stamp
     for link in config.links:
@@ -89,11 +84,19 @@ def decisions_task(
 ) -> DiagnosticStatus:
     """The same in diagnostics."""
     reasons = block_reasons(config, state, now)
+    text = state_text(config, state, reasons, now)
     level = diagnostics.OK
-    if state.alarming.alarms or state.stage is Stage.FAULT:
+    if state.alarming.alarms or state.stage is Stage.FAULT or UNGUARDED in text:
         level = diagnostics.ERROR
-    elif reasons or state.heard.disputed or state.mode is not Mode.ACTIVE:
+    elif (
+        reasons
+        or alarms(config, state, now)
+        or state.heard.disputed
+        or state.mode is not Mode.ACTIVE
+    ):
         level = diagnostics.WARN
+        # In the air it takes nothing back that a take-off would be forbidden now.
+        text += f": {'; '.join(reasons)}" if text == state.stage.name and reasons else ""
     values: dict[str, object] = {
         "state": state.stage.name,
         "mode": state.mode.name,
@@ -120,7 +123,7 @@ def decisions_task(
         in_doubt = doubt(state, measurement, value, now)
         told = f"{value:.2f} (in doubt: {in_doubt})" if in_doubt else f"{value:.2f}"
         values[measurement] = f"unusable: {why}" if why else told
-    return diagnostics.status(name, "decisions", level, _text(config, state, reasons), values, "")
+    return diagnostics.status(name, "decisions", level, text, values, "")
 
 
 def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float) -> RuleState:
@@ -139,24 +142,3 @@ def _rule_message(config: SupervisorConfig, state: State, rule: Rule, now: float
         conditions=[f"{marks[one.holds]} {one.text}" for one in judged.findings] if alive else [],
         denied=counted.denied,
     )
-
-
-def _text(config: SupervisorConfig, state: State, reasons: tuple[str, ...]) -> str:
-    text = _stage_text(state, reasons)
-    armed = ", ".join(map(" ".join, state.armed(config)))
-    if armed and state.stage in ON_GROUND and state.stage is not Stage.ARMED:
-        text += f"; ARMED all the same: {armed} (safety/arm disarms)"
-    return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
-
-
-def _stage_text(state: State, reasons: tuple[str, ...]) -> str:
-    if state.stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
-        return f"{state.stage.name}: {'; '.join(reasons)}"
-    if state.alarming.alarms:
-        return f"{state.stage.name}: {state.alarming.alarms[-1]}"
-    if state.heard.disputed:
-        parts = ", ".join(sorted(state.heard.disputed))
-        return (
-            f"{state.stage.name}: {parts} in doubt, as the vehicle's sources contradict each other"
-        )
-    return state.stage.name

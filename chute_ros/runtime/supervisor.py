@@ -16,13 +16,19 @@ from itertools import count
 from operator import attrgetter
 from typing import Any, Protocol
 
-from chute_ros.model import Decision
+from chute_ros.model import Action, Decision
 from chute_ros.protocol.events import Notice, Severity
 from chute_ros.runtime.arming import ArmCaller, DeviceArming
 from chute_ros.runtime.deferred_work import DeferredWork
 from chute_ros.runtime.lease_keeper import LeaseKeeper, LeaseShell
 from chute_ros.runtime.supervisor_inputs import input_of
-from chute_ros.runtime.topics import DeviceBeat, LeaseClaim, SafetyTold, SupervisorBeat
+from chute_ros.runtime.topics import (
+    DeviceBeat,
+    LeaseClaim,
+    PastDecision,
+    SafetyTold,
+    SupervisorBeat,
+)
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.core import update
@@ -32,6 +38,7 @@ from chute_ros.supervisor.state import Own, State
 from chute_ros.supervisor.wakes import next_deadline
 
 HEARTBEAT_INTERVAL = 0.1  # s
+_FIRES = (Action.KILL, Action.DEPLOY)
 STATE_INTERVAL = 1.0  # s, at the latest
 
 
@@ -60,8 +67,8 @@ class Start:
 
 
 class SupervisorShell(LeaseShell, ArmCaller, Protocol):
-    """Carries out what a supervisor does. publish gets decisions, SupervisorBeat, SafetyTold and
-    LeaseClaim."""
+    """Carries out what a supervisor does. publish gets decisions, PastDecision, SupervisorBeat,
+    SafetyTold and LeaseClaim."""
 
     def record(self, turn: FinishedTurn) -> None:
         """Keep it in the black box."""
@@ -120,6 +127,8 @@ class SupervisorRuntime:
     def turn(self, new: tuple[inputs.Input, ...], now: float) -> None:
         """Give the core what came, or let it look at the clock, and do what it says."""
         first, self._first = self._first, ()
+        if first:
+            self._tell_history()
         self._look((*first, *new), now)
 
     def heard(self, one: Any, difference: float, now: float) -> None:
@@ -196,7 +205,7 @@ class SupervisorRuntime:
         self._shell.record(FinishedTurn(now, new, outputs, before, self.state))
         if decided:
             self.afterwards.decided(now)
-            self.afterwards.tell(partial(self._tell_decisions, decided))
+            self.afterwards.tell(partial(self._tell_decisions, decided, now))
         return outputs
 
     def _refuse(self, refused: tuple[inputs.Input, ...], why: str) -> None:
@@ -225,11 +234,19 @@ class SupervisorRuntime:
     def _armed(self, done: inputs.ArmDone, now: float) -> None:
         self.turn((done,), now)
 
-    def _tell_decisions(self, decided: list[inputs.Decide]) -> None:
+    def _tell_decisions(self, decided: list[inputs.Decide], now: float) -> None:
         self._shell.keep(self.state)
         for output in decided:
             if not output.again:
                 self._shell.log(Notice(Severity.WARNING, _told(output.decision)))
+                if output.decision.action in _FIRES:
+                    self._shell.publish(PastDecision(output.decision, now))
+
+    def _tell_history(self) -> None:
+        """What whoever was before has decided, for whoever comes late."""
+        kill = self.state.killing.kill
+        for one in (*([kill] if kill else []), *self.state.deploying.deploys):
+            self._shell.publish(PastDecision(one.decision, one.decided_at))
 
     # -- the lease ------------------------------------------------------------------------------
 
@@ -253,6 +270,8 @@ class SupervisorRuntime:
         self._shell.log(Notice(Severity.WARNING, text))
         outputs = self._update((new,), now)
         self._shell.offer(leads)
+        if leads:
+            self._tell_history()
         self._carry_out(outputs or (), now)
         self.lease.tell(now)
 
@@ -266,8 +285,7 @@ class SupervisorRuntime:
 
     def _changed(self) -> bool:
         before, now = self._published, self.state
-        told = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
-        return before is None or bool(told(before) != told(now))
+        return before is None or _told_at_once(before) != _told_at_once(now)
 
     def _publish_state(self, now: float) -> None:
         self._published, self._state_at = self.state, now + STATE_INTERVAL
@@ -275,6 +293,15 @@ class SupervisorRuntime:
         self._shell.publish(
             SafetyTold(self.lease.config.name, self.state, dict(self._stamps), now)
         )
+
+
+#: What a person is told at once.
+_AT_ONCE = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
+
+
+def _told_at_once(state: State) -> tuple[object, ...]:
+    acted_on = [name for name, evidence in state.rules.items() if evidence.latched]
+    return (*_AT_ONCE(state), acted_on)
 
 
 def _told(decision: Decision) -> str:

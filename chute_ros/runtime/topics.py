@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from chute_ros.model import Action, LinkState
+from chute_ros.model import Action, Decision, LinkState
 from chute_ros.protocol.events import Ask
 from chute_ros.supervisor.inputs import ActionReport, ParachuteReport
 from chute_ros.supervisor.lease import Claim
@@ -34,6 +34,16 @@ class ParachuteTold:
 
     report: ParachuteReport
     received: float
+
+
+@dataclass(frozen=True)
+class PastDecision:
+    """A kill or a deploy that was decided, for whoever comes late (safety/history). Nobody acts on
+    it."""
+
+    decision: Decision
+    #: Monotonic s.
+    decided_at: float
 
 
 @dataclass(frozen=True)

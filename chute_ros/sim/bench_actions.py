@@ -44,8 +44,8 @@ ACTIONS: tuple[BenchAction, ...] = (
     BenchAction(
         "land",
         "Land",
-        "The vehicle sinks at 2 m/s, and disarms at touchdown. The supervisor goes to LANDED, "
-        "then READY.",
+        "The vehicle sinks at 2 m/s, and disarms at touchdown. The supervisor is READY again 1 s "
+        "later.",
         ((AUTOPILOT, "land"),),
     ),
     BenchAction(

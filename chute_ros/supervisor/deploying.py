@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from chute_ros.model import Action, Outcome
-from chute_ros.supervisor import flight
+from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.answers import deploy_details, deploy_reached, end_kill, finish_deploy
 from chute_ros.supervisor.config import SupervisorConfig
@@ -43,7 +43,13 @@ def check_parachutes(turn: Turn) -> None:
     out = sorted(turn.state.newly_released(turn.config, turn.now))
     if out and listed(turn.state.stage, Event.PARACHUTE_OPEN):
         said = f"{', '.join(map(' '.join, out))} says deployed"
-        turn.move(Event.PARACHUTE_OPEN, said)
+        _note_open(turn, said)
+
+
+def _note_open(turn: Turn, why: str) -> None:
+    turn.move(Event.PARACHUTE_OPEN, why)
+    height = readings.measured(turn.config, turn.state, "height", turn.now)
+    turn.deploying = replace(turn.deploying, deploy_height=height)
 
 
 def check_kill(turn: Turn) -> None:
@@ -90,7 +96,7 @@ def check_deploy(turn: Turn) -> None:
     confirmed = deploy_reached(turn, Outcome.CONFIRMED)
     # Also while somebody kills once more after the ladder's end.
     if confirmed and turn.state.stage in (Stage.KILLING, Stage.DEPLOYING, Stage.FAULT):
-        turn.move(Event.PARACHUTE_OPEN, deploy_details(turn))
+        _note_open(turn, deploy_details(turn))
     elif turn.state.stage is Stage.DEPLOYING and turn.deploying.deploys:
         _climb(turn)
     elif turn.state.stage is Stage.FAULT:

@@ -205,7 +205,8 @@ class Measured:
 
     def _impossible(self, sample: Sample, limits: Limits) -> str:
         if not math.isfinite(sample.value):
-            return f"{sample.value} is not a number"
+            told = "reported without a value"
+            return told if math.isnan(sample.value) else f"{sample.value} is not a number"
         if not limits.minimum <= sample.value <= limits.maximum:
             return f"{sample.value:g} is out of {limits.minimum:g} to {limits.maximum:g}"
         return ""

@@ -81,6 +81,7 @@ def order_deploy(turn: Turn, rule: str, reasons: tuple[str, ...]) -> None:
         # Where all are out as far as is known, none of them is trusted to be.
         deploy_ladder=still_in,
         deploys=(),
+        deploy_height=readings.measured(turn.config, turn.state, "height", turn.now),
     )
 
 

@@ -17,6 +17,7 @@ from chute_ros.model import (
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor.config import TRIGGER, PreflightLimits, Rung, SupervisorConfig
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.kinds import kind
 from chute_ros.supervisor.link_evidence import LinkEvidence, LinkJudgement
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measurements import PRESSURE_ALTITUDE
@@ -66,7 +67,10 @@ def _faults(evidence: LinkEvidence) -> str:
     devices = sorted(evidence.devices.items())
     faults = [f"{name} {fault}" for name, status in devices for fault in status.faults]
     faults += [f"{device} is released" for device in sorted(evidence.deployed)]
-    faults += [reason for reason in evidence.reasons if reason not in faults]
+    # The same fault, told a moment later, has another age; and its node may not name the device.
+    unnamed = [fault for _, status in devices for fault in status.faults]
+    known = {kind(fault) for fault in (*faults, *unnamed)}
+    faults += [reason for reason in evidence.reasons if kind(reason) not in known]
     return f" ({'; '.join(faults)})" if faults else ""
 
 

@@ -53,6 +53,9 @@ class DeployUnderWay:
     deploy_ladder: tuple[Rung, ...] = ()
     #: When it leaves at the latest. A kill that is decided again does not put it off.
     deploy_due: Time = math.nan
+    #: Where the vehicle was when a deploy was ordered, and then when a parachute was seen to be
+    #: out, m; NaN: not known.
+    deploy_height: float = math.nan
 
 
 @dataclass(frozen=True)

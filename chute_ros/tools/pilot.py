@@ -1,4 +1,4 @@
-"""The pilot of simulated flights: arms, takes off, breaks a motor, over MAVLink."""
+"""The pilot of simulated flights: arms, takes off, lands, breaks a motor, over MAVLink."""
 
 from __future__ import annotations
 
@@ -26,6 +26,14 @@ class Pilot:
     def arm(self) -> None:
         """Arm the motors."""
         self._command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def disarm(self) -> None:
+        """Stop the motors, on the ground."""
+        self._command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+
+    def land(self) -> None:
+        """Come down, and stop the motors."""
+        self._command(dialect.MAV_CMD_NAV_LAND)
 
     def take_off(self, height: float) -> None:
         """Climb to height, m."""

@@ -9,17 +9,17 @@ from chute_ros.model import Action, LinkState, Outcome
 from chute_ros.supervisor.machine import Stage
 
 #: Of a colour that says what a part means; the page's light or dark colours are behind them.
-TONES = ("good", "warn", "bad", "quiet", "plain", "act")
+TONES = ("good", "live", "warn", "bad", "quiet", "plain", "act")
 STYLE = """
 .timeline { --ink:#1c2733; --soft:#5b6b7b; --grid:#dfe5ea; --back:#ffffff; --good:#2f9e5b;
-  --warn:#d99a1c; --bad:#cc3d3d; --quiet:#9aa7b3; --plain:#2f74c0; --act:#8a4fc4;
+  --warn:#d99a1c; --bad:#cc3d3d; --quiet:#9aa7b3; --plain:#2f74c0; --act:#8a4fc4; --live:#c2541a;
   font: 12px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif; width: 100%;
   height: auto; display: block; background: var(--back); }
 @media (prefers-color-scheme: dark) { .timeline { --ink:#e6edf3; --soft:#9fb0c0; --grid:#2b3742;
   --back:#11181f; --good:#3fae6b; --warn:#c98d17; --bad:#e05656; --quiet:#5c6a77;
-  --plain:#4b90dc; --act:#a06ee0; } }
+  --plain:#4b90dc; --act:#a06ee0; --live:#d9713a; } }
 @media print { .timeline { --ink:#000; --soft:#444; --grid:#ccc; --back:#fff; --good:#2f9e5b;
-  --warn:#d99a1c; --bad:#cc3d3d; --quiet:#9aa7b3; --plain:#2f74c0; --act:#8a4fc4;
+  --warn:#d99a1c; --bad:#cc3d3d; --quiet:#9aa7b3; --plain:#2f74c0; --act:#8a4fc4; --live:#c2541a;
   print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 .timeline text { fill: var(--ink); }
 .timeline .soft { fill: var(--soft); font-size: 11px; }
@@ -40,7 +40,8 @@ STAGE_TONES = {
     Stage.STARTUP: "quiet",
     Stage.BLOCKED: "warn",
     Stage.READY: "good",
-    Stage.ARMED: "good",
+    # A parachute that is live is no vehicle that merely may fly.
+    Stage.ARMED: "live",
     Stage.IN_FLIGHT: "plain",
     Stage.KILLING: "bad",
     Stage.DEPLOYING: "bad",

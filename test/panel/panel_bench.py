@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import os
+import re
 import shutil
 from pathlib import Path
 
 from playwright.sync_api import expect
+from rich.console import Console
+from rich.terminal_theme import MONOKAI
+from rich.text import Text
 
 from chute_ros.tools.isolation import free_tcp_port
 from chute_ros.tools.processes import Processes, ros_arguments
@@ -122,12 +127,45 @@ def press(page, name):
     raise AssertionError(f"{name} is not counted as held")
 
 
-def picture(page, name):
-    """Keep what is seen, where make pictures wants it for the docs."""
+def picture(page, name, whole=False):
+    """Keep what is seen, where make pictures wants it for the docs. whole: with what is below."""
     if folder := os.environ.get("CHUTE_PICTURES"):
         file = Path(folder) / name
         page.evaluate("window.scrollTo(0, 0)")
-        page.screenshot(path=file, type="jpeg", quality=70, animations="disabled")
+        page.screenshot(path=file, type="jpeg", quality=70, animations="disabled", full_page=whole)
+
+
+class Patience:
+    """Of who waits for a terminal while a browser is open (test/tools/chute_bench.py)."""
+
+    def __init__(self, page, namespace):
+        self._page, self.namespace = page, namespace
+
+    def until(self, condition, what, seconds=PATIENCE / 1000):
+        """Wait until this holds."""
+        for _ in range(int(seconds * 20)):
+            if condition():
+                return
+            self._page.wait_for_timeout(50)
+        raise AssertionError(f"{what} did not happen within {seconds:g} s")
+
+
+def terminal_rows(shown):
+    """Number -> the row of a full screen, with its colours, as it was sent last."""
+    parts = re.findall(r"\x1b\[(\d+);1H(.*?)\x1b\[K", shown, re.DOTALL)
+    return {int(number): row for number, row in parts}
+
+
+def terminal_picture(page, shown, name):
+    """The same for what a terminal of 80 columns shows."""
+    if not os.environ.get("CHUTE_PICTURES"):
+        return
+    console = Console(record=True, width=80, file=io.StringIO())
+    for _, row in sorted(terminal_rows(shown).items()):
+        console.print(Text.from_ansi(row), no_wrap=True, overflow="crop")
+    page.set_viewport_size({"width": 820, "height": 560})
+    page.set_content(console.export_html(inline_styles=True, theme=MONOKAI))
+    picture(page, name, whole=True)
 
 
 def fits(page):

@@ -42,6 +42,27 @@ def test_the_worst_comes_first():
     ) == ["d", "c", "i", "e", "f", "g", "h", "b", "a"]
 
 
+def test_one_that_flies_unguarded_comes_next_to_what_has_failed_and_looks_like_it():
+    why = "no parachute can be reached: upf_can is LOST"
+    one = summary(Stage.IN_FLIGHT, alarms=1)
+    one.message.text = f"IN_FLIGHT, NOT GUARDED: {why}"
+    assert order(a=summary(Stage.KILLING), b=one, c=summary(Stage.FAULT)) == ["c", "b", "a"]
+    page = fleet([("/a", one)], NOW)
+    assert "tone-bad" in page
+    assert text_of(page).startswith(f"/a ✖ IN FLIGHT, NOT GUARDED {why} alarms: 1")
+    # With an alarm alone it is guarded, and not calm.
+    one.message.text = "IN_FLIGHT: rule 'battery dead' warns: it is empty"
+    assert "tone-warn" in fleet([("/a", one)], NOW)
+
+
+def test_a_parachute_that_is_armed_on_the_ground_looks_so_in_every_state():
+    for stage in (Stage.READY, Stage.LANDED, Stage.BLOCKED, Stage.ARMED):
+        page = fleet([("/a", summary(stage, armed=["upf_can 33"]))], NOW)
+        assert "tone-live" in page
+        assert text_of(page).startswith(f"/a ◆ {stage.name} ")
+    assert "tone-plain" in fleet([("/a", summary(Stage.IN_FLIGHT, armed=["upf_can 33"]))], NOW)
+
+
 def test_one_that_is_silent_is_not_shown_as_if_it_were_now():
     page = fleet([("/a", summary(Stage.IN_FLIGHT, at=-5.0))], NOW)
     assert text_of(page) == (
@@ -68,7 +89,7 @@ def test_a_vehicle_with_all_that_is_said_of_it():
         released=["mavlink_parachute 1/161"],
     )
     assert text_of(fleet([("/a", one)], NOW)) == (
-        "/a ● ARMED mode SHADOW alarms: 1 links OK: 2 of 2 armed: upf_can 33 released: "
+        "/a ◆ ARMED mode SHADOW alarms: 1 links OK: 2 of 2 armed: upf_can 33 released: "
         "mavlink_parachute 1/161 last word: <1 s ago"
     )
 

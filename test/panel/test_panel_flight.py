@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import re
 import signal
+import subprocess
+import sys
 
 import pytest
+from chute_bench import AtTerminal
 from panel_bench import (
     PATIENCE,
     PHONE,
+    Patience,
     fits,
     hold,
     log_in,
     password_file,
     picture,
+    terminal_picture,
+    terminal_rows,
     watch_words,
     word,
 )
@@ -27,22 +35,27 @@ pytestmark = pytest.mark.xdist_group("browser")
 
 
 @pytest.fixture
-def rig(request, namespace, tmp_path):
-    """A drone whose parachute is not plugged in yet: a MAVLink one, or of the kind that a test
+def hangar(request, namespace, tmp_path):
+    """A drone of which nothing runs yet: with a MAVLink parachute, or of the kind that a test
     names."""
     folder = tmp_path / "vehicle"
     folder.mkdir()
     processes = Processes(folder)
-    one = Rig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
-    one.start_supervisor("supervisor")
-    one.start_vehicle()
-    yield one
+    yield Rig.on_free_ports(getattr(request, "param", "mavlink"), "", namespace, processes)
     processes.end()
 
 
 @pytest.fixture
-def pilot(rig):
-    one = Pilot(rig.pilot, 1)
+def rig(hangar):
+    """A drone whose parachute is not plugged in yet."""
+    hangar.start_supervisor("supervisor")
+    hangar.start_vehicle()
+    return hangar
+
+
+@pytest.fixture
+def pilot(hangar):
+    one = Pilot(hangar.pilot, 1)
     yield one
     one.close()
 
@@ -55,21 +68,20 @@ def opened(rig, panel, open_page):
     return page
 
 
+def opened_late(page, open_page):
+    """The same page, in the browser of somebody who comes now."""
+    return open_page(page.url)
+
+
 def answered(page, text):
     """Wait until an answer to an order is shown."""
     expect(page.locator(".answers")).to_contain_text(text, timeout=PATIENCE)
 
 
-def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path, await_until):
+def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
-    page = open_page(f"{panel.address}/", PHONE, has_touch=True)
-
     # Given a vehicle whose parachute is missing, when somebody looks, then it says why.
-    def found():
-        page.goto(f"{panel.address}/vehicle{rig.namespace}")
-        return page.locator(".part-banner").count()
-
-    await_until(found, "the vehicle is found")
+    page = open_page(f"{panel.address}/vehicle{rig.namespace}", PHONE, has_touch=True)
     word(page, "BLOCKED")
     expect(page.locator(".part-banner .why")).to_contain_text("mavlink_parachute")
     watch_words(page)
@@ -115,6 +127,85 @@ def test_a_whole_flight_on_a_phone(rig, pilot, start_panel, open_page, tmp_path,
     assert fits(page)
 
 
+def test_a_flight_that_ends_well_on_a_phone(hangar, pilot, start_panel, open_page, tmp_path):
+    panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
+    # Given a page that waits for its vehicle, when that starts, then it is seen from its start on.
+    page = open_page(f"{panel.address}/vehicle{hangar.namespace}", PHONE, has_touch=True)
+    expect(page.locator("body")).to_contain_text("No supervisor is found", timeout=PATIENCE)
+    hangar.start_supervisor("supervisor", "-p", "startup_grace:=60.0")
+    word(page, "STARTUP")
+    expect(page.locator(".part-banner .why")).to_contain_text("nothing received from its node")
+    assert fits(page)
+    hangar.start_vehicle()
+    hangar.start_parachute()
+    word(page, "READY")
+    log_in(page)
+    word(page, "READY")
+    hold(page, "Arm parachutes")
+    word(page, "ARMED")
+    assert fits(page)
+    watch_words(page)
+    pilot.arm()
+    vehicle = page.locator(".part-vehicle")
+    expect(vehicle).to_contain_text("motorsARMED", timeout=PATIENCE)
+    pilot.take_off(8.0)
+    word(page, "IN FLIGHT")
+    expect(page.locator(".part-banner .why")).to_have_text("The vehicle flies, and is guarded.")
+    expect(vehicle).to_contain_text("height7.", timeout=PATIENCE)
+    assert fits(page)
+    # When it lands, and the pilot keeps the motors running, then it has landed,
+    pilot.land()
+    landed = page.locator(".part-banner .word", has_text="LANDED")
+    for _ in range(PATIENCE // 100):
+        if vehicle.get_by_text("ON_GROUND").count():
+            pilot.arm()
+        page.wait_for_timeout(100)
+        if landed.count():
+            break
+    word(page, "LANDED")
+    # and says that the parachute is live all the same.
+    expect(page.locator(".part-banner .why")).to_contain_text("ARMED all the same")
+    expect(page.locator(".part-banner .banner")).to_have_class(re.compile("tone-live"))
+    assert fits(page)
+    picture(page, "phone_landed.jpg")
+    # When the motors stop, then the supervisor disarms the parachute.
+    pilot.disarm()
+    word(page, "READY")
+    expect(page.locator(".part-parachutes")).to_contain_text("armedno", timeout=PATIENCE)
+    words = page.evaluate("window.words")
+    assert words[:3] == ["ARMED", "IN FLIGHT", "LANDED"]
+    assert not {"KILLING", "DEPLOYING", "DEPLOYED", "FAULT"} & {*words}
+
+
+@pytest.mark.parametrize("hangar", ["both"], indirect=True)
+def test_a_vehicle_whose_parachutes_are_lost_in_flight_is_not_guarded(
+    rig, pilot, start_panel, open_page
+):
+    panel = start_panel()
+    page = opened(rig, panel, open_page)
+    word(page, "READY")
+    pilot.arm()
+    expect(page.locator(".part-vehicle")).to_contain_text("motorsARMED", timeout=PATIENCE)
+    pilot.take_off(30.0)
+    word(page, "IN FLIGHT")
+    # When both parachutes fall silent in the air,
+    for name in ("parachute", "upf"):
+        rig.processes.send_signal(name, signal.SIGSTOP)
+    # then nobody takes it for a vehicle that is guarded.
+    word(page, "IN FLIGHT, NOT GUARDED")
+    expect(page.locator(".part-banner .why")).to_contain_text("no parachute can be reached")
+    expect(page.locator(".part-banner .banner")).to_have_class(re.compile("tone-bad"))
+    page.goto(f"{panel.address}/fleet")
+    card = page.locator(f'a[href="/vehicle{rig.namespace}"]')
+    expect(card).to_contain_text("IN FLIGHT, NOT GUARDED", timeout=PATIENCE)
+    status = ("--namespace", rig.namespace, "status", "--json")
+    command = [sys.executable, "-m", "chute_ros.tools.chute", *status]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+    told = json.loads(done.stdout)
+    assert (done.returncode, told["well"], told["unguarded"]) == (1, False, True)
+    assert any("no parachute can be reached" in one for one in told["alarms"])
+
+
 def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_path, await_until):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     page = opened(rig, panel, open_page)
@@ -155,7 +246,7 @@ def test_a_kill_and_a_deploy_by_hand(rig, pilot, start_panel, open_page, tmp_pat
     expect(page.locator(".part-decisions")).to_contain_text("the motor burns")
 
 
-@pytest.mark.parametrize("rig", ["both"], indirect=True)
+@pytest.mark.parametrize("hangar", ["both"], indirect=True)
 def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_path):
     panel = start_panel(allow_commands="true", password_file=password_file(tmp_path))
     page = opened(rig, panel, open_page)
@@ -172,7 +263,7 @@ def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_pa
     hold(page, "Arm parachutes")
     word(page, "ARMED")
     for card in (mavlink, upf):
-        expect(card).to_contain_text("armed▼ YES", timeout=PATIENCE)
+        expect(card).to_contain_text("armed◆ YES", timeout=PATIENCE)
     pilot.arm()
     vehicle = page.locator(".part-vehicle")
     expect(vehicle).to_contain_text("motorsARMED", timeout=PATIENCE)
@@ -184,7 +275,26 @@ def test_a_flight_with_two_parachutes(rig, pilot, start_panel, open_page, tmp_pa
     word(page, "DEPLOYED")
     expect(mavlink).to_contain_text("released▼ YES", timeout=PATIENCE)
     expect(upf).to_contain_text("releasedno")
+    expect(page.locator(".part-banner .why")).to_contain_text("mavlink_parachute 1/161 released")
+    expect(page.locator(".curves")).to_contain_text("DEPLOY", timeout=PATIENCE)
+    picture(page, "two_parachutes.jpg", whole=True)
     expect(vehicle).to_contain_text("ON_GROUND", timeout=PATIENCE)
+    # Whoever opens the page now finds the kill and the deploy with their reasons.
+    late = opened_late(page, open_page)
+    decisions = late.locator(".part-decisions")
+    for text in ("KILL by rule", "DEPLOY by rule", "kill confirmed after"):
+        expect(decisions).to_contain_text(text, timeout=PATIENCE)
+    # So does who has no more than a terminal of 24 rows.
+    terminal = AtTerminal(Patience(late, rig.namespace), "watch", rows=24, columns=80)
+    terminal.reads("DEPLOY by rule")
+    terminal.reads("OK, device NOT healthy")
+    terminal.reads("armed, DEPLOYED, link OK")
+    terminal.types("q")
+    assert terminal.end() == 0
+    shown = "\n".join(terminal_rows(terminal.shown).values())
+    for text in ("D E P L O Y E D", "released", "KILL by rule", "DEPLOY by rule"):
+        assert text in shown
+    terminal_picture(late, terminal.shown, "chute_watch.jpg")
 
 
 def test_what_is_old_is_grey_and_a_panel_that_is_gone_is_told(

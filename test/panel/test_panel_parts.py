@@ -22,7 +22,7 @@ HOSTILE = "<script>alert(1)</script>&\"'"
 
 def text_of(part):
     """What a person reads of it."""
-    return " ".join(html.unescape(re.sub("<[^>]*>", " ", part)).split())
+    return " ".join(html.unescape(re.sub("<[^>]*>", " ", part.replace("<wbr>", ""))).split())
 
 
 def shown(at=0.0, **fields):
@@ -41,7 +41,8 @@ def test_each_state_is_one_large_word_with_a_reason(stage):
 def test_the_supervisors_own_reason_comes_first():
     told = {"state": SafetyState.BLOCKED, "flight_blocked": True, "block_reasons": ["no fuel"]}
     assert "no fuel" in sections.banner(shown(state_text="BLOCKED", **told))
-    assert "BLOCKED: lost" in sections.banner(shown(state_text="BLOCKED: lost", **told))
+    part = sections.banner(shown(state_text="BLOCKED: lost", **told))
+    assert '<div class="why">lost</div>' in part, "the name of the state stands above it"
 
 
 def test_what_is_old_is_no_state():
@@ -56,6 +57,38 @@ def test_a_mode_that_does_not_fire_stands_out_and_so_does_an_alarm():
     assert "INHIBITED: it does nothing" in text_of(
         sections.banner(shown(mode=SafetyState.INHIBITED))
     )
+
+
+def test_a_vehicle_that_nobody_guards_is_no_calm_flight():
+    why = "no parachute can be reached: mavlink_parachute is LOST"
+    alarms = ["rule 'link lost' warns: a device is not heard", why]
+    part = sections.banner(shown(state_text=f"IN_FLIGHT, NOT GUARDED: {why}", alarms=alarms))
+    assert "tone-bad" in part
+    # Each is told once.
+    assert text_of(part) == f"✖ IN FLIGHT, NOT GUARDED {why} {alarms[0]}"
+    # What only warns takes the calm colour away.
+    part = sections.banner(shown(state_text=f"IN_FLIGHT: {alarms[0]}", alarms=alarms[:1]))
+    assert "tone-warn" in part
+    assert text_of(part) == f"■ IN FLIGHT {alarms[0]}"
+
+
+def test_a_parachute_that_is_armed_on_the_ground_colours_every_state():
+    for stage in (Stage.READY, Stage.LANDED, Stage.BLOCKED):
+        heard = Heard().hears(stamped(state(state=int(stage), state_text=stage.name)))
+        assert "tone-live" not in sections.banner(heard.view())
+        assert "tone-live" in sections.banner(heard.hears(stamped(parachute())).view())
+
+
+def test_a_fault_is_a_sentence_with_its_detail_below_it():
+    told = {"state": SafetyState.FAULT, "alarms": ["no parachute confirmed within 3 s: denied"]}
+    part = sections.banner(shown(state_text="FAULT: nothing came out, ordered by Anna", **told))
+    assert '<div class="why">nothing came out, ordered by Anna</div>' in part
+    assert part.count("denied") == 1
+
+
+def test_a_rule_that_only_warns_says_so():
+    rule = RuleState(name="link lost", alive=True, fulfilled=True, latched=True)
+    assert text_of(sections.rules(shown(rules=[rule]).rules, False)) == "Rules link lost warns"
 
 
 def parachute_part(at=0.0, identities=None, **fields):
@@ -74,8 +107,9 @@ def test_a_parachute_with_all_that_is_known_of_it():
         identities={"mavlink_parachute 1/161": "ACME, serial number 7, firmware 1.2"},
     )
     assert text_of(part) == (
-        "Parachute mavlink_parachute 1/161 armed ▼ YES: FC, OFFBOARD released ▼ YES, by MAVLINK "
-        "state ● ARMED, link OK packed 2026-06-19, 12 days ago own supply 8.2 V own height 0.0 m "
+        "Parachute mavlink_parachute 1/161 armed ◆ YES: FC, OFFBOARD released ▼ YES, by an "
+        "order over MAVLink (MAVLINK) state ◆ ARMED, link OK packed 2026-06-19, 12 days ago own "
+        "supply 8.2 V own height 0.0 m "
         "identity ACME, serial number 7, firmware 1.2 fault ✖ low power last word <1 s ago"
     )
 
@@ -160,6 +194,15 @@ def test_decisions_the_newest_first_with_what_came_of_them():
     part = text_of(sections.decisions(heard.view().decisions))
     assert part.index("DEPLOY by rule 'free fall'") < part.index("KILL by rule 'free fall'")
     assert "→ mavlink_parachute SENT: sent" in part
+
+
+def test_flight_blocks_do_not_push_out_the_newest_kill():
+    heard = Heard().hears(stamped(state()))
+    heard.hears(stamped(SafetyDecision(epoch=7, id=1, action=3, rule="falling", reasons=["why"])))
+    for number in range(2, 12):
+        heard.hears(stamped(SafetyDecision(epoch=7, id=number, action=1, rule="links")))
+    part = text_of(sections.decisions(heard.view().decisions))
+    assert part.endswith("KILL by rule 'falling', 0 s ago why")
 
 
 def test_diagnostics_tell_what_is_not_ok():
@@ -251,14 +294,13 @@ def test_a_rocket_with_its_valves_and_its_memory():
         blims_dist_to_target=320.0,
         blims_bearing_deg=45.0,
     )
-    memory = Task(
-        "rocket/umbilical: memory", "OK", "dump of flash", {"newest progress": "40 %"}, 0.1
-    )
+    memory = Task("rocket/umbilical: memory", "OK", "no dump", {"newest progress": "done"}, 0.1)
     assert text_of(rocket(telem, 0.2, [memory])) == (
-        "Rocket flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid valve OPEN "
-        "main valve closed drogue DEPLOYED main parachute not told air brake deployed, 25 % open "
+        "Rocket key ARMED flight mode COAST altitude 812.4 m predicted apogee 1500.0 m solenoid "
+        "valve OPEN main valve closed drogue DEPLOYED main parachute not told air brake deployed, "
+        "25 % open "
         "satellites 9 BLiMS target 320 m at 45 ° telemetry telem57, <1 s ago "
-        "memory dump of flash (40 %), <1 s ago"
+        "memory no dump (done), <1 s ago"
     )
     assert 'class="card old"' in rocket(telem, 3.0, [])
 
@@ -277,6 +319,38 @@ def test_what_a_rocket_does_not_tell_is_not_told():
         blims_dist_to_target=math.nan,
     )
     part = text_of(rocket(nothing, math.nan, []))
-    assert part.count("not told") == 7
+    assert part.count("not told") == 8
     assert part.count("not known") == 2
     assert "never received" in part
+
+
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [
+        (Telem.STARTUP, "key not armed"),
+        (Telem.STANDBY, "key ARMED"),
+        (Telem.COAST, "key ARMED"),
+        (Telem.FAULT, "key not told"),
+        (255, "key not told"),
+    ],
+)
+def test_of_the_key_is_said_what_the_mode_tells(mode, told):
+    assert told in text_of(rocket(Telem(flight_mode=mode), 0.1, []))
+
+
+def test_a_wipe_is_a_bar_that_fills_and_a_dump_one_that_moves():
+    values = {"newest progress": "wiping the flash: 3 of 4 sectors", "newest progress (%)": "75"}
+    wipe = Task("rocket/umbilical: memory", "WARN", "wipe flash is in progress", values, 0.1)
+    part = rocket(Telem(), 0.1, [wipe])
+    assert 'aria-valuenow="75"' in part
+    assert 'style="width:75%"' in part
+    values = {"newest progress": "dump flash: 262144 bytes", "newest progress (%)": ""}
+    dump = Task("rocket/umbilical: memory", "WARN", "dump flash is in progress", values, 0.1)
+    part = rocket(Telem(), 0.1, [dump])
+    assert '<i class="unknown">' in part
+    assert "aria-valuenow" not in part
+
+
+def test_a_long_name_is_broken_where_a_word_of_it_ends():
+    assert sections.broken("mavlink_parachute 1/161") == "mavlink_<wbr>parachute 1/<wbr>161"
+    assert sections.broken("<b>") == "&lt;b&gt;"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from panel_bench import PATIENCE, hold, log_in, password_file, picture, watch_words, word
 from playwright.sync_api import expect
@@ -47,6 +49,7 @@ def test_a_rocket_from_the_cable_to_the_main(
     word(page, "READY")
     for text in (
         "flight modeSTARTUP",
+        "keynot armed",
         "main valveclosed",
         "droguenot deployed",
         "no dump or wipe",
@@ -61,13 +64,19 @@ def test_a_rocket_from_the_cable_to_the_main(
     hold(page, "Arm parachutes")
     expect(answers).to_contain_text("arm: done", timeout=PATIENCE)
     word(page, "ARMED")
+    expect(rocket).to_contain_text("keyARMED", timeout=PATIENCE)
     # When it is launched, then every stage is seen.
     watch_words(page)
     assert command("launch", force=True).confirmed
     expect(rocket).to_contain_text("main valveOPEN", timeout=PATIENCE)
     expect(rocket).to_contain_text("flight modeCOAST", timeout=PATIENCE)
-    picture(page, "rocket.jpg")
     word(page, "IN FLIGHT")
+    # Its height and its curve are of the same moment, as far as a rocket has moments.
+    expect(page.locator(".part-vehicle")).to_contain_text(
+        re.compile(r"height\d{3,4}\."), timeout=PATIENCE
+    )
+    expect(page.locator(".curves")).to_contain_text(re.compile(r"\d,\d{3}"), timeout=PATIENCE)
+    picture(page, "rocket.jpg", whole=True)
     # When it falls past its apogee without a drogue, then the operator releases it on the page.
     expect(page.locator(".part-vehicle")).to_contain_text("vertical speed-", timeout=PATIENCE)
     hold(page, "DEPLOY")

@@ -57,6 +57,8 @@ def do(page, what, password):
     told = _BOLD.findall(what)
     if what.startswith("press"):
         page.get_by_role("button", name=told[0], exact=True).click()
+    elif what.startswith("open the tab"):
+        page.get_by_role("tab", name=told[0], exact=True).click()
     elif what.startswith("hold"):
         more = page.locator("details:not([open]) summary")
         if more.count():

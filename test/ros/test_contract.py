@@ -45,6 +45,7 @@ PUBLISHED = {
     "safety_supervisor": {
         "safety/heartbeat": ("LinkHeartbeat", STATUS),
         "safety/decision": ("SafetyDecision", DECISION),
+        "safety/history": ("SafetyDecision", (20, LATCHED)),
         "safety/lease": ("SupervisorLease", STATUS),
         "safety/state": ("SafetyState", (1, LATCHED)),
         "safety/summary": ("SafetySummary", (1, LATCHED)),

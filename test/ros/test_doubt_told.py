@@ -28,7 +28,8 @@ WELL = LinkEvidence(heard=NOW, reported=LinkState.OK, device_healthy=True)
 def known(**doubts: float) -> State:
     """In flight on its side, by an attitude that is known as well as this."""
     tilt = Measured(value=90.0, measured_at=NOW, same_since=NOW, count=9, **doubts)
-    told = MappingProxyType({"tilt_deg": tilt})
+    carried = Measured(value=9.8, measured_at=NOW, same_since=NOW, count=9)
+    told = MappingProxyType({"tilt_deg": tilt, "acceleration": carried})
     return State(
         epoch=1,
         started_at=0.0,

@@ -6,7 +6,7 @@ The words in which its core explains itself are the business of test/supervisor.
 from __future__ import annotations
 
 import pytest
-from chute_msgs.msg import LinkHeartbeat, SafetyRequest, SafetyState
+from chute_msgs.msg import LinkHeartbeat, SafetyDecision, SafetyRequest, SafetyState
 from chute_msgs.srv import Arm, Deploy, Kill, SetMode
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from std_srvs.srv import Trigger
@@ -69,6 +69,23 @@ def test_what_becomes_unhealthy_blocks_and_what_recovers_releases(ready, why):
     ready.await_decision(Action.FLIGHT_BLOCK)
     ready.link.healthy, ready.link.state, ready.link.beating = True, LinkState.OK, True
     ready.await_stage(SafetyState.READY)
+
+
+# For whoever comes late
+
+
+def test_a_kill_and_a_deploy_are_found_later_with_their_reasons_and_their_time(ready):
+    answer = ready.call(Deploy, "deploy", force=True, reason="smoke")
+    assert answer.accepted
+    made = [ready.await_decision(action) for action in (Action.KILL, Action.DEPLOY)]
+    found = ready.bench.follow(SafetyDecision, "safety/history", qos.HISTORY)
+    ready.bench.until(lambda: len(found) == 2, "both are found")
+    for then, now in zip(made, found, strict=True):
+        assert (now.epoch, now.id, now.action) == (then.epoch, then.id, then.action)
+        assert list(now.reasons) == list(then.reasons)
+        late = (now.header.stamp.sec - then.header.stamp.sec) * 1e9
+        late += now.header.stamp.nanosec - then.header.stamp.nanosec
+        assert abs(late) < 0.5e9, "stamped when it was decided"
 
 
 # What devices ask for

@@ -289,6 +289,7 @@ def leader(clock: float) -> State:
             deploy_reasons=("why",),
             deploy_ladder=(Rung(LINK, "1/161"),),
             deploy_due=clock + 0.5,
+            deploy_height=4.0,
         ),
     )
 
@@ -337,7 +338,7 @@ def test_in_the_test_above_no_field_is_as_at_the_start() -> None:
 #: Numbers of a state that others share, and of what it holds, that are no times.
 NO_TIMES = {
     *("killed_height", "killed_sinking", "took_off_height", "armed_height", "home_altitude"),
-    *("ground_pressure_altitude", "up_for", "level", "unknown"),
+    *("ground_pressure_altitude", "up_for", "level", "unknown", "deploy_height"),
 }
 
 

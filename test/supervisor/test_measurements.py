@@ -75,7 +75,7 @@ def test_a_sample_that_can_be_is_used(
         ([(3.0, NAN)], START, "never received"),
         ([(-3.0, 10.0)], 11.01, "old: 1.01 s (limit 1 s)"),
         # The reason stays when what was known has grown old.
-        ([(1.0, 9.0), (math.nan, 10.0)], 10.9, "nan is not a number"),
+        ([(1.0, 9.0), (math.nan, 10.0)], 10.9, "reported without a value"),
         ([(2.0, 10.0), (32.0, 10.05)], 10.05, "jumped by +30 in 0.050 s"),
         ([(0.0, 10.0), (15.1, 10.05)], 10.05, "jumped by +15.1 in 0.050 s"),
         ([(0.0, 10.0), (40.0, 10.05), (40.1, 10.1)], 10.1, "jumped by +40.1 in 0.100 s"),
@@ -103,7 +103,7 @@ def test_a_sample_that_cannot_be_is_not_used_and_says_why(
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        (math.nan, "nan is not a number"),
+        (math.nan, "reported without a value"),
         (math.inf, "inf is not a number"),
         (-math.inf, "-inf is not a number"),
         (400.1, "400.1 is out of -400 to 400"),
@@ -138,7 +138,7 @@ def test_a_bad_sample_leaves_what_was_known_and_forgets_what_jumped() -> None:
     assert "jumped" in known.unusable(LIMITS, 10.2)
     assert known.candidates == 1, "the confirmation begins anew"
     known = after(*SAME, (90.0, 15.05), (NAN, 15.07))
-    assert known.unusable(LIMITS, 15.1) == "nan is not a number"
+    assert known.unusable(LIMITS, 15.1) == "reported without a value"
     assert (known.value, known.measured_at, known.count) == (-3.0, 15.0, 11)
     again = known.with_sample(Sample(90.0, 15.09), LIMITS)
     assert again.unusable(LIMITS, 15.1) == "jumped by +93 in 0.090 s"

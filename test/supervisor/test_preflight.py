@@ -15,6 +15,7 @@ from story import (
     START,
     Story,
     changed,
+    parachute,
     rule,
     shipped,
     vehicle,
@@ -479,4 +480,16 @@ def test_a_pack_may_be_allowed_a_single_day() -> None:
     assert arm_reasons(config, state, day("2026-06-02"), NOW) == ()
     assert arm_reasons(config, state, day("2026-06-03"), NOW) == (
         "a 1: packed on 2026-06-01, 2 days ago (limit 1)",
+    )
+
+
+def test_a_fault_that_its_node_repeats_with_another_age_is_one() -> None:
+    story = Story().ready()
+    lost = ("heartbeat LOST: 7.6 s old",)
+    beat = story.heartbeat(healthy=False, state=LinkState.LOST)
+    late = ("1/161 heartbeat LOST: 8.1 s old", "heartbeat LOST: 8.2 s old", "no autopilot")
+    story.at(0.1, parachute(faults=lost, alive=False), replace(beat, reasons=late))
+    (reason,) = block_reasons(story.config, story.state, START + 0.1)
+    assert reason == (
+        f"{LINK}: its device is LOST (1/161 heartbeat LOST: 7.6 s old; no autopilot)"
     )

@@ -51,11 +51,11 @@ def run(bench, *arguments, namespace=None):
 class AtTerminal:
     """One run at a terminal of so many rows."""
 
-    def __init__(self, bench, *arguments, rows=40):
+    def __init__(self, bench, *arguments, rows=40, columns=100):
         self._bench = bench
         self.shown = ""
         ours, theirs = pty.openpty()
-        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", rows, 100, 0, 0))
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         os.set_blocking(ours, False)
         self._ours, self._theirs = ours, theirs
         self.settings = termios.tcgetattr(theirs)

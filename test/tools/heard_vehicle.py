@@ -104,6 +104,11 @@ class Heard:
         kinds[type(message)](message, NOW + at, WALL + at)
         return self
 
+    def finds(self, message, at=0.0):
+        """A decision of before is found in safety/history at t+at."""
+        self.picture.hear_history(message, NOW + at, WALL + at)
+        return self
+
     def view(self, at=0.0):
         return view(self.picture, "/drone1", NOW + at)
 

@@ -16,7 +16,7 @@ from heard_vehicle import Heard, heartbeat, parachute, stamped, state, vehicle
 
 from chute_ros.tools.chute.hearing import MOST_NAMES
 from chute_ros.tools.chute.json_text import json_text
-from chute_ros.tools.chute.status_text import decision_lines, order_lines
+from chute_ros.tools.chute.status_text import Line, decision_lines, headline, order_lines
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_a_vehicle_in_flight(heard):
         "  vertical speed     0.0 m/s, <1 s ago",
         "  battery            15.8 V, 87 %, 1 s ago",
         "rules: 2 of 3 active, 1 counting",
-        "  free fall: DEPLOY counting, 0.2 of 0.5 s",
+        "  free fall: DEPLOY, 0.2 of 0.5 s",
         "      [x] acceleration 0.65 (below 2)",
         "      [ ] tilt_deg 13.34 (above 45)",
         "  not counting: excess tilt",
@@ -93,14 +93,15 @@ def test_a_vehicle_that_may_not_fly_tells_why(heard):
         "BLOCKED",
         "  vehicle            /drone1, supervisor safety_supervisor, <1 s ago",
         "  mode               SHADOW",
-        "  why                BLOCKED: no fuel",
+        "  ALARM              the canopy was packed in 1999",
         "  flight             BLOCKED",
         "                     no fuel",
         "                     blocked by device upf_can 33",
-        "  ALARM              the canopy was packed in 1999",
         "links",
-        "  mavlink_parachute  NEVER_SEEN, device NOT healthy, device never received, node never "
-        "received: voltage 2 (above 3)",
+        (
+            "  mavlink_parachute  NEVER_SEEN, device NOT healthy, device never received, "
+            "node never received: voltage 2 (above 3)"
+        ),
         "parachutes",
         "  not received here within 0 s",
         "vehicle",
@@ -264,14 +265,45 @@ def test_a_decision_is_shown_once_with_its_reasons_and_its_newest_outcome(heard)
     heard.hears(decision(id=3, action=SafetyDecision.KILL, rule="by hand", shadow=True))
     heard.hears(decision()).hears(decision(), at=0.1)
     heard.hears(report(ActionReport.SENT), 0.1).hears(report(ActionReport.CONFIRMED), 0.2)
-    assert [line.text for line in decision_lines(heard.view(0.2).decisions)] == [
-        "decisions received here",
+    assert [line.text for line in decision_lines(heard.view(0.2).decisions, "decisions")] == [
+        "decisions",
         "  DEPLOY by rule 'free fall', 0 s ago",
         "      acceleration 0.65 (below 2)",
         "      -> mavlink_parachute CONFIRMED: after 0.1 s",
-        "  KILL in SHADOW, not sent by rule 'by hand', 0 s ago",
+        "  KILL in SHADOW, not sent, by rule 'by hand', 0 s ago",
         "      acceleration 0.65 (below 2)",
     ]
+
+
+def test_whoever_comes_late_finds_the_newest_kill_and_deploy_with_their_reasons(heard):
+    heard.hears(stamped(state()), at=60.0)
+    for number, action in ((3, SafetyDecision.KILL), (4, SafetyDecision.DEPLOY)):
+        heard.finds(stamped(decision(id=number, action=action), at=number / 10.0), at=60.0)
+    # What blocks flight since then does not push them out.
+    for number in range(5, 30):
+        block = decision(id=number, action=SafetyDecision.FLIGHT_BLOCK, rule="links")
+        heard.hears(block, at=60.0)
+    text = heard.text(60.0)
+    assert text[text.index("newest kill and deploy") :][:5] == [
+        "newest kill and deploy",
+        "  DEPLOY by rule 'free fall', 60 s ago",
+        "      acceleration 0.65 (below 2)",
+        "  KILL by rule 'free fall', 60 s ago",
+        "      acceleration 0.65 (below 2)",
+    ]
+
+
+def test_a_decision_that_was_received_is_no_other_when_it_is_found_again(heard):
+    heard.hears(stamped(state())).hears(decision(), at=0.0)
+    heard.finds(stamped(decision()), at=30.0)
+    assert [one.age for one in heard.view(30.0).decisions] == [30.0]
+
+
+def test_the_age_of_what_is_found_is_by_the_supervisors_clock(heard):
+    beat = heartbeat("safety_supervisor", supervisor=True)
+    heard.hears(stamped(state(), clock=3600.0)).hears(stamped(beat, clock=3600.0))
+    heard.finds(stamped(decision(), at=-20.0, clock=3600.0))
+    assert [round(one.age) for one in heard.view().decisions] == [20]
 
 
 # What a stranger may send
@@ -312,3 +344,50 @@ def test_json_has_null_for_what_is_no_number(heard):
     ]
     assert told["vehicle"]["height"] is None
     assert told["well"] is True
+
+
+# What warns
+
+
+WARNS = RuleState(
+    name="link lost", action=SafetyDecision.NONE, alive=True, fulfilled=True, latched=True
+)
+
+
+def unguarded():
+    """It flies, its only link is lost, and its supervisor says so."""
+    why = "no parachute can be reached: mavlink_parachute is LOST"
+    return state(
+        state_text=f"IN_FLIGHT, NOT GUARDED: {why}",
+        alarms=["rule 'link lost' warns: a device is not heard", why],
+        rules=[WARNS],
+        link_states=[3],
+        devices_healthy=[False],
+    )
+
+
+def test_a_vehicle_that_nobody_guards_says_so_in_its_first_line_and_is_not_well(heard):
+    text = heard.hears(stamped(unguarded())).text()
+    assert text[0] == "IN_FLIGHT, NOT GUARDED"
+    assert text[3:6] == [
+        "  why                no parachute can be reached: mavlink_parachute is LOST",
+        "  ALARM              rule 'link lost' warns: a device is not heard",
+        "  flight             not blocked",
+    ]
+    assert "  link lost: warns" in text
+    picture = heard.view()
+    assert (picture.well, picture.unguarded) == (False, True)
+    assert [(one.action, one.does) for one in picture.rules] == [("ALARM", "warns")]
+
+
+def test_an_alarm_alone_takes_the_calm_colour_away(heard):
+    heard.hears(stamped(state(alarms=["rule 'battery dead' warns: it is empty"])))
+    assert headline(heard.view()) == Line("IN_FLIGHT", "warn")
+    heard.hears(stamped(unguarded(), at=0.1), at=0.1)
+    assert headline(heard.view(0.1)) == Line("IN_FLIGHT, NOT GUARDED", "bad")
+
+
+def test_the_mode_is_told_once(heard):
+    told = "SHADOW: reports its decisions and sends none; IN_FLIGHT"
+    text = heard.hears(stamped(state(state_text=told, mode=SafetyState.SHADOW))).text()
+    assert [line for line in text if "SHADOW" in line] == ["  mode               SHADOW"]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from chute_ros import model
+from chute_ros.links.umbilical.protocol import events
 from chute_ros.links.umbilical.protocol.decoder import NOT_YET
 from chute_ros.links.umbilical.protocol.line_parser import UNKNOWN_LINE
 from chute_ros.links.umbilical.protocol.link import UmbilicalLink
@@ -78,11 +79,13 @@ def port_task(
     return diagnostics.wire_task(name, wire, troubles, received, values, details.dropped, READABLE)
 
 
-def memory_task(name: str, details: Details, progress: str) -> DiagnosticStatus:
-    """A dump or a wipe that is under way."""
+def memory_task(name: str, details: Details, progress: events.Progress) -> DiagnosticStatus:
+    """A dump or a wipe that is under way. progress: the newest."""
     text = details.work or "no dump or wipe under way"
     level = diagnostics.WARN if details.work else diagnostics.OK
-    return diagnostics.status(name, "memory", level, text, {"newest progress": progress}, "")
+    percent = f"{100.0 * progress.done / progress.total:.0f}" if progress.total else ""
+    values = {"newest progress": progress.text, "newest progress (%)": percent}
+    return diagnostics.status(name, "memory", level, text, values, "")
 
 
 def _computer(link: UmbilicalLink, now: float) -> Task:

@@ -53,7 +53,7 @@ class UmbilicalNode(DeviceNode):
         self.loop = WireLoop(
             link, make_wire(address), self.deliver, link.wire_opened, link.not_written
         )
-        self._progress = ""
+        self._progress = events.Progress("", 0, 0)
         # The flight computer's own log, told apart from ours by the logger's name.
         its_log = self.get_logger().get_child("flight_computer")
         self._telem_publisher = self.create_publisher(Telem, "umbilical/telem", qos.STATUS)
@@ -88,7 +88,7 @@ class UmbilicalNode(DeviceNode):
         self._telem_publisher.publish(telem(event.record, event.sequence, stamp))
 
     def _progressed(self, event: events.Progress, stamp: Time) -> None:
-        self._progress = event.text
+        self._progress = event
         self.get_logger().info(event.text, throttle_duration_sec=1.0)
 
     def diagnose(self, summary: Summary) -> list[DiagnosticStatus]:

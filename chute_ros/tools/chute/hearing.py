@@ -13,6 +13,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from chute_ros.model import Action
 from chute_ros.tools.chute.words import is_old
 
 #: Heartbeats of each sender whose delays are compared: the fastest shows its clock best.
@@ -20,6 +21,8 @@ _COMPARED = 20
 #: Links, devices and supervisors that are remembered: a stranger on the network may invent many.
 MOST_NAMES = 32
 MOST_DECISIONS = 8
+#: Kills and deploys are remembered apart, so that no flight blocks push them out.
+_FIRES = (Action.KILL, Action.DEPLOY)
 
 
 def stamp_seconds(message: Any) -> float:
@@ -49,8 +52,10 @@ class Picture:
     heartbeats: dict[str, Heard] = field(default_factory=dict)
     parachutes: dict[tuple[str, str], Heard] = field(default_factory=dict)
     vehicle: Heard | None = None
-    #: The newest last; a decision that is resent counts once.
-    decisions: deque[Heard] = field(default_factory=lambda: deque(maxlen=MOST_DECISIONS))
+    #: (epoch, id) -> each decision once, though it is resent; of kills and deploys, and of flight
+    #: blocks, the newest.
+    fired: dict[tuple[int, int], Heard] = field(default_factory=dict)
+    blocks: dict[tuple[int, int], Heard] = field(default_factory=dict)
     #: (epoch, id, link) -> the newest report of that link on that decision.
     reports: dict[tuple[int, int, str], Heard] = field(default_factory=dict)
     _ahead: dict[str, deque[float]] = field(default_factory=dict)
@@ -81,9 +86,24 @@ class Picture:
 
     def hear_decision(self, message: Any, now: float, wall: float) -> None:
         """safety/decision."""
-        known = {(one.message.epoch, one.message.id) for one in self.decisions}
-        if (message.epoch, message.id) not in known:
-            self.decisions.append(Heard(message, now, wall))
+        into = self.fired if message.action in _FIRES else self.blocks
+        into.setdefault((message.epoch, message.id), Heard(message, now, wall))
+        while len(into) > MOST_DECISIONS:
+            del into[min(into)]
+
+    def hear_history(self, message: Any, now: float, wall: float) -> None:
+        """safety/history: what was decided before this listener came is as old as its stamp
+        says."""
+        stamp = stamp_seconds(message)
+        newest = self.state(now)
+        sent = self._sent(newest.message.supervisor, stamp) if newest else math.nan
+        decided = now - max(0.0, wall - stamp) if math.isnan(sent) else min(sent, now)
+        self.hear_decision(message, decided, wall)
+
+    @property
+    def decisions(self) -> list[Heard]:
+        """The newest last."""
+        return [one for _, one in sorted({**self.blocks, **self.fired}.items())]
 
     def hear_report(self, message: Any, now: float, wall: float) -> None:
         """safety/action."""

@@ -42,6 +42,7 @@ def subscribe(
             (ParachuteStatus, "parachute/status", qos.newest(qos.STATUS), picture.hear_parachute),
             (VehicleState, "vehicle/state", qos.newest(qos.STATUS), picture.hear_vehicle),
             (SafetyDecision, "safety/decision", qos.newest(qos.DECISION), picture.hear_decision),
+            (SafetyDecision, "safety/history", qos.HISTORY, picture.hear_history),
             (ActionReport, "safety/action", qos.newest(qos.DECISION), picture.hear_report),
         )
     ]
@@ -49,7 +50,7 @@ def subscribe(
 
 class Listening:
     """Listens from now on, with the least load for the vehicle: nothing is sent again for it but
-    the latched state."""
+    the latched state, and kills and deploys."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from chute_ros.plain_text import span_text
 from chute_ros.tools.chute.box_files import BoxFile, folder_of
 from chute_ros.tools.chute.diagnostic_tasks import Task
-from chute_ros.tools.chute.words import age_text, span_text
+from chute_ros.tools.chute.words import age_text
 
 BLACK_BOX = "black box"
 

@@ -23,16 +23,15 @@ from chute_ros.tools.chute.watch_text import KEYS, Page
 #: The tones of timeline_rows.py in colours that the colour-blind can tell (Okabe and Ito).
 _COLOURS = {
     "good": "#009e73", "warn": "#e69f00", "bad": "#d55e00", "act": "#cc79a7", "plain": "#56b4e9",
-    "quiet": "#808080",
+    "quiet": "#808080", "live": "#f0e442",
 }  # fmt: skip
 _GREY = "#808080"
 #: So often all lines are sent (s): something else may have written to the terminal.
 _ANEW = 10.0
-#: Rows that one line may take.
-_MOST_ROWS = 3
 #: Columns by which the second row of a line, and those after it, are moved in.
 _HANGING = 8
-_BANNER_ROWS = 3
+#: The end of a line that needs more rows than it may take.
+_CUT = " ..."
 _OPEN, _CLOSE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 
 
@@ -99,7 +98,7 @@ def _rows(page: Page, width: int, height: int) -> list[str]:
     rows = [Text(" " * width, style), _banner(page.banner.text, width, style)]
     rows.append(rows[0])
     for line in page.lines:
-        rows += _wrapped(console, Text(line.text, _style(line, page.grey)), width)
+        rows += _wrapped(console, Text(line.text, _style(line, page.grey)), width, line.rows)
     most = max(1, height - 1)
     if len(rows) > most:
         left_out = len(rows) - most + 1
@@ -109,11 +108,19 @@ def _rows(page: Page, width: int, height: int) -> list[str]:
     return [_ansi(console, row) for row in rows[:height]]
 
 
-def _wrapped(console: Console, text: Text, width: int) -> list[Text]:
-    """As it is if it fits, else in a few rows that show that they belong together."""
+def _wrapped(console: Console, text: Text, width: int, most: int) -> list[Text]:
+    """As it is if it fits, else in a few rows that show that they belong together; one that is cut
+    ends with a sign of it."""
     if text.cell_len <= width or width <= 2 * _HANGING:
-        return list(text.wrap(console, width))[:_MOST_ROWS]
-    rows = list(text.wrap(console, width - _HANGING))[:_MOST_ROWS]
+        return list(text.wrap(console, width))[:most]
+    if most == 1:
+        text.truncate(width, overflow="ellipsis")
+        return [text]
+    rows = list(text.wrap(console, width - _HANGING))
+    if len(rows) > most:
+        rows = rows[:most]
+        rows[-1].truncate(width - _HANGING - len(_CUT))
+        rows[-1].append(_CUT)
     for row in rows[1:]:
         row.pad_left(_HANGING)
     return rows

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from chute_ros.model import LinkState
+from chute_ros.model import Action, LinkState
+from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.machine import ON_GROUND
+from chute_ros.supervisor.state_text import UNGUARDED
 from chute_ros.tools.chute.view import (
     DecisionView,
     LinkView,
@@ -14,23 +17,28 @@ from chute_ros.tools.chute.view import (
     RuleView,
     VehiclePicture,
 )
-from chute_ros.tools.chute.words import age_text, is_old, not_here, span_text, value_text
+from chute_ros.tools.chute.words import age_text, is_old, not_here, value_text
 from chute_ros.tools.timeline_rows import ACTION_TONES, LINK_TONES, STAGE_TONES
 
 #: Name of a state of the vehicle, or of a link -> its tone (timeline_rows.py).
 STAGE_TONE = {stage.name: tone for stage, tone in STAGE_TONES.items()}
 LINK_TONE = {state.name: tone for state, tone in LINK_TONES.items()}
 _OF_ACTION = {action.name: tone for action, tone in ACTION_TONES.items()}
-#: Columns of the name at the beginning of a line.
-_NAME = 19
+#: Columns of the name at the beginning of a line; and of one of two values in one.
+_NAME, _HALF = 19, 40
+_ON_GROUND = tuple(stage.name for stage in ON_GROUND)
+#: Decisions that stop motors or release a parachute.
+_FIRES = (Action.KILL.name, Action.DEPLOY.name)
 
 
 @dataclass(frozen=True)
 class Line:
-    """One line. tone: as in timeline_rows.py; "head" for a headline."""
+    """One line. tone: as in timeline_rows.py; "head" for a headline; rows: of a terminal that it
+    may take."""
 
     text: str
     tone: str = "plain"
+    rows: int = 3
 
 
 def headline(picture: VehiclePicture) -> Line:
@@ -38,18 +46,36 @@ def headline(picture: VehiclePicture) -> Line:
     if is_old(picture.age):
         text = f"NOT KNOWN NOW (was {picture.state}, last word {span_text(picture.age)} ago)"
         return Line(text, "quiet")
-    return Line(picture.state, STAGE_TONE.get(picture.state, "quiet"))
+    armed = any(one.armed and not is_old(one.age) for one in picture.parachutes)
+    tone = state_tone(picture.state, picture.unguarded, bool(picture.alarms), armed)
+    return Line(state_words(picture.state, picture.unguarded), tone)
+
+
+def state_words(state: str, unguarded: bool) -> str:
+    """What is shown in large."""
+    return f"{state}, {UNGUARDED}" if unguarded else state
+
+
+def state_tone(state: str, unguarded: bool, alarms: bool, armed: bool) -> str:
+    """No state is shown as if all were well while something warns, nor as if nothing could fire
+    while a parachute is armed beside people. armed: any is."""
+    tone = STAGE_TONE.get(state, "quiet")
+    if unguarded:
+        return "bad"
+    if armed and state in _ON_GROUND:
+        return "live"
+    return "warn" if alarms and tone in ("good", "plain", "quiet") else tone
 
 
 def status_lines(picture: VehiclePicture) -> list[Line]:
     """Everything but the decisions: for `chute status`, with the state first."""
-    return [headline(picture), *body_lines(picture), _newest(picture)]
-
-
-def body_lines(picture: VehiclePicture) -> list[Line]:
-    """Why, links, parachutes, vehicle, and the rules that count."""
+    fired = newest_fired(picture.decisions)
     return [
-        *_why(picture),
+        headline(picture),
+        *_about(picture),
+        *why_lines(picture),
+        *_reasons(picture),
+        *_unusable(picture),
         Line("links", "head"),
         *(_link(one) for one in picture.links),
         *([] if picture.links else [Line("  none required")]),
@@ -57,17 +83,47 @@ def body_lines(picture: VehiclePicture) -> list[Line]:
         *(line for one in picture.parachutes for line in _parachute(one)),
         *([] if picture.parachutes else [Line(f"  {not_here(picture.listened)}", "warn")]),
         *_vehicle(picture),
-        *_rules(picture.rules),
+        *(decision_lines(fired, "newest kill and deploy") if fired else []),
+        *rule_lines(picture.rules),
+        _newest(picture),
     ]
 
 
-def decision_lines(decisions: Sequence[DecisionView]) -> list[Line]:
+def watch_lines(picture: VehiclePicture) -> list[Line]:
+    """The same for a screen of 24 rows, on which what matters most must find its place: each
+    thing in as few rows as it needs, what may be long below all others."""
+    on_ground = picture.state in ("STARTUP", "BLOCKED")
+    flight = "BLOCKED" if picture.flight_blocked else "not blocked"
+    about = f"{picture.namespace}, {picture.supervisor}, {age_text(picture.age)}; "
+    about += f"mode {picture.mode}; flight {flight}"
+    reasons = [*_reasons(picture)]
+    return [
+        Line(f"  {about}", "plain" if picture.mode == Mode.ACTIVE.name else "bad", rows=2),
+        *why_lines(picture),
+        *(reasons if on_ground else []),
+        *(_in_short(one) for one in newest_fired(picture.decisions)),
+        *(replace(_link(one), rows=1) for one in picture.links),
+        *(replace(line, rows=1) for one in picture.parachutes for line in _parachute(one)),
+        *([] if picture.parachutes else [Line("  no parachute was ever received", "warn")]),
+        *_vehicle_in_short(picture),
+        *_unusable_in_short(picture),
+        *rule_lines(picture.rules),
+        *([] if on_ground else reasons),
+        *decision_lines(picture.decisions, "decisions"),
+    ]
+
+
+def newest_fired(decisions: Sequence[DecisionView]) -> list[DecisionView]:
+    """The newest kill and the newest deploy, as far as they are known, the newest last."""
+    newest = {one.action: one for one in decisions if one.action in _FIRES}
+    return [one for one in decisions if newest.get(one.action) is one]
+
+
+def decision_lines(decisions: Sequence[DecisionView], title: str) -> list[Line]:
     """The newest first."""
-    lines = [Line("decisions received here", "head")]
+    lines = [Line(title, "head")]
     for one in reversed(decisions):
-        shadow = " in SHADOW, not sent" if one.shadow else ""
-        text = f"  {one.action}{shadow} by rule '{one.rule}', {span_text(one.age)} ago"
-        lines.append(Line(text, _OF_ACTION.get(one.action, "plain")))
+        lines.append(Line(f"  {one.headline}", _OF_ACTION.get(one.action, "plain")))
         lines += [Line(f"      {reason}") for reason in one.reasons]
         lines += [Line(f"      -> {outcome}") for outcome in one.outcomes]
     return lines if decisions else [*lines, Line("  none")]
@@ -78,29 +134,46 @@ def order_lines(namespace: str, picture: VehiclePicture | None, does: str) -> li
     if picture is None:
         return [f"{namespace}: NOT KNOWN, no supervisor is received", f"this {does}"]
     lines = [f"{namespace}: {headline(picture).text}"]
-    if picture.state_text != picture.state:
-        lines.append(_named("why", picture.state_text))
+    if picture.why:
+        lines.append(_named("why", picture.why))
     lines += [line.text for line in _vehicle(picture)]
     lines += [line.text for one in picture.parachutes for line in _parachute(one)]
     return [*lines, f"this {does}"]
 
 
-def _why(picture: VehiclePicture) -> Iterator[Line]:
+def _in_short(one: DecisionView) -> Line:
+    told = [*one.reasons, *(f"-> {outcome}" for outcome in one.outcomes)]
+    text = f"  {one.headline}: {'; '.join(told)}"
+    return Line(text, _OF_ACTION.get(one.action, "plain"), rows=2)
+
+
+def _about(picture: VehiclePicture) -> Iterator[Line]:
     vehicle = f"{picture.namespace}, supervisor {picture.supervisor}, {age_text(picture.age)}"
     yield Line(_named("vehicle", vehicle), "quiet" if is_old(picture.age) else "plain")
     yield Line(
         _named("mode", picture.mode), "plain" if picture.mode == Mode.ACTIVE.name else "bad"
     )
-    if picture.state_text != picture.state:
-        yield Line(_named("why", picture.state_text), STAGE_TONE.get(picture.state, "quiet"))
+
+
+def why_lines(picture: VehiclePicture) -> Iterator[Line]:
+    """Why it is in this state, and every alarm that this does not tell."""
+    listed = picture.flight_blocked and picture.why == "; ".join(picture.block_reasons)
+    if picture.why and not listed:
+        yield Line(_named("why", picture.why), headline(picture).tone)
+    for alarm in picture.other_alarms:
+        yield Line(_named("ALARM", alarm), "bad")
+
+
+def _reasons(picture: VehiclePicture) -> Iterator[Line]:
     flight = "BLOCKED" if picture.flight_blocked else "not blocked"
     yield Line(_named("flight", flight), "warn" if picture.flight_blocked else "plain")
     for reason in picture.block_reasons:
         yield Line(_named("", reason), "warn")
     for device in picture.device_blocks:
         yield Line(_named("", f"blocked by device {device}"), "warn")
-    for alarm in picture.alarms:
-        yield Line(_named("ALARM", alarm), "bad")
+
+
+def _unusable(picture: VehiclePicture) -> Iterator[Line]:
     if picture.state == "IN_FLIGHT":
         # On the ground a measurement that does not move is none, and that is no news.
         for one in picture.unusable:
@@ -124,6 +197,13 @@ def parachute_age_text(one: ParachuteView) -> str:
     return f"{written}{age_text(one.age)}"
 
 
+def _unusable_in_short(picture: VehiclePicture) -> list[Line]:
+    names = [one.partition(":")[0] for one in picture.unusable]
+    if picture.state != "IN_FLIGHT" or not names:
+        return []
+    return [Line(_named("cannot be used", ", ".join(names)), "warn", rows=1)]
+
+
 def _link(one: LinkView) -> Line:
     tone = LINK_TONE.get(one.state, "warn")
     if one.state == LinkState.OK.name and not one.device_healthy:
@@ -141,7 +221,8 @@ def _parachute(one: ParachuteView) -> Iterator[Line]:
     if one.backup_voltage == one.backup_voltage:
         parts.append(f"backup {one.backup_voltage:.1f} V")
     parts.append(parachute_age_text(one))
-    tone = "quiet" if is_old(one.age) else "act" if one.deployed else "plain"
+    tone = "act" if one.deployed else "live" if one.armed else "plain"
+    tone = "quiet" if is_old(one.age) else tone
     yield Line(_named(f"{one.link} {one.device}", ", ".join(parts)), tone)
     for fault in one.faults:
         yield Line(_named("", f"fault: {fault}"), "bad")
@@ -171,20 +252,37 @@ def _vehicle(picture: VehiclePicture) -> Iterator[Line]:
         yield Line(_named("", f"fault: {fault}"), "bad")
 
 
-def _rules(rules: Sequence[RuleView]) -> Iterator[Line]:
+def _vehicle_in_short(picture: VehiclePicture) -> list[Line]:
+    """Two values in a row, grey if either is old."""
+    one = picture.vehicle
+    title, *lines = _vehicle(picture)
+    if one is None:
+        return [title, *lines]
+    values, faults = lines[: -len(one.faults) or None], lines[len(lines) - len(one.faults) :]
+    pairs = [values[number : number + 2] for number in range(0, len(values), 2)]
+    return [title, *map(_side_by_side, pairs), *faults]
+
+
+def _side_by_side(lines: Sequence[Line]) -> Line:
+    old = any(line.tone == "quiet" for line in lines)
+    text = "".join(f"{line.text:<{_HALF}}" for line in lines)
+    return Line(text.rstrip(), "quiet" if old else "plain")
+
+
+def rule_lines(rules: Sequence[RuleView]) -> Iterator[Line]:
+    """Those that count, with their conditions; the names of the others in one row."""
     active = sum(one.active for one in rules)
     counting = [one for one in rules if one.counts]
     told = f"{len(counting)} counting" if counting else "none counting"
     yield Line(f"rules: {active} of {len(rules)} active, {told}", "head")
     for one in counting:
-        state = "acted on" if one.acted_on else "fulfilled" if one.fulfilled else "counting"
-        text = f"{one.action} {state}, {one.level:.1f} of {one.hold:.1f} s"
-        yield Line(f"  {one.name}: {text}", _OF_ACTION.get(one.action, "plain"))
+        tone = "warn" if one.does == "warns" else _OF_ACTION.get(one.action, "plain")
+        yield Line(f"  {one.name}: {one.does}", tone)
         yield from (Line(f"      {condition}") for condition in one.conditions)
         if one.denied:
             yield Line(f"      not acted on: {one.denied}", "warn")
     if waiting := [one.name for one in rules if one.active and not one.counts]:
-        yield Line(f"  not counting: {', '.join(waiting)}")
+        yield Line(f"  not counting: {', '.join(waiting)}", rows=1)
 
 
 def _newest(picture: VehiclePicture) -> Line:

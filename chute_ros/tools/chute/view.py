@@ -16,8 +16,11 @@ from chute_ros.model import (
     ParachuteState,
     TriggerFlags,
 )
+from chute_ros.plain_text import span_text
+from chute_ros.supervisor.gate import OPERATOR
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.state_text import MODES, UNGUARDED
 from chute_ros.tools.chute.hearing import Heard, Picture
 from chute_ros.tools.chute.words import NEVER, is_old, name_of
 
@@ -25,6 +28,8 @@ from chute_ros.tools.chute.words import NEVER, is_old, name_of
 WELL = ("READY", "ARMED", "IN_FLIGHT", "LANDED")
 #: chute_msgs/SafetyState.LINK_REGAINED, which only the supervisor's judgement has.
 _REGAINED = 4
+#: What a rule without an action does, as profiles name it.
+_ALARM = "ALARM"
 #: The end of such a line of SafetyState.unusable.
 _NEVER_GIVEN = f": {NEVER}"
 
@@ -108,10 +113,20 @@ class RuleView:
         """Its counter has begun, or it was fulfilled, acted on or denied."""
         return self.level > 0.0 or self.fulfilled or self.acted_on or bool(self.denied)
 
+    @property
+    def does(self) -> str:
+        """What it is at, in words."""
+        if self.action == _ALARM and (self.acted_on or self.fulfilled):
+            return "warns"
+        if self.acted_on or self.fulfilled:
+            return f"{self.action}, {'acted on' if self.acted_on else 'fulfilled'}"
+        return f"{self.action}, {self.level:.1f} of {self.hold:.1f} s"
+
 
 @dataclass(frozen=True)
 class DecisionView:
-    """A decision received since the listener began. outcomes: link and outcome, with detail."""
+    """A decision; kills and deploys also from before the listener began. outcomes: link and
+    outcome, with detail, received since."""
 
     epoch: int
     id: int
@@ -121,6 +136,13 @@ class DecisionView:
     reasons: tuple[str, ...]
     outcomes: tuple[str, ...]
     age: float
+
+    @property
+    def headline(self) -> str:
+        """What, by whom and when."""
+        shadow = " in SHADOW, not sent," if self.shadow else ""
+        by = "a person" if self.rule == OPERATOR else f"rule '{self.rule}'"
+        return f"{self.action}{shadow} by {by}, {span_text(self.age)} ago"
 
 
 @dataclass(frozen=True)
@@ -138,6 +160,8 @@ class VehiclePicture:
     age: float
     listened: float
     well: bool
+    #: In flight, and nobody would be saved (state_text.UNGUARDED).
+    unguarded: bool
     flight_blocked: bool
     block_reasons: tuple[str, ...]
     device_blocks: tuple[str, ...]
@@ -152,6 +176,17 @@ class VehiclePicture:
     rules: tuple[RuleView, ...]
     newest_decision: str
     decisions: tuple[DecisionView, ...]
+
+    @property
+    def why(self) -> str:
+        """The reason of the state in a sentence, without the names of the state and the mode,
+        which stand beside it; empty: none is told."""
+        return reason_in(self.state_text, self.state)
+
+    @property
+    def other_alarms(self) -> tuple[str, ...]:
+        """Those that why does not tell already."""
+        return tuple(one for one in self.alarms if one not in self.why)
 
 
 def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
@@ -172,6 +207,7 @@ def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
         age=age,
         listened=now - picture.began,
         well=state in WELL and mode == Mode.ACTIVE.name and not alarms and not is_old(age),
+        unguarded=is_unguarded(message.state_text),
         flight_blocked=message.flight_blocked,
         block_reasons=tuple(message.block_reasons),
         device_blocks=tuple(message.device_blocks),
@@ -192,6 +228,20 @@ def view(picture: Picture, namespace: str, now: float) -> VehiclePicture | None:
         newest_decision=_newest_decision(message),
         decisions=tuple(_decision(picture, one, now) for one in picture.decisions),
     )
+
+
+def reason_in(text: str, state: str) -> str:
+    """text: of this state, as the supervisor says it; without the names of the state and of the
+    mode."""
+    for meant in MODES.values():
+        text = text.removeprefix(f"{meant}; ")
+    text = text.removeprefix(state).removeprefix(f", {UNGUARDED}")
+    return text.removeprefix(": ").removeprefix("; ")
+
+
+def is_unguarded(text: str) -> bool:
+    """text: of a state, as the supervisor says it."""
+    return f"{Stage.IN_FLIGHT.name}, {UNGUARDED}: " in text
 
 
 def _links(picture: Picture, message: Any, age: float, now: float) -> tuple[LinkView, ...]:
@@ -279,7 +329,7 @@ def _vehicle(heard: Heard | None, now: float) -> VehicleView | None:
 def _rule(message: Any) -> RuleView:
     return RuleView(
         name=message.name,
-        action=name_of(Action, message.action),
+        action=name_of(Action, message.action) if message.action else _ALARM,
         active=message.alive,
         fulfilled=message.fulfilled,
         acted_on=message.latched,

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from chute_ros.tools.chute.status_text import Line, body_lines, decision_lines, headline
+from chute_ros.plain_text import span_text
+from chute_ros.tools.chute.status_text import Line, headline, watch_lines
 from chute_ros.tools.chute.view import VehiclePicture
-from chute_ros.tools.chute.words import is_old, span_text
+from chute_ros.tools.chute.words import is_old
 
 KEYS = "q ends"
 
@@ -27,9 +28,8 @@ def page_of(picture: VehiclePicture) -> Page:
     if old:
         text = f"LAST WORD {span_text(picture.age)} AGO (WAS {spaced(picture.state)})"
     else:
-        text = spaced(picture.state)
-    lines = [*body_lines(picture), *decision_lines(picture.decisions)]
-    return Page(Line(text, headline(picture).tone), tuple(lines), grey=old)
+        text = spaced(headline(picture).text)
+    return Page(Line(text, headline(picture).tone), tuple(watch_lines(picture)), grey=old)
 
 
 def empty_page(namespace: str, around: str, vehicles: Sequence[str], seconds: float) -> Page:

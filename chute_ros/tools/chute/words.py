@@ -5,6 +5,8 @@ from __future__ import annotations
 import enum
 import math
 
+from chute_ros.plain_text import span_text
+
 #: What is older than this is not shown as if it were now, s.
 OLD_AFTER = 2.0
 NEVER = "never received"
@@ -28,15 +30,6 @@ def age_text(age: float) -> str:
     if age < 1.0:
         return "<1 s ago"
     return f"{'OLD: ' if is_old(age) else ''}{span_text(age)} ago"
-
-
-def span_text(seconds: float) -> str:
-    """A span of time in the unit that suits it."""
-    if seconds < 120.0:
-        return f"{seconds:.0f} s"
-    if seconds < 7200.0:
-        return f"{seconds / 60.0:.0f} min"
-    return f"{seconds / 3600.0:.0f} h" if seconds < 172800.0 else f"{seconds / 86400.0:.0f} days"
 
 
 def not_here(listened: float) -> str:

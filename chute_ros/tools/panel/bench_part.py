@@ -1,4 +1,4 @@
-"""What can be done to a simulated vehicle: a button each, and what will happen beside it."""
+"""What can be done to a simulated vehicle: a button each, what will happen, what came of it."""
 
 from __future__ import annotations
 
@@ -27,9 +27,8 @@ class BenchPart:
         self._node, self._namespace = node, namespace
         self._offered: list[str] | None = None
         with ui.element("section").classes("card bench"):
-            ui.html("<h2>Bench: what happens to the simulated vehicle</h2>", sanitize=False)
-            self._rows = ui.element("div")
-            self._answer = ui.label("").classes("answers").props('aria-live="polite"')
+            ui.html("<h2>What happens to the simulated vehicle</h2>", sanitize=False)
+            self._rows = ui.element("div").classes("actions")
 
     def refresh(self) -> None:
         """Look what is offered."""
@@ -47,22 +46,25 @@ class BenchPart:
 
     def _row(self, name: str) -> None:
         action = _EFFECTS[name]
+        with ui.element("div").classes("action"):
+            with ui.element("button") as button:
+                ui.label(action.title)
+            ui.label(action.effect).classes("effect")
+            # Beside the button that was pressed: on a phone the next is a screen away.
+            answer = ui.label("").classes("answers").props('aria-live="polite"')
 
         async def pressed() -> None:
-            await self._do(name)
+            await self._do(name, answer)
 
-        with ui.element("div").classes("row"):
-            with ui.element("button").on("click", pressed, args=[]):
-                ui.label(action.title)
-            ui.label(action.effect)
+        button.on("click", pressed, args=[])
 
-    async def _do(self, name: str) -> None:
+    async def _do(self, name: str, told: Any) -> None:
         order = Order(_EFFECTS[name].title, "Trigger", f"{BENCH}{name}")
-        self._answer.set_text(f"{order.name}: ...")
+        told.set_text(f"{order.name}: ...")
         future: Any = asyncio.wrap_future(self._node.order(self._namespace, order, None))
         try:
             answer = await asyncio.wait_for(future, _LONGEST)
         except asyncio.TimeoutError:
-            self._answer.set_text(not_answered(order, f"within {_LONGEST:g} s"))
+            told.set_text(not_answered(order, f"within {_LONGEST:g} s"))
             return
-        self._answer.set_text(answer_text(order, answer))
+        told.set_text(answer_text(order, answer))

@@ -10,7 +10,8 @@ from urllib.parse import quote
 
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.hearing import Heard, stamp_seconds
-from chute_ros.tools.chute.status_text import STAGE_TONE
+from chute_ros.tools.chute.status_text import state_tone, state_words
+from chute_ros.tools.chute.view import is_unguarded, reason_in
 from chute_ros.tools.chute.words import age_text, is_old, name_of
 from chute_ros.tools.panel.tones import TONES
 
@@ -21,6 +22,10 @@ _WORST_FIRST = (
 )  # fmt: skip
 #: One that is silent, or has an alarm: after those in which something happens.
 _UNSURE = _WORST_FIRST.index("DEPLOYED") + 0.5
+
+
+#: Flies, and nobody would be saved: only what has failed already comes before.
+_UNGUARDED = _WORST_FIRST.index("FAULT") + 0.5
 
 
 def age_of(heard: Heard | None, now: float) -> float:
@@ -50,6 +55,8 @@ def link_to(namespace: str) -> str:
 def _rank(summary: Any, age: float) -> float:
     if summary is None or is_old(age):
         return _UNSURE
+    if is_unguarded(summary.text):
+        return _UNGUARDED
     names = _WORST_FIRST
     rank = names.index(summary.state_name) if summary.state_name in names else 0
     return min(float(rank), _UNSURE) if summary.alarms else float(rank)
@@ -60,8 +67,11 @@ def _card(namespace: str, summary: Any, age: float) -> str:
     if summary is None:
         word, tone, lines = "NOTHING RECEIVED", "quiet", list[str]()
     else:
-        word = "NOT KNOWN NOW" if old else summary.state_name.replace("_", " ")
-        tone = "quiet" if old else STAGE_TONE.get(summary.state_name, "quiet")
+        state, unguarded = summary.state_name, is_unguarded(summary.text)
+        words = state_words(state, unguarded).replace("_", " ")
+        word = "NOT KNOWN NOW" if old else words
+        alarms, armed = bool(summary.alarms), bool(summary.armed)
+        tone = "quiet" if old else state_tone(state, unguarded, alarms, armed)
         lines = list(_lines(summary, age))
     told = "".join(f"<div>{escape(line)}</div>" for line in lines)
     return (
@@ -75,8 +85,8 @@ def _card(namespace: str, summary: Any, age: float) -> str:
 def _lines(summary: Any, age: float) -> Iterable[str]:
     if is_old(age):
         yield f"it was {summary.state_name}"
-    if summary.text != summary.state_name:
-        yield summary.text
+    if why := reason_in(summary.text, summary.state_name):
+        yield why
     if (mode := name_of(Mode, summary.mode)) != Mode.ACTIVE.name:
         yield f"mode {mode}"
     if summary.alarms:

@@ -51,7 +51,7 @@ class OrdersPart:
                 with ui.element("div").classes("buttons"):
                     self._button("DEPLOY", "act", orders.deploy)
                     self._button("KILL motors", "bad", orders.kill)
-                    self._button("Arm parachutes", "good", lambda _: orders.arm(True))
+                    self._button("Arm parachutes", "live", lambda _: orders.arm(True))
                     self._button("Disarm", "warn", lambda _: orders.arm(False))
                 with ui.element("details"):
                     ui.html("more orders", sanitize=False, tag="summary")

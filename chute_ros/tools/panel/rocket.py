@@ -10,6 +10,7 @@ from typing import Any
 from chute_ros.links.umbilical.protocol.modes import FlightMode
 from chute_ros.tools.chute.diagnostic_tasks import Task
 from chute_ros.tools.chute.words import age_text, is_old, name_of, value_text
+from chute_ros.tools.panel.sections import broken
 
 _AIR_BRAKE = {0: "idle", 1: "deployed", 2: "retracted"}
 _NOT_THERE = -1
@@ -21,6 +22,7 @@ def rocket(telem: Any, age: float, tasks: Iterable[Task]) -> str:
     """telem: the newest chute_msgs/Telem; age: since it was received, s."""
     mode = telem.flight_mode
     rows = [
+        ("key", _key(mode)),
         ("flight mode", name_of(FlightMode, mode)),
         ("altitude", value_text(telem.altitude, "m")),
         ("predicted apogee", value_text(telem.predicted_apogee, "m")),
@@ -33,17 +35,42 @@ def rocket(telem: Any, age: float, tasks: Iterable[Task]) -> str:
         ("BLiMS target", _target(telem)),
         ("telemetry", f"{telem.layout}, {age_text(age)}"),
     ]
-    for task in tasks:
-        if task.node == "umbilical" and task.task == _MEMORY:
-            progress = task.values.get("newest progress", "")
-            what = f"{task.message}{f' ({progress})' if progress else ''}"
-            rows.append(("memory", f"{what}, {age_text(task.age)}"))
-    told = "".join(
-        f'<div class="row"><span>{escape(name)}</span><span>{escape(text)}</span></div>'
-        for name, text in rows
+    told = "".join(_row(name, text) for name, text in rows)
+    told += "".join(
+        _memory(task) for task in tasks if task.node == "umbilical" and task.task == _MEMORY
     )
     old = " old" if is_old(age) else ""
     return f'<section class="card{old}"><h2>Rocket</h2>{told}</section>'
+
+
+def _row(name: str, text: str) -> str:
+    return f'<div class="row"><span>{escape(name)}</span><span>{broken(text)}</span></div>'
+
+
+def _key(mode: int) -> str:
+    """It gates the mode: STARTUP ends once it is turned. In FAULT nobody knows."""
+    if mode == FlightMode.STARTUP:
+        return "not armed"
+    known = FlightMode._value2member_map_.keys() - {FlightMode.FAULT}
+    return "ARMED" if mode in known else "not told"
+
+
+def _memory(task: Task) -> str:
+    """A dump or a wipe of the flash; a bar while one is under way."""
+    progress, percent = (
+        task.values.get(name, "") for name in ("newest progress", "newest progress (%)")
+    )
+    what = f"{task.message}{f' ({progress})' if progress else ''}"
+    row = _row("memory", f"{what}, {age_text(task.age)}")
+    if task.level == "OK":
+        return row
+    # Of a dump nobody knows how long it will be.
+    now = f' aria-valuenow="{escape(percent)}"' if percent else ""
+    style = f' style="width:{escape(percent)}%"' if percent else ' class="unknown"'
+    return (
+        f'{row}<div class="bar" role="progressbar" aria-label="memory" aria-valuemin="0" '
+        f'aria-valuemax="100"{now}><i{style}></i></div>'
+    )
 
 
 def _switch(value: int, on: str, off: str) -> str:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import datetime
 import math
+import re
 from collections.abc import Mapping, Sequence
 from html import escape
 
+from chute_ros.model import LinkState, ParachuteState
+from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.diagnostic_tasks import Task
 from chute_ros.tools.chute.status_text import (
     LINK_TONE,
-    STAGE_TONE,
+    headline,
     link_text,
+    newest_fired,
     parachute_age_text,
 )
 from chute_ros.tools.chute.view import (
@@ -22,7 +26,7 @@ from chute_ros.tools.chute.view import (
     RuleView,
     VehiclePicture,
 )
-from chute_ros.tools.chute.words import age_text, is_old, not_here, span_text, value_text
+from chute_ros.tools.chute.words import age_text, is_old, not_here, value_text
 from chute_ros.tools.panel.tones import TONES
 
 #: What a state means to a person, where the supervisor says no more than its name.
@@ -30,13 +34,22 @@ MEANINGS = {
     "STARTUP": "The supervisor waits for the first word of its links.",
     "BLOCKED": "The vehicle must not take off.",
     "READY": "Nothing forbids the take-off; no parachute is armed.",
-    "ARMED": "Nothing forbids the take-off; the parachutes are armed.",
+    "ARMED": "The parachutes are armed: keep clear of them. Nothing forbids the take-off.",
     "IN_FLIGHT": "The vehicle flies, and is guarded.",
     "KILLING": "The motors are being stopped.",
     "DEPLOYING": "The parachute is being released.",
     "DEPLOYED": "A parachute was released.",
     "LANDED": "The vehicle has landed.",
     "FAULT": "What was ordered could not be done.",
+}
+#: What released a parachute, as itself says -> in words.
+_BY = {
+    "MANUAL": "hand (MANUAL)",
+    "ATS": "its own sensors (ATS)",
+    "DRONE": "an order over the vehicle's trigger (DRONE)",
+    "MAVLINK": "an order over MAVLink (MAVLINK)",
+    "GEOFENCE": "its geofence (GEOFENCE)",
+    "FTS_PRECHECKING": "its flight termination system (FTS_PRECHECKING)",
 }
 _HISTORY = 8
 _MODES = {"SHADOW": "it decides, and sends nothing", "INHIBITED": "it does nothing"}
@@ -52,13 +65,13 @@ def banner(picture: VehiclePicture) -> str:
         why = f"It was {picture.state}; the last word came {span_text(picture.age)} ago."
         tone = "quiet"
     else:
-        word, why = picture.state.replace("_", " "), _why(picture)
-        tone = STAGE_TONE.get(picture.state, "quiet")
+        line = headline(picture)
+        word, tone, why = line.text.replace("_", " "), line.tone, _why(picture)
     mode = ""
     if picture.mode != Mode.ACTIVE.name:
         meant = _MODES.get(picture.mode, "what it does is not known")
         mode = f'<div class="mode">{_sign("bad")} {escape(picture.mode)}: {escape(meant)}</div>'
-    alarms = "".join(f"<li>{escape(one)}</li>" for one in picture.alarms)
+    alarms = "".join(f"<li>{escape(one)}</li>" for one in picture.other_alarms)
     return (
         f'<div class="banner tone-{tone}">'
         f'<div class="word">{_sign(tone)} {escape(word)}</div><div class="why">{escape(why)}</div>'
@@ -150,15 +163,16 @@ def rules(those: Sequence[RuleView], old: bool) -> str:
 
 
 def decisions(those: Sequence[DecisionView]) -> str:
-    """What was decided since somebody looks, the newest first."""
+    """What was decided, the newest first: kills and deploys also before somebody looked."""
     rows = []
-    for one in list(reversed(those))[:_HISTORY]:
-        shadow = " (SHADOW: not sent)" if one.shadow else ""
+    newest = list(reversed(those))
+    # However often flight was blocked since.
+    fired = [one for one in newest_fired(those) if one not in newest[:_HISTORY]]
+    for one in [*newest[:_HISTORY], *reversed(fired)]:
         told = [*one.reasons, *(f"→ {outcome}" for outcome in one.outcomes)]
         lines = "".join(f"<li>{escape(line)}</li>" for line in told)
-        head = f"{one.action}{shadow} by rule '{one.rule}', {span_text(one.age)} ago"
-        rows.append(f'<div class="decision"><b>{escape(head)}</b><ul>{lines}</ul></div>')
-    return _card("Decisions received here", "".join(rows) or _row("", "none", ""), False)
+        rows.append(f'<div class="decision"><b>{escape(one.headline)}</b><ul>{lines}</ul></div>')
+    return _card("Decisions", "".join(rows) or _row("", "no kill, no deploy", ""), False)
 
 
 def diagnostics(tasks: Sequence[Task]) -> str:
@@ -179,8 +193,8 @@ def diagnostics(tasks: Sequence[Task]) -> str:
 
 
 def _why(picture: VehiclePicture) -> str:
-    if picture.state_text and picture.state_text != picture.state:
-        return picture.state_text
+    if picture.why:
+        return picture.why
     if picture.state in ("STARTUP", "BLOCKED") and picture.block_reasons:
         return picture.block_reasons[0]
     return MEANINGS.get(picture.state, "")
@@ -188,9 +202,9 @@ def _why(picture: VehiclePicture) -> str:
 
 def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetime.date) -> str:
     rows = [
-        _row("armed", _armed(one), "act" if one.armed else ""),
+        _row("armed", _armed(one), "live" if one.armed else ""),
         _row("released", _released(one), "act" if one.deployed else ""),
-        _row("state", f"{one.state}, link {one.link_state}", LINK_TONE.get(one.link_state, "")),
+        _row("state", f"{one.state}, link {one.link_state}", _state_tone(one)),
         _row("packed", _packed(one.packed_date, today), ""),
         _row("own supply", value_text(one.backup_voltage, "V"), ""),
     ]
@@ -203,6 +217,13 @@ def _parachute(one: ParachuteView, identities: Mapping[str, str], today: datetim
     return _card(f"Parachute {one.link} {one.device}", "".join(rows), is_old(one.age))
 
 
+def _state_tone(one: ParachuteView) -> str:
+    """An armed parachute looks armed wherever that stands."""
+    if one.link_state == LinkState.OK.name and one.state == ParachuteState.ARMED.name:
+        return "live"
+    return LINK_TONE.get(one.link_state, "")
+
+
 def _armed(one: ParachuteView) -> str:
     if not one.armed:
         return "no"
@@ -212,7 +233,7 @@ def _armed(one: ParachuteView) -> str:
 def _released(one: ParachuteView) -> str:
     if not one.deployed:
         return "no"
-    return "YES" if one.released_by == "NONE" else f"YES, by {one.released_by}"
+    return f"YES, by {_BY[one.released_by]}" if one.released_by in _BY else "YES"
 
 
 def _packed(date: str, today: datetime.date) -> str:
@@ -247,20 +268,13 @@ def _rule(one: RuleView) -> str:
     filled = 0.0 if not one.hold else min(1.0, one.level / one.hold)
     if one.fulfilled or one.acted_on:
         filled = 1.0
-    state = (
-        "acted on"
-        if one.acted_on
-        else "fulfilled"
-        if one.fulfilled
-        else f"{one.level:.1f} of {one.hold:.1f} s"
-    )
     lines = "".join(f"<li>{escape(line)}</li>" for line in one.conditions if one.counts)
     if one.denied:
         lines += f"<li>not acted on: {escape(one.denied)}</li>"
     percent = f"{filled * 100.0:.0f}"
     return (
-        f'<div class="rule"><div class="row"><span>{escape(one.name)}</span>'
-        f"<span>{escape(one.action)}, {escape(state)}</span></div>"
+        f'<div class="rule"><div class="row"><span>{broken(one.name)}</span>'
+        f"<span>{escape(one.does)}</span></div>"
         f'<div class="bar" role="progressbar" aria-label="{escape(one.name)}" aria-valuemin="0" '
         f'aria-valuemax="100" aria-valuenow="{percent}"><i style="width:{percent}%"></i></div>'
         f"<ul>{lines}</ul></div>"
@@ -269,12 +283,17 @@ def _rule(one: RuleView) -> str:
 
 def _row(name: str, text: str, tone: str) -> str:
     sign = f"{_sign(tone)} " if tone else ""
-    told = f"<span>{escape(name)}</span><span>{sign}{escape(text)}</span>"
+    told = f"<span>{broken(name)}</span><span>{sign}{broken(text)}</span>"
     return f'<div class="row{f" is-{tone}" if tone else ""}">{told}</div>'
 
 
 def _card(title: str, rows: str, old: bool) -> str:
-    return f'<section class="card{" old" if old else ""}"><h2>{escape(title)}</h2>{rows}</section>'
+    return f'<section class="card{" old" if old else ""}"><h2>{broken(title)}</h2>{rows}</section>'
+
+
+def broken(name: str) -> str:
+    """A name as HTML, that on a narrow screen goes on in the next line after a _ or a /."""
+    return re.sub("([_/])", r"\1<wbr>", escape(name))
 
 
 def _sign(tone: str) -> str:

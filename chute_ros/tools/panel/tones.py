@@ -20,6 +20,7 @@ class Tone:
 
 TONES = {
     "good": Tone("#1b7f5c", "#ffffff", "●"),
+    "live": Tone("#e06c1f", "#1d1600", "◆"),
     "plain": Tone("#8cc4f0", "#0b1d2a", "▲"),
     "warn": Tone("#f2c230", "#1d1600", "■"),
     "bad": Tone("#8f1220", "#ffffff", "✖"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -22,11 +23,14 @@ _EVERY = 0.25  # s
 #: A vehicle that is not found is looked for so often, s.
 _LOOKS = 1.0
 #: Of so many turns one draws the curves, and looks what the bench offers.
-_SLOWLY = 8
+_SLOWLY = 4
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_][A-Za-z0-9_]*)+")
 #: Parts of the page, in their order on a phone; wide screens have two columns.
 _LEFT = ("blocks", "parachutes", "vehicle")
 _RIGHT = ("rocket", "links", "decisions", "rules", "diagnostics")
+
+#: What stands beside the bench as well.
+_BESIDE_BENCH = ("vehicle", "links")
 
 
 def register(node: PanelNode) -> None:
@@ -43,28 +47,44 @@ def register(node: PanelNode) -> None:
         ui.page_title(f"{namespace}: chute_ros")
         pulse = Pulse()
         _head(node, namespace, request)
-        shown: dict[str, Any] = {"banner": _part("banner").props('role="status"')}
+        shown: list[tuple[str, Any]] = [("banner", _part("banner").props('role="status"'))]
         # Before all that scrolls: an operator who must act must not search.
         orders = OrdersPart(node, namespace, request, pulse)
-        with ui.element("div").classes("columns"):
-            with ui.element("div"):
-                shown |= {one: _part(one) for one in _LEFT}
-                bench = BenchPart(node, namespace) if node.settings.bench else None
-            with ui.element("div"):
-                curves = Curves()
-                shown |= {one: _part(one) for one in _RIGHT}
+        bench: list[BenchPart] = []
+        curves: list[Curves] = []
+
+        def field() -> None:
+            with ui.element("div").classes("columns"):
+                with ui.element("div"):
+                    shown.extend((one, _part(one)) for one in _LEFT)
+                with ui.element("div"):
+                    curves.append(Curves())
+                    shown.extend((one, _part(one)) for one in _RIGHT)
+
+        def try_out() -> None:
+            with ui.element("div").classes("columns"):
+                bench.append(BenchPart(node, namespace))
+                # What a button does to it is seen beside it.
+                with ui.element("div"):
+                    shown.extend((one, _part(one)) for one in _BESIDE_BENCH)
+
+        if node.settings.bench:
+            _tabs(Field=field, Bench=try_out)
+        else:
+            field()
         turns = 0
 
         def refresh() -> None:
             nonlocal turns
             parts = watched.parts()
-            for name, element in shown.items():
+            for name, element in shown:
                 element.set_content(parts.get(name, ""))
             orders.refresh(parts.get("unreached", ""))
             if turns % _SLOWLY == 0:
-                curves.draw(*watched.drawn())
-                if bench is not None:
-                    bench.refresh()
+                for drawn in curves:
+                    drawn.draw(*watched.drawn())
+                for one in bench:
+                    one.refresh()
             turns += 1
             # Last: what fails before it must not seem to be of now.
             pulse.beat()
@@ -84,6 +104,17 @@ def _head(node: PanelNode, namespace: str, request: Request) -> None:
                 ui.element("button").add_slot("default", "log out")
         else:
             ui.html(f'<a href="/login?next={onward}">log in</a>', sanitize=False)
+
+
+def _tabs(**pages: Callable[[], None]) -> None:
+    """A tab each: the first is open, and each stays as it was while another one is."""
+    with ui.tabs().props("no-caps align=left") as tabs:
+        for name in pages:
+            ui.tab(name)
+    with ui.tab_panels(tabs, value=next(iter(pages)), animated=False, keep_alive=True):
+        for name, fill in pages.items():
+            with ui.tab_panel(name):
+                fill()
 
 
 def _part(name: str) -> Any:

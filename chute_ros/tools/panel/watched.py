@@ -152,9 +152,11 @@ class Watched:
             self._ask_identity(link, device)
 
     def _draw(self, picture: VehiclePicture, wall: float) -> None:
-        vehicle = picture.vehicle
-        if vehicle is not None and vehicle.height_age < 2.0:
-            self._trace.add(MotionPoint(wall, vehicle.height, vehicle.vertical_speed))
+        height = speed = math.nan
+        if (vehicle := picture.vehicle) is not None:
+            height = math.nan if is_old(vehicle.height_age) else vehicle.height
+            speed = math.nan if is_old(vehicle.vertical_speed_age) else vehicle.vertical_speed
+        self._trace.add(MotionPoint(wall, height, speed))
         for one in picture.decisions:
             if (one.epoch, one.id) > self._marked:
                 self._marked = (one.epoch, one.id)

@@ -1,0 +1,176 @@
+"""What a person must know of the state: in a sentence, and what warns as long as it holds.
+
+Whatever shows a vehicle (safety/state, safety/summary, diagnostics, `chute`, the panel, the fleet)
+has it from here: no reader decides for itself whether a vehicle is guarded.
+"""
+
+from __future__ import annotations
+
+import math
+
+from chute_ros.model import Action, Decision
+from chute_ros.plain_text import span_text
+from chute_ros.supervisor.config import SupervisorConfig
+from chute_ros.supervisor.inputs import Mode
+from chute_ros.supervisor.link_evidence import LinkJudgement
+from chute_ros.supervisor.machine import ON_GROUND, Stage
+from chute_ros.supervisor.measurements import CLIMB_RATE, FALL_SIGNS
+from chute_ros.supervisor.policy import judge
+from chute_ros.supervisor.readings import unusable
+from chute_ros.supervisor.state import State
+
+#: What the modes mean in which no vehicle is protected.
+MODES = {
+    Mode.SHADOW: "SHADOW: reports its decisions and sends none",
+    Mode.INHIBITED: "INHIBITED: decides nothing",
+}
+#: In the text of a state: nothing can be released now, or nobody would notice that it must be.
+UNGUARDED = "NOT GUARDED"
+#: Alarms that are published at most.
+_MOST_ALARMS = 16
+#: A link in one of these reaches no parachute, for how long nobody knows.
+_GONE = (LinkJudgement.NEVER_SEEN, LinkJudgement.LOST)
+
+
+def alarms(config: SupervisorConfig, state: State, now: float) -> tuple[str, ...]:
+    """Faults that last: those that stay until a reset, and what warns as long as it holds."""
+    last = (*state.alarming.alarms, *_warnings(config, state, now))
+    return (*last, *_unguarded(config, state, now))[-_MOST_ALARMS:]
+
+
+def state_text(
+    config: SupervisorConfig, state: State, reasons: tuple[str, ...], now: float
+) -> str:
+    """The state with its reason in a sentence. reasons: against a take-off (block_reasons)."""
+    text = _stage_text(config, state, reasons, now)
+    armed = ", ".join(map(" ".join, state.armed(config)))
+    if armed and state.stage in ON_GROUND and state.stage is not Stage.ARMED:
+        text += f"; ARMED all the same: {armed} (safety/arm disarms)"
+    return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
+
+
+def _stage_text(
+    config: SupervisorConfig, state: State, reasons: tuple[str, ...], now: float
+) -> str:
+    stage = state.stage
+    if stage in (Stage.STARTUP, Stage.BLOCKED) and reasons:
+        return f"{stage.name}: {'; '.join(reasons)}"
+    if unguarded := _unguarded(config, state, now):
+        return f"{stage.name}, {UNGUARDED}: {'; '.join(unguarded)}"
+    told = [*state.alarming.alarms, *_warnings(config, state, now)][-1:]
+    if sentence := _what_was_done(config, state, now):
+        # The alarm that led to FAULT is its detail, and stands beside it.
+        told = [] if stage is Stage.FAULT else told
+        return f"{stage.name}: {'; '.join((sentence, *told))}"
+    if told:
+        return f"{stage.name}: {told[0]}"
+    if state.heard.disputed:
+        parts = ", ".join(sorted(state.heard.disputed))
+        return f"{stage.name}: {parts} in doubt, as the vehicle's sources contradict each other"
+    deploys = any(rule.action is Action.DEPLOY for rule in config.profile.rules)
+    if stage is Stage.IN_FLIGHT and not deploys:
+        name = config.profile.name
+        return f"{stage.name}: only a person releases: profile {name} has no rule that does"
+    return stage.name
+
+
+def _unguarded(config: SupervisorConfig, state: State, now: float) -> list[str]:
+    """Why nobody would be saved now in flight; empty: the vehicle is guarded."""
+    if state.stage is not Stage.IN_FLIGHT:
+        return []
+    told = []
+    problems = {link: _no_parachute(config, state, link, now) for link in config.deploy_links}
+    if all(problems.values()):
+        gone = all(problem in _GONE_WORDS for problem in problems.values())
+        what = "no parachute can be reached" if gone else "no parachute can be relied on"
+        links = ", ".join(f"{link} {problem}" for link, problem in problems.items())
+        told.append(f"{what}: {links}")
+    signs = (*FALL_SIGNS, CLIMB_RATE)
+    used = {name for rule in config.profile.rules for name in rule.measured}
+    if used & {*signs} and all(unusable(config, state, name, now) for name in signs):
+        told.append("nothing tells whether it falls: no vertical speed, acceleration or height")
+    return told
+
+
+_GONE_WORDS = tuple(f"is {one.name}" for one in _GONE)
+
+
+def _no_parachute(config: SupervisorConfig, state: State, link: str, now: float) -> str:
+    """Why this link would release nothing; empty: it may."""
+    evidence, limits = state.evidence(link), config.limits(link)
+    judged = evidence.judged(limits, now)
+    if judged in _GONE:
+        return f"is {judged.name}"
+    unhealthy = judged is LinkJudgement.OK and not evidence.device_healthy
+    return "is not healthy" if unhealthy else ""
+
+
+def _warnings(config: SupervisorConfig, state: State, now: float) -> list[str]:
+    """Of the rules that only warn, those that do now."""
+    told = []
+    for rule in config.profile.rules:
+        evidence = state.rule(rule.name)
+        warns = evidence.latched or evidence.fulfilled(rule)
+        if rule.action is Action.NONE and state.stage in rule.states and warns:
+            says = rule.says or "; ".join(judge(config, state, rule, now).reasons())
+            told.append(f"rule '{rule.name}' warns: {says}")
+    return told
+
+
+def _what_was_done(config: SupervisorConfig, state: State, now: float) -> str:
+    """The kill or the deploy of this state: what, when, by whose order and why; empty: none."""
+    kill, deploys = state.killing.kill, state.deploying.deploys
+    if state.stage is Stage.KILLING and kill is not None:
+        what = "the motors are off" if kill.confirmed else "the motors are being stopped"
+        height = _at_height(state.killing.killed_height)
+        follows = "; the deploy follows" if state.deploying.deploy_rule else ""
+        after = "; no deploy follows" if state.killing.kill_only else follows
+        by = _ordered(config, kill.decision, kill.decided_at, height, now)
+        return f"{what}, {by}{after}"
+    if state.stage is Stage.DEPLOYED:
+        return _what_is_out(config, state, now)
+    if state.stage not in (Stage.DEPLOYING, Stage.FAULT) or not deploys:
+        return ""
+    height = _at_height(state.deploying.deploy_height)
+    by = _ordered(config, deploys[0].decision, deploys[0].decided_at, height, now)
+    if state.stage is Stage.FAULT:
+        return f"no parachute confirmed that it was released, {by}"
+    step = f"step {len(deploys)} of {len(state.ladder(config))}"
+    return f"{_target(deploys[-1].decision)} is to release ({step}), {by}"
+
+
+def _what_is_out(config: SupervisorConfig, state: State, now: float) -> str:
+    """Which parachute is out, since when, at what height, and by whose order."""
+    out = [" ".join(one) for one in sorted(state.newly_released(config, now))]
+    confirmed = [one for one in state.deploying.deploys if one.confirmed]
+    out = out or [_target(one.decision) for one in confirmed[-1:]]
+    who = ", ".join(out) or "a parachute that is not received any more"
+    when = f"{span_text(now - state.stage_since)} ago{_at_height(state.deploying.deploy_height)}"
+    if state.deploying.deploys:
+        decision = state.deploying.deploys[0].decision
+        return f"{who} released {when}, by {_whose(config, decision)}"
+    return f"{who} released {when}, not by an order of this supervisor"
+
+
+def _ordered(
+    config: SupervisorConfig, decision: Decision, at: float, height: str, now: float
+) -> str:
+    return f"ordered {span_text(now - at)} ago{height} by {_whose(config, decision)}"
+
+
+def _whose(config: SupervisorConfig, decision: Decision) -> str:
+    """The rule and what it says, or who asked and why."""
+    why = decision.reasons[0] if decision.reasons else ""
+    for rule in config.profile.rules:
+        if rule.name == decision.rule:
+            return f"rule '{rule.name}' ({rule.says or why})"
+    # A person's reason begins with who it was.
+    return why if why.startswith(decision.rule) else f"{decision.rule}: {why}"
+
+
+def _target(decision: Decision) -> str:
+    return " ".join((*decision.targets, decision.device)).strip()
+
+
+def _at_height(height: float) -> str:
+    return "" if math.isnan(height) else f" at {height:.1f} m"

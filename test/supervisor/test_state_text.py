@@ -1,0 +1,198 @@
+"""The state in a sentence: a vehicle that nobody guards never looks like one that is, and what was
+done has who ordered it, why, when and where."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from story import FLYING, LINK, START, Story, parachute, shipped, vehicle
+
+from chute_ros.model import Action, LinkState, Outcome
+from chute_ros.supervisor import inputs as i
+from chute_ros.supervisor.machine import Stage
+from chute_ros.supervisor.preflight import block_reasons
+from chute_ros.supervisor.state_text import alarms, state_text
+
+UPF = "upf_can"
+BOTH: dict[str, Any] = {"required_links": (LINK, UPF), "deploy_links": (LINK, UPF)}
+
+
+def text(story: Story) -> str:
+    """What is shown of it now."""
+    now = START + story.t
+    reasons = block_reasons(story.config, story.state, now)
+    return state_text(story.config, story.state, reasons, now)
+
+
+def told(story: Story) -> tuple[str, ...]:
+    """Its alarms now."""
+    return alarms(story.config, story.state, START + story.t)
+
+
+def flying(profile: str = "multirotor", **settings: Any) -> Story:
+    """Guarded, by two parachutes."""
+    story = Story(shipped(profile, **{**BOTH, **settings}))
+    story.at(0.0, story.heartbeat(), story.heartbeat(UPF))
+    story.flying()
+    return goes_on(story, 1.0)
+
+
+def goes_on(story: Story, until: float, healthy: bool = True, **states: LinkState) -> Story:
+    """It flies well; each link as states has it, else OK."""
+    while story.t < until - 1e-9:
+        beats = [
+            story.heartbeat(link, healthy, states.get(link, LinkState.OK)) for link in (LINK, UPF)
+        ]
+        story.at(story.t + 0.05, *beats, story.told())
+    return story
+
+
+# Guarded, and not
+
+
+def test_a_vehicle_that_is_guarded_says_no_more_than_that_it_flies() -> None:
+    story = flying()
+    assert text(story) == "IN_FLIGHT"
+    assert told(story) == ()
+
+
+def test_one_lost_link_of_two_warns_and_the_vehicle_is_still_guarded() -> None:
+    story = goes_on(flying(), 2.0, upf_can=LinkState.LOST)
+    warning = "rule 'link lost' warns: a device is not heard"
+    assert text(story) == f"IN_FLIGHT: {warning}"
+    assert told(story) == (warning,)
+    # When it is heard again, then the warning is over.
+    story = goes_on(story, 4.0)
+    assert text(story) == "IN_FLIGHT"
+    assert told(story) == ()
+
+
+def test_a_vehicle_none_of_whose_parachutes_is_received_is_not_guarded() -> None:
+    story = goes_on(flying(), 2.0, mavlink_parachute=LinkState.LOST, upf_can=LinkState.LOST)
+    why = f"no parachute can be reached: {LINK} is LOST, {UPF} is LOST"
+    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    assert told(story) == ("rule 'link lost' warns: a device is not heard", why)
+    assert text(goes_on(story, 4.0)) == "IN_FLIGHT"
+
+
+def test_parachutes_that_are_received_and_not_fit_guard_nobody() -> None:
+    story = goes_on(flying(), 2.0, healthy=False)
+    why = f"no parachute can be relied on: {LINK} is not healthy, {UPF} is not healthy"
+    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    story = goes_on(flying(), 2.0, healthy=False, upf_can=LinkState.LOST)
+    why = f"no parachute can be relied on: {LINK} is not healthy, {UPF} is LOST"
+    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+
+
+def test_a_vehicle_of_which_nothing_is_measured_is_not_guarded() -> None:
+    story = flying()
+    # When its link is cut, then its nodes are heard and nothing of it is,
+    while story.t < 4.0:
+        story.at(story.t + 0.1, story.heartbeat(), story.heartbeat(UPF))
+    why = "nothing tells whether it falls: no vertical speed, acceleration or height"
+    assert text(story) == f"IN_FLIGHT, NOT GUARDED: {why}"
+    # and both of what is wrong is an alarm.
+    lost = "rule 'autopilot lost' warns: the autopilot is silent; if it falls, deploy by hand"
+    assert told(story) == (lost, why)
+
+
+def test_heights_alone_are_enough_to_see_a_fall() -> None:
+    story = flying()
+    flies = {"armed": FLYING.armed, "landed_state": FLYING.landed_state}
+    step = 0
+    while story.t < 4.0:
+        step += 1
+        moved = {**flies, "height": 50.0 + 0.01 * (step % 7)}
+        story.at(story.t + 0.1, story.heartbeat(), story.heartbeat(UPF), vehicle(**moved))
+    assert "nothing tells" not in text(story)
+
+
+def test_a_profile_that_releases_nothing_itself_says_who_does() -> None:
+    story = flying("by_hand")
+    assert text(story) == (
+        "IN_FLIGHT: only a person releases: profile by_hand has no rule that does"
+    )
+    assert told(story) == (), "it was chosen"
+
+
+def test_on_the_ground_nobody_needs_a_guard() -> None:
+    story = Story(shipped("multirotor", **BOTH))
+    story.at(
+        0.0, story.heartbeat(state=LinkState.LOST), story.heartbeat(UPF, True, LinkState.LOST)
+    )
+    story.at(20.0)
+    assert story.state.stage is Stage.BLOCKED
+    assert told(story) == ()
+
+
+# What was done
+
+
+def test_a_kill_says_by_which_rule_why_when_and_where() -> None:
+    story = Story(shipped("multirotor")).flying().fly(2.0, height=100.0)
+    story.fall(2.95, height=100.0)
+    assert story.state.stage is Stage.KILLING
+    rule = story.newest(Action.KILL).rule
+    says = next(one.says for one in story.config.profile.rules if one.name == rule)
+    assert f"by rule '{rule}' ({says})" in text(story)
+    assert text(story).startswith("KILLING: the motors are being stopped, ordered 0 s ago at 9")
+    assert text(story).endswith("; the deploy follows")
+
+
+def test_a_kill_by_a_person_says_whose_and_that_no_deploy_follows() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    story.at(1.0, i.KillRequest(3, "operator", "Anna: the wind", kill_only=True))
+    assert text(story) == (
+        "KILLING: the motors are being stopped, ordered 0 s ago at 50.0 m by operator: Anna: the "
+        "wind; no deploy follows"
+    )
+    story.at(1.2, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    assert text(story).startswith("KILLING: the motors are off, ordered 0 s ago")
+
+
+def test_a_deploy_says_which_step_for_whom_and_whose_order() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    story.at(1.0, i.DeployRequest(5, False, "Anna: it burns"))
+    story.at(1.1, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    assert text(story) == (
+        f"DEPLOYING: {LINK} is to release (step 1 of 1), ordered 0 s ago at 50.0 m by operator: "
+        "Anna: it burns"
+    )
+    # When it is out, then it says which, when and where,
+    story.fly(2.0, height=42.0)
+    story.at(2.0, parachute(deployed=True))
+    story.fly(4.0, height=40.0)
+    assert text(story) == (
+        f"DEPLOYED: {LINK} 1/161 released 2 s ago at 42.0 m, by operator: Anna: it burns"
+    )
+
+
+def test_a_parachute_that_opens_by_itself_was_not_ordered() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    story.at(1.0, story.heartbeat(), parachute(deployed=True))
+    assert text(story) == (
+        f"DEPLOYED: {LINK} 1/161 released 0 s ago at 50.0 m, not by an order of this supervisor"
+    )
+
+
+def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once() -> None:
+    story = Story(shipped("multirotor")).flying().fly(1.0)
+    story.at(1.0, i.DeployRequest(5, False, "Anna: it burns"))
+    story.at(1.1, story.heartbeat(), story.report(Action.KILL, Outcome.CONFIRMED))
+    failed = story.report(Action.DEPLOY, Outcome.FAILED, detail="denied: three lines of protocol")
+    story.at(1.2, story.heartbeat(), failed)
+    assert story.state.stage is Stage.FAULT
+    assert text(story) == (
+        "FAULT: no parachute confirmed that it was released, ordered 0 s ago at 50.0 m by "
+        "operator: Anna: it burns"
+    )
+    (alarm,) = told(story)
+    assert "three lines of protocol" in alarm
+
+
+@pytest.mark.parametrize("mode", [i.Mode.SHADOW, i.Mode.INHIBITED])
+def test_a_mode_in_which_nobody_is_protected_comes_first(mode: i.Mode) -> None:
+    story = Story(shipped("multirotor"), mode).flying().fly(1.0)
+    assert text(story).startswith(f"{mode.name}: ")
+    assert text(story).endswith("; IN_FLIGHT")
