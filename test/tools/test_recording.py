@@ -52,7 +52,7 @@ def test_every_turn_and_message_comes_back_in_its_order(flight):
     assert turns[0].wall == WALL
     assert turns[0].turn.now == START
     assert [output for one in turns for output in one.turn.outputs] == flight.outputs
-    assert turns[0].config == flight.config
+    assert repr(turns[0].config) == repr(flight.config)  # a limit that is not asked for is NaN
     assert turns[0].state is not None
     assert turns[1].state is None, "the state is written at the beginning, not each time"
     assert len(recording.messages["safety/state"]) == len(turns)
