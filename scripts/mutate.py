@@ -154,6 +154,8 @@ def main() -> None:
     options.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants at once")
     options.add_argument("--quick", action="store_true", help="only the tests of the module")
     given = options.parse_args()
+    if unknown := [one for one in given.modules if one not in TESTS]:
+        options.error(f"{unknown[0]}: need one of {', '.join(TESTS)}")
     page, unexplained = PAGE.read_text(), 0
     for module in given.modules:
         with tempfile.TemporaryDirectory(prefix="mutate_") as folder:

@@ -47,7 +47,7 @@ from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.profile_reader import read_profile
 from chute_ros.supervisor.rules import Profile
-from chute_ros.tools.campaign_command import positive
+from chute_ros.tools.arguments import positive
 from chute_ros.tools.entry import INTERRUPTED
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent

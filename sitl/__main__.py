@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from chute_ros.errors import ChuteError
+from chute_ros.tools.arguments import positive
 from chute_ros.tools.isolation import isolated_ros
 from faults.ending import take_down_when_ended
 from sitl import results, stories
@@ -157,7 +158,9 @@ def _options() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser("sitl", description=__doc__)
     options.add_argument("autopilots", nargs="*", metavar="AUTOPILOT", help="simulator binary")
     options.add_argument("--stories", nargs="+", default=[], metavar="NAME", help="only these")
-    options.add_argument("--runs", type=int, default=3, help="runs of each story (default: 3)")
+    options.add_argument(
+        "--runs", type=positive, default=3, help="runs of each story (default: 3)"
+    )
     options.add_argument("--list", action="store_true", help="list the stories")
     options.add_argument(
         "--page",

@@ -30,6 +30,7 @@ from chute_ros.errors import CampaignError, RecordError
 from chute_ros.ros.config_folder import config_folder
 from chute_ros.ros.private_files import replace_text
 from chute_ros.ros.ros_home import ros_home
+from chute_ros.tools.arguments import positive
 from chute_ros.tools.campaign_bodies import page_of_bodies
 from chute_ros.tools.campaign_page import page
 from chute_ros.tools.campaign_picture import picture
@@ -303,17 +304,6 @@ class _Progress:
             (self._failures / f"{line.seed}.json").write_text(text, encoding="utf-8")
         except OSError as error:
             self.unsaved = str(error)
-
-
-def positive(text: str) -> int:
-    """1 or more."""
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text}: need a whole number, 1 or more")
-    return number
 
 
 def scheduler(text: str) -> str:

@@ -20,7 +20,8 @@ from chute_ros.campaign.judge import Count
 from chute_ros.campaign.pool import flown_here
 from chute_ros.errors import CampaignError
 from chute_ros.ros.config_folder import config_folder
-from chute_ros.tools.campaign_command import positive, writable
+from chute_ros.tools.arguments import positive
+from chute_ros.tools.campaign_command import writable
 from chute_ros.tools.compare_page import Run, page
 from chute_ros.tools.compare_picture import curves, delays
 from chute_ros.tools.machine import machine

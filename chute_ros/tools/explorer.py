@@ -17,6 +17,7 @@ from chute_ros.supervisor import core
 from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.state import State
 from chute_ros.supervisor.wakes import next_deadline
+from chute_ros.tools.arguments import positive
 from chute_ros.tools.explore_key import canonical
 from chute_ros.tools.explore_properties import (
     PROPERTIES,
@@ -227,7 +228,7 @@ property tests in `test/supervisor` go further, at random.
 def main() -> None:
     """Explore the repository in the present folder."""
     options = argparse.ArgumentParser("explore", description=__doc__)
-    options.add_argument("--depth", type=int, default=2)
+    options.add_argument("--depth", type=positive, default=2)
     depth = options.parse_args().depth
     began = time.monotonic()
     explorer = Explorer(Path())

@@ -24,6 +24,7 @@ from collections.abc import Iterator
 from hashlib import sha256
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import NoReturn
 
 from chute_ros.errors import ChuteError
 from chute_ros.links.api import SUPERVISOR, Sockets
@@ -35,6 +36,7 @@ from chute_ros.ros.ros_home import ros_home
 from chute_ros.sim.bench_actions import ACTIONS, actions_of
 from chute_ros.supervisor.machine import Stage
 from chute_ros.tools.bench_call import call_action
+from chute_ros.tools.chute.surroundings import installed_middlewares, surroundings
 from chute_ros.tools.demo_director import Director
 from chute_ros.tools.isolation import free_udp_ports, stay_on_this_host
 from chute_ros.tools.launch_checks import Flight
@@ -60,6 +62,8 @@ def main() -> None:
     """Run it; exit code 2 on a user's mistake, 1 if something ends by itself."""
     chosen = _options().parse_args()
     stay_on_this_host()
+    if mistake := surroundings(os.environ, installed_middlewares()).mistake():
+        _refuse(mistake)
     if chosen.do:
         try:
             print(call_action(chosen.namespace, chosen.do))
@@ -170,9 +174,13 @@ def _new_home() -> Path:
     try:
         make_folder(folder)
     except OSError as error:
-        print(f"sim: {folder}: {error.strerror or error}: set ROS_HOME", file=sys.stderr)
-        sys.exit(2)
+        _refuse(f"{folder}: {error.strerror or error}: set ROS_HOME")
     return folder
+
+
+def _refuse(text: str) -> NoReturn:
+    print(f"sim: {text}", file=sys.stderr)
+    sys.exit(2)
 
 
 def _tell_kept(home: Path) -> None:

@@ -1,6 +1,7 @@
 """The exploration of the core finds what is broken, and leaves out nothing that decides."""
 
 import dataclasses
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from chute_ros.supervisor.state import State
 from chute_ros.supervisor.turn import Turn
 from chute_ros.tools import explore_key
 from chute_ros.tools.explore_properties import PROPERTIES
-from chute_ros.tools.explorer import BEGINNINGS, Explorer, Found, page
+from chute_ros.tools.explorer import BEGINNINGS, Explorer, Found, main, page
 
 ROOT = Path(__file__).parents[2]
 
@@ -104,3 +105,12 @@ def test_every_field_of_a_state_decides_or_is_named_as_one_that_does_not() -> No
     used |= {"measurements"} if ".measured(" in text else set()
     assert [name for name in names if name not in used | explore_key.LEFT_OUT] == []
     assert used & explore_key.LEFT_OUT <= {"epoch"}, "compared, but not counted"
+
+
+@pytest.mark.parametrize("depth", ["0", "-1", "deep"])
+def test_without_a_step_nothing_would_be_explored(depth, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["explore", "--depth", depth])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert f"--depth: {depth}: need a whole number, 1 or more" in capsys.readouterr().err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -134,6 +135,12 @@ def test_a_log_that_was_cut_off_is_judged_to_there(name, fallen, tmp_path):
         ("noise.tlog", bytes(range(256)) * 20, "no log of a known format"),
         ("table.csv", b"a,b\n1,2\n", "no column for time and height; its first line has a, b"),
         ("table.csv", b"time,height\n1,x\n", "no flight: it has 0 rows with a time and a height"),
+        ("table.csv", b"time," + b"a" * 200_000 + b"\n1,2\n", "no table: field larger than"),
+        (
+            "table.csv",
+            b"time,height\n" + b"".join(b"%d,1\n" % (k * 100_000) for k in range(9)),
+            "its rows are 1e+05 s apart: if 'time' is in other units, --column 'time=time*FACTOR'",
+        ),
         ("flight.mcap", b"\x89MCAP0\r\n", "no recording of ROS"),
     ],
 )
@@ -185,6 +192,19 @@ def test_a_unit_that_is_not_known_is_not_guessed(tmp_path):
     columns = dict([table.column("height=height (furlong)*201.168")])
     log = formats.read(path, columns)
     assert log.remarks == ["height from 'height (furlong)', time from 'time'"]
+
+
+def test_a_heading_that_was_given_and_is_not_there_is_not_replaced_by_another(tmp_path):
+    path = tmp_path / "rocket.csv"
+    path.write_text(rocket(25.0, "time", "height", 1.0))
+    with pytest.raises(LogError, match=r"\(given: 'Height AGL' \(for height\)\); its first line"):
+        formats.read(path, dict([table.column("height=Height AGL")]))
+
+
+def test_a_fifo_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "flight.bin")
+    with pytest.raises(LogError, match="it is no file"):
+        formats.read(tmp_path / "flight.bin", {})
 
 
 @pytest.mark.parametrize("text", ["height", "size=x", "height=x*0", "height=x*-", "=x"])
@@ -277,6 +297,7 @@ def test_the_exit_code_tells_whether_anything_would_have_left(landed, fallen, tm
     ("arguments", "says"),
     [
         (("--profile", "helicopter"), "--profile helicopter: No such file or directory; shipped"),
+        (("--profile", "/bin/sh.yaml"), "--profile /bin/sh.yaml: No such file or directory"),
         (("--page", "/nowhere/judged.html"), "/nowhere/judged.html: No such file or directory"),
         (("--column", "size=1"), "size=1: need NAME=HEADING"),
     ],

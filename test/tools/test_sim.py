@@ -264,9 +264,10 @@ def test_each_vehicle_is_started_flies_and_ends_on_a_termination_without_a_trace
     assert not Path(folder).exists()
 
 
-def run(*arguments):
+def run(*arguments, **around):
     done = subprocess.run(
         [sys.executable, "-m", "chute_ros.tools.sim", *arguments],
+        env={**os.environ, **around},
         capture_output=True,
         text=True,
         timeout=60.0,
@@ -319,3 +320,17 @@ def test_a_mistake_is_told_in_one_line(arguments, said):
     code, out, err = run(*arguments)
     assert (code, out) == (2, "")
     assert said in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("arguments", [("--no-panel",), ("--do", "take_off")])
+def test_so_is_a_domain_that_is_none(arguments):
+    code, out, err = run(*arguments, ROS_DOMAIN_ID="abc")
+    assert (code, out) == (2, "")
+    assert err == "sim: ROS_DOMAIN_ID is 'abc': need a whole number from 0 to 232\n"
+
+
+def test_where_nothing_can_be_kept_nothing_starts():
+    code, out, err = run("--no-panel", ROS_HOME="/proc/nowhere")
+    assert (code, out) == (2, "")
+    assert err.startswith("sim: /proc/nowhere/chute_ros/simulations/")
+    assert err.endswith(": set ROS_HOME\n")

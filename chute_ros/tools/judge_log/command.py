@@ -131,11 +131,13 @@ def config_of(log: FlightLog, profile: str | None) -> SupervisorConfig:
         folder, name = Path(name).resolve().parent, Path(name).stem
     try:
         return Shipped(folder).config(_VEHICLE, name, False, 0)
+    except UnicodeDecodeError as error:
+        raise ChuteError(f"--profile {profile}: no text: {error}") from None
     except OSError as error:
         files = (config_folder() / "profiles").glob("*.yaml")
         shipped = ", ".join(sorted(one.stem for one in files))
         why = error.strerror or error
-        raise ChuteError(f"--profile {name}: {why}; shipped are {shipped}") from None
+        raise ChuteError(f"--profile {profile or name}: {why}; shipped are {shipped}") from None
 
 
 def flown(log: FlightLog, config: SupervisorConfig) -> Judged:

@@ -18,6 +18,9 @@ def read(path: Path, columns: Mapping[str, table.Column]) -> FlightLog:
     """The log in this file, of whatever format; LogError if it is of none, or damaged."""
     if path.is_dir():
         return bag.read(path)
+    if path.exists() and not path.is_file():
+        # A FIFO would be waited for, and a device never ends.
+        raise LogError(f"{path}: it is no file")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)

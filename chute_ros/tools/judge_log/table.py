@@ -7,8 +7,10 @@ the heights tell it.
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import re
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +49,8 @@ _HEADING = re.compile(r"([^(\[]*)(?:[(\[]([^)\]]*))?")
 _GIVEN = re.compile(r"(\w+)=(.+?)(?:\*([-+.\deE]+))?$")
 #: A speed by the heights of so long, s.
 _SLOPE = 0.5
+#: Most rows of a flight come sooner, s.
+_FURTHEST_APART = 60.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,10 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
     except OSError as error:
         raise LogError(f"{path}: {error.strerror or error}") from None
     dialect_of = ";" if text[:4000].count(";") > text[:4000].count(",") else ","
-    rows = [row for row in csv.reader(text.splitlines(), delimiter=dialect_of) if row]
+    try:
+        rows = [row for row in csv.reader(text.splitlines(), delimiter=dialect_of) if row]
+    except csv.Error as error:
+        raise LogError(f"{path}: no table: {error}") from None
     begin, places = _places(path, rows, given)
     values, bad = [], 0
     for row in rows[begin:]:
@@ -87,6 +94,7 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
     values.sort(key=lambda one: one["time"])
     if len(values) < 2:
         raise LogError(f"{path}: no flight: it has {len(values)} rows with a time and a height")
+    _check_times(path, [one["time"] for one in values], rows[begin - 1][places["time"][0]])
     remarks = [f"{bad} rows without a time or a height were left out"] if bad else []
     headings = rows[begin - 1]
     used = ", ".join(f"{name} from {headings[at].strip()!r}" for name, (at, _) in places.items())
@@ -101,6 +109,16 @@ def read(path: Path, given: Mapping[str, Column]) -> FlightLog:
     )
 
 
+def _check_times(path: Path, times: Sequence[float], heading: str) -> None:
+    """LogError: in seconds they cannot be."""
+    apart = statistics.median(b - a for a, b in itertools.pairwise(times))
+    if apart > _FURTHEST_APART:
+        raise LogError(
+            f"{path}: its rows are {apart:.3g} s apart: if {heading.strip()!r} is in other units, "
+            f"--column 'time={heading.strip()}*FACTOR' makes seconds of it"
+        )
+
+
 def _places(
     path: Path, rows: Sequence[Sequence[str]], given: Mapping[str, Column]
 ) -> tuple[int, dict[str, tuple[int, float]]]:
@@ -108,7 +126,7 @@ def _places(
     headings: list[str] = []
     for number, row in enumerate(rows):
         found = _found(row, given)
-        if "time" in found and "height" in found:
+        if {"time", "height", *given} <= found.keys():
             return number + 1, found
         headings = headings or [one.strip() for one in row]
     missing = [f"{one.heading!r} (for {name})" for name, one in given.items()]
@@ -128,6 +146,8 @@ def _found(row: Sequence[str], given: Mapping[str, Column]) -> dict[str, tuple[i
             places[name] = (cells.index(one.heading), one.factor)
     parsed = [_meaning(cell) for cell in cells]
     for name, known in COLUMNS.items():
+        if name in given:
+            continue  # what it is called was said
         for place in (parsed.index(one) for one in known if one in parsed):
             places.setdefault(name, (place, _factor(cells[place])))
     return places
