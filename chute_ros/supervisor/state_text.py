@@ -67,6 +67,8 @@ def _stage_text(
     if state.heard.disputed:
         parts = ", ".join(sorted(state.heard.disputed))
         return f"{stage.name}: {parts} in doubt, as the vehicle's sources contradict each other"
+    if stage is Stage.IN_FLIGHT and state.mode is not Mode.ACTIVE:
+        return f"{stage.name}: this supervisor guards no vehicle in this mode"
     deploys = any(rule.action is Action.DEPLOY for rule in config.profile.rules)
     if stage is Stage.IN_FLIGHT and not deploys:
         name = config.profile.name

@@ -79,6 +79,12 @@ def test_a_parachute_that_is_armed_on_the_ground_colours_every_state():
         assert "tone-live" in sections.banner(heard.hears(stamped(parachute())).view())
 
 
+def test_a_mode_that_sends_nothing_takes_the_calm_colour_away():
+    told = {"state": SafetyState.READY, "state_text": "READY"}
+    assert "tone-good" in sections.banner(shown(**told))
+    assert "tone-warn" in sections.banner(shown(mode=SafetyState.SHADOW, **told))
+
+
 def test_a_fault_is_a_sentence_with_its_detail_below_it():
     told = {"state": SafetyState.FAULT, "alarms": ["no parachute confirmed within 3 s: denied"]}
     part = sections.banner(shown(state_text="FAULT: nothing came out, ordered by Anna", **told))

@@ -195,4 +195,4 @@ def test_a_fault_is_one_sentence_and_its_detail_is_an_alarm_once() -> None:
 def test_a_mode_in_which_nobody_is_protected_comes_first(mode: i.Mode) -> None:
     story = Story(shipped("multirotor"), mode).flying().fly(1.0)
     assert text(story).startswith(f"{mode.name}: ")
-    assert text(story).endswith("; IN_FLIGHT")
+    assert text(story).endswith("; IN_FLIGHT: this supervisor guards no vehicle in this mode")

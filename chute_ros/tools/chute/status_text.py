@@ -47,7 +47,8 @@ def headline(picture: VehiclePicture) -> Line:
         text = f"NOT KNOWN NOW (was {picture.state}, last word {span_text(picture.age)} ago)"
         return Line(text, "quiet")
     armed = any(one.armed and not is_old(one.age) for one in picture.parachutes)
-    tone = state_tone(picture.state, picture.unguarded, bool(picture.alarms), armed)
+    warns = bool(picture.alarms) or picture.mode != Mode.ACTIVE.name
+    tone = state_tone(picture.state, picture.unguarded, warns, armed)
     return Line(state_words(picture.state, picture.unguarded), tone)
 
 
@@ -56,15 +57,16 @@ def state_words(state: str, unguarded: bool) -> str:
     return f"{state}, {UNGUARDED}" if unguarded else state
 
 
-def state_tone(state: str, unguarded: bool, alarms: bool, armed: bool) -> str:
+def state_tone(state: str, unguarded: bool, warns: bool, armed: bool) -> str:
     """No state is shown as if all were well while something warns, nor as if nothing could fire
-    while a parachute is armed beside people. armed: any is."""
+    while a parachute is armed beside people. warns: an alarm, or a mode that sends nothing; armed:
+    any parachute is."""
     tone = STAGE_TONE.get(state, "quiet")
     if unguarded:
         return "bad"
     if armed and state in _ON_GROUND:
         return "live"
-    return "warn" if alarms and tone in ("good", "plain", "quiet") else tone
+    return "warn" if warns and tone in ("good", "plain", "quiet") else tone
 
 
 def status_lines(picture: VehiclePicture) -> list[Line]:

@@ -70,8 +70,8 @@ def _card(namespace: str, summary: Any, age: float) -> str:
         state, unguarded = summary.state_name, is_unguarded(summary.text)
         words = state_words(state, unguarded).replace("_", " ")
         word = "NOT KNOWN NOW" if old else words
-        alarms, armed = bool(summary.alarms), bool(summary.armed)
-        tone = "quiet" if old else state_tone(state, unguarded, alarms, armed)
+        warns = bool(summary.alarms) or summary.mode != Mode.ACTIVE
+        tone = "quiet" if old else state_tone(state, unguarded, warns, bool(summary.armed))
         lines = list(_lines(summary, age))
     told = "".join(f"<div>{escape(line)}</div>" for line in lines)
     return (
