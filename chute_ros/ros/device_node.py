@@ -157,7 +157,7 @@ class DeviceNode(SuiteNode, ABC):
         self._followers[kind] = follower
 
     def receipt(self, received: float, stamp: Time) -> Time:
-        """When data was received (monotonic s), by the wall clock; NaN, never: 0. stamp: of now."""
+        """When data was received (monotonic s), by the wall clock; NaN, never: 0. stamp: now."""
         if math.isnan(received):
             return Time()
         return messages.before(stamp, time.monotonic() - received)

@@ -89,6 +89,7 @@ def test_a_vehicle_that_may_not_fly_tells_why(heard):
     heard.hears(stamped(blocked)).hears(
         stamped(heartbeat(age=math.nan, reasons=["voltage 2 (above 3)"]))
     )
+    told = "device NOT healthy, device never received, node never received"
     assert heard.text() == [
         "BLOCKED",
         "  vehicle            /drone1, supervisor safety_supervisor, <1 s ago",
@@ -99,8 +100,7 @@ def test_a_vehicle_that_may_not_fly_tells_why(heard):
         "                     blocked by device upf_can 33",
         "  ALARM              the canopy was packed in 1999",
         "links",
-        "  mavlink_parachute  NEVER_SEEN, device NOT healthy, device never received, node never "
-        "received: voltage 2 (above 3)",
+        f"  mavlink_parachute  NEVER_SEEN, {told}: voltage 2 (above 3)",
         "parachutes",
         "  not received here within 0 s",
         "vehicle",

@@ -1,5 +1,5 @@
-"""Whether an order can reach a parachute, as far as a listener can tell: a person who releases must
-know before that only the motors will stop."""
+"""Whether an order can reach a parachute, as far as a listener can tell: a person who releases
+must know before that only the motors will stop."""
 
 from __future__ import annotations
 
