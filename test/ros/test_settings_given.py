@@ -306,23 +306,21 @@ def test_the_argument_of_a_link_that_is_not_started_is_told_with_the_fix(
     assert capsys.readouterr().err == f"{told}{node}: it is not used\n"
 
 
-HAS_LAUNCH = importlib.util.find_spec("launch.actions") is not None
+if importlib.util.find_spec("launch.actions"):  # where ROS is installed; there is no wheel of it
 
-
-@pytest.mark.skipif(not HAS_LAUNCH, reason="`launch` is no wheel")
-@pytest.mark.parametrize("argument", ["ns:=drone1", "bus:=socketcan:can0"])
-def test_the_real_launch_ends_with_the_line(argument: str) -> None:
-    """As `ros2 launch` does it, with what is only where ROS is installed."""
-    done = subprocess.run(
-        [sys.executable, "-c", AS_ROS2_LAUNCH, str(LAUNCH / VEHICLE), argument],
-        capture_output=True,
-        text=True,
-        timeout=30.0,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert f"{VEHICLE}: " in done.stderr
-    assert "process started" not in done.stderr
+    @pytest.mark.parametrize("argument", ["ns:=drone1", "bus:=socketcan:can0"])
+    def test_the_real_launch_ends_with_the_line(argument: str) -> None:
+        """As `ros2 launch` does it."""
+        done = subprocess.run(
+            [sys.executable, "-c", AS_ROS2_LAUNCH, str(LAUNCH / VEHICLE), argument],
+            capture_output=True,
+            text=True,
+            timeout=30.0,
+            check=False,
+        )
+        assert done.returncode == 2
+        assert f"{VEHICLE}: " in done.stderr
+        assert "process started" not in done.stderr
 
 
 @pytest.mark.parametrize("port", ["abc", "", "0", "65534", "-1", "1.5"])
