@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import signal
+import subprocess
 
 import pytest
 from panel_bench import PATIENCE, PHONE, fits, hold, log_in, password_file, picture, word
@@ -143,3 +144,30 @@ def test_it_is_said_in_which_state_it_is(fly, namespace, start_panel, open_page)
     page = open_vehicle(fly, panel, open_page, f"{namespace}/drone1")
     word(page, "FAULT")
     assert page.locator(".part-banner").get_attribute("role") == "status"
+
+
+def test_over_https_a_person_logs_in_and_orders(fly, namespace, start_panel, open_page, tmp_path):
+    """Given a certificate of one's own, as for a laptop in the field."""
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    subprocess.run(
+        [
+            *("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1"),
+            *("-subj", "/CN=127.0.0.1", "-keyout", str(key), "-out", str(certificate)),
+        ],
+        check=True,
+        capture_output=True,
+    )
+    vehicles = fly({"drone1": Stage.LANDED})
+    files = {"certificate_file": certificate, "key_file": key}
+    given = {"allow_commands": "true", "password_file": password_file(tmp_path)}
+    panel = start_panel(**files, **given)
+    address = panel.address.replace("http:", "https:")
+    assert f"panel at {address}" in panel.log()
+    page = open_page(f"{address}/vehicle{namespace}/drone1", ignore_https_errors=True)
+    until(fly, page.locator(".part-banner .word").count, page)
+    log_in(page)
+    page.get_by_text("more orders").click()
+    hold(page, "Reset")
+    until(fly, lambda: vehicles.resets, page)
+    (session,) = [one for one in page.context.cookies() if "chute_panel" in one["name"]]
+    assert session["secure"]
