@@ -64,16 +64,21 @@ def _nodes(context: LaunchContext) -> list:
                 **LIVES_ON,
             )
         )
-    supervisor = Node(
-        package="chute_ros",
-        executable="safety_supervisor",
-        namespace=namespace,
-        parameters=[config],
-        ros_arguments=["--enclave", f"{place}/safety_supervisor"] if secured else [],
-        output="screen",
-        **LIVES_ON,
-    )
-    return [*nodes, supervisor]
+    action = LaunchConfiguration("deploy_action").perform(context) == "true"
+    # It has no parameters, and so no section in the file.
+    for name, own_config in ((SUPERVISOR, [config]), *([("deploy_action", [])] if action else [])):
+        nodes.append(
+            Node(
+                package="chute_ros",
+                executable=name,
+                namespace=namespace,
+                parameters=own_config,
+                ros_arguments=["--enclave", f"{place}/{name}"] if secured else [],
+                output="screen",
+                **LIVES_ON,
+            )
+        )
+    return nodes
 
 
 def _range() -> str:
@@ -120,6 +125,12 @@ def _arguments() -> list:
                 description=f"{kind.argument.description}; empty: from the parameter file",
             )
             for kind in links().values()
+        ),
+        DeclareLaunchArgument(
+            "deploy_action",
+            default_value="false",
+            choices=["true", "false"],
+            description="the action safety/deploy_action as well; docs/reference/interfaces.md",
         ),
         DeclareLaunchArgument(
             "enclaves",

@@ -234,6 +234,20 @@ def test_each_node_of_a_vehicle_gets_its_own_enclave_if_asked_to(namespace, plac
             assert node["ros_arguments"] == (own if enclaves == "true" else [])
 
 
+def test_the_action_is_started_beside_the_supervisor_if_asked_for(monkeypatch):
+    """It takes no file: it has no parameters."""
+    (vehicle,) = [file for file in FILES if file.name.startswith("vehicle")]
+    for asked, more in (("true", ["deploy_action"]), ("false", []), ("", [])):
+        given = {"parachute": "mavlink", "namespace": "drone1", "deploy_action": asked}
+        made = made_by(vehicle, monkeypatch, **given)
+        nodes = {
+            one.options["executable"]: one.options for one in made if "executable" in one.options
+        }
+        assert list(nodes) == ["mavlink_parachute", "safety_supervisor", *more]
+        for name in more:
+            assert (nodes[name]["namespace"], nodes[name]["parameters"]) == ("drone1", [])
+
+
 @EVERY
 def test_it_makes_a_description(file):
     """Really, where `launch` is there; elsewhere at least as Python with that one function."""
