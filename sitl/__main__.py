@@ -1,6 +1,6 @@
 """make sitl: flies real autopilots in their simulators, writes docs/evidence/real_autopilots.md.
 
-python3 -m sitl [--stories NAME ...] [--runs N] [--list] AUTOPILOT ...
+python3 -m sitl AUTOPILOT ... [--stories NAME ...] [--runs N] [--list]
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from sitl.autopilots import ARDUCOPTER, ARDUPLANE, PX4
 from sitl.flight import Flight
 from sitl.judge import Want
 from sitl.stories import Story
+from sitl.truth import GROUND
 from sitl.vehicle import Setup
 
 _ARDUPILOT = (ARDUCOPTER, ARDUPLANE)
@@ -127,8 +128,6 @@ def _wings(flight: Flight) -> None:
 #: Parameters that spoil a sensor (those that this version has), and for how long; each is healed
 #: before the next.
 _SENSORS: tuple[tuple[str, dict[str, float], float], ...] = (
-    ("no GPS", {"SIM_GPS1_ENABLE": 0, "SIM_GPS_DISABLE": 1}, 8.0),
-    ("GPS 40 m off", {"SIM_GPS1_GLTCH_X": 0.00036, "SIM_GPS_GLITCH_X": 0.00036}, 8.0),
     ("barometer 20 m off", {"SIM_BARO_GLITCH": 20}, 6.0),
     ("barometer drifts 2 m/s", {"SIM_BARO_DRIFT": 2}, 8.0),
     ("no barometer", {"SIM_BARO_DISABLE": 1}, 6.0),
@@ -138,6 +137,9 @@ _SENSORS: tuple[tuple[str, dict[str, float], float], ...] = (
     ("gyroscope 1 stands still", {"SIM_GYR_FAIL_MSK": 1}, 6.0),
     ("vibration", {"SIM_VIB_MOT_MAX": 40, "SIM_ACC1_RND": 20, "SIM_ACC2_RND": 20}, 8.0),
     ("wind 12 m/s with turbulence", {"SIM_WIND_SPD": 12, "SIM_WIND_TURB": 4}, 10.0),
+    # The last: without a place it lands by itself.
+    ("no GPS", {"SIM_GPS1_ENABLE": 0, "SIM_GPS_DISABLE": 1}, 8.0),
+    ("GPS 40 m off", {"SIM_GPS1_GLTCH_X": 0.00036, "SIM_GPS_GLITCH_X": 0.00036}, 8.0),
 )
 #: Its units of MAV_CMD_INJECT_FAILURE.
 _PX4_SENSORS = (
@@ -150,10 +152,10 @@ _PX4_SENSORS = (
 def _sensors(flight: Flight) -> None:
     vehicle = flight.vehicle
     flight.go_up(40.0)
-    flight.change_mode({ARDUCOPTER: "LOITER", ARDUPLANE: "QLOITER", PX4: "HOLD"}[flight.kind])
     flight.pilot.sticks(0.0, 0.0, 0.0, 0.0)
     if flight.kind == PX4:
         for what, unit, seconds in _PX4_SENSORS:
+            _hold(flight)
             vehicle.bench.command(420, unit, dialect.FAILURE_TYPE_OFF)
             _see(flight, what, seconds)
             vehicle.bench.command(420, unit, dialect.FAILURE_TYPE_OK)
@@ -164,6 +166,7 @@ def _sensors(flight: Flight) -> None:
             before = {name: value for name, value in known.items() if not math.isnan(value)}
             if not before:
                 flight.verdict.happened.append(f"not to be had: {what}")
+            _hold(flight)
             for name in before:
                 flight.pilot.set(name, values[name])
             _see(flight, what, seconds)
@@ -173,9 +176,16 @@ def _sensors(flight: Flight) -> None:
     flight.expect(Want.BY_TRUTH, flight.began)
 
 
+def _hold(flight: Flight) -> None:
+    """Where it is; after a fault it may be on its way down by itself."""
+    flight.change_mode({ARDUCOPTER: "LOITER", ARDUPLANE: "QLOITER", PX4: "HOLD"}[flight.kind])
+
+
 def _see(flight: Flight, what: str, seconds: float) -> None:
-    """Fly on with it; a release is named after what led to it."""
+    """Fly on with it; a release is named after what led to it. On the ground it shows nothing."""
     before = flight.released()
+    if not before and flight.vehicle.height() < GROUND:
+        flight.verdict.wrong.append(f"error: on the ground before: {what}")
     flight.vehicle.rest(seconds)
     if flight.released() and not before:
         flight.verdict.happened.append(f"released in: {what}")

@@ -125,7 +125,7 @@ class SupervisorHost:
                 message.supervisor,
                 message.stamps,
                 state.alarming.alarms,
-                state.stage is Stage.DEPLOYED,
+                released=state.stage is Stage.DEPLOYED,
             )
         elif isinstance(message, Decision):
             number = (message.epoch, message.id)

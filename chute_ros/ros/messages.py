@@ -132,6 +132,7 @@ def safety_picture(message: SafetyState) -> SafetyPicture:
         message.supervisor,
         dict(zip(message.links, stamps, strict=False)),
         tuple(message.alarms),
+        tuple(message.block_reasons),
         message.state == SafetyState.DEPLOYED,
     )
 

@@ -91,6 +91,8 @@ class SafetyPicture:
     supervisor: str
     stamps: Mapping[str, int]
     alarms: tuple[str, ...] = ()
+    #: Why flight is blocked, as far as it is.
+    block_reasons: tuple[str, ...] = ()
     #: A parachute is out, by whomever.
     released: bool = False
 

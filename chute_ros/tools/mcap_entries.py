@@ -66,9 +66,6 @@ class McapEntries:
 
     def __iter__(self) -> Iterator[Entry]:
         """RecordError if there is no such file, or if it is no MCAP from its first byte on."""
-        if self.path.exists() and not self.path.is_file():
-            # A FIFO would be waited for.
-            raise RecordError(f"{self.path}: it is no file")
         try:
             with self.path.open("rb") as file:
                 yield from self._read(file)

@@ -124,8 +124,12 @@ class GroundStation:
     def __init__(self) -> None:
         self.decided: list[float] = []
         self.texts: list[str] = []
+        self.reasons: list[str] = []
         self.deploy_decided = self.decided.append
         self.announce = self.texts.append
+
+    def flight_block(self, reason: str, now: float) -> None:
+        self.reasons.append(reason)
 
 
 def autopilots_node(shell: Shell) -> MavlinkRuntime:
@@ -155,3 +159,20 @@ def test_the_pilot_reads_each_alarm_of_the_supervisor_once(shell: Shell) -> None
     for alarms in told:
         node.heard_picture(replace(picture, alarms=alarms), 0.01, shell.now)
     assert shell.link.texts == ["a 1.5 s", "b", "b"], "after a reset it is a new one"
+
+
+def test_the_pilot_reads_why_flight_is_blocked_now(shell: Shell) -> None:
+    """Given a block of the first second, when nothing was heard yet, and what is wrong later."""
+    node = autopilots_node(shell)
+    block = replace(decision(1, Action.FLIGHT_BLOCK), targets=("mavlink_parachute",))
+    block = replace(block, reasons=("nothing received",))
+    node.heard_decisions([(block, 0.01)], shell.now)
+    picture = SafetyPicture(True, (), "safety_supervisor", {})
+    low = ("1/161 LOW_POWER 13.1 V",), ("1/161 LOW_POWER 13.0 V",)
+    for reasons in (("nothing received",), *low, low[0], ()):
+        node.heard_picture(replace(picture, block_reasons=reasons), 0.01, shell.now)
+    assert shell.link.reasons == ["nothing received", "1/161 LOW_POWER 13.1 V"]
+    release = replace(block, id=2, action=Action.FLIGHT_BLOCK_RELEASE)
+    node.heard_decisions([(release, 0.01)], shell.now)
+    node.heard_picture(replace(picture, block_reasons=low[0]), 0.01, shell.now)
+    assert shell.link.reasons[2:] == [""]

@@ -1,6 +1,5 @@
 """What was recorded is read back, whatever became of the file."""
 
-import os
 import random
 import struct
 import zlib
@@ -245,9 +244,3 @@ def test_a_wall_clock_that_is_set_moves_nothing(step):
 def test_after_another_start_the_wall_clock_tells_how_long_it_was_away():
     recording = Recording([turn(0, 100.0, 5.0), turn(1, 101.0, 6.0), turn(0, 161.0, 2.0)])
     assert [recording.seconds(one.wall) for one in recording.turns] == [0.0, 1.0, 61.0]
-
-
-def test_a_fifo_is_not_waited_for(tmp_path):
-    os.mkfifo(tmp_path / "pipe.mcap")
-    with pytest.raises(RecordError, match="it is no file"):
-        list(McapEntries(tmp_path / "pipe.mcap"))

@@ -54,6 +54,8 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
     #: Of the newest deploy that is another node's: its number, and who releases, until it is out.
     _deploy_number = (0, 0)
     _releases = ""
+    #: Why flight is blocked by now; empty: it is not, or nobody has said so yet.
+    _reason = ""
     #: Those of the supervisor that were announced.
     _alarms: tuple[str, ...] = ()
 
@@ -107,9 +109,17 @@ class MavlinkRuntime(DeviceRuntime[MavlinkSettings]):
         for text in one.alarms:
             if kind(text) not in known:
                 self._announce(text)
+        self._keep_reason(one)
         if self._releases and one.released:
             self._announce(f"DEPLOY by {self._releases} confirmed")
             self._releases = ""
+
+    def _keep_reason(self, one: SafetyPicture) -> None:
+        """A block lasts longer than the reason of its first moment: the pilot reads today's."""
+        reason = "; ".join(one.block_reasons) if self.decided_block else ""
+        if reason and kind(reason) != kind(self._reason or self.decided_block):
+            self.shell.in_link(lambda link, now: link.flight_block(reason, now))
+        self._reason = reason
 
     def _announce(self, text: str) -> None:
         """To the ground station, whose only way is this link."""
