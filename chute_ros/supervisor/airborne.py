@@ -7,7 +7,6 @@ from types import MappingProxyType
 
 from chute_ros.supervisor import flight, readings
 from chute_ros.supervisor import inputs as i
-from chute_ros.supervisor.contradictions import felt_fall
 from chute_ros.supervisor.machine import ON_GROUND, Event, Stage, listed
 from chute_ros.supervisor.orders import armed_since, note_released
 from chute_ros.supervisor.quick_replace import replace
@@ -16,8 +15,6 @@ from chute_ros.supervisor.turn import Turn
 
 #: Off the ground for so long it was seen to be up, on it to be down, s; no look counts for more.
 _UP_TAKES, _DOWN_TAKES, _LONGEST_LOOK = 0.5, 1.0, 0.2
-#: A fall that was felt gave it so much, m/s: 0.6 s of free fall.
-_FELL = 6.0
 
 
 def check_vehicle(turn: Turn) -> None:
@@ -110,19 +107,16 @@ def note_height(turn: Turn) -> None:
     told = height if math.isnan(by_pressure) else by_pressure
     # Far below the take-off nobody knows the height above the ground.
     high = told >= minimum or (told <= -minimum and up_for >= _UP_TAKES)
-    # What stands feels no fall: two origins against a barometer that was clogged before.
-    felt = height >= minimum and felt_fall(state.heard.motion) <= -_FELL
     if math.isnan(told):
         # One that tells what cannot be is no silence: it may run away on the ground.
         wrong = now < state.measured("height").doubted_at + flight.HIGH_AFTER
         high = not wrong and now >= state.flight.airborne_since + flight.HIGH_AFTER
-    high |= felt
     since = state.heard.at_ground_since
     if not flight.at_ground(turn.config, state, by_pressure, now):
         since = math.nan
     elif math.isnan(since):
         since = now
-    down = now >= since + _DOWN_TAKES and not felt
+    down = now >= since + _DOWN_TAKES
     was_high, up_for = (state.flight.was_high or high) and not down, 0.0 if down else up_for
     if (was_high, up_for) != (state.flight.was_high, state.flight.up_for):
         turn.flight = replace(turn.flight, was_high=was_high, up_for=min(up_for, _UP_TAKES))
