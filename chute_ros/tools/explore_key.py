@@ -51,6 +51,7 @@ LEFT_OUT = frozenset(
         "vehicle_rests_until",  # told by the measurements
         "killed_at",  # as the next, told by the height that is left since
         "killed_height",
+        "deploy_height",  # for people alone
         "home",  # from it only the fence is measured, whose rule raises an alarm
         "reasons",
         "behind",  # every node here keeps up

@@ -15,12 +15,14 @@ SPEED = 10.0
 
 @dataclass(frozen=True)
 class RocketRig:
-    """One rocket with its nodes. fault: one of FAULTS, or empty; folder: where the port is."""
+    """One rocket with its nodes. fault: one of FAULTS, or empty; folder: where the port is;
+    profile: of its supervisor."""
 
     fault: str
     namespace: str
     processes: Processes
     folder: Path
+    profile: str = "rocket"
 
     def start_ground(self) -> None:
         """The nodes: everything but the rocket."""
@@ -30,7 +32,7 @@ class RocketRig:
             required_links=links,
             kill_links=links,
             deploy_links=links,
-            profile="rocket",
+            profile=self.profile,
         )
         start("supervisor", "chute_ros.ros.safety_supervisor", *supervisor)
         umbilical = ros_arguments(

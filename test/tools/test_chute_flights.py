@@ -221,7 +221,8 @@ def command(namespace):
 
 def test_a_rocket_whose_drogue_a_person_releases(namespace, terminal, command, tmp_path):
     processes = Processes(tmp_path)
-    rocket = RocketRig("", namespace, processes, tmp_path)
+    # Nobody else releases: a rule would on a machine that is busy, before the person has.
+    rocket = RocketRig("", namespace, processes, tmp_path, profile="by_hand")
     try:
         rocket.start_ground()
         rocket.plug_cable_in()

@@ -83,7 +83,8 @@ def test_its_summary_has_the_kill_before_the_release(runs):
     }
     kill, release = times["kill on the wire"], times["release on the wire"]
     assert 0.0 < kill <= times["deploy decided"] <= release
-    assert release <= times["parachute's own status: deployed"]
+    # Each is stamped in its own process, as it is read there.
+    assert release <= times["parachute's own status: deployed"] + 0.05
     assert times["release acknowledged"] < 10.0
 
 

@@ -13,6 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from log_bench import FAILS, FAILS_AT, FORMATS, LANDS, Told, flown
+from rosbags.rosbag2 import Writer
+from rosbags.typesys import Stores, get_typestore
 
 from chute_ros.model import Action
 from chute_ros.tools.judge_log import command, formats, table
@@ -199,6 +201,15 @@ def test_a_heading_that_was_given_and_is_not_there_is_not_replaced_by_another(tm
     path.write_text(rocket(25.0, "time", "height", 1.0))
     with pytest.raises(LogError, match=r"\(given: 'Height AGL' \(for height\)\); its first line"):
         formats.read(path, dict([table.column("height=Height AGL")]))
+
+
+def test_a_recording_of_something_else_is_refused_with_what_it_lacks(tmp_path):
+    store, kind = get_typestore(Stores.ROS2_JAZZY), "std_msgs/msg/Float64"
+    with Writer(tmp_path / "other", version=9) as writer:
+        topic = writer.add_connection("/temperature", kind, typestore=store)
+        writer.write(topic, 10**9, store.serialize_cdr(store.types[kind](21.0), kind))
+    with pytest.raises(LogError, match="no topic tells a height"):
+        formats.read(tmp_path / "other", {})
 
 
 def test_a_fifo_is_not_waited_for(tmp_path):

@@ -198,7 +198,9 @@ def test_the_tutorial_is_flown_by_services_alone_as_it_is_told(start, bench):  #
     assert "\nreport FOLDER " in TUTORIAL
     report = [sys.executable, "-m", "chute_ros.tools.report", box]
     done = subprocess.run(report, capture_output=True, text=True, timeout=120.0, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0, done.stderr
+    # A machine that is busy takes so long that its progress is told.
+    assert all(line.startswith("replaying: ") for line in done.stderr.splitlines())
     page = Path(done.stdout.strip()).read_text()
     assert "DEPLOY" in page
     assert "free fall" in page

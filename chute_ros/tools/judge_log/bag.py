@@ -59,7 +59,8 @@ def read(path: Path) -> FlightLog:
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
             chosen = [one for one in reader.connections if _end_of(one.topic)]
-            for connection, time, raw in reader.messages(connections=chosen):
+            # Of none of them it would give all.
+            for connection, time, raw in reader.messages(connections=chosen) if chosen else ():
                 try:
                     message = reader.deserialize(raw, connection.msgtype)
                 except (KeyError, TypesysError):
