@@ -242,13 +242,14 @@ class State:
             for device in self.evidence(link).deployed
         )
 
-    def armed(self, config: SupervisorConfig) -> list[tuple[str, str]]:
-        """(link, device) of every parachute that is received and says that it is armed."""
+    def armed(self, config: SupervisorConfig, received: bool = True) -> list[tuple[str, str]]:
+        """(link, device) of every parachute that is received and says that it is armed; not
+        received: that said so last, and is silent."""
         return [
             (link, device)
             for link in config.deploy_links
             for device, status in sorted(self.evidence(link).devices.items())
-            if status.armed and status.link_state is LinkState.OK
+            if status.armed and (status.link_state is LinkState.OK) is received
         ]
 
     def newly_released(self, config: SupervisorConfig, now: float) -> frozenset[tuple[str, str]]:

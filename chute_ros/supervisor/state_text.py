@@ -43,9 +43,11 @@ def state_text(
 ) -> str:
     """The state with its reason in a sentence. reasons: against a take-off (block_reasons)."""
     text = _stage_text(config, state, reasons, now)
-    armed = ", ".join(map(" ".join, state.armed(config)))
-    if armed and state.stage in ON_GROUND and state.stage is not Stage.ARMED:
-        text += f"; ARMED all the same: {armed} (safety/arm disarms)"
+    if state.stage in ON_GROUND and state.stage is not Stage.ARMED:
+        if armed := ", ".join(map(" ".join, state.armed(config))):
+            text += f"; ARMED all the same: {armed} (safety/arm disarms)"
+        if armed := ", ".join(map(" ".join, state.armed(config, received=False))):
+            text += f"; ARMED when it was last received: {armed}"
     return f"{MODES[state.mode]}; {text}" if state.mode in MODES else text
 
 

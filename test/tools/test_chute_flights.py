@@ -202,6 +202,25 @@ def test_without_a_parachute_in_reach_the_motors_stop_and_that_was_said(rig, ter
     terminal.sees(of_vehicle("armed", "DISARMED"), "the motors are off")
 
 
+def test_an_armed_parachute_is_told_in_every_state_on_the_ground(rig, terminal, await_until):
+    """Given one that is armed, when its cable is out for a while: it never is READY."""
+    terminal.sees_state("READY")
+    # It must have heard that it stands on the ground, or it is refused.
+    await_until(lambda: terminal.chute("arm")[0] == 0, "it arms", PATIENCE)
+    terminal.sees_state("ARMED")
+    begun = len(terminal.told)
+    rig.processes.send_signal("parachute", signal.SIGSTOP)
+    terminal.sees_state("BLOCKED")
+    code, out, _ = terminal.chute("status")
+    assert code == 1
+    assert "ARMED when it was last received: mavlink_parachute 1/161" in " ".join(out.split())
+    rig.processes.send_signal("parachute", signal.SIGCONT)
+    terminal.sees_state("ARMED")
+    assert "READY" not in {one["state"] for one in terminal.told[begun:]}
+    terminal.orders("disarm")
+    terminal.sees_state("READY")
+
+
 @pytest.mark.parametrize("rig", ["both"], indirect=True)
 def test_a_drone_with_both_parachutes(rig, terminal, pilot):
     terminal.sees_state("READY")
