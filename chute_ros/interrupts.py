@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -25,10 +26,14 @@ def at_ctrl_c(end: Callable[..., Any] | signal.Handlers) -> Iterator[None]:
 
 
 class CtrlC:
-    """A handler of SIGINT that raises KeyboardInterrupt, as Python's own does, but may be held."""
+    """A handler of SIGINT that raises KeyboardInterrupt, as Python's own does, but may be held.
 
-    def __init__(self) -> None:
-        self._held = False
+    last_resort: called so many seconds later, in a thread of its own, where that was swallowed on
+    its way or the end itself hangs.
+    """
+
+    def __init__(self, last_resort: tuple[float, Callable[[], Any]] | None = None) -> None:
+        self._held, self._last_resort = False, last_resort
         #: Somebody pressed it.
         self.came = False
 
@@ -39,6 +44,10 @@ class CtrlC:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Python calls this, in the main thread."""
+        if self._last_resort is not None and not self.came:
+            timer = threading.Timer(*self._last_resort)
+            timer.daemon = True
+            timer.start()
         self.came = True
         if not self._held:
             raise KeyboardInterrupt

@@ -13,6 +13,8 @@ from chute_ros.interrupts import CtrlC, at_ctrl_c
 #: The exit code of what a Ctrl-C ended, as shells have it.
 INTERRUPTED = 128 + signal.SIGINT
 _STDERR = 2
+#: Tools that leave nothing behind, which therefore may be cut off so long after a Ctrl-C, s.
+_ALONE, _CUT_OFF_AFTER = ("chute",), 5.0
 
 
 def run(name: str, module: str) -> None:
@@ -25,7 +27,7 @@ def run(name: str, module: str) -> None:
     with at_ctrl_c(end):
         # Here: it takes up to a second.
         main = importlib.import_module(f"chute_ros.tools.{module}").main
-    ctrl_c = CtrlC()
+    ctrl_c = CtrlC((_CUT_OFF_AFTER, end) if name in _ALONE else None)
     ctrl_c.install()
     try:
         main()

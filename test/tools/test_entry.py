@@ -106,6 +106,40 @@ def test_in_the_middle_of_a_binding_that_makes_an_error_of_it():
     assert (done.returncode, done.stderr) == (130, "binding: interrupted\n")
 
 
+#: Something on its way swallows it, as a finaliser does.
+SWALLOWED = """
+import signal
+import sys
+import time
+import types
+
+from chute_ros.tools import entry
+
+
+def main():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        pass
+    time.sleep(600)
+
+
+module = types.ModuleType("chute_ros.tools.swallowing")
+module.main = main
+sys.modules[module.__name__] = module
+entry._CUT_OFF_AFTER = 0.2
+entry.run("chute", "swallowing")
+"""
+
+
+def test_one_that_was_swallowed_ends_it_all_the_same():
+    command = [sys.executable, "-c", SWALLOWED]
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=ROOT, check=False, timeout=60.0
+    )
+    assert (done.returncode, done.stderr) == (130, "chute: interrupted\n")
+
+
 def test_an_error_of_another_cause_is_one():
     code = BINDING.format(number="signal.SIGCONT")
     command = [sys.executable, "-c", code]
