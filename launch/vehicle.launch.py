@@ -50,35 +50,27 @@ def _nodes(context: LaunchContext) -> list:
     names = [*(kind.name for kind in kinds), SUPERVISOR]
     checked("vehicle.launch.py", lambda: check_file(Path(config), place, names, connections))
     secured = LaunchConfiguration("enclaves").perform(context) == "true"
-    nodes = []
-    for kind in kinds:
-        wire = connections.get(kind.name)
-        nodes.append(
-            Node(
-                package=kind.package,
-                executable=kind.name,
-                namespace=namespace,
-                parameters=[config, *([{"connection": wire}] if wire else [])],
-                ros_arguments=["--enclave", f"{place}/{kind.name}"] if secured else [],
-                output="screen",
-                **LIVES_ON,
-            )
+    started = [(kind.package, kind.name, [config]) for kind in kinds]
+    started.append(("chute_ros", SUPERVISOR, [config]))
+    if LaunchConfiguration("deploy_action").perform(context) == "true":
+        # It has no parameters, and so no section in the file.
+        started.append(("chute_ros", "deploy_action", []))
+    return [
+        Node(
+            package=package,
+            executable=name,
+            namespace=namespace,
+            parameters=[*own_config, *_connection(connections.get(name))],
+            ros_arguments=["--enclave", f"{place}/{name}"] if secured else [],
+            output="screen",
+            **LIVES_ON,
         )
-    action = LaunchConfiguration("deploy_action").perform(context) == "true"
-    # It has no parameters, and so no section in the file.
-    for name, own_config in ((SUPERVISOR, [config]), *([("deploy_action", [])] if action else [])):
-        nodes.append(
-            Node(
-                package="chute_ros",
-                executable=name,
-                namespace=namespace,
-                parameters=own_config,
-                ros_arguments=["--enclave", f"{place}/{name}"] if secured else [],
-                output="screen",
-                **LIVES_ON,
-            )
-        )
-    return nodes
+        for package, name, own_config in started
+    ]
+
+
+def _connection(given: str | None) -> list[dict[str, str]]:
+    return [{"connection": given}] if given else []
 
 
 def _range() -> str:
