@@ -43,8 +43,8 @@ def nanoseconds(stamp: Time) -> int:
 
 
 def before(stamp: Time, age: float) -> Time:
-    """The stamp of age seconds before."""
-    return stamp_of(nanoseconds(stamp) - round(age * 1e9))
+    """The stamp of age seconds before; no stamp is before the clock's zero."""
+    return stamp_of(max(0, nanoseconds(stamp) - round(age * 1e9)))
 
 
 def device_beat(one: DeviceBeat, stamp: Time) -> LinkHeartbeat:

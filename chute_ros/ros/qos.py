@@ -3,31 +3,18 @@
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 
-def reliable(depth: int) -> QoSProfile:
-    """RELIABLE, VOLATILE, this depth."""
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.VOLATILE,
-    )
+def reliable(depth: int, durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
+    """RELIABLE, this depth."""
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE, durability=durability)
 
 
 STATUS = reliable(10)
 #: Volatile: a restarted node must never act on an old decision.
 DECISION = reliable(50)
 
-
-def _latched(depth: int) -> QoSProfile:
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )
-
-
-LATCHED = _latched(1)
+LATCHED = reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 #: Kills and deploys for whoever comes late; no node acts on them.
-HISTORY = _latched(20)
+HISTORY = reliable(20, DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def newest(profile: QoSProfile) -> QoSProfile:

@@ -249,8 +249,7 @@ class SafetySupervisorNode(SuiteNode):
 
     def _publish_past(self, past: PastDecision, stamp: Time) -> None:
         """With the stamp of when it was decided."""
-        ago = round(max(0.0, time.monotonic() - past.decided_at) * 1e9)
-        decided = messages.stamp_of(max(0, messages.nanoseconds(stamp) - ago))
+        decided = messages.before(stamp, max(0.0, time.monotonic() - past.decided_at))
         self._history_publisher.publish(messages.decision(past.decision, decided))
 
     def _publish_beat(self, beat: SupervisorBeat, stamp: Time) -> None:
