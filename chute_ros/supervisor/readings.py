@@ -126,10 +126,22 @@ def _newest_word(config: SupervisorConfig, state: State, now: float) -> float:
     return newest if now - newest <= believed else now
 
 
-def rate_count(config: SupervisorConfig, state: State, now: float) -> int:
-    """Samples that have come so far of what tells CLIMB_RATE."""
-    by_pressure = not math.isnan(pressure_rate(config, state, now))
-    return state.measured(PRESSURE_ALTITUDE if by_pressure else HEIGHT).count
+def samples(config: SupervisorConfig, state: State, name: str, value: float, now: float) -> int:
+    """How many have come so far of what tells a measurement that can be used. value: what was read
+    of it, which may be what the heights tell in its place."""
+    speed = state.measured(VERTICAL_SPEED)
+    if name == FELT_FALL:
+        told = ACCELERATION
+    elif name == VERTICAL_ACCELERATION and not speed.unusable(
+        config.profile.limits[VERTICAL_SPEED], now
+    ):
+        told = VERTICAL_SPEED
+    elif name == CLIMB_RATE or value != state.measured(name).value:
+        by_pressure = not math.isnan(pressure_rate(config, state, now))
+        told = PRESSURE_ALTITUDE if by_pressure else HEIGHT
+    else:
+        told = name
+    return state.measured(told).count
 
 
 def _estimated_rate(config: SupervisorConfig, state: State, now: float) -> tuple[float, str]:

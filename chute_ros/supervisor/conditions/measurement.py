@@ -16,7 +16,6 @@ from chute_ros.supervisor.measurements import (
     ACCELERATION,
     CLIMB_RATE,
     DERIVED,
-    FELT_FALL,
     STANDARD_LIMITS,
     TILT,
     VERTICAL_ACCELERATION,
@@ -173,7 +172,6 @@ class MeasurementCondition(Condition):
     def find(self, config: SupervisorConfig, state: State, now: float) -> Finding:
         """What is measured, unless others deny it, against the limits."""
         name, known = self.measurement, state.measured(self.measurement)
-        samples = known.count
         value, why = readings.reading(config, state, name, now)
         if why:
 
@@ -183,17 +181,9 @@ class MeasurementCondition(Condition):
 
             if self.if_unknown:
                 return Finding(True, tell, presumed=True)
-            return Finding(None, tell, samples)
+            return Finding(None, tell, known.count)
         doubt = readings.doubt(state, name, value, now)
-        speed = state.measured(VERTICAL_SPEED)
-        if name == FELT_FALL:
-            samples = state.measured(ACCELERATION).count
-        elif name == VERTICAL_ACCELERATION and not speed.unusable(
-            config.profile.limits[VERTICAL_SPEED], now
-        ):
-            samples = speed.count
-        elif name == CLIMB_RATE or value != known.value:
-            samples = readings.rate_count(config, state, now)  # told by heights instead
+        samples = readings.samples(config, state, name, value, now)
         holds = self.holds_at(value)
         denied = self._denied(config, state, now) if holds else ""
         if holds and self.unless_dived:
