@@ -122,6 +122,10 @@ class Action(enum.IntEnum):
     DEPLOY = 4
 
 
+#: Those that end a flight.
+FIRES = (Action.KILL, Action.DEPLOY)
+
+
 class Outcome(enum.IntEnum):
     """How far a device node got with a decision (chute_msgs/ActionReport)."""
 

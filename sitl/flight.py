@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from chute_ros.model import Action
+from chute_ros.model import FIRES, Action
 from chute_ros.protocol.mavlink.dialect import dialect
 from chute_ros.supervisor.machine import Stage
 from sitl.autopilots import ARDUPLANE, PX4
@@ -206,7 +206,7 @@ class Flight:
         """The rules that killed and deployed."""
         every = self.vehicle.watch.decisions.values()
         rules = {one.rule: None for at, one in every
-                 if at >= self.began and one.action in (Action.KILL, Action.DEPLOY)}  # fmt: skip
+                 if at >= self.began and one.action in FIRES}  # fmt: skip
         return [f"by {', '.join(rules)}"] if rules else []
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from chute_ros.campaign.blind import Need, Seen, blinded, enough_time, misled
 from chute_ros.campaign.flight import Flown
 from chute_ros.campaign.truth import SOFT, SOFT_UNDER_DROGUE
-from chute_ros.model import Action
+from chute_ros.model import FIRES, Action
 from chute_ros.supervisor.gate import OPERATOR
 
 _REFUSED = "the only parachute refused: by the wrong height that it was told, it stood"
@@ -59,7 +59,7 @@ def judge(flown: Flown) -> Judged:
 def _never(flown: Flown) -> Judged | None:
     """What must never happen, whatever reached whom."""
     # Motors that are stopped on the ground hurt nobody.
-    fires = (Action.DEPLOY,) if flown.scenario.stands else (Action.KILL, Action.DEPLOY)
+    fires = (Action.DEPLOY,) if flown.scenario.stands else FIRES
     fired = [one for one in flown.acted if one.decision.action in fires]
     person = flown.scenario.person
     known = min(

@@ -16,7 +16,7 @@ from itertools import count
 from operator import attrgetter
 from typing import Any, Protocol
 
-from chute_ros.model import Action, Decision
+from chute_ros.model import FIRES, Decision
 from chute_ros.protocol.events import Notice, Severity
 from chute_ros.runtime.arming import ArmCaller, DeviceArming
 from chute_ros.runtime.deferred_work import DeferredWork
@@ -38,7 +38,6 @@ from chute_ros.supervisor.state import Own, State
 from chute_ros.supervisor.wakes import next_deadline
 
 HEARTBEAT_INTERVAL = 0.1  # s
-_FIRES = (Action.KILL, Action.DEPLOY)
 STATE_INTERVAL = 1.0  # s, at the latest
 
 
@@ -239,7 +238,7 @@ class SupervisorRuntime:
         for output in decided:
             if not output.again:
                 self._shell.log(Notice(Severity.WARNING, _told(output.decision)))
-                if output.decision.action in _FIRES:
+                if output.decision.action in FIRES:
                     self._shell.publish(PastDecision(output.decision, now))
 
     def _tell_history(self) -> None:

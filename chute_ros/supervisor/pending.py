@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated
 
-from chute_ros.model import Action, Decision, Outcome
+from chute_ros.model import FIRES, Decision, Outcome
 from chute_ros.supervisor.config import SupervisorConfig
 
 #: Monotonic s of this host: another one that it is told has a clock of its own.
@@ -101,7 +101,7 @@ class Pending:
         """When to send it again: ever more rarely, as long as it stays without a report. What
         fires goes from _SOONEST_RESEND to resend_interval, another from there to its rarest."""
         slower = (self.sent_at - self.decided_at) / 4
-        if self.decision.action in (Action.KILL, Action.DEPLOY):
+        if self.decision.action in FIRES:
             return self.sent_at + min(max(_SOONEST_RESEND, slower), config.resend_interval)
         return self.sent_at + max(config.resend_interval, min(slower, _RAREST_RESEND))
 

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from chute_ros.errors import ParameterError, ProfileError
-from chute_ros.model import Action
+from chute_ros.model import FIRES, Action
 from chute_ros.supervisor.conditions import CONDITIONS
 from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.gate import OPERATOR
@@ -165,7 +165,7 @@ def _rule(reader: ProfileLines, name: str, where: Where) -> Rule:
 
 
 def _timing(reader: ProfileLines, what: str, entries: dict[str, Where], rule: Rule) -> Rule:
-    ends_flights = rule.action in (Action.KILL, Action.DEPLOY)
+    ends_flights = rule.action in FIRES
     longest = LONGEST_HOLD if ends_flights else LONGEST_WARNING
     least = LEAST_LEAK if ends_flights else 0.0
     readers: dict[str, Callable[[Where], dict[str, Any]]] = {

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable
 
-from chute_ros.model import Action
+from chute_ros.model import FIRES, Action
 from chute_ros.supervisor import flight
 from chute_ros.supervisor.conditions.measurement import MeasurementCondition
 from chute_ros.supervisor.config import SupervisorConfig
@@ -222,7 +222,7 @@ def _pending(
 ) -> Hashable:
     if pending is None:
         return None
-    blocks = pending.decision.action not in (Action.KILL, Action.DEPLOY)
+    blocks = pending.decision.action not in FIRES
     longest = max(config.kill_timeout, config.deploy_timeout)
     return (
         pending.decision.action,

@@ -8,7 +8,7 @@ import enum
 import typing
 from dataclasses import dataclass, field
 
-from chute_ros.model import Action, Decision, VehicleState
+from chute_ros.model import FIRES, Decision, VehicleState
 from chute_ros.ros.messages import decision_from, nanoseconds
 from chute_ros.supervisor import inputs as i
 from chute_ros.tools.recording import Recording
@@ -86,7 +86,7 @@ class FlightStory:
         """When a kill or a deploy was decided, and when it was reported on, s."""
         moments = []
         for one in self.decisions:
-            if one.decision.action in (Action.KILL, Action.DEPLOY):
+            if one.decision.action in FIRES:
                 moments += [one.at, *(one.at + after for after, _ in one.reports)]
         return moments
 
@@ -101,7 +101,7 @@ class FlightStory:
         """Each report of a link on a kill or a deploy."""
         marks = []
         for number, one in enumerate(self.decisions, 1):
-            if one.decision.action not in (Action.KILL, Action.DEPLOY):
+            if one.decision.action not in FIRES:
                 continue
             for after, report in one.reports:
                 text = f"{report.link}: {one.name} {report.outcome.name}: {report.detail}"

@@ -13,7 +13,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
-from chute_ros.model import Action
+from chute_ros.model import FIRES
 from chute_ros.tools.chute.words import is_old
 
 #: Heartbeats of each sender whose delays are compared: the fastest shows its clock best.
@@ -22,7 +22,6 @@ _COMPARED = 20
 MOST_NAMES = 32
 MOST_DECISIONS = 8
 #: Kills and deploys are remembered apart, so that no flight blocks push them out.
-_FIRES = (Action.KILL, Action.DEPLOY)
 
 
 def stamp_seconds(message: Any) -> float:
@@ -86,7 +85,7 @@ class Picture:
 
     def hear_decision(self, message: Any, now: float, wall: float) -> None:
         """safety/decision."""
-        into = self.fired if message.action in _FIRES else self.blocks
+        into = self.fired if message.action in FIRES else self.blocks
         into.setdefault((message.epoch, message.id), Heard(message, now, wall))
         while len(into) > MOST_DECISIONS:
             del into[min(into)]

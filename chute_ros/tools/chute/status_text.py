@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from chute_ros.model import Action, LinkState
+from chute_ros.model import FIRES, Action, LinkState
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import ON_GROUND
@@ -28,7 +28,7 @@ _OF_ACTION = {action.name: tone for action, tone in ACTION_TONES.items()}
 _NAME, _HALF = 19, 40
 _ON_GROUND = tuple(stage.name for stage in ON_GROUND)
 #: Decisions that stop motors or release a parachute.
-_FIRES = (Action.KILL.name, Action.DEPLOY.name)
+_FIRES = tuple(action.name for action in FIRES)
 
 
 @dataclass(frozen=True)

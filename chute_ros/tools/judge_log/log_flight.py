@@ -20,7 +20,7 @@ from chute_ros.campaign.world import World
 from chute_ros.links.api import AUTOPILOT_LINK
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.links.mavlink.virtual import VirtualMavlink
-from chute_ros.model import Action, Decision, TriggerFlags, VehicleState
+from chute_ros.model import FIRES, Action, Decision, TriggerFlags, VehicleState
 from chute_ros.protocol.vehicle_merge import VEHICLE_STATE
 from chute_ros.ros.supervisor_messages import state_message
 from chute_ros.runtime.topics import SafetyTold
@@ -142,7 +142,7 @@ class _Over:
         if self._looks % 1000 == 0:
             self._progress(now - LEAD)
         self._flown |= self._host.state.flight.airborne
-        acts = (Action.KILL, Action.DEPLOY) if self._flown else (Action.DEPLOY,)
+        acts = FIRES if self._flown else (Action.DEPLOY,)
         first = next((at for at, one in self._host.decided if one.action in acts), math.inf)
         return now > first + _FOLLOWED
 
