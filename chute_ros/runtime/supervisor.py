@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
-from operator import attrgetter
 from typing import Any, Protocol
 
 from chute_ros.model import FIRES, Decision
@@ -117,7 +116,8 @@ class SupervisorRuntime:
         self._beat_at = self._state_at = now
         #: How late the newest heartbeat was, s.
         self.beat_late = 0.0
-        self._published: State | None = None
+        #: What was last published of what a person is told at once.
+        self._told_at_once: tuple[object, ...] = ()
         #: When the core has something to do, and when what is around it has, monotonic s.
         self.core_due = self.due = now
 
@@ -174,7 +174,7 @@ class SupervisorRuntime:
         if now >= self._beat_at:
             self._beat(now)
         self.afterwards.look(now)
-        to_tell = self._changed() or now >= self._state_at
+        to_tell = now >= self._state_at or self._told_at_once != _at_once(self.state)
         if self.lease.leading and to_tell and not self.afterwards.quiet:
             self._publish_state(now)
         self._set_due(now)
@@ -282,25 +282,19 @@ class SupervisorRuntime:
         self._shell.publish(SupervisorBeat(self.lease.config.name, self.lease.leading))
         self.lease.tell(now)
 
-    def _changed(self) -> bool:
-        before, now = self._published, self.state
-        return before is None or _told_at_once(before) != _told_at_once(now)
-
     def _publish_state(self, now: float) -> None:
-        self._published, self._state_at = self.state, now + STATE_INTERVAL
+        self._told_at_once, self._state_at = _at_once(self.state), now + STATE_INTERVAL
         self._shell.keep(self.state)
         self._shell.publish(
             SafetyTold(self.lease.config.name, self.state, dict(self._stamps), now)
         )
 
 
-#: What a person is told at once.
-_AT_ONCE = attrgetter("stage", "mode", "next_id", "alarming.alarms", "device_blocks")
-
-
-def _told_at_once(state: State) -> tuple[object, ...]:
+def _at_once(state: State) -> tuple[object, ...]:
+    """What a person is told at once."""
     acted_on = [name for name, evidence in state.rules.items() if evidence.latched]
-    return (*_AT_ONCE(state), acted_on)
+    alarms = state.alarming.alarms
+    return (state.stage, state.mode, state.next_id, alarms, state.device_blocks, acted_on)
 
 
 def _told(decision: Decision) -> str:
