@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from chute_ros.model import FIRES, Action, LinkState
+from chute_ros.model import FIRES, LinkState
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import ON_GROUND
@@ -83,7 +83,7 @@ def status_lines(picture: VehiclePicture) -> list[Line]:
         *([] if picture.links else [Line("  none required")]),
         Line("parachutes", "head"),
         *(line for one in picture.parachutes for line in _parachute(one)),
-        *([] if picture.parachutes else [Line(f"  {not_here(picture.listened)}", "warn")]),
+        *([] if picture.parachutes else [_no_parachute(picture)]),
         *_vehicle(picture),
         *(decision_lines(fired, "newest kill and deploy") if fired else []),
         *rule_lines(picture.rules),
@@ -106,13 +106,17 @@ def watch_lines(picture: VehiclePicture) -> list[Line]:
         *(_in_short(one) for one in newest_fired(picture.decisions)),
         *(replace(_link(one), rows=1) for one in picture.links),
         *(replace(line, rows=1) for one in picture.parachutes for line in _parachute(one)),
-        *([] if picture.parachutes else [Line("  no parachute was ever received", "warn")]),
+        *([] if picture.parachutes else [_no_parachute(picture, "parachutes: ")]),
         *_vehicle_in_short(picture),
         *_unusable_in_short(picture),
         *rule_lines(picture.rules),
         *([] if on_ground else reasons),
         *decision_lines(picture.decisions, "decisions"),
     ]
+
+
+def _no_parachute(picture: VehiclePicture, what: str = "") -> Line:
+    return Line(f"  {what}{not_here(picture.listened)}", "warn")
 
 
 def newest_fired(decisions: Sequence[DecisionView]) -> list[DecisionView]:
