@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from story import DOWN, Story, falling, pressure_at, shipped
 
 from chute_ros.model import Action, Armed, LandedState, Outcome
+from chute_ros.supervisor import inputs as i
 from chute_ros.supervisor.contradictions import GRAVITY, least_drop
 from chute_ros.supervisor.machine import Stage
 
@@ -383,8 +384,6 @@ def test_one_that_climbs_before_it_says_so_is_believed() -> None:
 
 def test_in_the_air_without_a_height_a_blocked_one_stays_blocked_by_its_barometer() -> None:
     """Given a take-off that is not allowed: IN_AIR comes with the order, and no height at all."""
-    from chute_ros.supervisor import inputs as i
-
     teller, unknown = told_to("multirotor"), {"height": math.nan, "true_height": 0.0}
     teller.stand(2.0, **unknown)
     story = teller.story
@@ -396,8 +395,6 @@ def test_in_the_air_without_a_height_a_blocked_one_stays_blocked_by_its_baromete
 
 def test_in_the_air_for_ever_after_a_crash_a_person_may_reset() -> None:
     """Given a kill in flight; the wreck lies still, and its autopilot says IN_AIR for ever."""
-    from chute_ros.supervisor import inputs as i
-
     teller = told_to("by_hand")
     teller.hover(2.0, 20.0)
     story = teller.story
@@ -430,8 +427,6 @@ def test_an_estimator_that_drifts_after_the_landing_keeps_nobody_in_flight(speed
 
 def test_in_the_air_for_ever_with_its_motors_off_a_person_may_reset_in_flight() -> None:
     """Given a crash that nobody saw: it lies still, and its autopilot says IN_AIR for ever."""
-    from chute_ros.supervisor import inputs as i
-
     teller = told_to("multirotor")
     teller.hover(4.0, 20.0, true_height=20.0)
     lies = {"landed_state": LandedState.IN_AIR, "height": 0.0, "tilt": 20.0, "force": 9.8}

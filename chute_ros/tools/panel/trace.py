@@ -108,7 +108,7 @@ class Trace:
         for start in range(0, len(points), size):
             part = points[start : start + size]
             unknown = [one for one in part if math.isnan(one.height)]
-            known = [one for one in part if one not in unknown] or part
+            known = [one for one in part if not math.isnan(one.height)] or part
             low = min(known, key=lambda one: one.height)
             high = max(known, key=lambda one: one.height)
             kept += sorted({low, high, *unknown[:1]}, key=lambda one: one.at)
