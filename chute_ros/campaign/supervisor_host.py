@@ -124,8 +124,9 @@ class SupervisorHost:
                 tuple(state.device_blocks),
                 message.supervisor,
                 message.stamps,
-                state.alarming.alarms,
-                released=state.stage is Stage.DEPLOYED,
+                message.alarms,
+                message.reasons if state.flight_blocked else (),
+                state.stage is Stage.DEPLOYED,
             )
         elif isinstance(message, Decision):
             number = (message.epoch, message.id)

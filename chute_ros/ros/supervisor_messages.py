@@ -22,18 +22,17 @@ from chute_ros.supervisor.state_text import UNGUARDED, alarms, state_text
 def state_message(config: SupervisorConfig, told: SafetyTold, stamp: Time) -> SafetyState:
     """safety/state."""
     state, now = told.state, told.now
-    reasons = block_reasons(config, state, now)
     blocked = state.flight_blocked
     message = SafetyState(
         supervisor=told.supervisor,
         epoch=state.epoch,
         state=int(state.stage),
-        state_text=state_text(config, state, reasons, now),
+        state_text=state_text(config, state, told.reasons, now),
         mode=int(state.mode),
         flight_blocked=blocked,
-        block_reasons=list(reasons) if blocked else [],
+        block_reasons=list(told.reasons) if blocked else [],
         device_blocks=sorted(state.device_blocks),
-        alarms=list(alarms(config, state, now)),
+        alarms=list(told.alarms),
     )
     message.header.stamp = stamp
     for link in config.links:

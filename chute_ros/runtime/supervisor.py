@@ -25,8 +25,8 @@ from chute_ros.runtime.topics import (
     DeviceBeat,
     LeaseClaim,
     PastDecision,
-    SafetyTold,
     SupervisorBeat,
+    safety_told,
 )
 from chute_ros.supervisor import inputs
 from chute_ros.supervisor.config import SupervisorConfig
@@ -286,7 +286,7 @@ class SupervisorRuntime:
         self._told_at_once, self._state_at = _at_once(self.state), now + STATE_INTERVAL
         self._shell.keep(self.state)
         self._shell.publish(
-            SafetyTold(self.lease.config.name, self.state, dict(self._stamps), now)
+            safety_told(self.config, self.lease.config.name, self.state, dict(self._stamps), now)
         )
 
 

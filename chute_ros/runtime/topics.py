@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 from chute_ros.model import Action, Decision, LinkState
 from chute_ros.protocol.events import Ask
+from chute_ros.supervisor.config import SupervisorConfig
 from chute_ros.supervisor.inputs import ActionReport, ParachuteReport
 from chute_ros.supervisor.lease import Claim
+from chute_ros.supervisor.preflight import block_reasons
 from chute_ros.supervisor.state import State
+from chute_ros.supervisor.state_text import alarms
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,17 @@ class SafetyTold:
     stamps: Mapping[str, int]
     #: Monotonic s.
     now: float
+    #: Against a take-off; what warns as long as it holds.
+    reasons: tuple[str, ...]
+    alarms: tuple[str, ...]
+
+
+def safety_told(
+    config: SupervisorConfig, supervisor: str, state: State, stamps: Mapping[str, int], now: float
+) -> SafetyTold:
+    """The picture of this state, s monotonic."""
+    reasons, warns = block_reasons(config, state, now), alarms(config, state, now)
+    return SafetyTold(supervisor, state, stamps, now, reasons, warns)
 
 
 @dataclass(frozen=True)

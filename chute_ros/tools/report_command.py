@@ -14,7 +14,7 @@ from builtin_interfaces.msg import Time
 from chute_msgs.msg import PersonRequest, SafetyDecision, SafetyState
 
 from chute_ros.ros.supervisor_messages import state_message
-from chute_ros.runtime.topics import SafetyTold
+from chute_ros.runtime.topics import safety_told
 from chute_ros.tools.flight_story import DECISION, PERSON, tell
 from chute_ros.tools.progress import Progress
 from chute_ros.tools.recording import Recording, read
@@ -94,7 +94,7 @@ def replayed_states(recording: Recording) -> list[tuple[float, Any]]:
             continue
         at = recording.seconds(turn.wall)
         if outputs or not pictures or not 0.0 <= at - pictures[-1][0] < apart:
-            told = SafetyTold("", core.state, {}, turn.turn.now)
+            told = safety_told(core.config, "", core.state, {}, turn.turn.now)
             picture = state_message(core.config, told, Time())
             pictures.append((at, picture))
     return pictures

@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from chute_ros.model import Armed, LinkState, ParachuteStatus, VehicleState
 from chute_ros.ros.supervisor_messages import decisions_task, state_message, summary_message
 from chute_ros.ros.supervisor_parameters import PARAMETERS, config_from
-from chute_ros.runtime.topics import SafetyTold
+from chute_ros.runtime.topics import safety_told
 from chute_ros.supervisor.link_evidence import LinkEvidence
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.measured import Measured
@@ -62,7 +62,8 @@ def test_sources_that_contradict_each_other_are_a_warning_with_the_part_named() 
     assert text in task.message
     assert values(task)["sources contradict each other"] == "attitude"
     assert values(task)["tilt_deg"] == "90.00 (in doubt: another source told otherwise)"
-    assert text in state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text
+    told = safety_told(CONFIG, "", state, {}, NOW)
+    assert text in state_message(CONFIG, told, Time()).state_text
 
 
 ARMED = ParachuteStatus("1/161", LinkState.OK, armed=True)
@@ -85,7 +86,7 @@ def test_a_parachute_that_is_armed_is_told_in_every_state_on_the_ground(
     evidence = replace(WELL, devices=MappingProxyType({"1/161": replace(ARMED, armed=armed)}))
     links = MappingProxyType({**state.heard.links, link: evidence})
     state = replace(state, stage=stage, heard=replace(state.heard, links=links))
-    told = state_message(CONFIG, SafetyTold("", state, {}, NOW), Time()).state_text
+    told = state_message(CONFIG, safety_told(CONFIG, "", state, {}, NOW), Time()).state_text
     assert told == text.format(f"{link} 1/161")
     assert decisions_task("safety_supervisor", CONFIG, state, NOW).message.endswith(told)
 
@@ -100,7 +101,7 @@ def test_the_summary_is_the_same_in_a_few_fields() -> None:
         released_since_reset=frozenset({(link, "1/162")}),
         alarming=Alarms(alarms=("one", "two")),
     )
-    told = SafetyTold("supervisor", state, {}, NOW)
+    told = safety_told(CONFIG, "supervisor", state, {}, NOW)
     whole = state_message(CONFIG, told, Time(sec=5))
     summary = summary_message(CONFIG, told, whole)
     assert (summary.header.stamp.sec, summary.supervisor) == (5, "supervisor")

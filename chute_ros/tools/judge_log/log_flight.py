@@ -23,7 +23,7 @@ from chute_ros.links.mavlink.virtual import VirtualMavlink
 from chute_ros.model import FIRES, Action, Decision, TriggerFlags, VehicleState
 from chute_ros.protocol.vehicle_merge import VEHICLE_STATE
 from chute_ros.ros.supervisor_messages import state_message
-from chute_ros.runtime.topics import SafetyTold
+from chute_ros.runtime.topics import safety_told
 from chute_ros.runtime.supervisor import FinishedTurn
 from chute_ros.sim.faults import flip_a_byte
 from chute_ros.supervisor import inputs as i
@@ -90,7 +90,7 @@ class _Host(SupervisorHost):
         """One more turn."""
         pictures, at = self.judged.pictures, turn.now - LEAD
         if turn.outputs or not pictures or at - pictures[-1][0] >= _APART:
-            told = SafetyTold(self.process.name, turn.after, {}, turn.now)
+            told = safety_told(self.config, self.process.name, turn.after, {}, turn.now)
             pictures.append((at, state_message(self.config, told, Time())))
             self.judged.nearest.look(self.config, turn.after, turn.now, at)
 
