@@ -91,6 +91,7 @@ class SupervisorHost:
         self._hearing = VehicleHearing(
             self._vehicle_sources,
             self.config.vehicle_state_age,
+            self.config.vehicle_source_rate,
             self._vehicle_told,
             LinkState.NEVER_SEEN if before is None else before.heard.vehicle.link_state,
             now,

@@ -22,6 +22,7 @@ from typing import Any
 
 from chute_ros.model import LinkState, VehicleState
 from chute_ros.protocol import vehicle_readings as readings
+from chute_ros.protocol.stream_rate import SAID_AFTER, StreamRate
 
 #: The source with chute_msgs/VehicleState, and the one with MAVROS's topics. Both know the
 #: autopilot itself, the other sources do not.
@@ -42,6 +43,9 @@ _DISPUTES = {"vertical_speed": (0, 5.0), "attitude": (3, math.pi / 2.0), "accele
 #: By so much more a word may differ from the one before of its own source, each second: six
 #: times the gravity, m/s, and three turns, rad. A force is another at once, when the motors stop.
 _CHANGES = {"vertical_speed": 60.0, "attitude": 6.0 * math.pi, "acceleration": 1e6}
+#: What the rules measure with, and so is judged by how often it comes. Of vehicle/state the link
+#: judges what it is made of.
+_JUDGED = ("height", "vertical_speed", "attitude", "acceleration")
 #: What is told with its source: what was doubted of one source says nothing of another.
 _WITH_SOURCE = ("height", *_DISPUTES)
 #: A source leaps that differs by more from its own word before, and so much more each second: m/s
@@ -107,12 +111,19 @@ class VehicleMerge:
     """The newest words of some sources, and the picture that they make together.
 
     sources: names, the preferred ones first. lost_after: a source that has not heard its autopilot
-    for longer (s), or is silent itself, has lost it. Times are monotonic seconds.
+    for longer (s), or is silent itself, has lost it. needed_rate: of each part that the rules
+    measure with, Hz; 0: any will do. Times are monotonic seconds.
     """
 
-    def __init__(self, sources: Sequence[str], lost_after: float) -> None:
+    def __init__(
+        self, sources: Sequence[str], lost_after: float, needed_rate: float = 0.0
+    ) -> None:
         self._sources = tuple(sources)
-        self._lost_after = lost_after
+        self._lost_after, self._needed_rate = lost_after, needed_rate
+        #: Each source that was received -> part -> how often it comes.
+        self._rates: dict[str, dict[str, StreamRate]] = {}
+        #: When the first of them was.
+        self._begun = math.inf
         self._words: dict[str, dict[str, _Word]] = {source: {} for source in sources}
         self._vehicle = VehicleState()
         #: (Part, source) -> when another source last told otherwise.
@@ -132,12 +143,16 @@ class VehicleMerge:
 
     def hear(self, source: str, parts: readings.Parts, now: float) -> None:
         """A message of source came now and says this."""
+        rates = self._rates_of(source, now)
         for part, values in parts.items():
             self._store(source, part, values, now)
+            if part in _JUDGED and values is not None:
+                rates.setdefault(part, StreamRate(self._needed_rate)).heard(now)
 
     def hear_state(self, state: VehicleState, now: float) -> None:
         """A message on vehicle/state came now; its parts are as old as it says."""
         self._vehicle = state
+        self._rates_of(VEHICLE_STATE, now)
         for part, values in readings.vehicle_state(state).items():
             age = getattr(state, f"{part}_age", 0.0)
             # A part from the future would look fresh for longer than it is.
@@ -189,6 +204,10 @@ class VehicleMerge:
             if source is not None and source != self._sources[0]:
                 told[part] = source
         return MappingProxyType(told)
+
+    def _rates_of(self, source: str, now: float) -> dict[str, StreamRate]:
+        self._begun = min(self._begun, now)
+        return self._rates.setdefault(source, {})
 
     def _store(
         self, source: str, part: str, values: readings.Values | None, received: float
@@ -267,10 +286,32 @@ class VehicleMerge:
         return min(told, key=lambda one: _PREFERENCE.index(one[0]), default=(LinkState.OK, 0))
 
     def _faults(self, now: float) -> tuple[str, ...]:
-        """As vehicle/state tells them; of one that is lost that is the reason."""
+        """As vehicle/state tells them; of one that is lost that is the reason. And which of the
+        other sources are missing, or tell too seldom."""
         told = VEHICLE_STATE in self._sources
         lost = told and self._link(VEHICLE_STATE, now)[0] is LinkState.LOST
-        return () if lost else self._vehicle.faults
+        faults = () if lost else self._vehicle.faults
+        return (*faults, *self._missing(now), *self._slow(now))
+
+    def _missing(self, now: float) -> list[str]:
+        """Sources of which nothing was ever received, once others had the time to begin."""
+        if not self._needed_rate or now - self._begun < SAID_AFTER:
+            return []
+        return [f"{one} was never received" for one in self._sources if one not in self._rates]
+
+    def _slow(self, now: float) -> list[str]:
+        told = []
+        for source, rates in self._rates.items():
+            slow = [part for part in _JUDGED if part in rates and rates[part].too_slow(now)]
+            if slow:
+                each = ", ".join(
+                    f"{part.replace('_', ' ')} {rates[part].rate(now):.1f} Hz" for part in slow
+                )
+                told.append(
+                    f"{source} comes too seldom: {each} (need {self._needed_rate:g} Hz): raise "
+                    "its rate, or take it out of vehicle_sources"
+                )
+        return told
 
     def _link(self, source: str, now: float) -> tuple[LinkState, int]:
         word = self._words[source].get(readings.AUTOPILOT)

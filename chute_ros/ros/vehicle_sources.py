@@ -93,10 +93,10 @@ Reader = Callable[[Any], readings.Parts]
 class VehicleSources:
     """Subscribes to what the parameters name and tells what the vehicle is by then.
 
-    values: the node's parameters, VehicleSettings' among them, and vehicle_state_age (s): a
-    source of the autopilot that is silent for longer has lost it. tell(report, now) is called by
-    the node's executor. clock: monotonic seconds. before: how the autopilot was heard before a
-    restart (NEVER_SEEN: not, or nobody knows).
+    values: the node's parameters, VehicleSettings' among them, vehicle_state_age (s): a source of
+    the autopilot that is silent for longer has lost it, and vehicle_source_rate (Hz).
+    tell(report, now) is called by the node's executor. clock: monotonic seconds. before: how the
+    autopilot was heard before a restart (NEVER_SEEN: not, or nobody knows).
     """
 
     def __init__(
@@ -109,9 +109,8 @@ class VehicleSources:
     ) -> None:
         self._node, self._values, self._tell, self._clock = node, values, tell, clock
         sources = list(settings_from(VehicleSettings, values).vehicle_sources)
-        self._hearing = VehicleHearing(
-            sources, values["vehicle_state_age"], self._told, before, clock()
-        )
+        limits = values["vehicle_state_age"], values["vehicle_source_rate"]
+        self._hearing = VehicleHearing(sources, *limits, self._told, before, clock())
         self._refused: set[str] = set()
         self._disputed: frozenset[str] = frozenset()
         inputs = {source: self._inputs(source) for source in sources if source != VEHICLE_STATE}

@@ -17,19 +17,21 @@ from chute_ros.supervisor.inputs import VehicleReport
 
 class VehicleHearing:
     """lost_after: vehicle_state_age, s: a source of the autopilot that is silent for longer has
-    lost it; before: how the autopilot was heard before a restart at now. tell(report, now) is
-    called at once, or together with what else comes until the interval is over."""
+    lost it; needed_rate: vehicle_source_rate, Hz; before: how the autopilot was heard before a
+    restart at now. tell(report, now) is called at once, or together with what else comes until the
+    interval is over."""
 
     def __init__(
         self,
         sources: Sequence[str],
         lost_after: float,
+        needed_rate: float,
         tell: Callable[[VehicleReport, float], None],
         before: LinkState = LinkState.NEVER_SEEN,
         now: float = 0.0,
     ) -> None:
         self._alone = tuple(sources) == (VEHICLE_STATE,)
-        self._merge, self._tell = VehicleMerge(sources, lost_after), tell
+        self._merge, self._tell = VehicleMerge(sources, lost_after, needed_rate), tell
         self._merge.recall(before, now)
         self._told_at = -math.inf
         #: When what waits is told, monotonic s; infinity: nothing waits.

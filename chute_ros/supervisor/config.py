@@ -129,6 +129,15 @@ class SupervisorConfig(Settings):
     vehicle_state_age: float = parameter(
         2.5, "parts of vehicle/state older than this are ignored", 0.1, 60.0, "s"
     )
+    vehicle_source_rate: float = parameter(
+        5.0,
+        "take-off is forbidden if another source of vehicle_sources than vehicle/state tells "
+        "height, vertical speed, attitude or acceleration at a lower rate, or is never received; "
+        "0: not checked",
+        0.0,
+        100.0,
+        "Hz",
+    )
     require_vehicle_state: bool = parameter(
         True, "block flight without vehicle/state: flight and ground cannot be told apart"
     )

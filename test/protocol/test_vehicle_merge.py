@@ -46,6 +46,67 @@ def test_what_vehicle_state_says_is_told_until_it_forgets_it_or_is_lost():
     assert one.state(30.25).height_age == 0.25, "nothing is younger than new"
 
 
+def told_at(one, *rates, until=20.0):
+    """The faults at the end, of an IMU whose parts come at these rates (Hz) from 10 s on, beside
+    an autopilot at 10 Hz."""
+    words = [(10.0 + n / 10.0, "") for n in range(1 + int((until - 10.0) * 10.0))]
+    for part, rate in zip(("attitude", "acceleration"), rates, strict=False):
+        words += [(10.0 + n / rate, part) for n in range(1 + int((until - 10.0) * rate))]
+    for now, part in sorted(words):
+        if part:
+            one.hear("imu", {part: LEVEL if part == "attitude" else (9.8, 0.0)}, now)
+        else:
+            one.hear_state(VehicleState(link_state=LinkState.OK), now)
+    return one.state(until).faults
+
+
+SELDOM = "imu comes too seldom: {} (need 5 Hz): raise its rate, or take it out of vehicle_sources"
+
+
+@pytest.mark.parametrize(
+    ("rates", "told"),
+    [
+        ((50.0, 50.0), ()),
+        ((5.0, 5.0), ()),
+        ((2.0, 50.0), (SELDOM.format("attitude 2.0 Hz"),)),
+        ((2.0, 1.0), (SELDOM.format("attitude 2.0 Hz, acceleration 1.0 Hz"),)),
+        ((), ("imu was never received",)),
+    ],
+)
+def test_a_source_that_tells_too_seldom_or_never_is_named(rates, told):
+    """As a stream of the autopilot is: a rule must not starve because another program or a line
+    slows a source down, and nobody is told."""
+    assert told_at(VehicleMerge((VEHICLE_STATE, IMU), 2.5, 5.0), *rates) == told
+    assert told_at(VehicleMerge((VEHICLE_STATE, IMU), 2.5, 0.0), *rates) == (), "not checked"
+
+
+def test_a_source_has_its_time_to_begin_and_may_be_late_once():
+    one = VehicleMerge((VEHICLE_STATE, IMU), 2.5, 5.0)
+    assert told_at(one, until=11.9) == ()
+    assert told_at(VehicleMerge((VEHICLE_STATE, IMU), 2.5, 5.0), 2.0, 50.0, until=11.9) == ()
+    for now in (10.0, 10.1, 10.2, 11.4, 11.5, 11.6, 11.7, 11.8, 11.9, 12.0):
+        one.hear("imu", {"attitude": LEVEL}, now)
+    assert one.state(12.1).faults == (), "1.2 s of silence, and over"
+
+
+def test_a_source_that_falls_silent_is_named_until_it_comes_again():
+    one = VehicleMerge((VEHICLE_STATE, IMU), 2.5, 5.0)
+    assert told_at(one, 50.0, 50.0) == ()
+    assert one.state(21.9).faults == ()
+    assert one.state(23.0).faults == (SELDOM.format("attitude 0.3 Hz, acceleration 0.3 Hz"),)
+    for n in range(20):
+        one.hear("imu", {"attitude": LEVEL, "acceleration": (9.8, 0.0)}, 23.0 + 0.02 * n)
+    assert one.state(23.4).faults == ()
+
+
+def test_a_source_without_attitude_is_not_slow():
+    """One that never estimated it has no rate of it."""
+    one = VehicleMerge((IMU,), 2.5, 5.0)
+    for n in range(200):
+        one.hear("imu", {"attitude": None, "acceleration": (9.8, 0.0)}, 10.0 + 0.02 * n)
+    assert one.state(14.0).faults == ()
+
+
 def test_new_parts_have_their_own_source_and_age():
     one = merge("imu", "vehicle/state")
     one.hear("imu", {"acceleration": (9.8,)}, 10.0)

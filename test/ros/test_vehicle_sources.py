@@ -32,7 +32,8 @@ class Listener(Node):
         super().__init__("listener", **options)
         self.now = 100.0
         self.told, self.disputed, self.told_by = [], frozenset(), None
-        values = {**declare(self, parameters_of(VehicleSettings)), "vehicle_state_age": 2.5}
+        limits = {"vehicle_state_age": 2.5, "vehicle_source_rate": 5.0}
+        values = {**declare(self, parameters_of(VehicleSettings)), **limits}
         self.sources = VehicleSources(self, values, self.hear, lambda: self.now)
 
     def hear(self, report, now):

@@ -35,7 +35,7 @@ def test_the_picture_is_told_at_once_and_then_as_often_as_by_the_node() -> None:
     """Given messages each 4 ms: the first is told at once, the others together."""
     told: list[tuple[float, VehicleState]] = []
     hearing = VehicleHearing(
-        (VEHICLE_STATE, IMU), 2.5, lambda report, now: told.append((now, report.state))
+        (VEHICLE_STATE, IMU), 2.5, 5.0, lambda report, now: told.append((now, report.state))
     )
     hearing.hear_state(VehicleState(height=12.0, height_age=0.1), 10.0)
     assert [now for now, _ in told] == [10.0]

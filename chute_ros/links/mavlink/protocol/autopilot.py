@@ -14,12 +14,7 @@ from chute_ros.links.mavlink.protocol.motor_signs import MotorSigns
 from chute_ros.links.mavlink.protocol.readings import Readings
 from chute_ros.links.mavlink.protocol.round_trip import RoundTrip
 from chute_ros.links.mavlink.protocol.sensors import FURTHER_ACCELEROMETERS, PRESSURE
-from chute_ros.links.mavlink.protocol.stream_watch import (
-    Ask,
-    OptionalStreams,
-    StreamRate,
-    StreamWatch,
-)
+from chute_ros.links.mavlink.protocol.stream_watch import Ask, OptionalStreams, StreamWatch
 from chute_ros.links.mavlink.protocol.targets import Vehicle
 from chute_ros.links.mavlink.protocol.twins import WINDOW, Twins
 from chute_ros.links.mavlink.protocol.vehicle_readers import VehicleReaders
@@ -27,6 +22,7 @@ from chute_ros.model import Armed, LandedState, LinkState, Reading, VehicleState
 from chute_ros.protocol.boot_clock import Age, BootClock
 from chute_ros.protocol.liveness import LinkChange, Liveness, LivenessLimits
 from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.stream_rate import StreamRate
 from chute_ros.protocol.vehicle_readings import PARTS
 
 #: What was said longer ago (s) proves nothing about now.

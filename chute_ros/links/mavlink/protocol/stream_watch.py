@@ -22,39 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from chute_ros.protocol.mavlink.dialect import dialect
-
-#: What the newest gap counts in the average.
-_WEIGHT = 0.2
-
-
-class StreamRate:
-    """Follows the average gap between the messages of one stream."""
-
-    def __init__(self) -> None:
-        #: When the newest one came, monotonic s.
-        self.newest = -math.inf
-        self._gap = math.nan
-
-    def heard(self, now: float) -> None:
-        """One came."""
-        gap = now - self.newest
-        self.newest = now
-        if math.isnan(self._gap):
-            self._gap = gap if math.isfinite(gap) else math.nan
-        else:
-            self._gap += _WEIGHT * (gap - self._gap)
-
-    @property
-    def average(self) -> float:
-        """Hz while it comes; NaN: fewer than two came."""
-        return 1.0 / self._gap if self._gap > 0.0 else math.inf if self._gap == 0.0 else math.nan
-
-    def rate(self, now: float) -> float:
-        """Hz; of one that pauses for longer than its average gap no more than that shows; NaN:
-        fewer than two came."""
-        pause = now - self.newest
-        return min(self.average, 1.0 / pause) if pause > 0.0 else self.average
-
+from chute_ros.protocol.stream_rate import TOLERANCE, StreamRate
 
 #: Parts of the vehicle's picture, and the message that is asked for to have them.
 ASKED_FOR: dict[str, int] = {
@@ -79,10 +47,6 @@ _LINE_SHARE, _REQUEST_BYTES, _SAVED = 0.02, 45.0, 10
 _MISSING_AFTER = 5.0
 #: Where the intervals are long nobody waits for five: after so many of them, or this long, s.
 _MISSING_SOON, _MISSING_AT_LAST = 1.5, 2.5
-#: An average so much below a rate is no shortfall.
-_TOLERANCE = 1.1
-#: A rate below what is needed for so long, s, is said.
-SAID_AFTER = 2.0
 
 #: So much seldomer than the needed ones.
 SELDOMER = 2.0
@@ -138,9 +102,8 @@ class StreamWatch:
 
     def __init__(self, needed: float) -> None:
         self._needed = needed
-        self._rates: defaultdict[str, StreamRate] = defaultdict(StreamRate)
+        self.begin()
         self.fill_stores()
-        self._slow_since: dict[str, float] = {}
         self._saved = 0.0
 
     def fill_stores(self) -> None:
@@ -150,8 +113,7 @@ class StreamWatch:
 
     def begin(self) -> None:
         """The autopilot is heard, or heard again, or started anew: nothing has come of it yet."""
-        self._rates.clear()
-        self._slow_since.clear()
+        self._rates = {part: StreamRate(self._needed) for part in ASKED_FOR}
 
     def received(self, size: int) -> None:
         """The line carried so many bytes."""
@@ -159,14 +121,8 @@ class StreamWatch:
 
     def heard(self, part: str, now: float) -> None:
         """A part of the picture came, by whatever message."""
-        if part not in ASKED_FOR:
-            return
-        rate = self._rates[part]
-        rate.heard(now)
-        if rate.average < self._needed / _TOLERANCE:
-            self._slow_since.setdefault(part, now)
-        else:
-            self._slow_since.pop(part, None)
+        if part in ASKED_FOR:
+            self._rates[part].heard(now)
 
     def due(self, interval: float, now: float) -> tuple[Ask, ...]:
         """What to ask for now, so that each message comes each interval (s), or seldomer if that
@@ -181,11 +137,9 @@ class StreamWatch:
     def slow(self, now: float) -> dict[str, float]:
         """Messages that the rules need and that come too seldom for a while, with their rates."""
         return {
-            name: rate.rate(now)
+            name: self._rates[part].rate(now)
             for part, name in _JUDGED.items()
-            if (rate := self._rates.get(part)) is not None
-            and rate.rate(now) < self._needed / _TOLERANCE
-            and now - min(self._slow_since.get(part, math.inf), rate.newest) >= SAID_AFTER
+            if self._rates[part].too_slow(now)
         }
 
     def line_is_slow(self, now: float) -> bool:
@@ -208,7 +162,7 @@ class StreamWatch:
         enough = 0.5 / interval
         if part in _JUDGED and self._needed:
             enough = min(self._needed, 1.0 / interval)
-        return rate.average < enough / _TOLERANCE
+        return rate.average < enough / TOLERANCE
 
     def _take(self, part: str, now: float) -> bool:
         if now - self._asked[part] < ASK_AGAIN:
