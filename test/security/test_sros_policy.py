@@ -197,7 +197,7 @@ def test_the_command_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch
     Listening(session)
     gather(session, 0.0)
     for words in ORDERS:
-        Call(session, order_of(parse(words), "ann@ground"))
+        Call(session, order_of(parse(words), "ann@ground"), "ann@ground")
     for node in (*sorted(set(NODES) - PLAIN), "standby"):
         parameters_of_node(session, node, 0.0)
     name = session.node.get_name()
@@ -246,7 +246,10 @@ def test_the_panel_is_allowed_what_it_does_and_nothing_more(bench, monkeypatch):
         ("safety/lease", {"safety_supervisor", "standby"}),
         ("safety/state", {"safety_supervisor", "standby"}),
         ("safety/request", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
-        ("safety/person", {"mavlink_parachute", "upf_can", "umbilical", "relay", "panel"}),
+        (
+            "safety/person",
+            {"mavlink_parachute", "upf_can", "umbilical", "relay", "panel", "chute"},
+        ),
         ("safety/action", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("parachute/status", {"mavlink_parachute", "upf_can", "umbilical", "relay"}),
         ("vehicle/state", {"mavlink_parachute", "umbilical"}),

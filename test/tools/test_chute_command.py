@@ -11,7 +11,7 @@ import threading
 
 import pytest
 from chute_bench import COMMAND, CONTROL, ROOT, AtTerminal, Command, run
-from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, SafetyState
+from chute_msgs.msg import LinkHeartbeat, ParachuteStatus, PersonRequest, SafetyState
 from chute_msgs.srv import Kill
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from node_bench import bench, stamped  # noqa: F401
@@ -147,6 +147,21 @@ def test_arm_and_disarm_by_the_supervisor(ready):
         },
     )
     assert [arm for arm, _ in ready.link.arm_requests] == [True, False]
+
+
+@pytest.mark.parametrize("succeeds", [True, False])
+def test_who_ordered_it_and_what_came_of_it_is_on_the_record(ready, succeeds):
+    """Given orders that have no reason, in which its giver could stand."""
+    heard = ready.bench.follow(PersonRequest, "safety/person")
+    ready.link.arm_succeeds = succeeds
+    run(ready.bench, "arm")
+    ready.bench.until(lambda: any(one.answered for one in heard), "the answer is recorded")
+    told = heard[-1]
+    assert (told.link, told.service) == ("chute", "safety/arm")
+    assert re.fullmatch(r"arm=True, triggers=0, by='\S+@\S+'", told.request)
+    assert (told.success, told.message) == (succeeds, "mavlink_parachute: as told")
+    assert told.after > 0.0
+    assert told.header.stamp == heard[0].header.stamp
 
 
 def test_a_refusal_is_no_success(ready):

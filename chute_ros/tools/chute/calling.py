@@ -11,6 +11,7 @@ from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.tools.chute.errors import CommandError
 from chute_ros.tools.chute.order import Answer, Order, not_answered
 from chute_ros.tools.chute.session import Session
+from chute_ros.tools.person_record import PersonRecord
 
 #: Type of a service, by Order.kind.
 KINDS: dict[str, Any] = {
@@ -19,10 +20,12 @@ KINDS: dict[str, Any] = {
 
 
 class Call:
-    """One order. Made first, so that its service is found while the vehicle is listened to."""
+    """One order. Made first, so that its service, and who keeps the record, are found while the
+    vehicle is listened to. who: gives it."""
 
-    def __init__(self, session: Session, order: Order) -> None:
-        self._session, self._order = session, order
+    def __init__(self, session: Session, order: Order, who: str) -> None:
+        self._session, self._order, self._who = session, order, who
+        self._record = PersonRecord(session.node, "chute", "safety/person")
         self._kind = KINDS[order.kind]
         self._client = session.node.create_client(self._kind, order.service)
 
@@ -35,9 +38,14 @@ class Call:
         if not self.found():
             text = f"{self._order.name}: {self._order.service} is gone: nothing was sent"
             raise CommandError(text, {"sent": False})
-        future = self._client.call_async(self._kind.Request(**self._order.fields))
+        request = self._kind.Request(**self._order.fields)
+        recorded = self._record.ordered(self._order.service, request, self._who)
+        future = self._client.call_async(request)
         if not self._session.until(future.done, seconds):
             text = not_answered(self._order, f"within {seconds:g} s")
             raise CommandError(text, {"sent": True, "answered": False})
         message = with_plain_texts(future.result())
-        return Answer(message.success, message.message, getattr(message, "accepted", None))
+        answer = Answer(message.success, message.message, getattr(message, "accepted", None))
+        recorded.answered(answer)
+        self._record.leave()
+        return answer

@@ -31,12 +31,13 @@ _WARNED_WITHIN = 0.3
 
 def main(chosen: Chosen) -> int:
     """Exit code 0: done, and the answer says so; 1: anything else; 2: nobody could be asked."""
-    order = order_of(chosen, _who())
+    who = _who()
+    order = order_of(chosen, who)
     asks = bool(order.word) and not chosen.more.yes
     if asks:
         require_terminal(order.name)
     with opened(chosen.namespace) as session:
-        call = Call(session, order)
+        call = Call(session, order, who)
         listening = Listening(session) if asks or order.unreached else None
         within, warned = chosen.wait(), asks
         if not session.until(call.found, within):

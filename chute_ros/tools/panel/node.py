@@ -5,7 +5,6 @@ The web server has a thread of its own; whatever it wants of ROS is done in ROS'
 
 from __future__ import annotations
 
-import math
 import os
 import secrets
 import time
@@ -16,11 +15,11 @@ from functools import partial
 from threading import Lock
 from typing import Any
 
-from chute_msgs.msg import PersonRequest, SafetySummary
+from chute_msgs.msg import SafetySummary
 from rclpy.node import Node
 
 from chute_ros.plain_text import plain
-from chute_ros.ros import messages, qos
+from chute_ros.ros import qos
 from chute_ros.ros.parameters import declare, settings_taken
 from chute_ros.ros.plain_border import with_plain_texts
 from chute_ros.settings import settings_from
@@ -34,6 +33,7 @@ from chute_ros.tools.panel.parameters import NODE, PARAMETERS, PanelSettings
 from chute_ros.tools.panel.password import password_from
 from chute_ros.tools.panel.server import PanelServer
 from chute_ros.tools.panel.watched import Watched
+from chute_ros.tools.person_record import PersonRecord
 
 #: Before the start changes them.
 _AROUND = surroundings(os.environ, installed_middlewares()).text()
@@ -65,7 +65,8 @@ class PanelNode(Node):
         self._summaries: dict[str, tuple[Any, Heard | None]] = {}
         #: Full name of a service or topic -> what is used for it.
         self._callers: dict[str, Any] = {}
-        self._recorders: dict[str, Any] = {}
+        #: By namespace.
+        self._records: dict[str, PersonRecord] = {}
         self.server = PanelServer(self)
         self.server.start()
 
@@ -224,27 +225,14 @@ class PanelNode(Node):
     ) -> Callable[[Answer], None]:
         """Put who orders what on safety/person and into the log; what is returned puts the
         answer there."""
-        if namespace not in self._recorders:
+        if namespace not in self._records:
             topic = f"{namespace.rstrip('/')}/safety/person"
-            self._recorders[namespace] = self.create_publisher(PersonRequest, topic, qos.STATUS)
-        publisher, called = self._recorders[namespace], time.monotonic()
-        words = messages.request_words(request)
-        by = f"by={plain(person.text)!r}"
-        told = PersonRequest(
-            link=NODE,
-            service=service,
-            request=f"{words}, {by}" if words else by,
-            after=math.nan,
-        )
-        told.header.stamp = self.get_clock().now().to_msg()
-        publisher.publish(told)
-        self.get_logger().info(f"{namespace} {service}: {told.request}")
+            self._records[namespace] = PersonRecord(self, NODE, topic)
+        one = self._records[namespace].ordered(service, request, person.text)
+        self.get_logger().info(f"{namespace} {service}: {one.told.request}")
 
         def answered(answer: Answer) -> None:
-            told.answered, told.success = True, answer.success
-            told.accepted, told.message = bool(answer.accepted), answer.message
-            told.after = time.monotonic() - called
-            publisher.publish(told)
+            one.answered(answer)
             self.get_logger().info(f"{namespace} {service}: {answer.message}")
 
         return answered
