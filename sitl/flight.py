@@ -105,6 +105,9 @@ class Flight:
         self.get_ready()
         if self.kind == PX4:
             self.vehicle.set("MIS_TAKEOFF_ALT", height)
+        else:
+            # On a busy machine it may be armed before its estimator has a position.
+            self.wait_for_position()
         self.change_mode(self.pilot.ready_to_climb())
         self.arm()
         self.climb(height)

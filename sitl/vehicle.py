@@ -125,12 +125,18 @@ class Vehicle(Patient):
     def again(self, what: str, seconds: float, order: Callable[[], Any],
               done: Callable[[], bool], pause: float = 1.0) -> None:  # fmt: skip
         """Give an order again and again until it is done."""
-        end = time.monotonic() + seconds
-        while not done():
-            order()
-            if time.monotonic() >= end:
-                self.must(what, 0.0, done)
-            self.until(pause, done)
+        due = -math.inf
+
+        def ordered() -> bool:
+            nonlocal due
+            if done():
+                return True
+            if time.monotonic() >= due:
+                due = time.monotonic() + pause
+                order()
+            return False
+
+        self.must(what, seconds, ordered)
 
     def set(self, name: str, value: float) -> float:
         """A parameter of the autopilot, and it says that it has it; when it was sent."""
