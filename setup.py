@@ -58,6 +58,7 @@ setup(
             "report = chute_ros.tools.report:main",
             "to_rosbag2 = chute_ros.tools.to_rosbag2:main",
             "judge_log = chute_ros.tools.judge_log.__main__:main",
+            "conformance = chute_ros.tools.conformance:main",
             "campaign = chute_ros.tools.campaign:main",
         ],
     },

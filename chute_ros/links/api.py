@@ -9,6 +9,8 @@ A link is how one kind of device is spoken to. Everything of it is in one folder
     parameters.py   the settings of the node (chute_ros/settings.py), each parameter written once
     __main__.py     starts the node
     simulator/      the simulated device, where there is one
+    conformance/    pure: the clauses of its document, for whoever builds such a device; kit.py
+                    what the command `conformance` takes of them
     virtual.py      its node and its simulated device in a flight of the campaign (a CampaignPart)
     __init__.py     LINK, a LinkKind: how launch files, parameter tables, the campaign, the device
                     suite and the docs find all that
@@ -160,6 +162,9 @@ class LinkKind:
     simulators: Callable[[VehicleKind, Sockets], tuple[tuple[str, ...], ...]]
     connection: Callable[[Sockets], str]
     part: Place = ""
+    #: Name of its device for `conformance`, and its Kit (conformance/kit.py); empty: it has none.
+    device: str = ""
+    kit: Place = ""
     #: The ROS package that its executables are in.
     package: str = "chute_ros"
 

@@ -119,7 +119,7 @@ class AutopilotDevice(AutopilotTelemetry):
             entry[1]()
         if (order := self._authorization.overdue(now)) is not None:
             self.say("ARM AUTHORIZATION: no response")
-            self._acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+            self.acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
 
     def _fly(self, now: float) -> None:
         """Move the vehicle on to now."""
@@ -257,7 +257,7 @@ class AutopilotDevice(AutopilotTelemetry):
             super()._command(order)
         elif order is not None:
             self.say("ARM AUTHORIZATION: denied")
-            self._acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
+            self.acknowledge(order, dialect.MAV_RESULT_TEMPORARILY_REJECTED)
 
     def _parameter(self, frame: Frame) -> None:
         message = frame.message

@@ -50,10 +50,10 @@ class MavlinkDevice(Actor):
         self._started_at = math.nan
         self._intervals: dict[int, float] = {}
         self._due: dict[int, float] = {}
-        self._encoder = FrameEncoder(system_id, component_id)
-        self._verifier: Verifier | None = None
+        self.encoder = FrameEncoder(system_id, component_id)
+        self.verifier: Verifier | None = None
         self._decoders: dict[Hashable, FrameDecoder] = {}
-        self._after_acknowledgement: list[Any] = []
+        self.after_acknowledgement: list[Any] = []
         self._output: list[bytes] = []
 
     # -- as the loop wants it -------------------------------------------------------------------
@@ -62,12 +62,12 @@ class MavlinkDevice(Actor):
         if math.isnan(self._started_at):
             self.update(now)
         self.now = now
-        decoder = self._decoders.setdefault(stream, FrameDecoder(self._verifier))
+        decoder = self._decoders.setdefault(stream, FrameDecoder(self.verifier))
         frames = decoder.feed_datagram(data, now) if stream is None else decoder.feed(data, now)
         for frame in frames:
             if frame.message.get_type() not in ("COMMAND_LONG", "COMMAND_INT"):
                 self.heard(frame)
-            elif self._is_meant(frame.message):
+            elif self.is_meant(frame.message):
                 self._command(frame)
 
     def stream_ended(self, stream: Hashable) -> None:
@@ -100,8 +100,8 @@ class MavlinkDevice(Actor):
 
     def sign(self, signer: Signer, verifier: Verifier) -> None:
         """From now on sign what is sent, and accept only signed frames."""
-        self._encoder = FrameEncoder(self.system_id, self.component_id, signer)
-        self._verifier = verifier
+        self.encoder = FrameEncoder(self.system_id, self.component_id, signer)
+        self.verifier = verifier
         self._decoders.clear()
 
     # -- for the subclass -----------------------------------------------------------------------
@@ -128,37 +128,40 @@ class MavlinkDevice(Actor):
         """Time since start, ms, as uint32."""
         return int((self.now - self.booted_at) * 1000.0) % 2**32
 
-    def send(self, message: Any) -> None:
-        """Send a message, unless silent."""
+    def send(self, message: Any, version: int = 2) -> None:
+        """Send a message, unless silent. version: of MAVLink."""
         if not self.silent:
-            self._output.append(self._encoder.encode(message, self.now))
+            self._output.append(self.encoder.encode(message, self.now, version))
 
     # -- commands -------------------------------------------------------------------------------
 
-    def _is_meant(self, command: Any) -> bool:
+    def is_meant(self, command: Any) -> bool:
+        """Whether a command is for this component."""
         systems, components = (0, self.system_id), (0, self.component_id)
         return command.target_system in systems and command.target_component in components
 
     def _command(self, frame: Frame) -> None:
-        message = frame.message
         if self.mute:
             return
-        handler = self.commands.get(message.command)
-        if handler is None:
-            result = dialect.MAV_RESULT_UNSUPPORTED
-        elif message.get_type() == "COMMAND_INT":
-            result = dialect.MAV_RESULT_COMMAND_LONG_ONLY
-        elif not math.isfinite(message.param1) or not math.isfinite(message.param2):
-            result = dialect.MAV_RESULT_DENIED
-        else:
-            params: Any = tuple(getattr(message, f"param{number}") for number in range(1, 8))
-            result = handler(params)
-        self._acknowledge(frame, result)
-        for later in self._after_acknowledgement:
+        self.acknowledge(frame, self.carry_out(frame.message))
+        for later in self.after_acknowledgement:
             self.send(later)
-        self._after_acknowledgement.clear()
+        self.after_acknowledgement.clear()
 
-    def _acknowledge(self, frame: Frame, result: int) -> None:
+    def carry_out(self, command: Any) -> int:
+        """Do what a command for this component says; a MAV_RESULT."""
+        handler = self.commands.get(command.command)
+        if handler is None:
+            return int(dialect.MAV_RESULT_UNSUPPORTED)
+        if command.get_type() == "COMMAND_INT":
+            return int(dialect.MAV_RESULT_COMMAND_LONG_ONLY)
+        if not math.isfinite(command.param1) or not math.isfinite(command.param2):
+            return int(dialect.MAV_RESULT_DENIED)
+        params: Any = tuple(getattr(command, f"param{number}") for number in range(1, 8))
+        return handler(params)
+
+    def acknowledge(self, frame: Frame, result: int) -> None:
+        """Answer a command with this MAV_RESULT, unless mute."""
         if self.mute:
             return
         self.send(
@@ -176,7 +179,7 @@ class MavlinkDevice(Actor):
             return self._get_message_interval((params[1], *params[1:]))
         if message_id not in self.streams:
             return int(dialect.MAV_RESULT_DENIED)
-        self._after_acknowledgement.append(self.streams[message_id]())
+        self.after_acknowledgement.append(self.streams[message_id]())
         return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _set_message_interval(self, params: Params) -> int:
@@ -202,7 +205,7 @@ class MavlinkDevice(Actor):
             return int(dialect.MAV_RESULT_DENIED)
         interval = self._intervals.get(message_id, math.inf)
         interval_us = -1 if interval == math.inf else int(interval * 1e6)
-        self._after_acknowledgement.append(
+        self.after_acknowledgement.append(
             dialect.MAVLink_message_interval_message(message_id, interval_us)
         )
         return int(dialect.MAV_RESULT_ACCEPTED)

@@ -34,4 +34,6 @@ LINK = LinkKind(
     simulators=_simulators,
     connection=lambda sockets: f"udpin:{sockets.network}",
     part=f"{_FOLDER}.virtual:MavlinkPart",
+    device="mavlink",
+    kit=f"{_FOLDER}.kit:KIT",
 )

@@ -98,8 +98,8 @@ class ReleasedParachute(ParachuteDevice):
             self.misled_at = self.now
         return result
 
-    def _deploy(self, trigger: DeploymentTrigger) -> None:
-        super()._deploy(trigger)
+    def deploy(self, trigger: DeploymentTrigger) -> None:
+        super().deploy(trigger)
         self._out()
 
 

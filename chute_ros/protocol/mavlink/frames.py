@@ -204,7 +204,7 @@ def _checksum_may_fit(raw: bytes) -> bool:
 
 
 class FrameEncoder:
-    """Packs messages into MAVLink 2 frames of one sender, signed if a signer is given."""
+    """Packs messages into frames of one sender, signed if a signer is given."""
 
     def __init__(self, system_id: int, component_id: int, signer: Signer | None = None) -> None:
         self._writer = dialect.MAVLink(None, srcSystem=system_id, srcComponent=component_id)
@@ -214,12 +214,13 @@ class FrameEncoder:
             self._writer.signing.link_id = signer.link_id
             self._writer.signing.sign_outgoing = True
 
-    def encode(self, message: Any, now: float) -> bytes:
-        """The frame of message; MessageError if one of its fields cannot carry its value."""
+    def encode(self, message: Any, now: float, version: int = 2) -> bytes:
+        """The frame of message; MessageError if one of its fields cannot carry its value. version:
+        of MAVLink."""
         if self._signer is not None:
             self._writer.signing.timestamp = self._signer.next_timestamp(now)
         try:
-            frame: bytes = message.pack(self._writer)
+            frame: bytes = message.pack(self._writer, force_mavlink1=version == 1)
         except (struct.error, OverflowError, TypeError, IndexError) as error:
             raise MessageError(f"{message.get_type()} cannot be packed: {error}") from error
         self._writer.seq = (self._writer.seq + 1) % 256

@@ -75,9 +75,9 @@ class Module(Remembering, ParachuteDevice):
         flags = super().safety()
         return flags if self.cleared else flags & ~SafetyFlags.GROUND_CLEARED
 
-    def _deploy(self, trigger):
+    def deploy(self, trigger):
         if not self.stuck:
-            super()._deploy(trigger)
+            super().deploy(trigger)
 
 
 class Autopilot(Remembering, AutopilotDevice):

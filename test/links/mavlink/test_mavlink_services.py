@@ -97,7 +97,7 @@ def test_deploy_with_force_arms_on_the_way(bench, module):
 
 def test_a_lost_acknowledgement_is_no_lost_deploy(bench, module):
     assert call(bench, Arm, "arm", arm=True).success
-    do(bench, module.loop, lambda: setattr(module, "_acknowledge", lambda *_: None))
+    do(bench, module.loop, lambda: setattr(module, "acknowledge", lambda *_: None))
     answer = call(bench, Deploy, "deploy", reason="a test")
     assert (answer.success, answer.accepted) == (True, False)
     assert "not acknowledged" in answer.message

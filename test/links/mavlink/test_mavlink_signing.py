@@ -23,7 +23,7 @@ class SigningModule(Module):
         super().__init__()
         clock = SigningClock(time.time() - time.monotonic())
         self.sign(Signer(key, clock, 3), Verifier(key, clock))
-        self.verified = self._decoders[None] = FrameDecoder(self._verifier)
+        self.verified = self._decoders[None] = FrameDecoder(self.verifier)
 
 
 @pytest.fixture

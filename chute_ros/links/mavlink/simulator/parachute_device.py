@@ -77,7 +77,7 @@ class ParachuteDevice(MavlinkDevice):
         self.actions |= {
             "error": lambda name: setattr(self, "errors", self.errors | ErrorFlags[name]),
             "clear-errors": lambda _: setattr(self, "errors", ErrorFlags(0)),
-            "deploy": lambda name: self._deploy(DeploymentTrigger[name]),
+            "deploy": lambda name: self.deploy(DeploymentTrigger[name]),
             "refuse": lambda _: setattr(self, "refuses", True),
             "accept": lambda _: setattr(self, "refuses", False),
             "repack": lambda _: self._repack(),
@@ -172,7 +172,7 @@ class ParachuteDevice(MavlinkDevice):
         if not self.safety() & SafetyFlags.GROUND_CLEARED:
             return int(dialect.MAV_RESULT_TEMPORARILY_REJECTED)
         by_fc = self.armed & TriggerFlags.FC
-        self._deploy(DeploymentTrigger.DRONE if by_fc else DeploymentTrigger.MAVLINK)
+        self.deploy(DeploymentTrigger.DRONE if by_fc else DeploymentTrigger.MAVLINK)
         return int(dialect.MAV_RESULT_ACCEPTED)
 
     def _set_parachute_arm(self, params: Params) -> int:
@@ -183,7 +183,8 @@ class ParachuteDevice(MavlinkDevice):
         self.say(f"armed triggers: {self.armed!r}")
         return int(dialect.MAV_RESULT_ACCEPTED)
 
-    def _deploy(self, trigger: DeploymentTrigger) -> None:
+    def deploy(self, trigger: DeploymentTrigger) -> None:
+        """Release, unless that was done before."""
         if self.deployment is DeploymentTrigger.NONE:
             self.deployment = trigger
             self.say(f"RELEASED by {trigger.name}")
@@ -204,4 +205,4 @@ class ParachuteDevice(MavlinkDevice):
             self._sinking_since = self.now
         fires = self.now - self._sinking_since >= ATS_SINK_TIME
         if fires and self.armed & TriggerFlags.ATS and self.safety() & SafetyFlags.GROUND_CLEARED:
-            self._deploy(DeploymentTrigger.ATS)
+            self.deploy(DeploymentTrigger.ATS)

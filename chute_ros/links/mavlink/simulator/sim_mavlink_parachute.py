@@ -10,6 +10,7 @@ from chute_ros.sim.command_line import main_of, number, parser, real, run, scrip
 
 def _run() -> None:
     # Here, so that a dialect that is not built ends in one line and not in a traceback.
+    from chute_ros.links.mavlink.simulator.broken import BREAKS, BrokenParachute
     from chute_ros.links.mavlink.simulator.parachute_device import (
         ParachuteDevice,
         ParachuteSettings,
@@ -68,6 +69,13 @@ def _run() -> None:
         default=start.system_status,
         help="MAV_STATE in the heartbeat (3 standby, 5 critical)",
     )
+    options.add_argument(
+        "--break",
+        dest="breaks",
+        choices=[*BREAKS],
+        metavar="CLAUSE",
+        help="be wrong in this clause of `conformance mavlink` (its --list names them)",
+    )
     chosen = options.parse_args()
     settings = ParachuteSettings(
         system_id=chosen.system_id,
@@ -81,7 +89,11 @@ def _run() -> None:
         packed_date=chosen.packed_date,
         system_status=chosen.system_status,
     )
-    run(ParachuteDevice(settings, script_of(chosen.at)), chosen)
+    script = script_of(chosen.at)
+    if chosen.breaks:
+        run(BrokenParachute(settings, script, chosen.breaks), chosen)
+    else:
+        run(ParachuteDevice(settings, script), chosen)
 
 
 def _date(text: str) -> str:

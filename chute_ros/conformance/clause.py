@@ -1,0 +1,105 @@
+"""A clause of a document, how it is tried, and what came of it."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from chute_ros.errors import ChuteError
+
+
+class Verdict(enum.Enum):
+    """What came of a clause. NOT_SUPPORTED: the document lets a device leave it out; it does."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_SUPPORTED = "not supported"
+    NOT_TRIED = "not tried"
+
+
+class Risk(enum.IntEnum):
+    """What the device may do while a clause is tried; each includes those before it."""
+
+    NONE = 0
+    ARMS = 1
+    FIRES = 2
+
+
+@dataclass(frozen=True)
+class Packet:
+    """What was sent or received. at: s since the start; sender: who sent it, in the device's own
+    way; text: its content in words."""
+
+    at: float
+    sent: bool
+    sender: str
+    name: str
+    text: str
+    raw: bytes
+
+
+class DecidedError(ChuteError):
+    """Ends the trial of a clause: its verdict, and why. proof: the packets that show it; none: all
+    of the trial do."""
+
+    def __init__(self, verdict: Verdict, why: str, proof: Sequence[Packet] = ()) -> None:
+        super().__init__(why)
+        self.verdict, self.proof = verdict, tuple(proof)
+
+
+def failed(why: str, proof: Sequence[Packet] = ()) -> DecidedError:
+    """It is not as the document says."""
+    return DecidedError(Verdict.FAILED, why, proof)
+
+
+def not_supported(why: str) -> DecidedError:
+    """The device says that it does not have this, which the document allows."""
+    return DecidedError(Verdict.NOT_SUPPORTED, why)
+
+
+def not_tried(why: str) -> DecidedError:
+    """It takes what is not there, or what the person has not allowed."""
+    return DecidedError(Verdict.NOT_TRIED, why)
+
+
+@dataclass(frozen=True)
+class Wait:
+    """A trial goes on at this time (monotonic s), or as soon as ready says so. It is sent back
+    whether ready did."""
+
+    until: float
+    ready: Callable[[], Any] = lambda: False
+
+
+#: A trial waits by yielding, and returns why it passed.
+Trial = Generator[Wait, bool, str]
+BenchT = TypeVar("BenchT")
+
+
+@dataclass(frozen=True)
+class Clause(Generic[BenchT]):
+    """name: without spaces, for command lines; document, section: where text stands, in the words
+    of the document; does: what the device may do meanwhile; needs: an option without which it is
+    not tried."""
+
+    name: str
+    document: str
+    section: str
+    text: str
+    does: str
+    trial: Callable[[BenchT], Trial]
+    risk: Risk = Risk.NONE
+    needs: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """took: s."""
+
+    clause: Clause[Any]
+    verdict: Verdict
+    why: str
+    proof: tuple[Packet, ...]
+    took: float

@@ -1,0 +1,338 @@
+"""The other end of a parachute's MAVLink network: sends commands, and remembers all that comes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
+from chute_ros.errors import ChuteError
+from chute_ros.links.mavlink.protocol.parachute import component_information
+from chute_ros.model import TriggerFlags
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import Frame, FrameDecoder, FrameEncoder
+from chute_ros.protocol.mavlink.signing import Signer, Verifier
+
+#: Heartbeats of our own, s: without them a router passes nothing on, and a device may stay silent.
+_BEAT = 1.0
+#: A device is found within this, or is not there, s.
+_FOUND_WITHIN = 10.0
+#: An answer comes within this, s; a command is sent so often before it counts as not answered.
+ANSWER = 1.0
+TRIES = 3
+#: A status comes by its stream at the latest, s.
+_STATUS_WITHIN = 3.0
+#: Whose commands these are: an onboard computer.
+US = 191
+_ACTIONS = (dialect.PARACHUTE_DISABLE, dialect.PARACHUTE_ENABLE)
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A frame of the device, and its packet. at: monotonic s; refused: why its signature is none
+    of the device's key."""
+
+    at: float
+    frame: Frame
+    packet: Packet
+    refused: str
+
+    @property
+    def message(self) -> Any:
+        """What it says."""
+        return self.frame.message
+
+    @property
+    def kind(self) -> str:
+        """Name of its message."""
+        return str(self.frame.message.get_type())
+
+
+class NotAllowedError(ChuteError):
+    """A trial tried to send what the person has not allowed: a mistake of ours."""
+
+
+class MavlinkBench:
+    """Commands are sent as component US of the device's own system. risk: the highest that the
+    person allows; nothing above it is ever sent. component: of the device, where several are on
+    the network; key: signs and verifies, None: nothing is signed; soak: how long it is watched in
+    the end, s."""
+
+    def __init__(
+        self,
+        risk: Risk = Risk.NONE,
+        component: int | None = None,
+        key: tuple[Signer, Verifier] | None = None,
+        soak: float = 0.0,
+    ) -> None:
+        self.now, self.soak, self.heard_at = 0.0, soak, -math.inf
+        self.traffic: list[Packet] = []
+        #: Of the device, in their order.
+        self.heard: list[Heard] = []
+        self.system = self.component = 0
+        #: What the trial at the beginning saw (watch).
+        self.watched: list[Heard] = []
+        self._risk, self._wanted, self._key = risk, component, key
+        self._began = math.nan
+        self._every: list[Heard] = []
+        self._decoders: dict[Hashable, FrameDecoder] = {}
+        #: Of each sender, that signs or does not.
+        self._encoders: dict[tuple[int, int, bool], FrameEncoder] = {}
+        self._output: list[bytes] = []
+        self._beat_at = -math.inf
+
+    # -- as the session wants it ------------------------------------------------------------------
+
+    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+        self._at(now)
+        decoder = self._decoders.setdefault(stream, FrameDecoder())
+        frames = decoder.feed_datagram(data, now) if stream is None else decoder.feed(data, now)
+        for frame in frames:
+            raw = bytes(frame.message.get_msgbuf())
+            packet = self._noted(frame.message, frame.device, False, raw)
+            one = Heard(now, frame, packet, self._refusal(frame, raw))
+            self._every.append(one)
+            if (frame.system_id, frame.component_id) == (self.system, self.component):
+                self.heard.append(one)
+                self.heard_at = now
+
+    def _refusal(self, frame: Frame, raw: bytes) -> str:
+        if self._key is None:
+            return ""
+        return self._key[1].refusal(raw, frame.signed, frame.message.get_msgId(), self.now)
+
+    def stream_ended(self, stream: Hashable) -> None:
+        self._decoders.pop(stream, None)
+
+    def update(self, now: float) -> None:
+        self._at(now)
+        if now >= self._beat_at:
+            self._beat_at = now + _BEAT
+            kind = dialect.MAV_TYPE_ONBOARD_CONTROLLER
+            beat = dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3)
+            self._output.append(self._packed(beat, (self.system or 1, US)))
+
+    def next_deadline(self) -> float:
+        return self._beat_at
+
+    def take_output(self) -> list[bytes]:
+        output, self._output = self._output, []
+        return output
+
+    def _at(self, now: float) -> None:
+        self.now = now
+        if math.isnan(self._began):
+            self._began = now
+
+    # -- what is sent ---------------------------------------------------------------------------
+
+    def send(
+        self,
+        message: Any,
+        sender: int = US,
+        version: int = 2,
+        change: Callable[[bytes], Iterable[bytes]] = lambda frame: (frame,),
+        signed: bool = True,
+    ) -> None:
+        """Send a message as this component. change: what becomes of its frame on the way."""
+        risk = _risk_of(message)
+        if risk > self._risk:
+            raise NotAllowedError(f"{message} needs {risk.name}, allowed is {self._risk.name}")
+        frame = self._packed(message, (self.system, sender), version, signed)
+        for piece in change(frame):
+            self._noted(message, f"{self.system}/{sender}", True, piece)
+            self._output.append(piece)
+
+    def send_bytes(self, data: bytes, what: str) -> None:
+        """Send what is no frame. It must hold none."""
+        self.traffic.append(Packet(self.now - self._began, True, "", what, "", data))
+        self._output.append(data)
+
+    def command_long(
+        self,
+        command: int,
+        *params: float,
+        target: tuple[int, int] | None = None,
+        confirmation: int = 0,
+    ) -> Any:
+        """COMMAND_LONG to the device, or to this target."""
+        system, component = target or (self.system, self.component)
+        padded = (*params, *[0.0] * (7 - len(params)))
+        return dialect.MAVLink_command_long_message(
+            system, component, command, confirmation, *padded
+        )
+
+    def _packed(
+        self, message: Any, sender: tuple[int, int], version: int = 2, signed: bool = True
+    ) -> bytes:
+        signer = self._key[0] if self._key is not None and signed else None
+        encoder = self._encoders.get((sender[0], sender[1], signed))
+        if encoder is None:
+            encoder = FrameEncoder(*sender, signer)
+            self._encoders[(sender[0], sender[1], signed)] = encoder
+        return encoder.encode(message, self.now, version)
+
+    @property
+    def signs(self) -> bool:
+        """The device has a key that is known here."""
+        return self._key is not None
+
+    def _noted(self, message: Any, sender: str, sent: bool, raw: bytes) -> Packet:
+        fields = message.to_dict()
+        name = fields.pop("mavpackettype")
+        text = ", ".join(f"{key}={value}" for key, value in fields.items())
+        packet = Packet(self.now - self._began, sent, sender, name, text, bytes(raw))
+        self.traffic.append(packet)
+        return packet
+
+    # -- steps of trials ------------------------------------------------------------------------
+
+    def find(self) -> Trial:
+        """Who says that it is a parachute, or reports as one."""
+        began = self.now
+        yield Wait(began + _FOUND_WITHIN, lambda: self._device() is not None)
+        device = self._device()
+        if device is None:
+            others = ", ".join(sorted({one.frame.device for one in self._every})) or "nobody"
+            raise failed(
+                f"no parachute is received within {_FOUND_WITHIN:g} s (heard: {others}): check "
+                "the connection, and name the device with --component if it calls itself "
+                "something else"
+            )
+        self.system, self.component = device
+        self.heard = [
+            one for one in self._every if (one.frame.system_id, one.frame.component_id) == device
+        ]
+        self.heard_at = self.now
+        return f"{self.system}/{self.component}"
+
+    def _device(self) -> tuple[int, int] | None:
+        for one in self._every:
+            ids = one.frame.system_id, one.frame.component_id
+            if self._wanted is not None:
+                if ids[1] == self._wanted:
+                    return ids
+                continue
+            beat = one.kind == "HEARTBEAT" and one.message.type == dialect.MAV_TYPE_PARACHUTE
+            if beat or one.kind == "PARACHUTE_STATUS":
+                return ids
+        return None
+
+    def identity(self) -> Mapping[str, str]:
+        """Of its last COMPONENT_INFORMATION_BASIC and PARACHUTE_STATUS."""
+        told: dict[str, str] = {}
+        for one in self.heard:
+            if one.kind == "COMPONENT_INFORMATION_BASIC":
+                told |= asdict(component_information(one.message))
+            elif one.kind == "PARACHUTE_STATUS":
+                told["packed"] = one.message.parachute_packed_date
+        return {name.replace("_", " "): str(text) for name, text in told.items() if text}
+
+    def disarm(self) -> Trial:
+        """Each trigger is disarmed, and its status says so."""
+        every = int(sum(TriggerFlags))
+        if self._risk is Risk.NONE or not self.component:
+            return "nothing was armed"
+        yield from self.command(dialect.MAV_CMD_SET_PARACHUTE_ARM, 0, every)
+        status = yield from self.status()
+        if status.message.arm_status:
+            yield from self.disarm_each()
+            status = yield from self.status()
+        if left := int(status.message.arm_status):
+            raise failed(f"the device is LEFT ARMED: arm_status is {left} after all was disarmed")
+        return "disarmed"
+
+    def disarm_each(self) -> Trial:
+        """Each source by a command of its own: not every device takes several at once."""
+        for source in TriggerFlags:
+            yield from self.command(dialect.MAV_CMD_SET_PARACHUTE_ARM, 0, int(source))
+        return ""
+
+    def watch(self, seconds: float) -> Trial:
+        """Look on for so long; what came is watched."""
+        began = self.now
+        yield Wait(began + seconds)
+        self.watched = [one for one in self.heard if one.at >= began]
+        return ""
+
+    def watch_on(self, seconds: float) -> Trial:
+        """Let so long pass."""
+        yield Wait(self.now + seconds)
+        return ""
+
+    def wait_for(
+        self, kind: str, within: float, fits: Callable[[Heard], bool] = lambda one: True
+    ) -> Any:
+        """The next message of this kind from the device that fits; None: none came within (s)."""
+        since = len(self.heard)
+
+        def found() -> Heard | None:
+            every = (one for one in self.heard[since:] if one.kind == kind and fits(one))
+            return next(every, None)
+
+        yield Wait(self.now + within, found)
+        return found()
+
+    def command(
+        self, command: int, *params: float, tries: int = TRIES, confirmation: int = 0
+    ) -> Any:
+        """The answer to a command (Heard), sent again where none comes; None: none came."""
+        for number in range(tries):
+            self.send(self.command_long(command, *params, confirmation=confirmation + number))
+            answer = yield from self.answer(command)
+            if answer is not None:
+                return answer
+        return None
+
+    def answer(self, command: int, within: float = ANSWER) -> Any:
+        """The next answer to this command; None: none came."""
+        return (
+            yield from self.wait_for(
+                "COMMAND_ACK", within, lambda one: one.message.command == command
+            )
+        )
+
+    def accepted(self, command: int, *params: float) -> Any:
+        """The same; it must be accepted."""
+        answer = yield from self.command(command, *params)
+        if answer is None:
+            raise failed(f"{name_of(command)} is not answered, {TRIES} times")
+        if answer.message.result != dialect.MAV_RESULT_ACCEPTED:
+            raise failed(f"{name_of(command)} is answered with {result_of(answer)}")
+        return answer
+
+    def status(self) -> Any:
+        """A PARACHUTE_STATUS of now (Heard), asked for, or as it is streamed."""
+        kind = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
+        self.send(self.command_long(dialect.MAV_CMD_REQUEST_MESSAGE, kind))
+        status = yield from self.wait_for("PARACHUTE_STATUS", _STATUS_WITHIN)
+        if status is None:
+            raise failed(f"no PARACHUTE_STATUS within {_STATUS_WITHIN:g} s")
+        return status
+
+    def packets(self, *kinds: str) -> Sequence[Packet]:
+        """Of what was watched, those of these kinds."""
+        return [one.packet for one in self.watched if one.kind in kinds]
+
+
+def _risk_of(message: Any) -> Risk:
+    """What a device may do that gets it."""
+    if message.get_type() not in ("COMMAND_LONG", "COMMAND_INT"):
+        return Risk.NONE
+    if message.command == dialect.MAV_CMD_DO_PARACHUTE:
+        return Risk.ARMS if message.param1 in _ACTIONS else Risk.FIRES
+    return Risk.ARMS if message.command == dialect.MAV_CMD_SET_PARACHUTE_ARM else Risk.NONE
+
+
+def name_of(command: int) -> str:
+    """A command by its name."""
+    known = dialect.enums["MAV_CMD"].get(command)
+    return known.name if known else f"command {command}"
+
+
+def result_of(answer: Heard) -> str:
+    """The result of an answer by its name."""
+    known = dialect.enums["MAV_RESULT"].get(answer.message.result)
+    return known.name if known else f"result {answer.message.result}"

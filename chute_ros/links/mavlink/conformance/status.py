@@ -1,0 +1,221 @@
+"""PARACHUTE_STATUS: its rate, and each of its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from chute_ros.conformance.clause import Trial, failed, not_supported
+from chute_ros.links.mavlink.conformance.bench import Heard, MavlinkBench, result_of
+from chute_ros.links.mavlink.conformance.connection import FOREIGN_MESSAGE, nominal
+from chute_ros.links.mavlink.conformance.document import ASKS, PARACHUTE, READS, of
+from chute_ros.links.mavlink.protocol.parachute import packed_date
+from chute_ros.model import DeploymentTrigger, ErrorFlags, SafetyFlags
+from chute_ros.protocol.mavlink.dialect import dialect
+
+_STATUS = dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS
+_RESERVED = ErrorFlags.RESERVED_1 | ErrorFlags.RESERVED_2
+#: Asked for, us, and how many of them are awaited.
+_FASTER, _AWAITED = 200_000, 6
+#: A clock may be off by this share, or this much, s.
+_CLOCK, _CLOCK_LEAST = 0.05, 0.1
+
+
+def _statuses(bench: MavlinkBench) -> Iterator[Heard]:
+    return (one for one in bench.heard if one.kind == "PARACHUTE_STATUS")
+
+
+def _rate(bench: MavlinkBench) -> Trial:
+    yield from ()
+    return nominal(bench, "PARACHUTE_STATUS")
+
+
+def _pace(bench: MavlinkBench, within: float) -> Trial:
+    """How often it comes now: the middle gap, s, as a text that is a number."""
+    gaps = []
+    first = yield from bench.wait_for("PARACHUTE_STATUS", within)
+    before = first.at if first else bench.now
+    for _ in range(_AWAITED):
+        status = yield from bench.wait_for("PARACHUTE_STATUS", within)
+        if status is None:
+            raise failed(f"no PARACHUTE_STATUS for {within:g} s")
+        gaps.append(status.at - before)
+        before = status.at
+    return f"{sorted(gaps)[len(gaps) // 2]:.3f}"
+
+
+def _set(bench: MavlinkBench, interval: int) -> Trial:
+    command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+    answer = yield from bench.command(command, _STATUS, interval)
+    if answer is None:
+        raise failed("MAV_CMD_SET_MESSAGE_INTERVAL is not answered")
+    if answer.message.result != dialect.MAV_RESULT_ACCEPTED:
+        raise not_supported(f"MAV_CMD_SET_MESSAGE_INTERVAL: {result_of(answer)}")
+    return ""
+
+
+def _set_interval(bench: MavlinkBench) -> Trial:
+    yield from _set(bench, _FASTER)
+    gap = float((yield from _pace(bench, 1.0)))
+    if not 0.5 * _FASTER <= gap * 1e6 <= 1.5 * _FASTER:
+        raise failed(f"200 ms were accepted, and it comes each {gap:.2f} s")
+    return f"200 ms were asked for, it comes each {gap:.2f} s"
+
+
+def _interval_told(bench: MavlinkBench) -> Trial:
+    yield from _set(bench, _FASTER)
+    answer = yield from bench.command(dialect.MAV_CMD_GET_MESSAGE_INTERVAL, _STATUS)
+    if answer is None:
+        raise failed("MAV_CMD_GET_MESSAGE_INTERVAL is not answered")
+    if answer.message.result != dialect.MAV_RESULT_ACCEPTED:
+        raise not_supported(f"MAV_CMD_GET_MESSAGE_INTERVAL: {result_of(answer)}")
+    yield from bench.wait_for("MESSAGE_INTERVAL", 0.4)
+    told = [one for one in bench.heard if one.kind == "MESSAGE_INTERVAL"]
+    if not told:
+        raise failed("accepted, but no MESSAGE_INTERVAL came within 0.4 s")
+    message = told[-1].message
+    if message.message_id != _STATUS or abs(message.interval_us - _FASTER) > 0.1 * _FASTER:
+        raise failed(f"it tells {message.interval_us} us (need {_FASTER})", [told[-1].packet])
+    return f"{message.interval_us} us"
+
+
+def _interval_default(bench: MavlinkBench) -> Trial:
+    yield from _set(bench, _FASTER)
+    yield from _set(bench, 0)
+    times = [one.at for one in bench.watched if one.kind == "PARACHUTE_STATUS"]
+    before = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
+    gap = float((yield from _pace(bench, 3.0 * before + 1.0)))
+    if not 0.6 * before <= gap <= 1.5 * before:
+        raise failed(f"0 (default) was accepted: each {gap:.2f} s (before: {before:.2f} s)")
+    return f"each {gap:.2f} s again"
+
+
+def _interval_unknown(bench: MavlinkBench) -> Trial:
+    command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+    answer = yield from bench.command(command, FOREIGN_MESSAGE, _FASTER)
+    if answer is None:
+        raise failed("an interval of a message that it does not have is not answered")
+    if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
+        raise failed("an interval of a message that it does not have is ACCEPTED")
+    return f"answered with {result_of(answer)}"
+
+
+def _boot_time(bench: MavlinkBench) -> Trial:
+    first = yield from bench.status()
+    yield from bench.watch_on(3.0)
+    last = yield from bench.status()
+    passed = last.at - first.at
+    told = (last.message.time_boot_ms - first.message.time_boot_ms) / 1000.0
+    if abs(told - passed) > max(_CLOCK * passed, _CLOCK_LEAST):
+        both = [first.packet, last.packet]
+        raise failed(f"in {passed:.2f} s time_boot_ms went on by {told:.2f} s", both)
+    return f"{told:.2f} s in {passed:.2f} s"
+
+
+def _error_flags(bench: MavlinkBench) -> Trial:
+    yield from ()
+    for one in _statuses(bench):
+        flags = one.message.error_status
+        if flags & ~int(sum(ErrorFlags)):
+            raise failed(f"error_status is {flags:#x}: bits beyond 20", [one.packet])
+        if flags & int(_RESERVED):
+            raise failed(f"error_status is {flags:#x}: bits 14 and 15 are reserved", [one.packet])
+    return "no bit that is unknown or reserved"
+
+
+def _safety_flags(bench: MavlinkBench) -> Trial:
+    yield from ()
+    for one in _statuses(bench):
+        flags = one.message.safety_status
+        if flags & ~int(sum(SafetyFlags)):
+            raise failed(f"safety_status is {flags:#x}: bits beyond 2", [one.packet])
+    return "no unknown bit"
+
+
+def _ground(bench: MavlinkBench) -> Trial:
+    yield from ()
+    for one in _statuses(bench):
+        both = SafetyFlags.GROUND_CLEARED | SafetyFlags.ON_GROUND
+        if one.message.safety_status & both == both:
+            raise failed("it says GROUND_CLEARED and ON_GROUND at once", [one.packet])
+    return "never both at once"
+
+
+def _deployment(bench: MavlinkBench) -> Trial:
+    yield from ()
+    for one in _statuses(bench):
+        if one.message.deployment_status not in DeploymentTrigger._value2member_map_:
+            told = one.message.deployment_status
+            raise failed(f"deployment_status is {told}, which is no trigger", [one.packet])
+    return "a known trigger, or none"
+
+
+def _date(bench: MavlinkBench) -> Trial:
+    yield from ()
+    told = ""
+    for one in _statuses(bench):
+        told, wrong = packed_date(one.message.parachute_packed_date)
+        if wrong:
+            raise failed(wrong, [one.packet])
+    return told or "not provided"
+
+
+_told = of(PARACHUTE, "Parachute Status")
+_errors = of(PARACHUTE, "Errors")
+CLAUSES = (
+    _told("status-rate", "PARACHUTE_STATUS is streamed at nominally 1 Hz", _rate, READS),
+    _told(
+        "set-interval",
+        "its rate can be set by MAV_CMD_SET_MESSAGE_INTERVAL",
+        _set_interval,
+        "it sends its status faster",
+    ),
+    _told(
+        "interval-told",
+        "the interval that was set can be read back",
+        _interval_told,
+        "it sends its status faster",
+    ),
+    _told(
+        "interval-default",
+        "interval 0 brings the default rate back",
+        _interval_default,
+        "it sends its status faster, and then as before",
+    ),
+    _told(
+        "interval-unknown",
+        "an interval of a message that it does not have is refused",
+        _interval_unknown,
+        ASKS,
+    ),
+    _told("boot-time", "time_boot_ms is the time since its start, ms", _boot_time, ASKS),
+    _errors(
+        "error-flags",
+        "error_status has flags of PARACHUTE_ERROR_FLAGS; bits 14 and 15 are reserved",
+        _error_flags,
+        READS,
+    ),
+    _told(
+        "deployment-value",
+        "deployment_status is a PARACHUTE_DEPLOYMENT_TRIGGER",
+        _deployment,
+        READS,
+    ),
+    _told(
+        "safety-flags",
+        "safety_status has flags of PARACHUTE_SAFETY_FLAGS",
+        _safety_flags,
+        READS,
+    ),
+    _told(
+        "ground-flags",
+        "GROUND_CLEARED (far enough from the ground) and ON_GROUND are not told at once",
+        _ground,
+        READS,
+    ),
+    _told(
+        "packed-date",
+        "parachute_packed_date is YYYY-MM-DD, 0 terminated, or all 0",
+        _date,
+        READS,
+    ),
+)

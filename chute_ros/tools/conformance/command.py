@@ -1,0 +1,255 @@
+"""Tries a device on the bench against each clause of its document.
+
+conformance DEVICE [--connection ...] [--arm] [--fire] [--html FILE] [--junit FILE] [--mcap FILE]
+
+Nothing is armed without --arm, and nothing is fired without --fire; each is asked for again. Exit
+code 0: no clause failed; 1: one did; 2: a mistake in the command line; 3: the run is not whole (no
+device, aborted, or the device could not be left disarmed).
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import queue
+import socket
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from chute_ros.conformance.clause import Clause, Result, Risk, Verdict
+from chute_ros.conformance.kit import Kit
+from chute_ros.conformance.session import Allowed, Bench, Ended, Found, Session, Trying
+from chute_ros.errors import ChuteError
+from chute_ros.links.api import LinkKind, load
+from chute_ros.links.registered import links
+from chute_ros.plain_text import plain
+from chute_ros.ros.own_version import own_version
+from chute_ros.tools.conformance.page import page
+from chute_ros.tools.conformance.report import Report
+from chute_ros.tools.conformance.traffic import write_mcap
+from chute_ros.transport.loop import WireLoop
+from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
+
+DONE, FAILED, MISTAKE, NOT_WHOLE = 0, 1, 2, 3
+#: After a Ctrl-C the device is disarmed, which takes this long at most, s.
+_ENDS_WITHIN = 40.0
+_MARKS = {
+    Verdict.PASSED: "passed",
+    Verdict.FAILED: "FAILED",
+    Verdict.NOT_SUPPORTED: "not supported",
+    Verdict.NOT_TRIED: "not tried",
+}
+#: What is typed again, and what it allows.
+_WORDS = {Risk.ARMS: "ARM", Risk.FIRES: "FIRE"}
+
+
+def main() -> None:
+    """Run the kit of the device that is named."""
+    kinds = {one.device: one for one in links().values() if one.kit}
+    device = _device(kinds)
+    try:
+        kit: Kit = load(kinds[device].kit)
+        chosen = _options(kinds, device, kit).parse_args()
+        if chosen.list:
+            _list(kit)
+            return
+        sys.exit(_run(device, kit, chosen))
+    except ChuteError as error:
+        print(f"conformance: {plain(error)}", file=sys.stderr)
+        sys.exit(MISTAKE)
+
+
+def _device(kinds: Mapping[str, LinkKind]) -> str:
+    """The device that the command line names: options of its own follow."""
+    named = next((one for one in sys.argv[1:] if not one.startswith("-")), "")
+    if named not in kinds:
+        names = ", ".join(kinds)
+        text = f"no kit is called {named!r}" if named else "no device is named"
+        print(f"{__doc__}\nconformance: {text}: need one of {names}", file=sys.stderr)
+        sys.exit(DONE if {"-h", "--help"} & {*sys.argv} else MISTAKE)
+    return named
+
+
+def _options(kinds: Mapping[str, LinkKind], device: str, kit: Kit) -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser(
+        f"conformance {device}",
+        description=f"{kinds[device].description}: {kit.document}",
+    )
+    options.add_argument("device", choices=[device], metavar=device, help="what is tried")
+    options.add_argument(
+        "--connection",
+        default=kit.default_connection,
+        metavar="WIRE",
+        help=f"{kit.forms} (default: {kit.default_connection})",
+    )
+    options.add_argument("--arm", action="store_true", help="try what arms the device")
+    options.add_argument("--fire", action="store_true", help="try what fires it, and what arms it")
+    options.add_argument(
+        "--only", nargs="+", default=[], metavar="CLAUSE", help="these clauses alone (--list)"
+    )
+    options.add_argument(
+        "--soak", type=float, metavar="SECONDS", help="look on for so long in the end"
+    )
+    options.add_argument("--html", type=Path, metavar="FILE", help="write the report for people")
+    options.add_argument("--junit", type=Path, metavar="FILE", help="write it as JUnit")
+    options.add_argument("--mcap", type=Path, metavar="FILE", help="write all traffic")
+    options.add_argument("--list", action="store_true", help="list the clauses")
+    kit.add_options(options)
+    return options
+
+
+def _list(kit: Kit) -> None:
+    for one in kit.clauses:
+        takes = one.needs or {Risk.ARMS: "--arm", Risk.FIRES: "--fire"}.get(one.risk, "")
+        print(f"{one.name:20s} {one.text}" + (f" ({takes})" if takes else ""))
+
+
+def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
+    clauses = _clauses(kit, chosen.only)
+    risk = Risk.FIRES if chosen.fire else Risk.ARMS if chosen.arm else Risk.NONE
+    bench, wire = kit.bench(chosen, risk), kit.wire(chosen)
+    given = {f"--{name.replace('_', '-')}" for name, value in vars(chosen).items() if value}
+    for file in (chosen.html, chosen.junit, chosen.mcap):
+        _writable(file)
+    if chosen.junit:
+        _junit()
+    if risk is not Risk.NONE:
+        _ask(kit, risk)
+    began = time.time_ns()
+    results, found, problem = _tried(Session(bench, clauses, Allowed(risk, given)), wire)
+    about = {
+        "device": found or "not found",
+        **bench.identity(),
+        "connection": chosen.connection,
+        "allowed": risk.name,
+        "kit": f"chute_ros {own_version()}",
+        "begun": datetime.fromtimestamp(began / 1e9, timezone.utc).isoformat(timespec="seconds"),
+        "computer": f"{socket.gethostname()}, Python {platform.python_version()}",
+    }
+    about = {name: plain(text) for name, text in about.items()}
+    report = Report(
+        kit.document, f"{device} {found}".strip(), about, results, problem, bench.traffic, began
+    )
+    print(report.summary)
+    if problem:
+        print(f"conformance: {plain(problem)}", file=sys.stderr)
+    _write(chosen, report)
+    return NOT_WHOLE if problem else FAILED if report.of(Verdict.FAILED) else DONE
+
+
+def _clauses(kit: Kit, only: Sequence[str]) -> list[Clause[Any]]:
+    names = [one.name for one in kit.clauses]
+    if unknown := [one for one in only if one not in names]:
+        raise ChuteError(f"--only {' '.join(unknown)}: no such clause; --list has all")
+    return [one for one in kit.clauses if not only or one.name in only]
+
+
+def _writable(file: Path | None) -> None:
+    """A long run must not end with a report that cannot be written."""
+    if file is not None:
+        try:
+            file.open("ab").close()
+        except OSError as error:
+            raise ChuteError(f"{file}: {error.strerror}") from None
+
+
+def _junit() -> Callable[[Report], str]:
+    # Few machines have what only this needs.
+    try:
+        from chute_ros.tools.conformance.junit import junit
+    except ImportError as error:
+        raise ChuteError(
+            f"--junit: {error.name} is not installed: "
+            "`python3 -m pip install -r requirements/extra.in` brings it"
+        ) from None
+    return junit
+
+
+def _ask(kit: Kit, risk: Risk) -> None:
+    """The word, typed again; another one sends nothing."""
+    word = _WORDS[risk]
+    print(f"The device may {'FIRE' if risk is Risk.FIRES else 'be ARMED'}: {kit.fires}.")
+    print(f"Type {word} to go on: ", end="", flush=True)
+    if sys.stdin.readline().strip() != word:
+        raise ChuteError(f"{word} was not typed: nothing was sent")
+
+
+def _tried(session: Session[Bench], wire: Any) -> tuple[list[Result], str, str]:
+    """(results, who was found, why it is not whole)."""
+    events: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def deliver(many: list[Any]) -> None:
+        for one in many:
+            events.put(one)
+
+    loop = WireLoop(session, wire, deliver)
+    results: list[Result] = []
+    found, problem = "", ""
+    ends_at = float("inf")
+
+    def abort(why: str) -> None:
+        nonlocal ends_at
+        ends_at = time.monotonic() + _ENDS_WITHIN
+        loop.call(lambda link, now: link.abort(why, now))
+
+    loop.start()
+    try:
+        while time.monotonic() < ends_at:
+            try:
+                event = _next(events)
+            except KeyboardInterrupt:
+                abort("aborted by Ctrl-C")
+                continue
+            if isinstance(event, Found):
+                found = plain(event.text)
+                print(f"found {found}", flush=True)
+            elif isinstance(event, Trying):
+                _tell_risk(event)
+            elif isinstance(event, Result):
+                results.append(event)
+                print(
+                    f"  {_MARKS[event.verdict]:14s} {event.clause.name:20s} {plain(event.why)}",
+                    flush=True,
+                )
+            elif isinstance(event, Ended):
+                return results, found, event.problem
+            elif isinstance(event, LoopFault):
+                problem = f"a mistake of the kit: {event.text}"
+                abort(problem)
+            elif isinstance(event, WireChange) and not event.is_open:
+                abort(event.text)
+            elif isinstance(event, WireTrouble) and event.text:
+                print(f"conformance: {plain(event.text)}", file=sys.stderr)
+    finally:
+        loop.stop()
+    return results, found, problem or "the device was NOT left disarmed: no answer in time"
+
+
+def _next(events: queue.SimpleQueue[Any]) -> Any:
+    """The next event; None: a while passed without one."""
+    try:
+        return events.get(timeout=0.5)
+    except queue.Empty:
+        return None
+
+
+def _tell_risk(event: Trying) -> None:
+    one = event.clause
+    if one.risk is not Risk.NONE:
+        print(f"  [{event.number}/{event.of}] {one.name}: {one.does}", flush=True)
+
+
+def _write(chosen: argparse.Namespace, report: Report) -> None:
+    writers: list[tuple[Path | None, Callable[[Path], object]]] = [
+        (chosen.html, lambda path: path.write_text(page(report))),
+        (chosen.junit, lambda path: path.write_text(_junit()(report))),
+        (chosen.mcap, lambda path: write_mcap(report, path)),
+    ]
+    for path, write in writers:
+        if path is not None:
+            write(path)
+            print(path)

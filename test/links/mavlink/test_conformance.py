@@ -1,0 +1,214 @@
+"""The kit on the simulated parachute, sound and broken in each clause, in virtual time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from chute_ros.conformance.clause import Result, Risk, Verdict
+from chute_ros.conformance.session import Allowed, Ended, Found, Session
+from chute_ros.conformance.virtual import VirtualLine
+from chute_ros.links.mavlink.conformance import CLAUSES
+from chute_ros.links.mavlink.conformance.bench import MavlinkBench, NotAllowedError
+from chute_ros.links.mavlink.kit import KIT
+from chute_ros.links.mavlink.simulator.broken import BREAKS
+from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
+from chute_ros.model import DeploymentTrigger, TriggerFlags
+from chute_ros.protocol.mavlink.dialect import dialect
+from chute_ros.protocol.mavlink.frames import FrameDecoder
+from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
+
+NAMES = [one.name for one in CLAUSES]
+
+
+def key() -> tuple[Signer, Verifier]:
+    """The key of the simulated bench."""
+    clock = SigningClock(1_790_000_000.0)
+    return Signer(bytes(range(32)), clock), Verifier(bytes(range(32)), clock)
+
+
+class Run:
+    """Kit and device on one line."""
+
+    def __init__(
+        self,
+        device: ParachuteDevice,
+        risk: Risk = Risk.FIRES,
+        session: Session[MavlinkBench] | None = None,
+    ) -> None:
+        self.device = device
+        self.session = session or Session(MavlinkBench(risk), CLAUSES, Allowed(risk))
+        self.line = VirtualLine(self.session, device)  # type: ignore[arg-type]
+
+    def to(self, until: Callable[[], bool] = lambda: False) -> Run:
+        """To its end, or until this holds."""
+        self.line.run(until)
+        return self
+
+    @property
+    def results(self) -> dict[str, Result]:
+        """By clause."""
+        return {one.clause.name: one for one in self.line.events if isinstance(one, Result)}
+
+    def of(self, verdict: Verdict) -> list[str]:
+        """The clauses with this verdict."""
+        return [name for name, one in self.results.items() if one.verdict is verdict]
+
+    @property
+    def problem(self) -> str:
+        """How it ended."""
+        (ended,) = (one for one in self.line.events if isinstance(one, Ended))
+        return ended.problem
+
+
+def sound(**settings: object) -> ParachuteDevice:
+    return ParachuteDevice(ParachuteSettings(**settings), [])  # type: ignore[arg-type]
+
+
+def simulated(broken: str) -> Run:
+    """As the kit has it for its evidence."""
+    one = KIT.simulated(broken)
+    return Run(one.device, session=one.session).to()  # type: ignore[arg-type]
+
+
+# -- what it finds ------------------------------------------------------------------------------
+
+
+def test_a_sound_device_passes_all_that_can_be_tried() -> None:
+    run = simulated("")
+    assert run.of(Verdict.FAILED) == run.of(Verdict.NOT_SUPPORTED) == []
+    key_and_ground = ["unsigned-refused", "signed-answers", "release-near-ground"]
+    assert run.of(Verdict.NOT_TRIED) == key_and_ground
+    assert [*run.results] == NAMES
+    assert run.problem == ""
+    assert run.device.deployment is DeploymentTrigger.DRONE
+    assert run.device.armed == TriggerFlags(0)
+
+
+def test_what_needs_a_key_or_the_ground_passes_with_it() -> None:
+    one = KIT.simulated("signed-answers")
+    device = sound()
+    device.sign(*key())
+    signed = Run(device, session=one.session).to()
+    assert signed.of(Verdict.FAILED) == []
+    assert {"unsigned-refused", "signed-answers"} <= {*signed.of(Verdict.PASSED)}
+    low = Run(sound(ground_cleared="no")).to()
+    assert low.of(Verdict.FAILED) == []
+    assert "release-near-ground" in low.of(Verdict.PASSED)
+    assert low.results["release"].verdict is Verdict.NOT_TRIED
+
+
+def test_each_clause_has_a_way_to_be_broken() -> None:
+    assert {*BREAKS} == {*NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_device_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
+    run = simulated(name)
+    assert run.of(Verdict.FAILED) == [name]
+    result = run.results[name]
+    assert result.why
+    assert result.proof or name == "component-id", "packets that show it"
+
+
+def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
+    """Given one without intervals, information and MAV_CMD_DO_PARACHUTE."""
+    device = sound()
+    for command in (dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_DO_PARACHUTE):
+        del device.commands[command]
+    del device.streams[dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC]
+    del device.default_intervals[dialect.MAVLINK_MSG_ID_COMPONENT_INFORMATION_BASIC]
+    run = Run(device).to()
+    lacks = ["request-information", "information-texts", "set-interval", "interval-told"]
+    lacks += ["interval-default", "automatic-release", "release"]
+    assert run.of(Verdict.NOT_SUPPORTED) == lacks
+    assert run.of(Verdict.FAILED) == []
+
+
+# -- what it must not do ------------------------------------------------------------------------
+
+
+def commands_in(sent: list[bytes]) -> set[tuple[int, float]]:
+    """(command, first parameter) of all that a device could take from these bytes."""
+    decoder = FrameDecoder()
+    frames = [frame for data in sent for frame in decoder.feed_datagram(data, 0.0)]
+    long = [one.message for one in frames if one.message.get_type() == "COMMAND_LONG"]
+    return {(one.command, one.param1) for one in long}
+
+
+@pytest.mark.parametrize("risk", [Risk.NONE, Risk.ARMS])
+def test_what_was_not_allowed_is_never_sent(risk: Risk) -> None:
+    run = Run(sound(), risk).to()
+    sent = commands_in(run.line.sent)
+    arms = {one for one in sent if one[0] == dialect.MAV_CMD_SET_PARACHUTE_ARM}
+    fires = {
+        one for one in sent if one[0] == dialect.MAV_CMD_DO_PARACHUTE and one[1] not in (0, 1)
+    }
+    assert bool(arms) == (risk is Risk.ARMS)
+    assert not fires
+    tried = [one for one in CLAUSES if run.results[one.name].verdict is not Verdict.NOT_TRIED]
+    assert max(one.risk for one in tried) == risk
+    assert run.device.deployment is DeploymentTrigger.NONE
+    assert run.device.armed == TriggerFlags(0)
+
+
+@pytest.mark.parametrize("action", [dialect.PARACHUTE_RELEASE, 9.0, -1.0, math.nan, 1.5])
+def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(action: float) -> None:
+    bench = MavlinkBench(Risk.ARMS)
+    with pytest.raises(NotAllowedError):
+        bench.send(bench.command_long(dialect.MAV_CMD_DO_PARACHUTE, action))
+    assert bench.take_output() == []
+
+
+def test_an_abort_leaves_the_device_disarmed() -> None:
+    """Given a Ctrl-C while sources are armed."""
+    run = Run(sound())
+    run.to(lambda: bool(run.device.armed))
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    run.to()
+    assert run.device.armed == TriggerFlags(0)
+    assert run.problem == "aborted by Ctrl-C"
+    run.session.abort("again", run.line.now)
+    assert run.session.take_events() == []
+
+
+def test_a_device_that_cannot_be_disarmed_is_named() -> None:
+    """Given one that stops to answer, armed."""
+    run = Run(sound())
+    run.to(lambda: bool(run.device.armed))
+    del run.device.commands[dialect.MAV_CMD_SET_PARACHUTE_ARM]
+    armed = int(run.device.armed)
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    run.to()
+    left = f"the device is LEFT ARMED: arm_status is {armed} after all was disarmed"
+    assert run.problem == f"aborted by Ctrl-C; {left}"
+
+
+def test_a_device_that_falls_silent_is_not_blamed_for_what_follows() -> None:
+    """Given one that dies of the last bytes that are no frame."""
+    device = sound()
+    run = Run(device)
+    run.to(lambda: "noise" in run.results)
+    device.act("silent")
+    run.to()
+    # What is listened to, or must not be answered, cannot tell.
+    assert run.of(Verdict.FAILED) == ["cut-frame"]
+    told = "the device fell silent as cut-frame was tried"
+    after = NAMES[NAMES.index("cut-frame") + 1 :]
+    assert [name for name in NAMES if run.results[name].why == told] == after
+    assert run.problem.startswith(told)
+
+
+def test_where_no_parachute_is_heard_it_tells_who_is() -> None:
+    device = sound(component_id=42)
+    device.streams[dialect.MAVLINK_MSG_ID_HEARTBEAT] = lambda: dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_GIMBAL, 8, 0, 0, 4, 3
+    )
+    del device.streams[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS]
+    del device.default_intervals[dialect.MAVLINK_MSG_ID_PARACHUTE_STATUS]
+    run = Run(device).to()
+    assert run.problem.startswith("no parachute is received within 10 s (heard: 1/42)")
+    assert run.results == {}
+    assert not any(isinstance(one, Found) for one in run.line.events)

@@ -1,0 +1,160 @@
+"""The command conformance as a process of its own, and a simulated device in another one."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+from junitparser import JUnitXml
+from mcap.reader import make_reader
+
+ROOT = Path(__file__).parents[2]
+COMMAND = [sys.executable, "-u", "-m", "chute_ros.tools.conformance"]
+SIMULATOR = [sys.executable, "-u", "-m"]
+SIMULATOR += ["chute_ros.links.mavlink.simulator.sim_mavlink_parachute"]
+QUICK = ["--only", "request-status", "unknown-command"]
+
+
+@contextmanager
+def started(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """A process that is gone afterwards."""
+    pipe = subprocess.PIPE
+    one = subprocess.Popen(arguments, stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=ROOT)
+    with one:
+        try:
+            yield one
+        finally:
+            one.kill()
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+class Bench:
+    """A device on loopback. connection: of the kit."""
+
+    def __init__(self, *options: str) -> None:
+        ours, theirs = free_port(), free_port()
+        self.connection = f"udppair:127.0.0.1:{ours}:127.0.0.1:{theirs}"
+        self._device = [
+            *SIMULATOR,
+            "--connection",
+            f"udppair:127.0.0.1:{theirs}:127.0.0.1:{ours}",
+            *options,
+        ]
+
+    @contextmanager
+    def trying(self, *options: str) -> Iterator[subprocess.Popen[str]]:
+        """The device, and the kit that tries it."""
+        with ExitStack() as both:
+            both.enter_context(started(*self._device))
+            kit = [*COMMAND, "mavlink", "--connection", self.connection]
+            yield both.enter_context(started(*kit, *options))
+
+    def run(self, *options: str, typed: str = "") -> tuple[int, str, str]:
+        """(exit code, output, errors) of the kit."""
+        with self.trying(*options) as kit:
+            out, errors = kit.communicate(typed, timeout=60.0)
+            return kit.returncode, out, errors
+
+
+def test_a_sound_device_and_what_is_written_of_it(tmp_path: Path) -> None:
+    page, verdicts, traffic = (tmp_path / name for name in ("a.html", "a.xml", "a.mcap"))
+    files = ["--html", str(page), "--junit", str(verdicts), "--mcap", str(traffic)]
+    code, out, errors = Bench().run(*QUICK, *files)
+    assert (code, errors) == (0, "")
+    assert "mavlink 1/161: 2 passed\n" in out
+    told = page.read_text()
+    assert "COMMAND_ACK" in told
+    assert "chute_ros, simulated parachute" not in told, "what was not tried"
+    (suite,) = JUnitXml.fromfile(str(verdicts))
+    assert [(case.name, case.is_passed) for case in suite] == [
+        ("request-status", True),
+        ("unknown-command", True),
+    ]
+    with traffic.open("rb") as file:
+        packets = [json.loads(one.data) for *_, one in make_reader(file).iter_messages()]
+    assert {"HEARTBEAT", "COMMAND_LONG", "COMMAND_ACK"} <= {one["name"] for one in packets}
+
+
+def test_a_clause_that_fails_ends_with_1(tmp_path: Path) -> None:
+    verdicts = tmp_path / "a.xml"
+    code, out, _ = Bench("--break", "unknown-command").run(*QUICK, "--junit", str(verdicts))
+    assert code == 1
+    assert "FAILED         unknown-command" in out
+    (suite,) = JUnitXml.fromfile(str(verdicts))
+    assert (suite.tests, suite.failures) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("option", "word", "typed"), [("--fire", "FIRE", "ARM\n"), ("--arm", "ARM", "")]
+)
+def test_without_the_word_typed_again_nothing_is_sent(option: str, word: str, typed: str) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as device:
+        device.bind(("127.0.0.1", 0))
+        connection = f"udpout:127.0.0.1:{device.getsockname()[1]}"
+        with started(*COMMAND, "mavlink", "--connection", connection, option) as kit:
+            _, errors = kit.communicate(typed, timeout=60.0)
+        assert (kit.returncode, errors) == (
+            2,
+            f"conformance: {word} was not typed: nothing was sent\n",
+        )
+        device.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            device.recv(1)
+
+
+def test_with_the_word_it_fires() -> None:
+    code, out, errors = Bench().run("--fire", "--only", "release", typed="FIRE\n")
+    assert (code, errors) == (0, "")
+    assert "release: IT RELEASES" in out
+    assert "passed         release              DRONE, told after" in out
+
+
+def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
+    with Bench().trying("--arm") as kit:
+        assert kit.stdin is not None
+        assert kit.stdout is not None
+        kit.stdin.write("ARM\n")
+        kit.stdin.flush()
+        for line in kit.stdout:
+            if line.endswith("found 1/161\n"):
+                break
+        kit.send_signal(signal.SIGINT)
+        out, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, errors) == (3, "conformance: aborted by Ctrl-C\n")
+    assert out.endswith("mavlink 1/161: nothing was tried\n")
+
+
+def test_a_wire_that_is_not_there_is_told_at_once() -> None:
+    with started(*COMMAND, "mavlink", "--connection", "serial:/dev/not_there") as kit:
+        _, errors = kit.communicate(timeout=60.0)
+    assert kit.returncode == 3
+    assert "/dev/not_there" in errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "no device is named: need one of "),
+        (["gimbal"], "no kit is called 'gimbal': need one of "),
+        (["mavlink", "--only", "nothing"], "--only nothing: no such clause; --list has all"),
+        (["mavlink", "--html", "/nowhere/a"], "/nowhere/a: No such file or directory"),
+        (["mavlink", "--connection", "abc"], "connection 'abc' is not understood"),
+    ],
+)
+def test_a_mistake_in_the_command_line_ends_with_2(arguments: list[str], told: str) -> None:
+    with started(*COMMAND, *arguments) as kit:
+        out, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, out) == (2, "")
+    assert f"conformance: {told}" in errors
