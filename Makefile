@@ -65,7 +65,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long pictures newcomer bench campaign compare without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign compare conformance without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -114,6 +114,9 @@ compare: build ## fly FLIGHTS flights from SEED on with this product, ArduPilot'
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),exec python3) \
 	    -m chute_ros.tools.compare --flights $(FLIGHTS) --seed $(SEED) \
 	    --page docs/evidence/compare.md $(COMPARE_ARGS)
+
+conformance: build ## try each conformance kit on devices that break each clause, write docs/evidence/conformance.md
+	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m chute_ros.tools.conformance.evidence
 
 without: build ## fly the campaign without a rule or heuristic, to see what needs it (WITHOUT_ARGS="--together ...")
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3) \

@@ -8,11 +8,9 @@ from functools import partial
 from chute_ros.conformance.clause import Clause, Risk, Trial
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench
 
-PARACHUTE = "Parachute Protocol (MAVLink developer guide, services/parachute)"
-HEARTBEAT = "Heartbeat/Connection Protocol, which the Parachute Protocol names"
-COMMAND = "Command Protocol, which the Parachute Protocol names"
-FRAMES = "MAVLink, packet serialization"
-SIGNING = "MAVLink, message signing"
+# All of the MAVLink developer guide; the first names the others.
+PARACHUTE, HEARTBEAT = "Parachute Protocol", "Heartbeat/Connection Protocol"
+COMMAND, FRAMES, SIGNING = "Command Protocol", "Packet Serialization", "Message Signing"
 
 #: What a device may do that is only read.
 READS = "nothing: it is only listened to"
