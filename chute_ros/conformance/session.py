@@ -48,8 +48,8 @@ class Bench(Protocol):
     def find(self) -> Trial:
         """Find the device, and return who it is in words; ends as FAILED if it is not there."""
 
-    def disarm(self) -> Trial:
-        """Leave the device disarmed; ends as FAILED if that cannot be seen."""
+    def leave(self) -> Trial:
+        """Leave the device disarmed and as it was found; ends as FAILED if that cannot be seen."""
 
 
 @dataclass(frozen=True)
@@ -197,9 +197,8 @@ class Session(Generic[BenchT]):
 
     def _end(self, problem: str) -> Steps:
         problems = [problem] if problem else []
-        if self._allowed.risk > Risk.NONE:
-            try:
-                yield from self.bench.disarm()
-            except DecidedError as decided:
-                problems.append(str(decided))
+        try:
+            yield from self.bench.leave()
+        except DecidedError as decided:
+            problems.append(str(decided))
         self._events.append(Ended("; ".join(problems)))

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import pytest
 
+from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import Result, Risk, Verdict
 from chute_ros.conformance.session import Allowed, Ended, Found, Session
 from chute_ros.conformance.virtual import VirtualLine
 from chute_ros.links.mavlink.conformance import CLAUSES
-from chute_ros.links.mavlink.conformance.bench import MavlinkBench, NotAllowedError
+from chute_ros.links.mavlink.conformance.bench import MavlinkBench
 from chute_ros.links.mavlink.kit import KIT
 from chute_ros.links.mavlink.simulator.broken import BREAKS
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings

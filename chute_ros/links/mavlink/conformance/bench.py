@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from chute_ros.conformance.bench import HeardPacket, NotAllowedError, RecordingBench
 from chute_ros.conformance.clause import Packet, Risk, Trial, Wait, failed
-from chute_ros.errors import ChuteError
 from chute_ros.links.mavlink.protocol.parachute import component_information
 from chute_ros.model import TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
@@ -30,13 +30,10 @@ _ACTIONS = (dialect.PARACHUTE_DISABLE, dialect.PARACHUTE_ENABLE)
 
 
 @dataclass(frozen=True)
-class Heard:
-    """A frame of the device, and its packet. at: monotonic s; refused: why its signature is none
-    of the device's key."""
+class Heard(HeardPacket):
+    """A frame of the device. refused: why its signature is none of the device's key."""
 
-    at: float
     frame: Frame
-    packet: Packet
     refused: str
 
     @property
@@ -44,17 +41,8 @@ class Heard:
         """What it says."""
         return self.frame.message
 
-    @property
-    def kind(self) -> str:
-        """Name of its message."""
-        return str(self.frame.message.get_type())
 
-
-class NotAllowedError(ChuteError):
-    """A trial tried to send what the person has not allowed: a mistake of ours."""
-
-
-class MavlinkBench:
+class MavlinkBench(RecordingBench[Heard]):
     """Commands are sent as component US of the device's own system. risk: the highest that the
     person allows; nothing above it is ever sent. component: of the device, where several are on
     the network; key: signs and verifies, None: nothing is signed; soak: how long it is watched in
@@ -67,15 +55,10 @@ class MavlinkBench:
         key: tuple[Signer, Verifier] | None = None,
         soak: float = 0.0,
     ) -> None:
-        self.now, self.soak, self.heard_at = 0.0, soak, -math.inf
-        self.traffic: list[Packet] = []
-        #: Of the device, in their order.
-        self.heard: list[Heard] = []
+        super().__init__()
+        self.soak = soak
         self.system = self.component = 0
-        #: What the trial at the beginning saw (watch).
-        self.watched: list[Heard] = []
         self._risk, self._wanted, self._key = risk, component, key
-        self._began = math.nan
         self._every: list[Heard] = []
         self._decoders: dict[Hashable, FrameDecoder] = {}
         #: Of each sender, that signs or does not.
@@ -86,13 +69,13 @@ class MavlinkBench:
     # -- as the session wants it ------------------------------------------------------------------
 
     def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
-        self._at(now)
+        self.at(now)
         decoder = self._decoders.setdefault(stream, FrameDecoder())
         frames = decoder.feed_datagram(data, now) if stream is None else decoder.feed(data, now)
         for frame in frames:
             raw = bytes(frame.message.get_msgbuf())
             packet = self._noted(frame.message, frame.device, False, raw)
-            one = Heard(now, frame, packet, self._refusal(frame, raw))
+            one = Heard(now, packet.name, packet, frame, self._refusal(frame, raw))
             self._every.append(one)
             if (frame.system_id, frame.component_id) == (self.system, self.component):
                 self.heard.append(one)
@@ -107,7 +90,7 @@ class MavlinkBench:
         self._decoders.pop(stream, None)
 
     def update(self, now: float) -> None:
-        self._at(now)
+        self.at(now)
         if now >= self._beat_at:
             self._beat_at = now + _BEAT
             kind = dialect.MAV_TYPE_ONBOARD_CONTROLLER
@@ -120,11 +103,6 @@ class MavlinkBench:
     def take_output(self) -> list[bytes]:
         output, self._output = self._output, []
         return output
-
-    def _at(self, now: float) -> None:
-        self.now = now
-        if math.isnan(self._began):
-            self._began = now
 
     # -- what is sent ---------------------------------------------------------------------------
 
@@ -147,7 +125,7 @@ class MavlinkBench:
 
     def send_bytes(self, data: bytes, what: str) -> None:
         """Send what is no frame. It must hold none."""
-        self.traffic.append(Packet(self.now - self._began, True, "", what, "", data))
+        self.noted(True, "", what, "", data)
         self._output.append(data)
 
     def command_long(
@@ -183,9 +161,7 @@ class MavlinkBench:
         fields = message.to_dict()
         name = fields.pop("mavpackettype")
         text = ", ".join(f"{key}={value}" for key, value in fields.items())
-        packet = Packet(self.now - self._began, sent, sender, name, text, bytes(raw))
-        self.traffic.append(packet)
-        return packet
+        return self.noted(sent, sender, name, text, bytes(raw))
 
     # -- steps of trials ------------------------------------------------------------------------
 
@@ -230,7 +206,7 @@ class MavlinkBench:
                 told["packed"] = one.message.parachute_packed_date
         return {name.replace("_", " "): str(text) for name, text in told.items() if text}
 
-    def disarm(self) -> Trial:
+    def leave(self) -> Trial:
         """Each trigger is disarmed, and its status says so."""
         every = int(sum(TriggerFlags))
         if self._risk is Risk.NONE or not self.component:
@@ -249,31 +225,6 @@ class MavlinkBench:
         for source in TriggerFlags:
             yield from self.command(dialect.MAV_CMD_SET_PARACHUTE_ARM, 0, int(source))
         return ""
-
-    def watch(self, seconds: float) -> Trial:
-        """Look on for so long; what came is watched."""
-        began = self.now
-        yield Wait(began + seconds)
-        self.watched = [one for one in self.heard if one.at >= began]
-        return ""
-
-    def watch_on(self, seconds: float) -> Trial:
-        """Let so long pass."""
-        yield Wait(self.now + seconds)
-        return ""
-
-    def wait_for(
-        self, kind: str, within: float, fits: Callable[[Heard], bool] = lambda one: True
-    ) -> Any:
-        """The next message of this kind from the device that fits; None: none came within (s)."""
-        since = len(self.heard)
-
-        def found() -> Heard | None:
-            every = (one for one in self.heard[since:] if one.kind == kind and fits(one))
-            return next(every, None)
-
-        yield Wait(self.now + within, found)
-        return found()
 
     def command(
         self, command: int, *params: float, tries: int = TRIES, confirmation: int = 0
@@ -311,10 +262,6 @@ class MavlinkBench:
         if status is None:
             raise failed(f"no PARACHUTE_STATUS within {_STATUS_WITHIN:g} s")
         return status
-
-    def packets(self, *kinds: str) -> Sequence[Packet]:
-        """Of what was watched, those of these kinds."""
-        return [one.packet for one in self.watched if one.kind in kinds]
 
 
 def _risk_of(message: Any) -> Risk:

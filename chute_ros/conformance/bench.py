@@ -1,0 +1,79 @@
+"""What the benches of all devices share: what was sent and received, and waiting for more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from chute_ros.conformance.clause import Packet, Trial, Wait
+from chute_ros.errors import ChuteError
+
+
+class NotAllowedError(ChuteError):
+    """A trial tried to send what the person has not allowed: a mistake of ours."""
+
+
+@dataclass(frozen=True)
+class HeardPacket:
+    """What the device sent, by the name of its message. at: monotonic s."""
+
+    at: float
+    kind: str
+    packet: Packet
+
+
+HeardT = TypeVar("HeardT", bound=HeardPacket)
+
+
+class RecordingBench(Generic[HeardT]):
+    """heard: of the device, in their order; watched: what the last watch saw."""
+
+    def __init__(self) -> None:
+        self.now, self.heard_at = 0.0, -math.inf
+        self.traffic: list[Packet] = []
+        self.heard: list[HeardT] = []
+        self.watched: list[HeardT] = []
+        self._began = math.nan
+
+    def at(self, now: float) -> None:
+        """The time is now, monotonic s."""
+        self.now = now
+        if math.isnan(self._began):
+            self._began = now
+
+    def noted(self, sent: bool, sender: str, name: str, text: str, raw: bytes) -> Packet:
+        """Remember what was sent or received."""
+        packet = Packet(self.now - self._began, sent, sender, name, text, raw)
+        self.traffic.append(packet)
+        return packet
+
+    def watch(self, seconds: float) -> Trial:
+        """Look on for so long; what came is watched."""
+        began = self.now
+        yield Wait(began + seconds)
+        self.watched = [one for one in self.heard if one.at >= began]
+        return ""
+
+    def watch_on(self, seconds: float) -> Trial:
+        """Let so long pass."""
+        yield Wait(self.now + seconds)
+        return ""
+
+    def wait_for(
+        self, kind: str, within: float, fits: Callable[[HeardT], bool] = lambda one: True
+    ) -> Any:
+        """The next message of this kind from the device that fits; None: none came within (s)."""
+        since = len(self.heard)
+
+        def found() -> HeardT | None:
+            every = (one for one in self.heard[since:] if one.kind == kind and fits(one))
+            return next(every, None)
+
+        yield Wait(self.now + within, found)
+        return found()
+
+    def packets(self, *kinds: str) -> Sequence[Packet]:
+        """Of what was watched, those of these kinds."""
+        return [one.packet for one in self.watched if one.kind in kinds]
