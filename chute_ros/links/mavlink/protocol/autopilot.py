@@ -96,8 +96,9 @@ class AutopilotTracker:
         self.settings = AutopilotSettings()
         self.motor_signs = MotorSigns()
         self.round_trip = RoundTrip()
-        #: How often it was seen to arm.
+        #: How often it was seen to arm; when it last said whether it is armed, monotonic s.
         self.arming_count = 0
+        self.armed_told_at = -math.inf
         self._system_status = 0
         self._streams = StreamWatch(needed_rate)
         self._optional = OptionalStreams()
@@ -145,10 +146,11 @@ class AutopilotTracker:
         terminated = self._system_status == dialect.MAV_STATE_FLIGHT_TERMINATION
         return self.armed is Armed.DISARMED or terminated
 
-    def heartbeat(self, message: Any, now: float) -> list[LinkChange]:
-        """A HEARTBEAT of the autopilot."""
+    def heartbeat(self, message: Any, now: float, copy: bool = False) -> list[LinkChange]:
+        """A HEARTBEAT of the autopilot. copy: of one that came before, which tells nothing new."""
         # Of two with the same ids nobody knows whose it is: what was known ages.
-        if not self._twins.found(now):
+        if not copy and not self._twins.found(now):
+            self.armed_told_at = now
             armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
             self.arming_count += armed and self.armed is Armed.DISARMED
             self.vehicle_type = message.type

@@ -40,6 +40,8 @@ NAMES: Mapping[Firmware, tuple[str, ...]] = {
     ),
     Firmware.OTHER: (),
 }
+#: Beginnings of the names of what an autopilot has as a whole, or not at all.
+_GROUPS = ("AFS_",)
 #: From one request to the next, and to its repetition, s.
 _PACE, _ANSWER_TIME = 0.2, 1.0
 _TRIES = 3
@@ -62,6 +64,8 @@ class AutopilotSettings:
     def __init__(self) -> None:
         self.firmware = Firmware.OTHER
         self._values: dict[str, float] = {}
+        #: The autopilot says so; or it did not answer, although it answered others.
+        self._denied: set[str] = set()
         self._absent: set[str] = set()
         #: Asked for in vain.
         self._unanswered: set[str] = set()
@@ -75,6 +79,7 @@ class AutopilotSettings:
         read before holds until then."""
         if firmware is not self.firmware:
             self._values.clear()
+            self._denied.clear()
             self._absent.clear()
             self._unanswered.clear()
         self.firmware = firmware
@@ -100,12 +105,13 @@ class AutopilotSettings:
         if message.get_type() == "PARAM_ERROR":
             if message.error == dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST:
                 self._values.pop(name, None)
-                self._absent.add(name)
+                self._denied.add(name)
                 self._answered(name)
             return
         value = self._decoded(message)
         if math.isfinite(value):
             self._values[name] = value
+            self._denied.discard(name)
             self._absent.discard(name)
             self._answered(name)
 
@@ -114,13 +120,16 @@ class AutopilotSettings:
         return self._values.get(name)
 
     def absent(self, name: str) -> bool:
-        """This autopilot has no such parameter."""
-        return name in self._absent
+        """This autopilot has no such parameter. Of a group it has all or none: where one of them
+        is answered, another one's answers were lost."""
+        group = name.partition("_")[0] if name.startswith(_GROUPS) else name
+        some = any(one.startswith(group) for one in self._values)
+        return name in self._denied or (name in self._absent and not some)
 
     @property
     def answers(self) -> bool:
         """The autopilot has answered at least once."""
-        return bool(self._values or self._absent)
+        return bool(self._values or self._denied or self._absent)
 
     @property
     def complete(self) -> bool:
@@ -140,9 +149,9 @@ class AutopilotSettings:
         """The value of one, in words."""
         if name in self._values:
             return f"{self._values[name]:g}"
-        if name in self._absent:
+        if self.absent(name):
             return "not there"
-        return "not answered" if self.silent else "not read yet"
+        return "not answered" if self.silent or name in self._absent else "not read yet"
 
     def _decoded(self, message: Any) -> float:
         form = _BYTEWISE.get(message.param_type)

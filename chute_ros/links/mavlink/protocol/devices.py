@@ -159,6 +159,13 @@ class Devices(EventLog):
         doubts = [parachutes.doubt(), autopilots.doubt()]
         doubts += [parachute.doubt(now) for parachute in parachutes.all()]
         doubts += [autopilot.doubt(now) for autopilot in autopilots.all()]
+        alive = [a.device for a in autopilots.all() if a.liveness.state is LinkState.OK]
+        if len(alive) > 1:
+            doubts.append(
+                f"autopilots {', '.join(alive)} are all received: a kill goes to one alone, and "
+                "another's motors may turn: set autopilot_component_id, or have the others say "
+                "that they are none"
+            )
         unset = [f"{one.kind}_system_id" for one in (parachutes, autopilots) if not one.fixed]
         both = parachutes.all() and autopilots.all()
         if both and unset and parachutes.system_id != autopilots.system_id:
@@ -170,8 +177,8 @@ class Devices(EventLog):
 
     # -- what they say ---------------------------------------------------------------------------
 
-    def heard(self, message: Any, ids: Ids, now: float) -> None:
-        """A message of anybody on the network."""
+    def heard(self, message: Any, ids: Ids, now: float, copy: bool = False) -> None:
+        """A message of anybody on the network. copy: of a heartbeat that came before."""
         if message.get_type() != "HEARTBEAT":
             self._from_parachute(message, ids, now)
             self._from_autopilot(message, ids, now)
@@ -182,7 +189,7 @@ class Devices(EventLog):
             if len(self._others) < MOST_DEVICES:
                 self._others.add(ids)
             if is_autopilot(message):
-                self._autopilot_heartbeat(message, ids, now)
+                self._autopilot_heartbeat(message, ids, now, copy)
 
     def update(self, now: float) -> None:
         """Look at the clock."""
@@ -225,7 +232,7 @@ class Devices(EventLog):
     def _tracker(self, ids: Ids) -> ParachuteTracker:
         return ParachuteTracker(*ids, self._config.parachute_liveness, self._config.status)
 
-    def _autopilot_heartbeat(self, message: Any, ids: Ids, now: float) -> None:
+    def _autopilot_heartbeat(self, message: Any, ids: Ids, now: float, copy: bool) -> None:
         if not self.autopilots.admits(*ids):
             return
         autopilot = self.autopilots.get(*ids)
@@ -233,7 +240,7 @@ class Devices(EventLog):
             limits, needed = self._config.autopilot_liveness, self._config.needed_message_rate
             autopilot = AutopilotTracker(*ids, limits, needed)
             self.autopilots.add(*ids, autopilot)
-        self.link_changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now))
+        self.link_changed(f"autopilot {autopilot.device}", autopilot.heartbeat(message, now, copy))
         self._vehicle_changed(now)
 
     def _from_parachute(self, message: Any, ids: Ids, now: float) -> None:

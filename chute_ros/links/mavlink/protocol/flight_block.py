@@ -4,7 +4,8 @@ Where the height is known, the vehicle is on the ground until it was higher than
 above where it was armed: some autopilots say IN_AIR as soon as a take-off is ordered, at height 0.
 Else the autopilot's own ON_GROUND is believed while it is fresh. An autopilot refuses a plain
 disarm in flight; a forced one, which it does not refuse, follows only where the vehicle was armed
-while flight was blocked already, and its height shows that it has not left the ground since.
+while flight was blocked already, and its height shows that it has not left the ground since. One
+that arms in the air (an autopilot that starts anew, the motor of a glider) has left it.
 """
 
 from __future__ import annotations
@@ -12,12 +13,16 @@ from __future__ import annotations
 import math
 
 from chute_ros.links.mavlink.protocol.autopilot import AutopilotTracker
-from chute_ros.model import Armed, Reading
+from chute_ros.model import Armed, LandedState, Reading
 
 #: Seconds from one disarm to the next, while the autopilot stays armed.
 DISARM_INTERVAL = 0.5
 #: It was higher once it was so for this long, s; a height older than this is not known, s.
 _FOR_A_MOMENT, _FRESH = 0.3, 1.0
+#: It says IN_AIR as soon as a take-off is ordered, so long before it is seen to arm at most, s.
+_STOOD_WITHIN = 3.0
+#: Home may be set again as it arms, so long after it at most, s.
+_HOME_SET_WITHIN = 1.0
 #: What a height is taken from: the first that is known as it arms. No home moves the first.
 _HEIGHTS = ("altitude", "height")
 
@@ -86,12 +91,17 @@ class _Rise:
         #: What the height is taken from; empty: it was not known as the vehicle was armed.
         self._source = ""
         self._newest = Reading()
-        #: The lowest since it was armed: home may be set again as it arms.
-        self._lowest = math.nan
+        #: When it was armed, monotonic s; its height then, and the lowest since.
+        self._armed_at = -math.inf
+        self._first = self._lowest = math.nan
+        #: When the autopilot last said that it stands, monotonic s.
+        self._stood_at = -math.inf
         self._higher_since = math.inf
 
     def observe(self, autopilot: AutopilotTracker, now: float) -> bool:
         """The autopilot may have said something; True: it was just seen to arm."""
+        if autopilot.on_ground(now):
+            self._stood_at = now
         before = self._armings.setdefault(autopilot.device, autopilot.arming_count)
         self._armings[autopilot.device] = autopilot.arming_count
         just_armed = autopilot.arming_count > before
@@ -111,13 +121,20 @@ class _Rise:
         fresh = (name for name in _HEIGHTS if autopilot.reading(name).age(now) <= _FRESH)
         self._source = next(fresh, "")
         self._newest = autopilot.reading(self._source)
-        self._lowest = self._newest.value
-        self.left_ground, self.is_low, self._higher_since = False, True, math.inf
+        self._first = self._lowest = self._newest.value
+        self._armed_at = now
+        stands = autopilot.landed_state is LandedState.UNKNOWN
+        self.left_ground = not stands and now - self._stood_at > _STOOD_WITHIN
+        self.is_low, self._higher_since = True, math.inf
 
     def _follow(self, height: Reading, now: float) -> None:
         self._newest = height
         self._lowest = min(self._lowest, height.value)
-        self.is_low = height.value - self._lowest <= self._limit
+        if self._source != _HEIGHTS[0] and now - self._armed_at <= _HOME_SET_WITHIN:
+            self._first = min(self._first, height.value)
+        # Launched downhill it has left the ground as well.
+        moved = max(height.value - self._lowest, self._first - height.value)
+        self.is_low = moved <= self._limit
         if self.is_low:
             self._higher_since = math.inf
         else:

@@ -158,8 +158,13 @@ def kill(
     as well, s. None: no way is allowed now."""
 
     def shown() -> bool:
-        told = autopilot.motors_off and autopilot.liveness.last_heard > now
-        return told or autopilot.motor_signs.stopped_since(now)
+        told = autopilot.motors_off and autopilot.armed_told_at > now
+        return told or autopilot.motor_signs.stopped_since(now, stopping())
+
+    def stopping() -> frozenset[int]:
+        """Numbers of the commands that stop the motors of this autopilot, once accepted."""
+        ways = (way for way in plan().ways if not way.obstacle)
+        return frozenset(_stop_order(autopilot, way.method).number for way in ways)
 
     def next_way(tried: tuple[KillMethod, ...]) -> MavlinkGoal | None:
         way = plan().allowed(tried, deploy_decided())
@@ -199,7 +204,7 @@ def disarm_on_ground(
             FORCED if forced else "disarm on the ground",
             (command(autopilot, dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, *param2),),
             "the autopilot's heartbeat reports disarmed",
-            lambda: autopilot.motors_off and autopilot.liveness.last_heard > now,
+            lambda: autopilot.motors_off and autopilot.armed_told_at > now,
             request_heartbeat(autopilot),
             # The plain one, which may be tried on, must not keep it waiting.
             urgent=forced,

@@ -59,10 +59,11 @@ class KillPlan:
                 f"kill_method is {self.method.value}, and {chosen.obstacle}: "
                 f"{_REMEDY[chosen.method]}, or set kill_method to auto"
             )
-        if any(not way.obstacle for way in self.ways):
+        if any(not way.obstacle and not way.releases for way in self.ways):
             return ""
-        obstacles = "; ".join(way.obstacle for way in self.ways)
-        return f"nothing stops the motors: {obstacles}; {_REMEDY[KillMethod.FORCED_DISARM]}"
+        why = "; ".join(way.obstacle or way.releases for way in self.ways)
+        alone = " without a deploy" if any(not way.obstacle for way in self.ways) else ""
+        return f"nothing stops the motors{alone}: {why}; {_REMEDY[KillMethod.FORCED_DISARM]}"
 
     def warning(self) -> str:
         """What a person should know of it before flight; empty: nothing."""
@@ -121,19 +122,29 @@ def _termination(vehicle_type: int, settings: AutopilotSettings) -> Way:
     enabled, action = settings.get("AFS_ENABLE"), settings.get("AFS_TERM_ACTION")
     if enabled is None and not settings.absent("AFS_ENABLE"):
         return Way(way, releases="AFS_ENABLE of the autopilot is not known")
+    # The pin is driven as soon as termination is asked for, also where it is refused then.
+    releases = _by_pin(settings) if enabled == 1 else ""
     if enabled == 1 and action == _LANDS:
-        return Way(way, "AFS_TERM_ACTION is 43: it lands and stops no motor", useless=True)
+        lands = "AFS_TERM_ACTION is 43: it lands and stops no motor"
+        return Way(way, lands, releases, useless=True)
     # A copter that has no AFS, or has it switched off, disarms.
     aeroplane = is_aeroplane(vehicle_type) or settings.get("HOME_RESET_ALT") is not None
+    obstacle = ""
     if aeroplane and enabled != 1:
-        return Way(way, f"AFS_ENABLE is {settings.text('AFS_ENABLE')}: termination is refused")
-    if aeroplane and action != _STOPS:
+        obstacle = f"AFS_ENABLE is {settings.text('AFS_ENABLE')}: termination is refused"
+    elif aeroplane and action != _STOPS:
         is_now = settings.text("AFS_TERM_ACTION")
-        return Way(way, f"AFS_TERM_ACTION is {is_now} (42 stops the motors): it is refused")
+        obstacle = f"AFS_TERM_ACTION is {is_now} (42 stops the motors): it is refused"
+    return Way(way, obstacle, releases)
+
+
+def _by_pin(settings: AutopilotSettings) -> str:
+    """Why termination may drive a pin on which a parachute hangs; empty: it drives none."""
     pin = settings.get("AFS_TERM_PIN")
-    if enabled == 1 and pin is not None and pin >= 0:
-        return Way(way, releases=f"AFS_TERM_PIN is {pin:g}: a parachute may hang on that pin")
-    return Way(way)
+    if pin is not None and pin >= 0:
+        return f"AFS_TERM_PIN is {pin:g}: a parachute may hang on that pin"
+    unknown = pin is None and not settings.absent("AFS_TERM_PIN")
+    return "AFS_TERM_PIN of the autopilot is not known" if unknown else ""
 
 
 def _described(way: Way) -> str:

@@ -49,7 +49,8 @@ class MavlinkLink:
         self.requests = Requests(CommandTransactions(config.commands), config.effect)
         self._inbox = Inbox(verifier, self.counts)
         self._outbox = Outbox(config.system_id, config.component_id, signer)
-        self._acknowledgements = Duplicates(config.commands.late_ack_window)
+        window = config.commands.late_ack_window
+        self._acknowledgements, self._heartbeats = Duplicates(window), Duplicates(window)
         self._announcements = Announcements()
         #: In which flight, counted by armings, a deploy was decided last.
         self._deploy_decided_in = -1
@@ -137,8 +138,11 @@ class MavlinkLink:
 
     def deploy(self, token: int, force: bool, now: float, device: str = "") -> None:
         """Release the parachute and see that its own status says so."""
-        self._deploy_decided_in = self._devices.arming_count()
         parachute = self._devices.to_release(device) or self._target(token, device)
+        # One on the autopilot itself may be known to nobody here; a name that does not exist is a
+        # caller's mistake.
+        if parachute is not None or not device:
+            self._deploy_decided_in = self._devices.arming_count()
         if parachute is not None:
             self.requests.make_way_for_release(now)
             self._announcements.ordered(token, f"DEPLOY of {parachute.device}")
@@ -263,13 +267,15 @@ class MavlinkLink:
     def _frame(self, frame: Frame, now: float) -> None:
         message, ids = frame.message, (frame.system_id, frame.component_id)
         self._acknowledgements.heard(frame)
+        self._heartbeats.heard(frame)
         self.requests.heard(*ids, message)
         if message.get_type() == "COMMAND_ACK":
             self._acknowledgement(frame, now)
         elif self._care.asks_to_arm(message):
             self._care.authorize(ids, now)
         else:
-            self._devices.heard(message, ids, now)
+            copy = message.get_type() == "HEARTBEAT" and self._heartbeats.is_copy(frame, now)
+            self._devices.heard(message, ids, now, copy)
         self.requests.effects_may_show(now)
 
     def _acknowledgement(self, frame: Frame, now: float) -> None:

@@ -6,7 +6,7 @@ an order to stop, and only if it is a change: an aeroplane that glides has its m
 armed.
 
 Sources: MAVLink common.xml, SERVO_OUTPUT_RAW (us), ESC_STATUS (rpm), EXTENDED_SYS_STATE,
-STATUSTEXT; ardupilotmega.xml, ESC_TELEMETRY_1_TO_4 (rpm); the texts: ArduCopter
+STATUSTEXT; ardupilotmega.xml, ESC_TELEMETRY_1_TO_4 to 9_TO_12 (rpm); the texts: ArduCopter
 AP_Arming_Copter.cpp, ArduPlane AP_Arming_Plane.cpp, PX4 Commander.cpp.
 """
 
@@ -25,7 +25,9 @@ _DRIVEN = 20
 _OUTPUTS = 16
 #: How the texts begin that autopilots send as they disarm.
 _DISARMED_TEXTS = ("Disarming motors", "Throttle disarmed", "Disarmed by ")
-#: The orders whose acceptance lets a sign count.
+#: Speed controllers are told of in groups.
+_TELEMETRY = tuple(f"ESC_TELEMETRY_{first}_TO_{first + 3}" for first in range(1, 12, 4))
+#: The orders whose acceptance may let a sign count.
 _STOPPING = (dialect.MAV_CMD_COMPONENT_ARM_DISARM, dialect.MAV_CMD_DO_FLIGHTTERMINATION)
 
 
@@ -33,7 +35,7 @@ class MotorSigns:
     """Follows the signs of one autopilot."""
 
     def __init__(self) -> None:
-        self._accepted = -math.inf
+        self._accepted, self._accepted_command = -math.inf, 0
         self._stopped = -math.inf
         self._armed = False
         #: Output (port, number) -> its value while disarmed, us.
@@ -51,11 +53,14 @@ class MotorSigns:
     def accepted(self, command: int, now: float) -> None:
         """The autopilot accepted a command of ours."""
         if command in _STOPPING:
-            self._accepted, self._stopped = now, -math.inf
+            self._accepted, self._accepted_command = now, command
+            self._stopped = -math.inf
 
-    def stopped_since(self, ordered: float) -> bool:
-        """A sign came after the autopilot accepted an order of ordered or later."""
-        return self._accepted >= ordered and self._stopped >= self._accepted
+    def stopped_since(self, ordered: float, stopping: frozenset[int]) -> bool:
+        """A sign came after the autopilot accepted one of these commands, ordered then or later:
+        what stops no motor of its is accepted all the same."""
+        accepted = self._accepted >= ordered and self._accepted_command in stopping
+        return accepted and self._stopped >= self._accepted
 
     def heard(self, message: Any, now: float) -> None:
         """Any message of the autopilot."""
@@ -64,8 +69,8 @@ class MotorSigns:
             self._outputs(message, now)
         elif kind == "ESC_STATUS":
             self._escs(message.index, message.rpm, now)
-        elif kind == "ESC_TELEMETRY_1_TO_4":
-            self._escs(0, message.rpm, now)
+        elif kind in _TELEMETRY:
+            self._escs(_TELEMETRY.index(kind), message.rpm, now)
         elif kind == "EXTENDED_SYS_STATE":
             self._landed_state(message, now)
         elif kind == "STATUSTEXT" and message.text.startswith(_DISARMED_TEXTS):
@@ -77,15 +82,17 @@ class MotorSigns:
             for number in range(1, _OUTPUTS + 1)
         }
         if not self._armed:
-            idle = {at: us for at, us in values.items() if 0 < us <= _HIGHEST_IDLE}
-            others = {at: us for at, us in self._idle.items() if at[0] != message.port}
-            self._idle = others | idle
+            # The lowest: the outputs of one that was armed a moment ago are told of before that.
+            for at, us in values.items():
+                if 0 < us <= _HIGHEST_IDLE:
+                    self._idle[at] = min(us, self._idle.get(at, us))
             return
         known = [at for at in values if at in self._idle]
         driven = {at for at in known if values[at] > self._idle[at] + _DRIVEN}
-        if not driven and any(at in self._driven for at in known):
-            self._stopped = now
+        turned = bool(self._driven)
         self._driven = {at for at in self._driven if at[0] != message.port} | driven
+        if turned and not self._driven:
+            self._stopped = now
 
     def _escs(self, group: int, rpm: Iterable[int], now: float) -> None:
         turned_before = any(self._turning.values())

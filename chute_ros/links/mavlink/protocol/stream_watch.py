@@ -70,6 +70,14 @@ _STREAM_CURE = (
 )
 
 
+_NEVER_CURE = (
+    "the rules are blind without it: switch its stream on in the autopilot's settings, or fly "
+    "without (needed_message_rate 0)"
+)
+#: A message that the autopilot is asked for, and that does not come for so long, never does, s.
+MISSING_AFTER = 8.0
+
+
 @dataclass(frozen=True)
 class Ask:
     """Ask for a message each interval, s; 0: at the rate that the autopilot chooses."""
@@ -114,6 +122,7 @@ class StreamWatch:
     def begin(self) -> None:
         """The autopilot is heard, or heard again, or started anew: nothing has come of it yet."""
         self._rates = {part: StreamRate(self._needed) for part in ASKED_FOR}
+        self._begun = math.nan
 
     def received(self, size: int) -> None:
         """The line carried so many bytes."""
@@ -142,6 +151,14 @@ class StreamWatch:
             if self._rates[part].too_slow(now)
         }
 
+    def missing(self, now: float) -> list[str]:
+        """Messages that the rules need and that have never come, once they had their time."""
+        if math.isnan(self._begun):
+            self._begun = now
+        if not self._needed or now - self._begun < MISSING_AFTER:
+            return []
+        return [name for part, name in _JUDGED.items() if self._rates[part].newest == -math.inf]
+
     def line_is_slow(self, now: float) -> bool:
         """All that the rules need comes too seldom, not one stream that somebody slowed down."""
         return len(self.slow(now)) == len(_JUDGED)
@@ -149,7 +166,8 @@ class StreamWatch:
     def faults(self, now: float) -> list[str]:
         """What is too slow, and what to do about it."""
         cure = LINE_CURE if self.line_is_slow(now) else _STREAM_CURE
-        return [
+        missing = [f"{name} has never come: {_NEVER_CURE}" for name in self.missing(now)]
+        return missing + [
             f"{name} comes at {rate:.1f} Hz (need {self._needed:g} Hz): {cure}"
             for name, rate in self.slow(now).items()
         ]

@@ -40,7 +40,7 @@ def test_all_are_asked_for_by_name_in_turn_and_not_at_once():
 
 
 def test_a_lost_request_is_sent_again_and_a_name_without_an_answer_is_not_there():
-    bench = Bench().hear(PILOT, ardupilot())
+    bench = Bench(needed_message_rate=0.0).hear(PILOT, ardupilot())
     for _ in range(400):
         bench.at(bench.t + 0.1).hear(PILOT, ardupilot())
         if asked(bench)[-1] != "ARMING_REQUIRE":
@@ -53,7 +53,8 @@ def test_a_lost_request_is_sent_again_and_a_name_without_an_answer_is_not_there(
 
 
 def test_an_autopilot_that_answers_none_is_said_to_and_forbids_nothing():
-    bench = Bench().hear(PILOT, ardupilot()).stream(30.0, 0.1, PILOT, ardupilot)
+    bench = Bench(needed_message_rate=0.0).hear(PILOT, ardupilot())
+    bench.stream(30.0, 0.1, PILOT, ardupilot)
     setup = bench.link.setup()
     assert set(setup.settings.values()) == {"not answered"}
     assert any("answers no parameter request" in text for text in setup.warnings)

@@ -44,6 +44,40 @@ def test_in_air_at_height_0_ends_no_block():
     assert bench.end(-1).finished.success
 
 
+@pytest.mark.parametrize("blocked_first", [True, False])
+def test_one_that_arms_in_the_air_is_not_disarmed(blocked_first):
+    """An autopilot that starts anew at 100 m, a glider that starts its motor: IN_AIR all the
+    time, and disarmed between two heartbeats."""
+    bench = Bench().hear(PILOT, quadplane(False), landed(), at_height(0.0))
+    climb(bench, quadplane, [10.0 * k for k in range(11)])
+    if blocked_first:
+        bench.call("flight_block", "the supervisor is lost")
+    climb(bench, quadplane, [100.0] * 40)
+    for armed in (False, True):
+        for _ in range(10):
+            bench.at(bench.t + 0.1).hear(PILOT, quadplane(armed), at_height(100.0), landed(IN_AIR))
+        bench.call("flight_block", "the supervisor is lost")
+    climb(bench, quadplane, [100.0] * 10)
+    assert disarms(bench) == []
+
+
+def test_one_that_is_launched_downhill_has_left_the_ground():
+    def fly(*depths):
+        for depth in depths:
+            alt, relative = int((500.0 - depth) * 1000), int(-depth * 1000)
+            at = d.MAVLink_global_position_int_message(0, 0, 0, alt, relative, 0, 0, 0, 0)
+            bench.at(bench.t + 0.1).hear(PILOT, at, landed(IN_AIR), quadplane(True))
+            if bench.commands(DISARM):
+                bench.hear(PILOT, ack(DISARM, d.MAV_RESULT_FAILED))
+
+    bench = Bench(takeoff_height=2.0).hear(PILOT, quadplane(False), landed())
+    bench.call("flight_block", "no parachute")
+    fly(*(0.1 * step for step in range(11)), 2.0, 3.0, 4.0, 5.0)
+    bench.clear()
+    fly(6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0)
+    assert disarms(bench) == []
+
+
 def test_a_disarm_without_an_answer_is_followed_by_a_forced_one():
     bench = on_the_ground().at(0.7).hear(PILOT, quadplane(True), at_height(0.1))
     for _ in range(3):

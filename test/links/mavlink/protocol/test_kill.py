@@ -181,6 +181,79 @@ def test_a_termination_that_lands_is_no_kill_and_its_pin_may_be_a_parachutes():
     assert "AFS_TERM_PIN is 50" in bench.link.setup().kill
 
 
+PIN = {"AFS_ENABLE": 1, "AFS_TERM_ACTION": 42, "AFS_TERM_PIN": 54}
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {**PIN, "AFS_TERM_ACTION": 0},
+        {**PIN, "AFS_TERM_ACTION": 43},
+        *({key: value for key, value in PIN.items() if key != lost} for lost in PIN),
+    ],
+)
+@pytest.mark.parametrize("make", [plane, ardupilot])
+@pytest.mark.parametrize("method", KillMethod)
+def test_a_pin_that_is_set_or_not_known_is_driven_by_no_kill_alone(method, make, told):
+    """ArduPilot drives it as soon as termination is asked for, also where it then refuses it. An
+    answer may be lost: the others show that the autopilot has it."""
+    bench = Bench(kill_method=method).hear(PILOT, make())
+    for _ in range(200):
+        bench.at(bench.t + 0.1).hear(PILOT, make())
+        bench.hear(PILOT, *(setting(*one) for one in told.items()))
+    bench.hear(PILOT, make(True), landed(d.MAV_LANDED_STATE_IN_AIR)).clear()
+    kill(bench)
+    for _ in range(20):
+        bench.at(bench.t + 0.1).hear(PILOT, make(True), ack(DISARM, FAILED))
+    assert {way for _, way in ways(bench)} == {DISARM}
+
+
+def test_where_only_a_way_that_releases_is_left_take_off_is_forbidden():
+    bench = Bench().hear(PILOT, plane(), *(setting(*one) for one in PIN.items()))
+    bench.hear(PILOT, setting("ARMING_REQUIRE", 0))
+    (text,) = bench.link.vehicle_state(bench.now).faults
+    for part in ("nothing stops the motors without a deploy", "AFS_TERM_PIN is 54"):
+        assert part in text
+
+
+def test_a_second_vehicle_with_the_same_ids_confirms_no_kill():
+    """Ours flies; the other stands, disarmed. Whose heartbeat it is nobody knows."""
+    bench, booted = Bench().hear(PILOT, copter()), {True: 500_000, False: 5_000}
+    for step in range(140):
+        bench.at(bench.t + 0.1)
+        for ours in (True,) if step < 60 else (True, False):
+            ms = booted[ours] + int(bench.t * 1000)
+            bench.hear(PILOT, d.MAVLink_attitude_message(ms, 0, 0, 0, 0, 0, 0))
+            if step % 10 == (0 if ours else 5):
+                bench.hear(PILOT, copter(ours))
+    assert bench.link.doubts(bench.now)
+    bench.call("kill", 1).at(bench.t + 0.03).hear(PILOT, ack(DISARM, FAILED), copter(True))
+    for _ in range(5):
+        bench.at(bench.t + 0.05).hear(PILOT, copter(False))
+    assert bench.ends(1) == []
+
+
+def test_a_late_copy_of_a_heartbeat_of_before_the_arming_confirms_no_kill():
+    """By a second way, 3 s late."""
+    bench = Bench()
+    before = bench.encoder(PILOT).encode(copter(False), bench.now)
+    bench.link.receive(before, bench.now)
+    bench.at(1.0).hear(PILOT, copter(True)).at(2.9)
+    kill(bench)
+    bench.link.receive(before, bench.now + 0.1)
+    bench.at(3.0).hear(PILOT, ack(DISARM, FAILED)).at(3.1)
+    assert bench.ends(1) == []
+    assert bench.link.vehicle_state(bench.now).armed is Armed.ARMED
+
+
+def test_a_deploy_of_a_parachute_that_is_not_there_lets_no_kill_alone_release():
+    bench = flying(copter).hear(CHUTE, heartbeat(), status(armed=12))
+    bench.link.deploy(5, False, bench.now, "1/162")
+    kill(bench)
+    bench.at(bench.t + 0.02).hear(PILOT, ack(DISARM, FAILED)).at(bench.t + 1.0)
+    assert {way for _, way in ways(bench)} == {DISARM}
+
+
 def test_the_way_is_said_once_the_settings_are_read():
     bench = Bench().hear(PILOT, copter())
     assert bench.notices() == []

@@ -111,7 +111,7 @@ def test_flood_of_made_up_devices_does_not_grow_it():
         bench.hear((system, 161), heartbeat(), copter(), status())
     assert len(bench.link.parachutes.all()) == MOST_DEVICES
     assert len(bench.link.autopilots.all()) == MOST_DEVICES
-    assert len(bench.link.doubts(bench.now)) == 2
+    assert len(bench.link.doubts(bench.now)) == 3
     for stream in range(100):
         bench.link.receive(b"\xfd\x09", bench.now, stream)
     assert bench.at(60.0).link.next_deadline() == math.inf

@@ -1,7 +1,9 @@
 """Signs that the motors stand still, beside HEARTBEAT: only after an accepted order, and new."""
 
+from functools import partial
+
 import pytest
-from link_bench import Bench, ack, ardupilot, landed
+from link_bench import Bench, ack, ardupilot, landed, setting
 
 from chute_ros.protocol.mavlink.dialect import dialect as d
 
@@ -10,9 +12,9 @@ DISARM = 400
 IN_AIR = d.MAV_LANDED_STATE_IN_AIR
 
 
-def outputs(*us):
+def outputs(*us, port=0):
     padded = (*us, *[0] * (16 - len(us)))
-    return d.MAVLink_servo_output_raw_message(0, 0, *padded[:8], *padded[8:])
+    return d.MAVLink_servo_output_raw_message(0, port, *padded[:8], *padded[8:])
 
 
 def text(words):
@@ -67,6 +69,40 @@ def test_one_of_eight_motors_that_turns_is_enough():
     bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, esc_status(0, 0, 0, 0))
     assert bench.ends(1) == []
     bench.at(1.07).hear(PILOT, esc_status(0, 0, 0, 0, index=4))
+    assert bench.end(1).finished.success
+
+
+def test_motors_on_another_port_or_in_another_group_must_stand_still_too():
+    bench = Bench().hear(PILOT, ardupilot(), IDLE, outputs(1000, 1000, port=1))
+    bench.at(0.5).hear(PILOT, ardupilot(True), DRIVEN, outputs(1600, 1600, port=1))
+    bench.at(1.0).call("kill", 1).at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, OFF)
+    assert bench.ends(1) == []
+    assert bench.hear(PILOT, outputs(1000, 1000, port=1)).end(1).finished.success
+    zero = [0] * 4
+    others = d.MAVLink_esc_telemetry_5_to_8_message(zero, zero, zero, zero, [4000] * 4, zero)
+    bench = flying().hear(PILOT, others).call("kill", 1)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, esc_telemetry(*zero))
+    assert bench.hear(PILOT, esc_status(*zero)).ends(1) == []
+
+
+def test_outputs_of_one_that_was_just_armed_are_not_those_of_one_that_stands_still():
+    """A heartbeat tells of the arming up to 1 s later."""
+    bench = Bench().hear(PILOT, ardupilot(), IDLE).at(0.4).hear(PILOT, outputs(1100, 1100, 1500))
+    bench.at(0.5).hear(PILOT, ardupilot(True), DRIVEN).at(1.0).call("kill", 1)
+    bench.at(1.02).hear(PILOT, ack(DISARM)).at(1.05).hear(PILOT, outputs(1100, 1100, 1500))
+    assert bench.ends(1) == []
+    assert bench.at(1.1).hear(PILOT, OFF).end(1).finished.success
+
+
+def test_what_says_that_an_order_is_obeyed_which_stops_no_motor_confirms_nothing():
+    """An aeroplane whose motor runs without arming accepts a disarm, and says so."""
+    afs = {"ARMING_REQUIRE": 0, "AFS_ENABLE": 1, "AFS_TERM_ACTION": 42, "AFS_TERM_PIN": -1}
+    plane = partial(ardupilot, kind=d.MAV_TYPE_FIXED_WING)
+    bench = Bench().hear(PILOT, plane(True), *(setting(*one) for one in afs.items()))
+    bench.at(1.0).call("kill", 1).at(1.22)
+    bench.hear(PILOT, ack(DISARM), text("Throttle disarmed"), plane(True))
+    assert bench.ends(1) == []
+    bench.hear(PILOT, ack(185), text("Throttle disarmed"))
     assert bench.end(1).finished.success
 
 

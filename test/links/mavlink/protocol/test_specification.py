@@ -183,7 +183,8 @@ def test_MAV_CMD_DO_PARACHUTE_208():  # noqa: N802
 )
 def test_kill(method, number, params):
     bench = Bench(kill_method=method).hear((1, 1), ardupilot(armed=True))
-    bench.hear((1, 1), setting("AFS_ENABLE", 1), setting("AFS_TERM_ACTION", 42))
+    afs = {"AFS_ENABLE": 1, "AFS_TERM_ACTION": 42, "AFS_TERM_PIN": -1}
+    bench.hear((1, 1), *(setting(name, value) for name, value in afs.items()))
     bench.call("kill", 6)
     (order,) = bench.commands()
     assert (order.command, order.param1, order.param2) == (number, *params)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from chute_ros.links.mavlink.protocol.stream_watch import (
     ASK_AGAIN,
     ASKED_FOR,
+    MISSING_AFTER,
     STORE,
     STORE_FILLS,
     StreamWatch,
@@ -204,8 +205,23 @@ def test_it_is_said_after_two_seconds_and_not_any_more_when_it_is_over():
     assert 10.0 <= said[-1] <= 11.5
 
 
-def test_nothing_is_said_of_what_never_came_nor_where_nothing_is_needed():
-    assert StreamWatch(NEEDED).faults(100.0) == []
+def test_what_never_comes_is_said_once_it_had_its_time():
+    """4 Hz forbid a take-off: so do 0 Hz. Each message is named alone."""
+    watch = StreamWatch(NEEDED)
+    assert watch.faults(100.0) == []
+    for step in range(100):
+        watch.heard("tilt", 100.0 + step / 10)
+    assert watch.faults(100.0 + MISSING_AFTER - 0.1) == []
+    told = watch.faults(100.0 + MISSING_AFTER)
+    assert [text.partition(" has never come: ")[0] for text in told] == [
+        "GLOBAL_POSITION_INT",
+        "SCALED_IMU",
+    ]
+    watch.begin()
+    assert watch.faults(109.0) == [], "after a restart it has its time again"
+
+
+def test_nothing_is_said_where_nothing_is_needed():
     watch = StreamWatch(0.0)
     for second in range(20):
         watch.heard("tilt", float(second))
