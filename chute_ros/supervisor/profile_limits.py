@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
+from chute_ros.model import FIRES
 from chute_ros.supervisor.conditions.base import Condition
 from chute_ros.supervisor.conditions.measurement import (
     ALWAYS,
@@ -13,7 +14,17 @@ from chute_ros.supervisor.conditions.measurement import (
     MeasurementCondition,
     range_of,
 )
-from chute_ros.supervisor.measurements import STANDARD_LIMITS, Limits
+from chute_ros.supervisor.measurements import (
+    ACCELERATION,
+    CLIMB_RATE,
+    FELT_FALL,
+    HEIGHT,
+    STANDARD_LIMITS,
+    TILT,
+    VERTICAL_ACCELERATION,
+    VERTICAL_SPEED,
+    Limits,
+)
 from chute_ros.supervisor.rules import Rule
 
 #: No vehicle has a height below which nothing is released, or that is low, of more than this, m.
@@ -29,11 +40,24 @@ MOST_SAMPLES = 50
 #: A measurement's limits may be so many times as far as the standard ones. A rocket's speed may
 #: jump by twelve times as much.
 WIDEST = 20.0
-#: An older measurement tells nothing of a vehicle that falls, s.
-OLDEST = 10.0
+#: An older measurement tells nothing of a vehicle that falls, s; and most that come are older than
+#: this as they are looked at.
+YOUNGEST, OLDEST = 0.1, 10.0
 #: Longer is as good as for ever, which is 0, s.
 LONGEST_STUCK = 600.0
 _ROUNDING = 1e-9
+#: What is measured of a vehicle that hovers upright, or stands on a roof.
+_HOVERS = {
+    HEIGHT: 30.0,
+    VERTICAL_SPEED: 0.0,
+    CLIMB_RATE: 0.0,
+    VERTICAL_ACCELERATION: 0.0,
+    FELT_FALL: 0.0,
+    TILT: 0.0,
+    "attitude_error": 0.0,
+    "sink_beyond_target": 0.0,
+    ACCELERATION: 9.81,
+}
 
 
 def bounds(name: str, key: str) -> tuple[float, float]:
@@ -42,8 +66,12 @@ def bounds(name: str, key: str) -> tuple[float, float]:
     if key in ("minimum", "maximum"):
         far = WIDEST * max(abs(standard.minimum), abs(standard.maximum))
         return -far, far
-    highest = {"max_age": OLDEST, "stuck_after": LONGEST_STUCK}
-    return 0.0, highest.get(key, WIDEST * float(getattr(standard, key)))
+    if key == "max_age":
+        return YOUNGEST, OLDEST
+    if key == "stuck_after":
+        return 0.0, LONGEST_STUCK
+    usual = float(getattr(standard, key))
+    return usual / WIDEST, WIDEST * usual
 
 
 def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:
@@ -56,6 +84,20 @@ def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:
         return f"{NEVER}: {most:g} at most of needed {rule.needed:g} can be true at once"
     if least >= needed:
         return f"{ALWAYS}: its limits leave no value out"
+    hovers = sum(
+        one.weight
+        for one in rule.conditions
+        if isinstance(one, MeasurementCondition)
+        and one.measurement in _HOVERS
+        and one.holds_at(_HOVERS[one.measurement])
+    )
+    if rule.action in FIRES and hovers >= needed:
+        told = ", ".join(
+            f"{one.measurement} {_HOVERS[one.measurement]:g}"
+            for one in rule.conditions
+            if isinstance(one, MeasurementCondition) and one.measurement in _HOVERS
+        )
+        return f"ends a flight in which nothing is wrong: it holds in a hover ({told})"
     return ""
 
 

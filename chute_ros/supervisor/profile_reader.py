@@ -117,6 +117,8 @@ def _limits(reader: ProfileLines, where: Where) -> MappingProxyType[str, Limits]
 def _rule(reader: ProfileLines, name: str, where: Where) -> Rule:
     what, before = f"rule '{name}'", len(reader.mistakes)
     entries = reader.mapping(where, _RULE_KEYS, what)
+    if not name.strip():
+        reader.wrong(where.line, "a rule has no name, by which its decisions are known: name it")
     if name == OPERATOR:
         reader.wrong(
             where.line, f"{what} has a person's name, whom no height holds back: rename it"

@@ -266,6 +266,49 @@ def test_each_shipped_profile_has_no_mistake_and_says_what_and_wherefrom(name: s
         assert rule.source
 
 
+@pytest.mark.parametrize("name", ['""', '"  "'])
+def test_a_rule_has_a_name(name: str) -> None:
+    """Decisions are known by it: one without would kill, and never deploy."""
+    (told,) = mistakes(WHOLE.replace("  falls:", f"  {name}:", 1))
+    assert "a rule has no name, by which its decisions are known: name it" in told
+
+
+@pytest.mark.parametrize(
+    ("limit", "told"),
+    [
+        ("tilt_deg, below: 180", "tilt_deg 0"),
+        ("acceleration, above: 0", "acceleration 9.81"),
+        ("vertical_speed, above: -399.9", "vertical_speed 0"),
+        ("height, above: -499", "height 30"),
+    ],
+)
+def test_a_rule_that_holds_in_a_hover_ends_no_flight(limit: str, told: str) -> None:
+    text = ALWAYS_TRUE.format(limit, "DEPLOY")
+    (wrong,) = mistakes(text)
+    assert wrong.endswith(
+        f"rule 'r' ends a flight in which nothing is wrong: it holds in a hover ({told})"
+    )
+    read_profile(ALWAYS_TRUE.format(limit, "ALARM"), "mine.yaml", LINKS)
+
+
+ALWAYS_TRUE = """profile: x
+rules:
+  r:
+    states: [IN_FLIGHT]
+    conditions: [{{measurement: {}}}]
+    for: 0.5
+    action: {}
+"""
+
+
+@pytest.mark.parametrize("key", ["max_age", "rate", "jump"])
+def test_a_limit_that_no_measurement_keeps_is_refused(key: str) -> None:
+    """Each change would be a jump, each word too old."""
+    text = WHOLE.replace("{maximum: 9000, jump: 20.0}", f"{{{key}: 0.0001}}")
+    (wrong,) = mistakes(text)
+    assert f"{key} of height is 0.0001: need " in wrong
+
+
 def test_no_rule_has_a_persons_name() -> None:
     """What a person orders passes below the minimum height."""
     (told,) = mistakes(WHOLE.replace("  falls:", "  operator:"))
@@ -447,7 +490,7 @@ def test_a_mistake_in_the_rules_is_told_after_one_in_the_measurements() -> None:
     text = WHOLE.replace("jump: 20.0", "jump: -1").replace("action: ALARM", "action: ALERT")
     need = "need ALARM or FLIGHT_BLOCK or KILL or DEPLOY (did you mean ALARM?)"
     assert mistakes(text) == [
-        "mine.yaml, line 7: jump of height is -1: need 0 to 200",
+        "mine.yaml, line 7: jump of height is -1: need 0.5 to 200",
         f"mine.yaml, line 29: action of rule 'silent' is 'ALERT': {need}",
     ]
 
