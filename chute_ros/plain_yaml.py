@@ -8,6 +8,7 @@ a value is refused.
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Any
 
 import yaml
@@ -45,15 +46,50 @@ def misread(node: yaml.Node | None) -> str:
 
 
 def load(text: str) -> Any:
-    """The value of a YAML text; yaml.YAMLError with the line if it has one that is misread."""
+    """The value of a YAML text; yaml.YAMLError with the line if it has one that is misread, or a
+    name twice."""
     return yaml.load(text, Loader=_Loader)
 
 
+def load_marked(text: str) -> Any:
+    """The same, where a Misread stands for each of these: of a file that many share each refuses
+    what is its own."""
+    return yaml.load(text, Loader=_Marking)
+
+
+@dataclass(frozen=True)
+class Misread:
+    """problem: in words that go on "it is"; line: from 1."""
+
+    problem: str
+    line: int
+
+
 class _Loader(yaml.SafeLoader):
-    """Refuses what is misread."""
+    """Refuses what is misread, and what a later one of the same name would replace."""
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
         if problem := misread(node):
-            mark = node.start_mark
-            raise yaml.constructor.ConstructorError(None, None, f"it is {problem}", mark)
+            return self.found(problem, node)
         return super().construct_object(node, deep)
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        # Merged names stand before those that replace them, on purpose.
+        own = [key.value for key, _ in node.value if key.tag != "tag:yaml.org,2002:merge"]
+        content = super().construct_mapping(node, deep)
+        for key in node.value[-len(own) :] if own else ():
+            if own.count(key[0].value) > 1 and isinstance(key[0], yaml.ScalarNode):
+                content[key[0].value] = self.found("there twice: leave one of them", key[0])
+        return content
+
+    def found(self, problem: str, node: yaml.Node) -> Any:
+        """What stands for it."""
+        mark = node.start_mark
+        raise yaml.constructor.ConstructorError(None, None, f"it is {problem}", mark)
+
+
+class _Marking(_Loader):
+    """Has a Misread in its place."""
+
+    def found(self, problem: str, node: yaml.Node) -> Any:
+        return Misread(problem, node.start_mark.line + 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from chute_ros.errors import ParameterError
+from chute_ros.plain_yaml import Misread, load_marked
 
 #: Names of nodes and parts of them in one file, at most.
 _MOST_NAMES = 1000
@@ -17,13 +18,12 @@ _MOST_NAMES = 1000
 _EVERY_NODE_HAS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
 
-def given_in(
-    path: Path, node: str, also: str = "", load: Callable[[str], Any] = yaml.safe_load
-) -> dict[str, Any]:
+def given_in(path: Path, node: str, also: str = "") -> dict[str, Any]:
     """Parameter, nested ones with dots -> value of what the file has for this node, the later over
     the earlier. node: its whole name; also: another that counts as it. ParameterError: the file
-    cannot be read, or has nothing for it: ROS would start the node on its defaults."""
-    whole = _read(path, load)
+    cannot be read, has nothing for it (ROS would start the node on its defaults), or a value for
+    it that YAML reads as another than it looks like, or twice."""
+    whole = _read(path)
     found: dict[str, Any] = {}
     names = {True: set[str](), False: set[str]()}
     for name, section in _sections(path, whole):
@@ -31,6 +31,10 @@ def given_in(
         names[ours].add(name)
         if ours:
             found.update(_flat(section))
+    for parameter, value in found.items():
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, Misread):
+                raise ParameterError(f"{path}, line {one.line}: {parameter} is {one.problem}")
     if not names[True]:
         own, others = node.rpartition("/")[2], sorted(names[False])
         has = f" (it has some for {', '.join(others[:5])})" if others else ""
@@ -46,7 +50,7 @@ def named_in(path: Path, node: str) -> list[str]:
     section of several nodes has may be for another. ParameterError as given_in has it."""
     return [
         name
-        for pattern, section in _sections(path, _read(path, yaml.safe_load))
+        for pattern, section in _sections(path, _read(path))
         if "*" not in pattern.rpartition("/")[2] and _matches(pattern, node)
         for name, _ in _flat(section)
     ]
@@ -95,9 +99,9 @@ def taken(arguments: Sequence[str], node: str, known: Iterable[str], given: Iter
     return f"{len(every)} parameters: {', '.join(parts)}"
 
 
-def _read(path: Path, load: Callable[[str], Any]) -> Any:
+def _read(path: Path) -> Any:
     try:
-        return load(path.read_text(encoding="utf-8"))
+        return load_marked(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror or error}") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:

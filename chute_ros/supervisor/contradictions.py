@@ -64,6 +64,8 @@ _FLOWN_SINK, _SPEEDS_UP = 7.0, 2.0
 #: One that lies on its side sinks by its barometer's last second with this at least, m/s: half a
 #: second of free fall, and what gusts of an ordinary flight do not reach.
 _LIES_AND_SINKS = 2.5
+#: An estimator that tells more than this share of a fall that is felt does not hide it.
+_TOLD_AS_WELL = 0.5
 #: Cosine of 45 degrees: a vehicle that leans less claims no fall.
 _LEANS = 0.7071
 
@@ -157,12 +159,18 @@ def _sink_denied(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> str
 
 def felt_fall(motion: tuple[Moment, ...]) -> float:
     """The vertical speed that a fall has given it lately, as its accelerometer felt it, m/s: 0, or
-    negative. Whichever way up it is: no attitude is asked."""
+    negative. Whichever way up it is: no attitude is asked. A fall that its estimator told as well
+    is none that it hides: what became of it since, it tells, too."""
     fell = [one[2] for one in motion if one[2] < FREE_FALL]
     if len(fell) < 3 or max(fell) - min(fell) < _FORCE_LIVES:
         return 0.0
-    steps = [(after[0] - before[0], after[2]) for before, after in pairwise(motion)]
-    return sum([(f - GRAVITY) * dt for dt, f in steps if f < FREE_FALL and dt <= _GAP])
+    felt = told = 0.0
+    for before, after in pairwise(motion):
+        passed = after[0] - before[0]
+        if after[2] < FREE_FALL and passed <= _GAP:
+            felt += (after[2] - GRAVITY) * passed
+            told += 0.0 if math.isnan(after[1] - before[1]) else after[1] - before[1]
+    return 0.0 if told < _TOLD_AS_WELL * felt else felt
 
 
 def height_denied(height: float, by_pressure: float) -> str:

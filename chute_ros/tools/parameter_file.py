@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from chute_ros import plain_yaml
 from chute_ros.errors import ParameterError
 from chute_ros.ros.parameter_file import given_in, of_every_node
 from chute_ros.ros.parameters import what_was_meant
@@ -18,7 +17,7 @@ NODE = "safety_supervisor"
 def other_from(path: Path, node: str) -> Other:
     """What the file asks for; ParameterError says what is wrong with it. node: the whole name of
     the node that flew."""
-    given = given_in(path, node, f"/{NODE}", plain_yaml.load)
+    given = given_in(path, node, f"/{NODE}")
     known = {one.name: one for one in PARAMETERS}
     for name in given:
         if name not in known and not of_every_node(name):

@@ -146,6 +146,29 @@ def test_names_of_nodes_count_as_with_ros(name: str, found: bool, tmp_path: Path
             given_in(path, "/upf_can")
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("system_id: 010", "line 3: system_id is 010, which YAML reads as 8: write 8"),
+        ("names: [a, 1_0]", "line 3: names is 1_0, which YAML reads as 10"),
+        ("on_lost: no", "line 3: on_lost is no, which YAML reads as false"),
+        ("a: {b: 1:30}", "line 3: a.b is 1:30, which YAML reads as 90"),
+        ("a: 1\n    a: 2", "line 4: a is there twice: leave one of them"),
+    ],
+)
+def test_a_value_that_yaml_reads_as_another_is_refused_where_it_is_ours(
+    line: str, told: str, tmp_path: Path
+) -> None:
+    """Other nodes' sections are their own matter."""
+    path = tmp_path / "settings.yaml"
+    section = f"  ros__parameters:\n    {line}\n"
+    path.write_text(f"/**/upf_can:\n{section}/**/other:\n  ros__parameters: {{}}\n")
+    with pytest.raises(ParameterError) as caught:
+        given_in(path, "/upf_can")
+    assert told in str(caught.value)
+    assert given_in(path, "/other") == {}
+
+
 # -- launch files ---------------------------------------------------------------------------------
 
 VEHICLE, SIMULATION = "vehicle.launch.py", "simulation.launch.py"

@@ -116,12 +116,24 @@ def test_whatever_an_estimator_tells_on_the_ground_nothing_is_released(
     assert not deployed(teller)
 
 
-MOMENTS = [(0.1 * k, -0.98 * k, 0.05 * (k % 2), 1.0) for k in range(11)]
+#: A second of free fall, of which the estimator tells nothing.
+MOMENTS = [(0.1 * k, 0.0, 0.05 * (k % 2), 1.0) for k in range(11)]
 
 
 def test_a_fall_is_felt_as_long_as_its_force_is_less_than_half_of_the_weight() -> None:
     assert felt_fall(tuple(MOMENTS)) == pytest.approx(-GRAVITY, abs=0.1)
     assert felt_fall(tuple((t, v, FREE_FALL, c) for t, v, _, c in MOMENTS)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("told", "felt"), [(math.nan, -GRAVITY), (-0.4, -GRAVITY), (-0.6, 0.0), (-0.98, 0.0)]
+)
+def test_a_fall_that_the_estimator_tells_is_none_that_it_hides(told: float, felt: float) -> None:
+    """Each 0.1 s it tells so much more, m/s. A drop that is flown, and caught, has been told."""
+    fell = tuple((t, told * k, f, c) for k, (t, _, f, c) in enumerate(MOMENTS))
+    assert felt_fall(fell) == pytest.approx(felt, abs=0.1)
+    caught = tuple((1.1 + 0.1 * k, told * (10 - k), 2.0 * GRAVITY, 1.0) for k in range(10))
+    assert felt_fall((*fell, *caught)) == pytest.approx(felt, abs=0.1)
 
 
 def test_what_is_stuck_or_was_not_told_feels_nothing() -> None:

@@ -188,8 +188,11 @@ def test_turns_without_a_beginning_are_counted_not_guessed(flight, monkeypatch, 
         (["required_links: [1]"], "required_links of safety_supervisor is [1]"),
         (["mode: LOUD"], "need one of ACTIVE, SHADOW, INHIBITED"),
         (["required_links: []"], "need at least one link"),
-        (["takeoff_height: 1:30.5"], "it is 1:30.5, which YAML reads as 90.5: write 90.5"),
-        (["ladder: yes"], "it is yes, which YAML reads as true: write true, or 'yes' if it"),
+        (
+            ["takeoff_height: 1:30.5"],
+            "takeoff_height is 1:30.5, which YAML reads as 90.5: write 90.5",
+        ),
+        (["ladder: yes"], "ladder is yes, which YAML reads as true: write true, or 'yes' if"),
     ],
 )
 def test_a_mistake_in_the_settings_is_told_in_one_line(

@@ -5,10 +5,11 @@ Source: Umbilical Reference, section 3; the other layouts were found in the fiel
 
 from __future__ import annotations
 
+import math
 import platform
 import re
 import struct
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -42,6 +43,9 @@ NEEDED = (
 )
 #: Those of them that are whole numbers.
 _WHOLE = tuple(name for name in NEEDED if name != "altitude")
+#: What a file may say, of itself and of each field.
+_KEYS = ("name", "target_floats", "target_fields", "heartbeat_in_flight", "fields")
+_FIELD_KEYS = ("name", "type", "unit", "expected")
 
 
 @dataclass(frozen=True)
@@ -156,11 +160,12 @@ class Record:
 def layout_from(content: Mapping[str, Any], where: str) -> Layout:
     """The layout in a file's content; ParameterError, with where, if there is a mistake in it."""
     try:
+        _known(content, _KEYS)
         fields = tuple(_field(one) for one in content["fields"])
         layout = Layout(
             _word(content["name"]),
             fields,
-            int(content["target_floats"]),
+            _whole_number(content["target_floats"]),
             tuple(_word(one) for one in content["target_fields"]),
             _switch(content.get("heartbeat_in_flight", False)),
         )
@@ -184,10 +189,30 @@ def layout_from(content: Mapping[str, Any], where: str) -> Layout:
 def _field(content: Mapping[str, Any]) -> Field:
     if _word(content["type"]) not in TYPES:
         raise ValueError(f"type {content['type']}: need one of {', '.join(TYPES)}")
+    _known(content, _FIELD_KEYS)
     expected = content.get("expected")
-    limits = None if expected is None else (float(expected[0]), float(expected[1]))
+    limits = None if expected is None else _limits(expected)
     name, unit = _word(content["name"]), _word(content["unit"])
     return Field(name, TYPES[_word(content["type"])], unit, limits)
+
+
+def _known(content: Mapping[str, Any], names: Collection[str]) -> None:
+    """A name that is misspelt would be left out without a word."""
+    if unknown := [str(name) for name in content if name not in names]:
+        raise ValueError(f"there is no {unknown[0][:40]}: need one of {', '.join(names)}")
+
+
+def _whole_number(content: Any) -> int:
+    if isinstance(content, bool) or not isinstance(content, int):
+        raise TypeError(f"target_floats is {content!r:.40}: need a whole number")
+    return content
+
+
+def _limits(content: Any) -> tuple[float, float]:
+    low, high = (float(one) for one in content)
+    if not -math.inf < low <= high < math.inf:
+        raise ValueError(f"expected is {low:g} to {high:g}: need the lowest and the highest")
+    return low, high
 
 
 def _word(content: Any) -> str:

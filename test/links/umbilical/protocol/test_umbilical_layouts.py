@@ -238,3 +238,24 @@ def test_what_yaml_reads_as_another_value_is_told_with_its_line(tmp_path, old, n
     with pytest.raises(ParameterError, match=r"line [0-9]+") as caught:
         load_layouts(str(tmp_path), "layouts")
     assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("target_floats: 2", "target_floats: 2.9", "need a whole number"),
+        ("heartbeat_in_flight:", "heartbeat_in_fligth:", "there is no heartbeat_in_fligth"),
+        ("type: f32, unit: Pa}", "type: f32, unit: Pa, expects: [0, 1]}", "there is no expects"),
+        ("type: f32, unit: Pa}", "type: f32, unit: Pa, expected: [2, 0]}", "expected is 2 to 0"),
+        ("type: f32, unit: Pa}", "type: f32, unit: Pa, expected: [.nan, 2]}", "expected is nan"),
+        ("type: f32, unit: Pa}", "type: f32, unit: Pa, unit: hPa}", "it is there twice"),
+        ("target_floats: 2", "target_floats: 2\ntarget_floats: 4", "it is there twice"),
+    ],
+)
+def test_what_would_be_left_out_or_replaced_without_a_word_is_refused(tmp_path, old, new, told):
+    text = (FOLDER / f"{STATE}.yaml").read_text()
+    assert old in text
+    (tmp_path / "mine.yaml").write_text(text.replace(old, new, 1))
+    with pytest.raises(ParameterError, match="mine.yaml") as caught:
+        load_layouts(str(tmp_path), "layouts")
+    assert told in str(caught.value)
