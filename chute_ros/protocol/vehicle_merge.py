@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from chute_ros.model import LinkState, VehicleState
+from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.protocol import vehicle_readings as readings
 from chute_ros.protocol.stream_rate import SAID_AFTER, StreamRate
 
@@ -43,6 +43,13 @@ _DISPUTES = {"vertical_speed": (0, 5.0), "attitude": (3, math.pi / 2.0), "accele
 #: By so much more a word may differ from the one before of its own source, each second: six
 #: times the gravity, m/s, and three turns, rad. A force is another at once, when the motors stop.
 _CHANGES = {"vertical_speed": 60.0, "attitude": 6.0 * math.pi, "acceleration": 1e6}
+#: By how much two sources differ at most while the vehicle stands: part -> place of its value,
+#: that much, the factor of its unit, the unit. Mounts are some degrees off.
+_AT_REST = {
+    "attitude": (3, 20.0, 180.0 / math.pi, "degrees from upright"),
+    "vertical_speed": (0, 2.5, 1.0, "m/s"),
+    "acceleration": (0, 3.0, 1.0, "m/s^2"),
+}
 #: What the rules measure with, and so is judged by how often it comes. Of vehicle/state the link
 #: judges what it is made of.
 _JUDGED = ("height", "vertical_speed", "attitude", "acceleration")
@@ -291,7 +298,30 @@ class VehicleMerge:
         told = VEHICLE_STATE in self._sources
         lost = told and self._link(VEHICLE_STATE, now)[0] is LinkState.LOST
         faults = () if lost else self._vehicle.faults
-        return (*faults, *self._missing(now), *self._slow(now))
+        return (*faults, *self._missing(now), *self._slow(now), *self._apart(now))
+
+    def _apart(self, now: float) -> list[str]:
+        """Sources of a vehicle with its motors off that differ as no two sound ones do: in flight
+        one of them alone may be left."""
+        off = self._source("armed", now)
+        if off is None or self._words[off]["armed"].values[0] is not Armed.DISARMED:
+            return []
+        told = []
+        for part, (place, most, factor, unit) in _AT_REST.items():
+            words = {
+                one: self._words[one][part].values[place] * factor
+                for one in self._sources
+                if part in self._words[one]
+                and now - self._words[one][part].received <= _FRESH_SOONER.get(part, FRESH)
+            }
+            if words and max(words.values()) - min(words.values()) > most:
+                each = ", ".join(f"{one} {value:.1f}" for one, value in words.items())
+                told.append(
+                    f"{part.replace('_', ' ')} differs while the vehicle stands: {each} {unit} "
+                    f"(at most {most:g} apart): turn or calibrate one, or take it out of "
+                    "vehicle_sources"
+                )
+        return told
 
     def _missing(self, now: float) -> list[str]:
         """Sources of which nothing was ever received, once others had the time to begin."""

@@ -30,7 +30,7 @@ GRAVITY = 9.81  # m/s^2
 #: (monotonic s, vertical speed m/s, specific force m/s^2, cosine of the tilt); NaN: not known.
 Moment = tuple[float, float, float, float]
 #: Moments are kept for so long, and this far apart at least, s.
-KEPT_FOR, _APART = 3.0, 0.08
+KEPT_FOR, _APART = 3.0, 0.05
 #: Between the least and the most of a sensor that lives, m/s^2 and m/s; and the usual step of a
 #: speed that is no noise, m/s.
 _FORCE_LIVES, _SPEED_LIVES, _SPEED_STEADY = 0.02, 0.003, 3.0
@@ -47,8 +47,9 @@ _HEIGHTS_DIFFER, _OF_HEIGHT = 20.0, 0.3
 _NOT_FELT, _FELT_OVER = 4.0, 1.0
 #: Below this a force is that of a fall, m/s^2: half of what a body at rest feels.
 FREE_FALL = 4.9
-#: It must have been that for so long, s, and the speed be higher by so much, m/s.
-_FALLS_FOR, _NO_SPEED = 0.25, 2.0
+#: It must have been that for so long, s, and the speed be higher by so much, m/s. Shorter than a
+#: rule counts: at 12.5 to 50 Hz there is a moment in between.
+_FALLS_FOR, _NO_SPEED = 0.23, 2.0
 #: An attitude follows its command if it is nearer than this, degrees (ArduPilot: AP_Parachute and
 #: crash_check take 30 for lost); a sink does that is faster by less than this, m/s.
 _FOLLOWS, _SINKS_AS_TOLD = 30.0, 3.0
@@ -99,10 +100,14 @@ def noted(motion: tuple[Moment, ...], moment: Moment) -> tuple[Moment, ...]:
     return (*(one for one in motion if now - one[0] <= KEPT_FOR), moment)
 
 
-def denials(motion: tuple[Moment, ...], barometer: Rise, drop: Drop) -> Mapping[str, str]:
-    """Measurement -> why what it claims is not so. barometer: of the last second."""
+def denials(
+    motion: tuple[Moment, ...], barometer: Rise, drop: Drop, before: Mapping[str, str]
+) -> Mapping[str, str]:
+    """Measurement -> why what it claims is not so. barometer: of the last second; before: what was
+    denied until now."""
     denied = {}
-    if why := _sink_denied(motion, barometer, drop):
+    sink = _sink_denied(motion, barometer, drop)
+    if why := sink or _still_denied(motion, barometer, before):
         denied[VERTICAL_SPEED] = why
     if why := _fall_denied(motion, barometer):
         denied[ACCELERATION] = why
@@ -222,6 +227,15 @@ def _not_felt(motion: tuple[Moment, ...]) -> str:
     if best <= _NOT_FELT:
         return ""
     return f"it sinks {best:.1f} m/s faster than {over:.1f} s before, of which no force tells"
+
+
+def _still_denied(motion: tuple[Moment, ...], barometer: Rise, before: Mapping[str, str]) -> str:
+    """A sink of which no force told as it began: an error that grows no more is no truth. It is
+    over once the estimator is back, a force is missing, or a barometer tells of it."""
+    sinks = bool(motion) and motion[-1][1] < -1.0
+    if not sinks or not math.isnan(barometer.rate) or not _carried(motion):
+        return ""
+    return before.get(VERTICAL_SPEED, "")
 
 
 def _fall_denied(motion: tuple[Moment, ...], barometer: Rise) -> str:

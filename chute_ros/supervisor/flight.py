@@ -45,6 +45,8 @@ _OFF_GROUND, _STANDS_BELOW = 2.5, 1.0
 #: An estimator that says that it is up is believed at first where it is not faster, m/s, and not
 #: further from upright, degrees: both are flown.
 _CALM_SPEED, _CALM_TILT = 8.0, 60.0
+#: What stands sinks no faster by two origins, m/s: lifts and slopes do not.
+_SINKS_FOR_SURE = 4.0
 #: What ends a flight, after which a person may reset one that has been still for so long, s.
 _ENDED, STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
@@ -142,7 +144,11 @@ def seen_up(
         return abs(by_pressure) > _OFF_GROUND
     calm = not abs(measured(config, state, VERTICAL_SPEED, now)) > _CALM_SPEED
     upright = not measured(config, state, TILT, now) > _CALM_TILT
-    return height - state.flight.armed_height > config.takeoff_height and calm and upright
+    above = height - state.flight.armed_height
+    if not math.isnan(state.flight.landed_at):
+        # It has flown since it was armed, and took off again from where it landed.
+        above = max(above, height - state.flight.took_off_height)
+    return above > config.takeoff_height and calm and upright
 
 
 def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: float) -> bool:
@@ -229,14 +235,22 @@ def _falls_against_its_word(
     was wrong before the fall, or the supervisor came in the middle of it. stands_off: it says
     both. A barometer that drifts, or a handful of wrong samples, must not look like it: it needs
     the accelerometer and another sign, where it says both all of them, and a flight just before.
+    Or, after a flight just before, an estimator and a barometer that tell the same: what tumbles
+    under some thrust is carried.
     """
     falls = measured(config, state, "acceleration", now) < FREE_FALL
     sinks = measured(config, state, "vertical_speed", now) < -config.profile.moving_speed
     height = measured(config, state, "height", now) - state.flight.armed_height
     high = height > max(config.takeoff_height, config.profile.minimum_height)
-    if stands_off:
-        return falls and sinks and high and now < state.flight.landed_at + FLIGHT_JUST_BEFORE
-    return falls and (sinks or high)
+    both = (
+        VERTICAL_SPEED not in state.heard.denied
+        and max(measured(config, state, VERTICAL_SPEED, now), pressure_rate(config, state, now))
+        < -_SINKS_FOR_SURE
+    )
+    flew = now < state.flight.landed_at + FLIGHT_JUST_BEFORE
+    if flew and both:
+        return True
+    return falls and sinks and high and flew if stands_off else falls and (sinks or high)
 
 
 def _told_high(config: SupervisorConfig, state: State) -> bool:

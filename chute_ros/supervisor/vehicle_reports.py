@@ -158,6 +158,7 @@ def _note_contradictions(turn: Turn) -> None:
         motion,
         readings.pressure_change(turn.config, state, now),
         readings.pressure_drop(turn.config, state, now),
+        state.heard.denied,
     )
     if why := _height_denied(turn):
         denied = {**denied, HEIGHT: why}

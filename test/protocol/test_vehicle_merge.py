@@ -99,6 +99,34 @@ def test_a_source_that_falls_silent_is_named_until_it_comes_again():
     assert one.state(23.4).faults == ()
 
 
+@pytest.mark.parametrize(
+    ("part", "values", "told"),
+    [
+        ("attitude", (0.9, 0.0, 0.0, 0.9), "0.6, imu 51.6 degrees from upright (at most 20"),
+        ("vertical_speed", (4.0,), "0.0, imu 4.0 m/s (at most 2.5"),
+        ("acceleration", (0.2, 0.0), "9.8, imu 0.2 m/s^2 (at most 3"),
+        ("attitude", (0.2, 0.0, 0.0, 0.2), ""),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("armed", Armed)
+def test_a_source_that_is_mounted_wrong_is_named_while_the_vehicle_stands(
+    part, values, told, armed
+):
+    """In flight the autopilot may fall silent, and that one alone is left."""
+    one = merge()
+    one.hear_state(
+        VehicleState(
+            link_state=LinkState.OK, armed=armed, armed_age=0.0, tilt=0.01, attitude_age=0.0,
+            vertical_speed=0.0, vertical_speed_age=0.0, acceleration=9.8, acceleration_age=0.0,
+        ),
+        10.0,
+    )  # fmt: skip
+    one.hear("imu", {part: values}, 10.0)
+    named = [text.split(" apart): turn")[0] for text in one.state(10.1).faults]
+    what = f"{part.replace('_', ' ')} differs while the vehicle stands: vehicle/state {told}"
+    assert named == ([what] if told and armed is Armed.DISARMED else [])
+
+
 def test_a_source_without_attitude_is_not_slow():
     """One that never estimated it has no rate of it."""
     one = VehicleMerge((IMU,), 2.5, 5.0)

@@ -475,3 +475,97 @@ def test_no_force_is_missing_on_command_of_one_that_lies_otherwise_than_it_shall
     assert story.fired() == ["KILL"]
     assert story.newest(Action.KILL).rule == "excess tilt"
     assert story.when(Action.KILL) - 2.0 <= 60.0 / 130.0 + 0.05 + 0.3 + 0.1
+
+
+# -- what another origin, or nothing, tells of it ----------------
+
+
+@AIRCRAFT
+@pytest.mark.parametrize("rate", [2.0, 3.0, 6.0])
+def test_a_sink_of_which_no_force_told_is_none_once_it_grows_no_more(
+    profile: str, rate: float
+) -> None:
+    """Given no barometer, and a hover: the estimator speeds up to 16 m/s down, and stays so."""
+    teller, height, speed = told_to(profile), 100.0, 0.0
+    teller.hover(6.0, height)
+    for _ in range(300):
+        speed = max(-16.0, speed - rate * EVERY)
+        height += EVERY * speed
+        teller.tell(height=height, vertical_speed=speed, tilt=3.0, force=9.8)
+    assert not deployed(teller)
+
+
+@pytest.mark.parametrize("landed", [LandedState.ON_GROUND, LandedState.IN_AIR])
+def test_a_land_detector_that_erred_in_the_hover_hides_no_fall(landed: LandedState) -> None:
+    """Given one motor of four that dies 8 s later: it lies on its side, its force is more than
+    half of the weight, and estimator and barometer tell the same sink."""
+    teller, height, speed = told_to("multirotor"), 60.0, 0.0
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(3.0, height, true_height=height)
+    teller.hover(8.0, height, true_height=height, landed_state=landed)
+    begun = teller.story.t
+    for k in range(60):
+        speed += EVERY * (-4.5 + 4.5 * (speed / 13.0) ** 2)
+        height += EVERY * speed
+        told = {"height": height, "vertical_speed": speed, "true_height": height}
+        lean = min(80.0, 3.0 + 12.0 * k)
+        teller.tell(**told, tilt=lean, force=5.3, landed_state=landed)
+        if deployed(teller):
+            break
+    assert deployed(teller)
+    assert teller.story.t - begun <= 2.2
+
+
+def test_one_that_takes_off_again_from_a_valley_is_seen_to_be_up() -> None:
+    """Given no barometer, a landing 40 m below the take-off, armed on, and 25 m above that."""
+    teller, height = told_to("multirotor"), 0.0
+    teller.stand(1.0)
+    teller.hover(5.0, 20.0)
+    for height in [20.0 - 0.3 * k for k in range(200)]:
+        teller.tell(height=height, vertical_speed=-3.0, tilt=3.0, force=9.8)
+    for _ in range(80):
+        teller.tell(height=-40.0, vertical_speed=0.0, tilt=1.0, force=9.8,
+                    landed_state=LandedState.ON_GROUND)  # fmt: skip
+    assert teller.story.state.stage is Stage.LANDED
+    for height in [-40.0 + 0.3 * k for k in range(84)]:
+        teller.tell(height=height, vertical_speed=3.0, tilt=3.0, force=9.8)
+    speed = 0.0
+    while height > -40.0 and not deployed(teller):
+        force = GRAVITY * (speed / 18.0) ** 2
+        speed -= EVERY * (GRAVITY - force)
+        height += EVERY * speed
+        teller.tell(height=height, vertical_speed=speed, tilt=3.0, force=force)
+    assert deployed(teller)
+    assert height > -30.0
+
+
+@pytest.mark.parametrize("fails", [0.3, 0.0])
+def test_an_accelerometer_that_fails_in_a_descent_is_no_fall_that_was_felt(fails: float) -> None:
+    """Given a descent of 6.8 m/s that is flown; estimator and barometer tell that it is steady."""
+    teller, height = told_to("multirotor"), 50.0
+    teller.stand(1.0, true_height=0.0)
+    teller.hover(3.0, height, true_height=height)
+    speed = 0.0
+    for k in range(60):
+        speed = max(-6.8, speed - 0.15)
+        height += EVERY * speed
+        force = 9.8 if k < 30 else fails
+        told = {"height": height, "vertical_speed": speed + teller.noise(0.1)}
+        teller.tell(**told, tilt=3.0, force=force, true_height=height)
+    assert teller.story.fired() == []
+
+
+@pytest.mark.parametrize("every", [0.02, 0.04, 0.05, 0.06, 0.07, 0.08, 0.1, 0.2])
+def test_a_force_of_which_no_speed_follows_is_denied_in_time_at_each_rate(every: float) -> None:
+    """Given a level bank of 52 degrees, held by its height and speed, and a force that fails."""
+    story = told_to("multirotor").story
+    story.fly(5.0, height=80.0)
+    random = Random(3)
+    until = story.t + 3.0
+    while story.t < until:
+        told = {
+            "vertical_speed": random.uniform(-0.1, 0.1),
+            "acceleration": random.uniform(0, 0.4),
+        }
+        story.at(story.t + every, story.heartbeat(), story.told(height=80.0, tilt=52.0, **told))
+    assert story.fired() == []

@@ -256,6 +256,6 @@ def test_what_would_be_left_out_or_replaced_without_a_word_is_refused(tmp_path, 
     text = (FOLDER / f"{STATE}.yaml").read_text()
     assert old in text
     (tmp_path / "mine.yaml").write_text(text.replace(old, new, 1))
-    with pytest.raises(ParameterError, match="mine.yaml") as caught:
+    with pytest.raises(ParameterError, match=r"mine\.yaml") as caught:
         load_layouts(str(tmp_path), "layouts")
     assert told in str(caught.value)
