@@ -63,4 +63,6 @@ LINK = LinkKind(
     simulators=_simulators,
     connection=lambda sockets: sockets.bus,
     part=f"{_FOLDER}.virtual:UpfPart",
+    device="upf",
+    kit=f"{_FOLDER}.kit:KIT",
 )

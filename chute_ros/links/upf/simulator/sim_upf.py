@@ -58,9 +58,17 @@ def _run() -> None:
         help=f"follow a simulated autopilot there, and open its canopy: {FORMS}",
     )
     options.add_argument("--system-id", type=number("id", 1, 255), default=1, help="of --vehicle")
+    options.add_argument(
+        "--break",
+        dest="breaks",
+        default="",
+        metavar="CLAUSE",
+        help="the controller is wrong in this clause of `conformance upf` (its --list names them)",
+    )
     chosen = options.parse_args()
 
     from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, Definitions
+    from chute_ros.links.upf.simulator.broken import BREAKS, BrokenController
     from chute_ros.links.upf.simulator.bus import UpfBus
     from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
     from chute_ros.links.upf.simulator.errors import error_places
@@ -82,7 +90,13 @@ def _run() -> None:
         minimum_height=chosen.minimum_height,
         errors=frozenset(chosen.error),
     )
-    controller = UpfController(definitions, settings)
+    if chosen.breaks and chosen.breaks not in BREAKS:
+        raise ParameterError(f"--break {chosen.breaks!r}: need one of {', '.join(BREAKS)}")
+    controller = (
+        BrokenController(definitions, settings, chosen.breaks)
+        if chosen.breaks
+        else UpfController(definitions, settings)
+    )
     of_trigger = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: chosen.trigger_node_id}
     trigger = UpfTrigger(definitions, NodeSettings(f"{chosen.name}.trigger", of_trigger))
     nodes: list[UpfNode] = [] if chosen.no_controller else [controller]

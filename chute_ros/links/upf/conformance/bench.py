@@ -1,0 +1,272 @@
+"""The vehicle on a UPF parachute's bus: calls services, answers, and remembers all that comes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from chute_ros.conformance.bench import HeardPacket, NotAllowedError, RecordingBench
+from chute_ros.conformance.clause import Risk, Trial, Wait, failed
+from chute_ros.links.upf.protocol import bus_requests
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import Definitions
+from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.endpoint import Endpoint, Heard
+from chute_ros.protocol.dronecan.transfer import TRANSFER_IDS, Kind
+
+NODE_STATUS = "uavcan.protocol.NodeStatus"
+#: Node id of the vehicle that is simulated here, unless another is chosen.
+VEHICLE = 110
+#: Of our own messages, s.
+_BEAT, _TELLS = 1.0, 0.1
+_FOUND_WITHIN = 10.0
+#: An answer comes within this, s; a call is made so often before it counts as not answered.
+ANSWER = 0.5
+TRIES = 3
+#: A state is broadcast at the latest after this, s.
+STATUS_WITHIN = 3.0
+_FIRES = ("TYPE_DEPLOY", "TYPE_DEPLOY_FORCE", "TYPE_LAUNCH")
+#: Whether these are set may decide whether it fires.
+_HARMLESS = (p.AUTO_SAVE, p.LIGHT, p.NODE_STATUS_INTERVAL, p.PARACHUTE_STATUS_INTERVAL)
+
+
+@dataclass(frozen=True)
+class HeardTransfer(HeardPacket):
+    """A message, request or response of the device."""
+
+    transfer: Heard
+
+    @property
+    def values(self) -> Mapping[str, Any]:
+        """Its fields."""
+        return self.transfer.values
+
+
+class UpfBench(RecordingBench[HeardTransfer]):
+    """risk: the highest that the person allows; nothing above it is ever sent. node: of the
+    controller, 0: whoever tells its state. vehicle: the node id that is used here."""
+
+    def __init__(
+        self,
+        definitions: Definitions,
+        risk: Risk = Risk.NONE,
+        node: int = 0,
+        vehicle: int = VEHICLE,
+        soak: float = 0.0,
+    ) -> None:
+        super().__init__()
+        self.definitions, self.soak, self.node = definitions, soak, 0
+        #: Of everybody, triggers as well.
+        self.every: list[HeardTransfer] = []
+        #: Parameters that were changed -> what they were.
+        self.changed: dict[str, p.Value] = {}
+        #: From which of every it was told to deploy; negative: it was not.
+        self.deployed_from = -1
+        self._risk, self._wanted = risk, node
+        self._endpoint = Endpoint(definitions.types, vehicle)
+        self._numbers: dict[tuple[int, str], int] = {}
+        self._beat_at = self._tell_at = -math.inf
+
+    # -- as the session wants it ----------------------------------------------------------------
+
+    def receive(self, data: bytes, now: float, stream: Hashable = None) -> None:
+        self.at(now)
+        heard = self._endpoint.receive(data, now)
+        if heard is None:
+            return
+        text = ", ".join(f"{key}={value}" for key, value in heard.values.items())
+        label = heard.name if heard.kind is Kind.MESSAGE else f"{heard.name} {heard.kind.value}"
+        packet = self.noted(False, f"node {heard.source}", label, text, data)
+        one = HeardTransfer(now, heard.name, packet, heard)
+        self.every.append(one)
+        if heard.source == self.node:
+            self.heard.append(one)
+            self.heard_at = now
+        if heard.kind is Kind.REQUEST:
+            self._answer(heard)
+
+    def stream_ended(self, stream: Hashable) -> None:
+        pass
+
+    def update(self, now: float) -> None:
+        self.at(now)
+        if now >= self._beat_at:
+            self._beat_at = now + _BEAT
+            status = {"uptime_sec": int(now - self._began), "health": 0, "mode": 0}
+            self._endpoint.broadcast(NODE_STATUS, status)
+        if now >= self._tell_at:
+            self._tell_at = now + _TELLS
+            told = self.definitions.present(names.VEHICLE_STATUS, {"is_parachute_connected": True})
+            self._endpoint.broadcast(names.VEHICLE_STATUS, told)
+
+    def next_deadline(self) -> float:
+        return min(self._beat_at, self._tell_at)
+
+    def take_output(self) -> list[bytes]:
+        return self._endpoint.take_output()
+
+    def _answer(self, request: Heard) -> None:
+        """As a vehicle that obeys."""
+        if request.name == names.VEHICLE_SERVICE:
+            result = self.definitions.result(names.VEHICLE_SERVICE, "SUCCESS")
+            self._endpoint.respond(request, result)
+
+    # -- what is sent ---------------------------------------------------------------------------
+
+    def call(
+        self, service: str, values: Mapping[str, Any], tries: int = TRIES, node: int | None = None
+    ) -> Any:
+        """The response (its values) of the device, or of this node; None: none came."""
+        server = self.node if node is None else node
+        self._check(service, values)
+        for _ in range(tries):
+            number = self._numbers.get((server, service), 0)
+            self._numbers[server, service] = (number + 1) % TRANSFER_IDS
+            text = ", ".join(f"{key}={value}" for key, value in values.items())
+            self.noted(True, "us", f"{service} request to node {server}", text, b"")
+            self._endpoint.request(server, service, number, values, 16)
+            answer = yield from self._response(server, service, number)
+            if answer is not None:
+                return answer
+        return None
+
+    def _response(self, server: int, service: str, number: int) -> Any:
+        since = len(self.every)
+
+        def found() -> Mapping[str, Any] | None:
+            for one in self.every[since:]:
+                heard = one.transfer
+                answers = heard.kind, heard.source, heard.name, heard.transfer_id
+                if answers == (Kind.RESPONSE, server, service, number):
+                    return heard.values
+            return None
+
+        yield Wait(self.now + ANSWER, lambda: found() is not None)
+        return found()
+
+    def _check(self, service: str, values: Mapping[str, Any]) -> None:
+        """Nothing leaves that is not allowed."""
+        risk = Risk.NONE
+        if service in (names.PARACHUTE_SERVICE, names.TRIGGER_SERVICE):
+            kind = self._type_of(service, values["type"])
+            risk = Risk.FIRES if kind in _FIRES else Risk.ARMS
+        elif service == bus_requests.GET_SET and "empty" not in values["value"]:
+            named = bytes(values["name"]).decode()
+            risk = Risk.NONE if named in _HARMLESS else Risk.ARMS
+        if risk > self._risk:
+            text = f"{service} {dict(values)}"
+            raise NotAllowedError(f"{text} needs {risk.name}, allowed is {self._risk.name}")
+
+    def _type_of(self, service: str, number: int) -> str:
+        """Whatever the magic number is."""
+        constants = self.definitions.types.request(service).constants
+        return self.definitions.type_name(
+            service, {"magic_number": constants[names.MAGIC], "type": number}
+        )
+
+    # -- steps of trials ------------------------------------------------------------------------
+
+    def find(self) -> Trial:
+        """Who tells the state of a parachute."""
+        began = self.now
+
+        def found() -> int:
+            told = (one for one in self.every if one.kind == names.PARACHUTE_STATUS)
+            sources = (one.transfer.source for one in told)
+            return next((one for one in sources if self._wanted in (0, one)), 0)
+
+        yield Wait(began + _FOUND_WITHIN, found)
+        self.node = found()
+        if not self.node:
+            others = sorted({one.transfer.source for one in self.every})
+            heard = ", ".join(map(str, others)) or "nobody"
+            raise failed(
+                f"no ParachuteStatus is received within {_FOUND_WITHIN:g} s (nodes heard: "
+                f"{heard}): check the bus and its bit rate, and the data types (--dsdl-path)"
+            )
+        self.heard = [one for one in self.every if one.transfer.source == self.node]
+        self.heard_at = self.now
+        yield from self.call(bus_requests.GET_NODE_INFO, {}, 1)
+        return f"node {self.node}"
+
+    def identity(self) -> Mapping[str, str]:
+        """Of its GetNodeInfo."""
+        told = [one for one in self.heard if one.kind == bus_requests.GET_NODE_INFO]
+        if not told:
+            return {}
+        values = told[-1].values
+        software, hardware = values["software_version"], values["hardware_version"]
+        return {
+            "name": bytes(values["name"]).decode("utf-8", "replace"),
+            "software": f"{software['major']}.{software['minor']}",
+            "hardware": f"{hardware['major']}.{hardware['minor']}",
+            "unique id": bytes(hardware["unique_id"]).hex(),
+        }
+
+    def leave(self) -> Trial:
+        """Not armed, and its parameters as they were."""
+        if not self.node or (self._risk is Risk.NONE and not self.changed):
+            return "nothing was changed"
+        if self._risk is not Risk.NONE:
+            for name in ("TYPE_DISARM", "TYPE_LAND"):
+                yield from self.ask(name)
+        left = []
+        for name, value in [*self.changed.items()]:
+            if (yield from self.set(name, value)) != value:
+                left.append(f"{name} is not {p.words(value)} again")
+            self.changed.pop(name, None)
+        state = yield from self.state()
+        if state is ParachuteState.ARMED:
+            left.append("it is LEFT ARMED")
+        if left:
+            raise failed(f"the device: {'; '.join(left)}")
+        return "as it was"
+
+    def ask(self, type_name: str) -> Any:
+        """The name of the result of a ParachuteService request; None: not answered."""
+        service = names.PARACHUTE_SERVICE
+        answer = yield from self.call(service, self.definitions.request(service, type_name))
+        return None if answer is None else self.definitions.result_name(service, answer)
+
+    def get(self, name: str = "", index: int = 0) -> Any:
+        """The response of GetSet (its values); None: not answered."""
+        values = {"index": index, "value": {"empty": {}}, "name": name.encode()}
+        return (yield from self.call(bus_requests.GET_SET, values))
+
+    def set(self, name: str, value: p.Value) -> Any:
+        """The value that a parameter has afterwards; None: not answered, or none of this name."""
+        if name not in self.changed:
+            before = yield from self.get(name)
+            known = None if before is None else p.value_of(before["value"])
+            if known is not None:
+                self.changed[name] = known
+        values = {"index": 0, "value": p.union_of(value), "name": name.encode()}
+        answer = yield from self.call(bus_requests.GET_SET, values)
+        told = None if answer is None else p.value_of(answer["value"])
+        return bool(told) if isinstance(value, bool) and told is not None else told
+
+    def state(self) -> Any:
+        """The state (ParachuteState) that it tells next; None: a number without a name."""
+        status = yield from self.wait_for(names.PARACHUTE_STATUS, STATUS_WITHIN)
+        if status is None:
+            raise failed(f"no ParachuteStatus within {STATUS_WITHIN:g} s")
+        return self.definitions.state(status.values["state"])
+
+    def reaches(self, state: ParachuteState, within: float) -> Any:
+        """Whether it tells this state within so many s."""
+        number = self.definitions.state_number(state)
+        told = yield from self.wait_for(
+            names.PARACHUTE_STATUS, within, lambda one: one.values["state"] == number
+        )
+        return told is not None
+
+    def vehicle_requests(self, since: int) -> list[str]:
+        """What it has asked of the vehicle, from this place of heard on, by name."""
+        every = (one.values for one in self.heard[since:] if one.kind == names.VEHICLE_SERVICE)
+        return [self.definitions.type_name(names.VEHICLE_SERVICE, one) for one in every]
+
+
+Try = Callable[[UpfBench], Trial]

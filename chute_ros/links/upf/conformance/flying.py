@@ -1,0 +1,280 @@
+"""The states, what moves them, and what fires."""
+
+from __future__ import annotations
+
+from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
+from chute_ros.links.upf.conformance.bench import UpfBench
+from chute_ros.links.upf.conformance.standard import UpfClause, clause
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.machine import DEPLOYED, REST_TIME
+from chute_ros.model import ParachuteState
+
+_S = ParachuteState
+_MOVES = "it moves through its states, up to ARMED: its APS may fire if it is shaken or dropped"
+_MAY = "it must not, but it may FIRE"
+#: A state is told so soon after what moves it, s; it fires after so long at most.
+_TOLD_WITHIN, _FIRES_WITHIN = 1.5, 4.0
+#: At rest for 5 s, and a while to tell.
+_RESTS = (REST_TIME - 0.5, REST_TIME + 5.0)
+_AUTOMATIC = (p.AUTO_TAKEOFF, p.AUTO_ARM, p.AUTO_DISARM, p.AUTO_LAND)
+_UNKNOWN_TYPE = 200
+
+
+def _bad_magic(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    before = yield from bench.state()
+    service = names.PARACHUTE_SERVICE
+    values = bench.definitions.request(service, "TYPE_TAKEOFF")
+    answer = yield from bench.call(service, {**values, "magic_number": 1})
+    if answer is not None and bench.definitions.result_name(service, answer) == "SUCCESS":
+        raise failed("a request with a wrong magic number is answered with SUCCESS")
+    after = yield from bench.state()
+    if after is not before:
+        raise failed(f"a request with a wrong magic number moved it from {before} to {after}")
+    return "refused" if answer is not None else "not answered"
+
+
+def _unknown_type(bench: UpfBench) -> Trial:
+    service = names.PARACHUTE_SERVICE
+    values = {**bench.definitions.request(service, "TYPE_LAND"), "type": _UNKNOWN_TYPE}
+    answer = yield from bench.call(service, values)
+    if answer is None:
+        raise failed(f"type {_UNKNOWN_TYPE}, which is none, is not answered")
+    if (result := bench.definitions.result_name(service, answer)) == "SUCCESS":
+        raise failed(f"type {_UNKNOWN_TYPE}, which is none, is answered with SUCCESS")
+    return result
+
+
+def _excludes(type_name: str) -> UpfClause:
+    parameter = p.EXCLUDES[type_name]
+    word = type_name.removeprefix("TYPE_").lower()
+
+    def trial(bench: UpfBench) -> Trial:
+        if (yield from bench.set(parameter, True)) is not True:
+            raise failed(f"{parameter} cannot be switched on")
+        result = yield from bench.ask(type_name)
+        if result != "REJECTED":
+            raise failed(f"{parameter} is on, and the answer is {result or 'none'}")
+        return "REJECTED"
+
+    return clause(
+        "Global working state",
+        f"exclude-{word}",
+        f"with {parameter} on {type_name} is rejected",
+        trial,
+        _MOVES,
+        Risk.ARMS,
+    )
+
+
+def _by_hand(bench: UpfBench) -> Trial:
+    """Nothing moves by itself, and it is READY."""
+    for name in _AUTOMATIC:
+        if (yield from bench.set(name, False)) is not False:
+            raise failed(f"{name} cannot be switched off")
+    for request in ("TYPE_DISARM", "TYPE_LAND"):
+        if (yield from bench.state()) in (_S.ARMED, _S.TAKEOFF):
+            yield from bench.ask(request)
+    state = yield from bench.state()
+    if state is not _S.READY:
+        raise not_tried(f"it is {'in no state' if state is None else state.name} (need READY)")
+    return ""
+
+
+def _moved(bench: UpfBench, request: str, to: ParachuteState) -> Trial:
+    result = yield from bench.ask(request)
+    if result != "SUCCESS":
+        raise failed(f"{request}: {result or 'not answered'}")
+    if not (yield from bench.reaches(to, _TOLD_WITHIN)):
+        state = yield from bench.state()
+        raise failed(f"{request}: SUCCESS, and it is {state} (need {to.name})")
+    return to.name
+
+
+def _reached(bench: UpfBench, *requests: str) -> Trial:
+    """Whatever it answers, which is another clause's matter."""
+    state = _S.READY
+    for request in requests:
+        yield from bench.ask(request)
+        state = _AFTER[request]
+        if not (yield from bench.reaches(state, _TOLD_WITHIN)):
+            raise not_tried(f"it did not become {state.name}")
+    return state.name
+
+
+_AFTER = {"TYPE_TAKEOFF": _S.TAKEOFF, "TYPE_ARM": _S.ARMED}
+
+
+def _takeoff(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    return (yield from _moved(bench, "TYPE_TAKEOFF", _S.TAKEOFF))
+
+
+def _arm(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    yield from _reached(bench, "TYPE_TAKEOFF")
+    return (yield from _moved(bench, "TYPE_ARM", _S.ARMED))
+
+
+def _disarm(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    yield from _reached(bench, "TYPE_TAKEOFF", "TYPE_ARM")
+    return (yield from _moved(bench, "TYPE_DISARM", _S.TAKEOFF))
+
+
+def _land(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    yield from _reached(bench, "TYPE_TAKEOFF")
+    return (yield from _moved(bench, "TYPE_LAND", _S.READY))
+
+
+def _order(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    result = yield from bench.ask("TYPE_ARM")
+    if result == "SUCCESS" or (yield from bench.state()) is _S.ARMED:
+        raise failed("it is READY, and TYPE_ARM arms it without a take-off")
+    return f"{result or 'not answered'}, still READY"
+
+
+def _waits(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    if (yield from bench.reaches(_S.TAKEOFF, 3.0)):
+        raise failed("Enable Auto-Takeoff is off, and it takes off by itself")
+    return "still READY after 3 s"
+
+
+def _disabled(bench: UpfBench) -> Trial:
+    yield from _by_hand(bench)
+    if (yield from bench.set(p.ENABLE_PARACHUTE, False)) is not False:
+        raise failed(f"{p.ENABLE_PARACHUTE} cannot be switched off")
+    since = len(bench.every)
+    result = yield from bench.ask("TYPE_DEPLOY_FORCE")
+    yield from bench.watch_on(_FIRES_WITHIN)
+    fired = _launches(bench, since) or (yield from bench.state()) in DEPLOYED
+    yield from bench.set(p.ENABLE_PARACHUTE, True)
+    if fired:
+        raise failed(f"{p.ENABLE_PARACHUTE} is off: IT FIRED by TYPE_DEPLOY_FORCE")
+    if result == "SUCCESS":
+        raise failed(f"{p.ENABLE_PARACHUTE} is off, and TYPE_DEPLOY_FORCE is a SUCCESS")
+    return result or "not answered"
+
+
+def _launches(bench: UpfBench, since: int) -> list[float]:
+    """When it told a trigger to fire, from this place on."""
+    kinds = (names.TRIGGER_LAUNCH, names.TRIGGER_SERVICE)
+    return [one.at for one in bench.every[since:] if one.kind in kinds]
+
+
+def _deploy(bench: UpfBench) -> Trial:
+    """In the air and armed."""
+    yield from _by_hand(bench)
+    yield from bench.set(p.ENABLE_PARACHUTE, True)
+    yield from _reached(bench, "TYPE_TAKEOFF", "TYPE_ARM")
+    began = bench.now
+    bench.deployed_from = len(bench.every)
+    result = yield from bench.ask("TYPE_DEPLOY")
+    if result != "SUCCESS":
+        raise failed(f"ARMED, and TYPE_DEPLOY: {result or 'not answered'}")
+    launched = bench.definitions.state_number(_S.LAUNCHED)
+
+    def out() -> bool:
+        return any(
+            one.values["state"] == launched
+            for one in bench.every[bench.deployed_from :]
+            if one.kind == names.PARACHUTE_STATUS and one.transfer.source == bench.node
+        )
+
+    yield Wait(began + _FIRES_WITHIN, out)
+    if not out():
+        bench.deployed_from = -1
+        raise failed(f"SUCCESS, and it is not LAUNCHED within {_FIRES_WITHIN:g} s")
+    return f"LAUNCHED after {bench.now - began:.2f} s"
+
+
+def _kill_first(bench: UpfBench) -> Trial:
+    yield from ()
+    if bench.deployed_from < 0:
+        raise not_tried("it was not deployed")
+    shown = bench.every[bench.deployed_from :]
+    launched = bench.definitions.state_number(_S.LAUNCHED)
+    for one in shown:
+        asks = one.kind == names.VEHICLE_SERVICE
+        if asks and bench.definitions.type_name(one.kind, one.values) == "TYPE_KILLSWITCH":
+            return "asked before"
+        told = one.kind == names.PARACHUTE_STATUS and one.values["state"] == launched
+        if told or one.kind == names.TRIGGER_LAUNCH:
+            raise failed("it fired before it asked for TYPE_KILLSWITCH", [one.packet])
+    raise failed("it never asked for TYPE_KILLSWITCH")
+
+
+def _touchdown(bench: UpfBench) -> Trial:
+    if (yield from bench.state()) not in DEPLOYED:
+        raise not_tried("it was not deployed")
+    if not (yield from bench.reaches(_S.TOUCHDOWN, _RESTS[1])):
+        raise failed(f"at rest, and it is not TOUCHDOWN after {_RESTS[1]:g} s")
+    launched = bench.definitions.state_number(_S.LAUNCHED)
+    first = next(
+        one.at
+        for one in bench.heard
+        if one.kind == names.PARACHUTE_STATUS and one.values["state"] == launched
+    )
+    if (passed := bench.now - first) < _RESTS[0]:
+        raise failed(f"TOUCHDOWN {passed:.1f} s after LAUNCHED (need 5 s at rest)")
+    return f"{passed:.1f} s after LAUNCHED"
+
+
+_STATES, _PARAMETERS = "Global working state", "Parameters"
+_SERVICE = "ParachuteService"
+CLAUSES: tuple[UpfClause, ...] = (
+    clause(
+        _SERVICE, "bad-magic", "a wrong magic number is refused", _bad_magic, _MOVES, Risk.ARMS
+    ),
+    clause(
+        _SERVICE,
+        "unknown-type",
+        "a type that is none is refused",
+        _unknown_type,
+        _MOVES,
+        Risk.ARMS,
+    ),
+    *(_excludes(one) for one in p.EXCLUDES),
+    clause(
+        _PARAMETERS,
+        "no-auto-takeoff",
+        "with Enable Auto-Takeoff off it stays READY",
+        _waits,
+        _MOVES,
+        Risk.ARMS,
+    ),
+    clause(_STATES, "arm-order", "it is armed only after a take-off", _order, _MOVES, Risk.ARMS),
+    clause(_STATES, "takeoff", "TYPE_TAKEOFF: TAKEOFF", _takeoff, _MOVES, Risk.ARMS),
+    clause(_STATES, "arm", "TYPE_ARM: ARMED", _arm, _MOVES, Risk.ARMS),
+    clause(_STATES, "disarm", "TYPE_DISARM: TAKEOFF", _disarm, _MOVES, Risk.ARMS),
+    clause(_STATES, "land", "TYPE_LAND: READY", _land, _MOVES, Risk.ARMS),
+    clause(
+        _PARAMETERS,
+        "disabled",
+        "with Enable Parachute off nothing deploys, not even TYPE_DEPLOY_FORCE",
+        _disabled,
+        _MAY,
+        Risk.FIRES,
+    ),
+    clause(_STATES, "deploy", "TYPE_DEPLOY: LAUNCHED", _deploy, "IT FIRES", Risk.FIRES),
+    clause(
+        _STATES,
+        "kill-first",
+        "before it fires it asks the vehicle for TYPE_KILLSWITCH",
+        _kill_first,
+        "it has fired",
+        Risk.FIRES,
+    ),
+    clause(
+        _STATES,
+        "touchdown",
+        "LAUNCHED and at rest for 5 s: TOUCHDOWN",
+        _touchdown,
+        "it has fired",
+        Risk.FIRES,
+    ),
+)

@@ -1,0 +1,413 @@
+"""Node, status and parameters: what needs nothing to be armed."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from chute_ros.conformance.clause import (
+    Clause,
+    DecidedError,
+    Risk,
+    Trial,
+    failed,
+    not_supported,
+    not_tried,
+)
+from chute_ros.links.upf.conformance.bench import NODE_STATUS, Try, UpfBench
+from chute_ros.links.upf.protocol import bus_requests
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.config import CONTROLLER_NODE_ID
+from chute_ros.model import ParachuteState
+
+DOCUMENT = "Flyfire UPF UAVCAN protocol V1.0"
+WATCHED = 5.0
+_READS, _ASKS = "nothing: it is only listened to", "nothing: it is only asked for what it knows"
+_SETS, _RESTARTS = "a parameter is changed, and set back", "it restarts"
+#: DroneCAN: a node tells its status at least so often, s.
+_LONGEST_STATUS = 1.0
+#: An interval may be off by this share, and this much, s.
+_SHARE, _LEAST = 0.25, 0.02
+#: Set for a trial, ms.
+_NODE_INTERVAL, _STATUS_INTERVAL = 400, 250
+_UNKNOWN = "No Such Parameter"
+#: It is ready so long after a restart at the latest, s.
+READY_WITHIN = 15.0
+SOAK = "--soak"
+
+UpfClause = Clause[UpfBench]
+
+
+def _mean(bench: UpfBench, kind: str) -> float:
+    """Between two of what was watched, s."""
+    times = [one.at for one in bench.watched if one.kind == kind]
+    if len(times) < 2:
+        raise failed(f"{len(times)} {kind} while it was watched", bench.packets(kind))
+    return (times[-1] - times[0]) / (len(times) - 1)
+
+
+def _node_status(bench: UpfBench) -> Trial:
+    yield from bench.watch(WATCHED)
+    times = [one.at for one in bench.watched if one.kind == NODE_STATUS]
+    longest = max((b - a for a, b in pairwise(times)), default=WATCHED)
+    if longest > _LONGEST_STATUS * (1.0 + _SHARE):
+        raise failed(
+            f"NodeStatus pauses for {longest:.2f} s (need at most 1)", bench.packets(NODE_STATUS)
+        )
+    return f"each {_mean(bench, NODE_STATUS):.2f} s"
+
+
+def _node_id(bench: UpfBench) -> Trial:
+    answer = yield from bench.get(p.STATIC_NODE_ID)
+    default = None if answer is None else p.value_of(answer["default_value"])
+    if default != CONTROLLER_NODE_ID:
+        raise failed(f"its static node id as delivered is {p.words(default) or 'not told'}")
+    return f"as delivered {CONTROLLER_NODE_ID}; it is {bench.node}"
+
+
+def _information(bench: UpfBench) -> Trial:
+    answer = yield from bench.call(bus_requests.GET_NODE_INFO, {})
+    if answer is None:
+        raise failed("GetNodeInfo is not answered")
+    if not bytes(answer["name"]):
+        raise failed("GetNodeInfo has no name")
+    if not any(bytes(answer["hardware_version"]["unique_id"])):
+        raise failed("its unique id is 0, so that nobody can tell it from another")
+    return bytes(answer["name"]).decode("utf-8", "replace")
+
+
+def _statistics(bench: UpfBench) -> Trial:
+    if (yield from bench.call(bus_requests.TRANSPORT_STATS, {})) is None:
+        raise failed("GetTransportStats is not answered")
+    return "answered"
+
+
+def _uptime(bench: UpfBench) -> Trial:
+    yield from ()
+    told = [one for one in bench.watched if one.kind == NODE_STATUS]
+    first, last = told[0], told[-1]
+    passed = last.at - first.at
+    went = last.values["uptime_sec"] - first.values["uptime_sec"]
+    if abs(went - passed) > 1.5:
+        both = [first.packet, last.packet]
+        raise failed(f"in {passed:.1f} s uptime_sec went on by {went}", both)
+    return f"{went} s in {passed:.1f} s"
+
+
+def _status_interval(bench: UpfBench) -> Trial:
+    answer = yield from bench.get(p.PARACHUTE_STATUS_INTERVAL)
+    told = None if answer is None else p.value_of(answer["value"])
+    if not isinstance(told, (int, float)) or isinstance(told, bool):
+        raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not told'}")
+    mean = _mean(bench, names.PARACHUTE_STATUS)
+    if abs(mean - told / 1000.0) > max(_SHARE * told / 1000.0, _LEAST):
+        packets = bench.packets(names.PARACHUTE_STATUS)
+        raise failed(f"each {mean:.3f} s, and its parameter says {told} ms", packets)
+    return f"each {mean:.3f} s, as its parameter says"
+
+
+def _state_known(bench: UpfBench) -> Trial:
+    yield from ()
+    for one in bench.heard:
+        told = one.kind == names.PARACHUTE_STATUS
+        if told and bench.definitions.state(one.values["state"]) is None:
+            raise failed(f"state is {one.values['state']}, which is none", [one.packet])
+    return "1 to 7"
+
+
+def _present(bench: UpfBench) -> Trial:
+    missing = []
+    for one in p.PARAMETERS:
+        answer = yield from bench.get(one.name)
+        if answer is None:
+            raise failed(f"GetSet of {one.name} is not answered")
+        if p.value_of(answer["value"]) is None:
+            missing.append(one.name)
+    if missing:
+        raise failed(f"it has no {', '.join(missing)}")
+    return f"all {len(p.PARAMETERS)}"
+
+
+def _kinds(bench: UpfBench) -> Trial:
+    for one in p.PARAMETERS:
+        answer = yield from bench.get(one.name)
+        kind = "" if answer is None else p.kind_of(answer["value"])
+        # A device may keep a switch as a number.
+        allowed = ("boolean", "integer") if one.kind is bool else ("integer",)
+        if kind and kind not in allowed:
+            raise failed(f"{one.name} is of kind {kind} (need {' or '.join(allowed)})")
+    return "switches and numbers"
+
+
+def _in_order(bench: UpfBench) -> Trial:
+    found: list[str] = []
+    for index in range(bus_requests.MOST_PARAMETERS):
+        answer = yield from bench.get(index=index)
+        if answer is None:
+            raise failed(f"GetSet of index {index} is not answered")
+        if not bytes(answer["name"]):
+            break
+        found.append(bytes(answer["name"]).decode("utf-8", "replace"))
+    else:
+        raise failed(f"its list does not end after {len(found)} parameters")
+    if missing := [one.name for one in p.PARAMETERS if one.name not in found]:
+        raise failed(f"by index there is no {', '.join(missing)}")
+    return f"{len(found)} parameters"
+
+
+def _unknown(bench: UpfBench) -> Trial:
+    answer = yield from bench.get(_UNKNOWN)
+    if answer is None:
+        raise failed("GetSet of a name that it does not have is not answered")
+    if bytes(answer["name"]) or p.value_of(answer["value"]) is not None:
+        raise failed("GetSet of a name that it does not have names a value")
+    return "answered without name and value"
+
+
+def _resistor(bench: UpfBench) -> Trial:
+    answer = yield from bench.get(p.CANBUS_RESISTER)
+    default = None if answer is None else p.value_of(answer["default_value"])
+    if default is None or p.as_switch(default):
+        raise failed(f"as delivered it is {p.words(default) or 'not told'} (need off)")
+    return "off"
+
+
+def _set_node_interval(bench: UpfBench) -> Trial:
+    return (yield from _set_interval(bench, p.NODE_STATUS_INTERVAL, _NODE_INTERVAL, NODE_STATUS))
+
+
+def _set_status_interval(bench: UpfBench) -> Trial:
+    name, wanted = p.PARACHUTE_STATUS_INTERVAL, _STATUS_INTERVAL
+    return (yield from _set_interval(bench, name, wanted, names.PARACHUTE_STATUS))
+
+
+def _set_interval(bench: UpfBench, name: str, wanted: int, kind: str) -> Trial:
+    before = p.value_of((yield from bench.get(name))["value"])
+    if (told := (yield from bench.set(name, wanted))) != wanted:
+        raise failed(f"{name} was set to {wanted}, and is {p.words(told) or 'not told'}")
+    yield from bench.watch(8.0 * wanted / 1000.0)
+    mean = _mean(bench, kind)
+    if before is not None:
+        yield from bench.set(name, before)
+    if abs(mean - wanted / 1000.0) > max(_SHARE * wanted / 1000.0, _LEAST):
+        raise failed(f"{wanted} ms were set, and it comes each {mean:.3f} s", bench.packets(kind))
+    return f"{wanted} ms were set, it comes each {mean:.3f} s"
+
+
+def _range(bench: UpfBench) -> Trial:
+    name = p.NODE_STATUS_INTERVAL
+    before = p.value_of((yield from bench.get(name))["value"])
+    for wrong in (-5, 10**9):
+        if (told := (yield from bench.set(name, wrong))) == wrong:
+            if before is not None:
+                yield from bench.set(name, before)
+            raise failed(f"{name} takes {wrong}")
+        if told != before:
+            raise failed(f"{name} {wrong} is refused, and {before} became {p.words(told)}")
+    return f"{name} stays {p.words(before)}"
+
+
+def _opcode(bench: UpfBench) -> Trial:
+    values = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
+    answer = yield from bench.call(bus_requests.EXECUTE_OPCODE, values)
+    if answer is None:
+        raise failed("ExecuteOpcode is not answered")
+    if not answer["ok"]:
+        raise failed("ExecuteOpcode save is not ok")
+    return "ok"
+
+
+def _restart_refused(bench: UpfBench) -> Trial:
+    before = [one for one in bench.heard if one.kind == NODE_STATUS][-1:]
+    yield from bench.call(bus_requests.RESTART_NODE, {"magic_number": 1})
+    yield from bench.watch(2.5)
+    told = [*before, *(one for one in bench.watched if one.kind == NODE_STATUS)]
+    uptimes = [one.values["uptime_sec"] for one in told]
+    if any(later < earlier for earlier, later in pairwise(uptimes)):
+        raise failed("it restarts by a wrong magic number", bench.packets(NODE_STATUS))
+    return "it goes on"
+
+
+def _restart(bench: UpfBench) -> Trial:
+    """What it does then is watched."""
+    magic = {"magic_number": bus_requests.RESTART_MAGIC}
+    answer = yield from bench.call(bus_requests.RESTART_NODE, magic, 1)
+    since = len(bench.heard)
+    if answer is not None and not answer["ok"]:
+        raise failed("RestartNode is not ok")
+    yield from bench.reaches(ParachuteState.NOT_READY, 5.0)
+    ready = yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
+    yield from bench.watch_on(0.5)
+    bench.watched = bench.heard[since:]
+    uptimes = [one for one in bench.watched if one.kind == NODE_STATUS]
+    if not uptimes or uptimes[0].values["uptime_sec"] > READY_WITHIN:
+        raise failed("uptime_sec does not begin anew", [one.packet for one in uptimes[:2]])
+    if not ready:
+        raise failed(f"it is not READY within {READY_WITHIN:g} s")
+    return "it starts anew, and is READY"
+
+
+def _blocks_at_start(bench: UpfBench) -> Trial:
+    yield from ()
+    return _asked(bench, "TYPE_FLIGHT_BLOCK", ParachuteState.NOT_READY)
+
+
+def _releases_when_ready(bench: UpfBench) -> Trial:
+    yield from ()
+    return _asked(bench, "TYPE_FLIGHT_BLOCK_RELEASE", ParachuteState.READY)
+
+
+def _asked(bench: UpfBench, what: str, state: ParachuteState) -> str:
+    service = names.VEHICLE_SERVICE
+    number = bench.definitions.state_number(ParachuteState.NOT_READY)
+    statuses = [one for one in bench.watched if one.kind == names.PARACHUTE_STATUS]
+    if not any(one.values["state"] == number for one in statuses):
+        raise not_tried("it was not seen to start anew")
+    asked = [
+        bench.definitions.type_name(service, one.values)
+        for one in bench.watched
+        if one.kind == service
+    ]
+    if what not in asked:
+        told = ", ".join(asked) or "nothing"
+        packets = bench.packets(service, names.PARACHUTE_STATUS)[:20]
+        raise failed(f"as it became {state.name} it asked the vehicle for {told}", packets)
+    return f"asked as it became {state.name}"
+
+
+def _kept_by_opcode(bench: UpfBench) -> Trial:
+    """With Auto-Save off only what was saved is left after a restart."""
+    name, auto = p.NODE_STATUS_INTERVAL, p.AUTO_SAVE
+    before = p.value_of((yield from bench.get(name))["value"])
+    if (yield from bench.set(auto, False)) is not False:
+        raise not_supported(f"{auto} cannot be switched off")
+    yield from bench.set(name, _NODE_INTERVAL)
+    try:
+        forgotten = yield from _after_restart(bench, name)
+    except DecidedError:
+        yield from bench.set(auto, True)
+        if before is not None:
+            yield from bench.set(name, before)
+        raise
+    yield from bench.set(name, _NODE_INTERVAL)
+    save = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
+    yield from bench.call(bus_requests.EXECUTE_OPCODE, save)
+    kept = yield from _after_restart(bench, name)
+    yield from bench.set(auto, True)
+    if before is not None:
+        yield from bench.set(name, before)
+    if forgotten != p.words(before):
+        raise failed(f"{auto} is off, and {name} is {forgotten} after a restart (was {before})")
+    if kept != str(_NODE_INTERVAL):
+        raise failed(f"it was saved, and {name} is {kept} after a restart")
+    return "kept only when it is saved"
+
+
+def _after_restart(bench: UpfBench, name: str) -> Trial:
+    magic = {"magic_number": bus_requests.RESTART_MAGIC}
+    answer = yield from bench.call(bus_requests.RESTART_NODE, magic, 1)
+    if answer is not None and not answer["ok"]:
+        raise not_tried("it does not restart")
+    yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
+    return p.words(p.value_of((yield from bench.get(name))["value"]))
+
+
+def _soak(bench: UpfBench) -> Trial:
+    yield from bench.watch(bench.soak)
+    times = [one.at for one in bench.watched if one.kind == NODE_STATUS]
+    longest = max((b - a for a, b in pairwise(times)), default=bench.soak)
+    if longest > _LONGEST_STATUS * (1.0 + _SHARE):
+        raise failed(f"NodeStatus paused for {longest:.1f} s", bench.packets(NODE_STATUS)[-5:])
+    uptimes = [one.values["uptime_sec"] for one in bench.watched if one.kind == NODE_STATUS]
+    if any(later < earlier for earlier, later in pairwise(uptimes)):
+        raise failed("it started anew meanwhile", bench.packets(NODE_STATUS)[-5:])
+    return f"{bench.soak:g} s"
+
+
+def clause(
+    section: str,
+    name: str,
+    text: str,
+    trial: Try,
+    does: str = _ASKS,
+    risk: Risk = Risk.NONE,
+    needs: str = "",
+) -> UpfClause:
+    """In the order in which they are tried."""
+    return Clause(name, DOCUMENT, section, text, does, trial, risk, needs)
+
+
+_NODE, _STANDARD = "Node discovery", "Standard UAVCAN protocols"
+_PARAMETERS, _STATES = "Parameters", "Global working state"
+CLAUSES: tuple[UpfClause, ...] = (
+    clause(_STANDARD, "node-status", "NodeStatus is broadcast", _node_status, _READS),
+    clause(_STANDARD, "uptime", "NodeStatus tells the time since its start", _uptime, _READS),
+    clause(
+        "UPF protocols",
+        "status-interval",
+        "ParachuteStatus is broadcast, as often as its parameter says",
+        _status_interval,
+    ),
+    clause(_STATES, "state-known", "its state is one of the seven", _state_known, _READS),
+    clause(_NODE, "node-id", "the static node id as delivered is 33", _node_id),
+    clause(_STANDARD, "node-info", "GetNodeInfo tells who it is", _information),
+    clause(_STANDARD, "transport-stats", "GetTransportStats is answered", _statistics),
+    clause(_PARAMETERS, "parameters", "it has each parameter of the document", _present),
+    clause(_PARAMETERS, "parameter-kinds", "each is of its kind", _kinds),
+    clause(_PARAMETERS, "parameter-list", "by index all can be read, to an end", _in_order),
+    clause(_PARAMETERS, "parameter-unknown", "another name has no value", _unknown),
+    clause(_PARAMETERS, "resister-off", "the resistor is off as delivered", _resistor),
+    clause(
+        _PARAMETERS,
+        "node-interval",
+        "Node Status Interval(ms) sets the interval of NodeStatus",
+        _set_node_interval,
+        _SETS,
+    ),
+    clause(
+        _PARAMETERS,
+        "parachute-interval",
+        "Parachute Status Interval(ms) sets the interval of ParachuteStatus",
+        _set_status_interval,
+        _SETS,
+    ),
+    clause(_PARAMETERS, "parameter-range", "what cannot be is refused", _range, _SETS),
+    clause(_STANDARD, "opcode-save", "ExecuteOpcode saves", _opcode),
+    clause(
+        _STANDARD,
+        "restart-magic",
+        "without its magic number RestartNode does nothing",
+        _restart_refused,
+        "it must not, but it may restart",
+    ),
+    clause(_STANDARD, "restart", "RestartNode starts it anew", _restart, _RESTARTS),
+    clause(
+        _STATES,
+        "block-at-start",
+        "as it becomes NOT_READY it asks the vehicle for TYPE_FLIGHT_BLOCK",
+        _blocks_at_start,
+        _READS,
+    ),
+    clause(
+        _STATES,
+        "release-when-ready",
+        "as it becomes READY it asks for TYPE_FLIGHT_BLOCK_RELEASE",
+        _releases_when_ready,
+        _READS,
+    ),
+    clause(
+        _PARAMETERS,
+        "auto-save",
+        "with Enable Auto-Save off only ExecuteOpcode keeps a change",
+        _kept_by_opcode,
+        "a parameter is changed, it restarts twice, and it is set back",
+    ),
+    clause(
+        "Over hours",
+        "soak",
+        "NodeStatus goes on without a pause or a restart",
+        _soak,
+        _READS,
+        needs=SOAK,
+    ),
+)

@@ -1,0 +1,85 @@
+"""The conformance kit of a UPF controller: what the command takes."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+from chute_ros.conformance.clause import Risk
+from chute_ros.conformance.kit import Kit, Simulated
+from chute_ros.conformance.session import Allowed, Session
+from chute_ros.links.upf.conformance import CLAUSES
+from chute_ros.links.upf.conformance.bench import VEHICLE, UpfBench
+from chute_ros.links.upf.conformance.standard import DOCUMENT, SOAK
+from chute_ros.links.upf.protocol.definitions import Definitions
+from chute_ros.links.upf.simulator.broken import BrokenController
+from chute_ros.links.upf.simulator.bus import UpfBus
+from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
+from chute_ros.links.upf.simulator.trigger import UpfTrigger
+from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
+from chute_ros.transport.can_wire import make_can_wire
+from chute_ros.transport.data_types import load_data_types
+from chute_ros.transport.wire import Wire
+
+_NODES = range(1, 126)
+#: Of what is simulated, s.
+_SOAK = 20.0
+
+
+def _add_options(options: ArgumentParser) -> None:
+    options.add_argument(
+        "--node",
+        type=int,
+        choices=_NODES,
+        default=0,
+        metavar="ID",
+        help="node id of the controller (default: whoever tells the state of a parachute)",
+    )
+    options.add_argument(
+        "--vehicle-node",
+        type=int,
+        choices=_NODES,
+        default=VEHICLE,
+        metavar="ID",
+        help=f"node id of the vehicle that is simulated here (default: {VEHICLE})",
+    )
+    options.add_argument("--bitrate", type=int, default=0, metavar="BIT/S", help="of the bus")
+    options.add_argument(
+        "--dsdl-path", default="", metavar="FOLDER", help="the vendor's data types (flyfire)"
+    )
+
+
+def _bench(chosen: Namespace, risk: Risk) -> UpfBench:
+    definitions = Definitions(load_data_types(chosen.dsdl_path, "--dsdl-path"))
+    return UpfBench(definitions, risk, chosen.node, chosen.vehicle_node, chosen.soak or 0.0)
+
+
+def _wire(chosen: Namespace) -> Wire:
+    return make_can_wire(parse_can_address(chosen.connection, chosen.bitrate))
+
+
+def _simulated(broken: str) -> Simulated:
+    """With a trigger, at rest on a bench; looked at for long where the clause needs that."""
+    definitions = Definitions(load_data_types("", ""))
+    settings = ControllerSettings()
+    controller = (
+        BrokenController(definitions, settings, broken)
+        if broken
+        else UpfController(definitions, settings)
+    )
+    needs = {one.name: one.needs for one in CLAUSES}.get(broken, SOAK)
+    bench = UpfBench(definitions, Risk.FIRES, soak=_SOAK)
+    session = Session(bench, CLAUSES, Allowed(Risk.FIRES, (needs,)))
+    return Simulated(UpfBus([controller, UpfTrigger(definitions)]), session)
+
+
+KIT = Kit(
+    document=DOCUMENT,
+    clauses=CLAUSES,
+    forms=CAN_FORMS,
+    default_connection="mcast:0",
+    add_options=_add_options,
+    bench=_bench,
+    wire=_wire,
+    fires="take the canopy out and the charge or spring out of the trigger, and keep clear of it",
+    simulated=_simulated,
+)

@@ -1,0 +1,235 @@
+"""A UPF controller that is wrong in one thing: for each clause of the conformance kit one way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from chute_ros.links.upf.protocol import bus_requests
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import Definitions
+from chute_ros.links.upf.protocol.machine import Event
+from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
+from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
+from chute_ros.links.upf.simulator.node import NODE_STATUS
+from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.endpoint import Heard
+
+_S = ParachuteState
+#: It falls silent so long after its first start, for so long, s.
+_PAUSES_AT, _PAUSES_FOR = 25.0, 5.0
+#: It takes off by itself after so long, s; and tells no state for so long at first.
+_TAKES_OFF_AFTER, _TELLS_NONE_FOR = 1.5, 2.0
+#: Request -> the clause that it breaks by its answer, though it does as it is told.
+_ANSWERS = {
+    "TYPE_TAKEOFF": "takeoff",
+    "TYPE_ARM": "arm",
+    "TYPE_DISARM": "disarm",
+    "TYPE_LAND": "land",
+}
+#: What it does not ask of the vehicle.
+_NOT_ASKED = {
+    "block-at-start": "TYPE_FLIGHT_BLOCK",
+    "release-when-ready": "TYPE_FLIGHT_BLOCK_RELEASE",
+    "kill-first": "TYPE_KILLSWITCH",
+}
+
+
+class BrokenController(UpfController):
+    """breaks: the name of a clause."""
+
+    def __init__(
+        self, definitions: Definitions, settings: ControllerSettings, breaks: str
+    ) -> None:
+        super().__init__(definitions, settings)
+        self.breaks = breaks
+        self._first_start = self._ready_since = math.nan
+        if change := _CHANGES.get(breaks):
+            change(self)
+
+    def start(self, now: float) -> None:
+        if math.isnan(self._first_start):
+            self._first_start = now
+        super().start(now)
+
+    def take_output(self) -> list[bytes]:
+        frames, up = super().take_output(), self.now - self._first_start
+        pauses = self.breaks == "soak" and _PAUSES_AT <= up < _PAUSES_AT + _PAUSES_FOR
+        return [] if pauses else frames
+
+    def step(self, now: float) -> None:
+        super().step(now)
+        ready = self.state is _S.READY and not self.switch(p.AUTO_TAKEOFF)
+        self._ready_since = min(self._ready_since, now) if ready else math.inf
+        by_itself = now - self._ready_since >= _TAKES_OFF_AFTER
+        if self.breaks == "no-auto-takeoff" and by_itself:
+            self._move(Event.TAKEOFF)
+
+    def status(self) -> dict[str, Any]:
+        told = super().status()
+        first = self.now - self._first_start < _TELLS_NONE_FOR
+        return {**told, "state": 0} if self.breaks == "state-known" and first else told
+
+    def decide(self, name: str) -> str:
+        if name == "" and self.breaks == "unknown-type":
+            return "SUCCESS"
+        switch, word = p.EXCLUDES.get(name), name.removeprefix("TYPE_").lower()
+        if switch is not None and self.breaks == f"exclude-{word}" and self.switch(switch):
+            return "SUCCESS"
+        by_hand = self.state is _S.READY and not self.switch(p.AUTO_ARM)
+        if name == "TYPE_ARM" and self.breaks == "arm-order" and by_hand:
+            self._enter(_S.ARMED)
+            return "SUCCESS"
+        if name == "TYPE_DEPLOY" and self.breaks == "deploy":
+            return "SUCCESS"
+        disabled = not self.switch(p.ENABLE_PARACHUTE)
+        if name == "TYPE_DEPLOY_FORCE" and self.breaks == "disabled" and disabled:
+            self._fire(self.now)
+            return "SUCCESS"
+        result = super().decide(name)
+        turned = result == "SUCCESS" and self.breaks == _ANSWERS.get(name)
+        return "FAILED" if turned else result
+
+    def _move(self, event: Event) -> None:
+        if event is not Event.AT_REST or self.breaks != "touchdown":
+            super()._move(event)
+
+    def _ask_vehicle(self, type_name: str) -> int:
+        if _NOT_ASKED.get(self.breaks) == type_name:
+            return 0
+        return super()._ask_vehicle(type_name)
+
+
+Answer = dict[str, Any] | None
+
+
+def _answers(
+    service: str, change: Callable[[BrokenController, Heard, Any], Answer]
+) -> Callable[[BrokenController], None]:
+    """It answers a request otherwise: change gets the right answer."""
+
+    def apply(device: BrokenController) -> None:
+        right = device.services[service]
+        device.services[service] = lambda request: change(device, request, right(request))
+
+    return apply
+
+
+def _parameter(name: str, **told: Any) -> Callable[[BrokenController], None]:
+    """It tells this parameter otherwise, by its name."""
+
+    def change(_: BrokenController, request: Heard, answer: Any) -> Answer:
+        return {**answer, **told} if _named(request) == name else answer
+
+    return _answers(bus_requests.GET_SET, change)
+
+
+def _named(request: Heard) -> str:
+    return bytes(request.values["name"]).decode()
+
+
+def _interval(
+    message: str, interval: Callable[[BrokenController], float]
+) -> Callable[[BrokenController], None]:
+    def apply(device: BrokenController) -> None:
+        _, make = device.broadcasts[message]
+        device.broadcasts[message] = (lambda: interval(device), make)
+
+    return apply
+
+
+def _no_uptime(device: BrokenController) -> None:
+    interval, make = device.broadcasts[NODE_STATUS]
+    device.broadcasts[NODE_STATUS] = (interval, lambda: {**make(), "uptime_sec": 7})
+
+
+def _no_id(_: BrokenController, request: Heard, answer: Any) -> Answer:
+    return {**answer, "hardware_version": {"major": 3, "unique_id": bytes(16)}}
+
+
+def _lacks_light(_: BrokenController, request: Heard, answer: Any) -> Answer:
+    return {} if _named(request) == p.LIGHT else answer
+
+
+def _endless(device: BrokenController, request: Heard, answer: Any) -> Answer:
+    at_end = not _named(request) and not answer
+    return device.memory.answer(p.LIGHT) if at_end else answer
+
+
+def _any_name(device: BrokenController, request: Heard, answer: Any) -> Answer:
+    known = bool(answer) or not _named(request)
+    return answer if known else device.memory.answer(p.LIGHT)
+
+
+def _takes_all(device: BrokenController, request: Heard, answer: Any) -> Answer:
+    wanted, told = p.value_of(request.values["value"]), dict(answer)
+    if wanted is not None and told:
+        device.memory.values[_named(request)] = wanted
+        told["value"] = p.union_of(wanted)
+    return told
+
+
+def _always_saves(device: BrokenController) -> None:
+    right = device.memory.set
+
+    def keep(name: str, wanted: p.Value) -> bool:
+        done = right(name, wanted)
+        device.memory.saved = dict(device.memory.values)
+        return done
+
+    device.memory.set = keep  # type: ignore[method-assign]
+
+
+def _any_magic(device: BrokenController) -> None:
+    service = names.PARACHUTE_SERVICE
+    right = device.services[service]
+    magic = device.definitions.types.request(service).constants[names.MAGIC]
+
+    def serve(request: Heard) -> Answer:
+        values: Mapping[str, Any] = {**request.values, "magic_number": magic}
+        whole = Heard(request.kind, request.name, request.source, request.transfer_id, {**values})
+        return right(whole)
+
+    device.services[service] = serve
+
+
+def _pace(device: BrokenController, name: str) -> float:
+    """A third of what its parameter says as it is delivered; as it says when it is set."""
+    told, delivered = device.values[name], CONTROLLER_PARAMETERS[name]
+    return float(told) / 1000.0 * (3.0 if told == delivered else 1.0)
+
+
+_CHANGES: dict[str, Callable[[BrokenController], None]] = {
+    "node-status": _interval(NODE_STATUS, lambda device: _pace(device, p.NODE_STATUS_INTERVAL)),
+    "uptime": _no_uptime,
+    "status-interval": _interval(
+        names.PARACHUTE_STATUS, lambda device: _pace(device, p.PARACHUTE_STATUS_INTERVAL)
+    ),
+    "node-id": _parameter(p.STATIC_NODE_ID, default_value=p.union_of(12)),
+    "node-info": _answers(bus_requests.GET_NODE_INFO, _no_id),
+    "transport-stats": _answers(bus_requests.TRANSPORT_STATS, lambda *_: None),
+    "parameters": _answers(bus_requests.GET_SET, _lacks_light),
+    "parameter-kinds": _parameter(p.LIGHT, value=p.union_of("on")),
+    "parameter-list": _answers(bus_requests.GET_SET, _endless),
+    "parameter-unknown": _answers(bus_requests.GET_SET, _any_name),
+    "resister-off": _parameter(p.CANBUS_RESISTER, default_value=p.union_of(True)),
+    "node-interval": _interval(NODE_STATUS, lambda device: 1.0),
+    "parachute-interval": _interval(names.PARACHUTE_STATUS, lambda device: 0.1),
+    "parameter-range": _answers(bus_requests.GET_SET, _takes_all),
+    "opcode-save": _answers(bus_requests.EXECUTE_OPCODE, lambda *_: {"ok": False}),
+    "restart-magic": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": True}),
+    "restart": _answers(bus_requests.RESTART_NODE, lambda *_: {"ok": False}),
+    "auto-save": _always_saves,
+    "bad-magic": _any_magic,
+}
+#: Clauses that a device can break.
+BREAKS = (
+    *_CHANGES,
+    *_NOT_ASKED,
+    *_ANSWERS.values(),
+    *(f"exclude-{name}" for name in _ANSWERS.values()),
+    *("state-known", "soak", "unknown-type", "no-auto-takeoff", "arm-order"),
+    *("disabled", "deploy", "touchdown"),
+)

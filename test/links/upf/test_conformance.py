@@ -1,0 +1,125 @@
+"""The kit on the simulated UPF controller, sound and broken in each clause, in virtual time."""
+
+from __future__ import annotations
+
+import pytest
+
+from chute_ros.conformance.bench import NotAllowedError
+from chute_ros.conformance.clause import Result, Risk, Verdict
+from chute_ros.conformance.session import Allowed, Ended, Session
+from chute_ros.conformance.virtual import VirtualLine
+from chute_ros.links.upf.conformance import CLAUSES
+from chute_ros.links.upf.conformance.bench import UpfBench
+from chute_ros.links.upf.kit import KIT
+from chute_ros.links.upf.protocol import bus_requests
+from chute_ros.links.upf.protocol import definitions as names
+from chute_ros.links.upf.protocol import parameters as p
+from chute_ros.links.upf.protocol.definitions import Definitions
+from chute_ros.links.upf.simulator.broken import BREAKS
+from chute_ros.links.upf.simulator.bus import UpfBus
+from chute_ros.links.upf.simulator.controller import UpfController
+from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
+from chute_ros.links.upf.simulator.trigger import UpfTrigger
+from chute_ros.model import ParachuteState
+from chute_ros.transport.data_types import load_data_types
+
+NAMES = [one.name for one in CLAUSES]
+DEFINITIONS = Definitions(load_data_types("", ""))
+
+
+class Run:
+    """A controller, a trigger and the kit on one bus."""
+
+    def __init__(self, risk: Risk) -> None:
+        self.controller, self.trigger = UpfController(DEFINITIONS), UpfTrigger(DEFINITIONS)
+        self.bench = UpfBench(DEFINITIONS, risk)
+        self.session = Session(self.bench, CLAUSES, Allowed(risk))
+        bus = UpfBus([self.controller, self.trigger])
+        self.line = VirtualLine(self.session, bus)  # type: ignore[arg-type]
+
+
+def results(line: VirtualLine) -> dict[str, Result]:
+    return {one.clause.name: one for one in line.events if isinstance(one, Result)}
+
+
+def of(line: VirtualLine, verdict: Verdict) -> list[str]:
+    return [name for name, one in results(line).items() if one.verdict is verdict]
+
+
+def problem(line: VirtualLine) -> str:
+    (ended,) = (one for one in line.events if isinstance(one, Ended))
+    return ended.problem
+
+
+def simulated(broken: str) -> VirtualLine:
+    """As the kit has it for its evidence."""
+    one = KIT.simulated(broken)
+    line = VirtualLine(one.session, one.device)
+    line.run()
+    return line
+
+
+def test_a_sound_controller_passes_all() -> None:
+    line = simulated("")
+    assert of(line, Verdict.PASSED) == NAMES
+    assert problem(line) == ""
+
+
+def test_each_clause_has_a_way_to_be_broken() -> None:
+    assert sorted(BREAKS) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_controller_that_breaks_a_clause_fails_exactly_that(name: str) -> None:
+    line = simulated(name)
+    assert of(line, Verdict.FAILED) == [name]
+    assert results(line)[name].why
+
+
+@pytest.mark.parametrize("risk", list(Risk))
+def test_it_is_left_as_it_was_found_and_did_no_more_than_was_allowed(risk: Risk) -> None:
+    run = Run(risk)
+    run.line.run()
+    assert run.controller.values == run.controller.saved == CONTROLLER_PARAMETERS
+    assert run.trigger.fired == (risk is Risk.FIRES)
+    if risk is Risk.NONE:
+        assert run.controller.requests_heard == []
+    if risk is not Risk.FIRES:
+        assert run.controller.state is ParachuteState.READY
+        deploys = [one for one in run.controller.requests_heard if "DEPLOY" in one]
+        assert deploys == []
+    tried = [one for one in CLAUSES if results(run.line)[one.name].verdict is Verdict.PASSED]
+    assert max(one.risk for one in tried) == risk
+
+
+def test_an_abort_leaves_it_disarmed_with_its_parameters_as_they_were() -> None:
+    run = Run(Risk.ARMS)
+    run.line.run(lambda: run.controller.state is ParachuteState.ARMED)
+    run.session.abort("aborted by Ctrl-C", run.line.now)
+    run.line.run()
+    assert run.controller.state is ParachuteState.READY
+    assert run.controller.values == CONTROLLER_PARAMETERS
+    assert problem(run.line) == "aborted by Ctrl-C"
+
+
+@pytest.mark.parametrize(
+    ("service", "type_name"),
+    [
+        (names.PARACHUTE_SERVICE, "TYPE_DEPLOY"),
+        (names.PARACHUTE_SERVICE, "TYPE_DEPLOY_FORCE"),
+        (names.TRIGGER_SERVICE, "TYPE_LAUNCH"),
+    ],
+)
+def test_a_trial_that_would_fire_unasked_ends_in_our_own_error(
+    service: str, type_name: str
+) -> None:
+    bench = UpfBench(DEFINITIONS, Risk.ARMS)
+    bench.at(1.0)
+    for magic in ({}, {"magic_number": 1}):
+        values = {**DEFINITIONS.request(service, type_name), **magic}
+        with pytest.raises(NotAllowedError):
+            next(bench.call(service, values))
+    aps = {"index": 0, "value": p.union_of(True), "name": p.ENABLE_APS.encode()}
+    with pytest.raises(NotAllowedError):
+        next(UpfBench(DEFINITIONS).call(bus_requests.GET_SET, aps))
+    assert bench.take_output() == []
