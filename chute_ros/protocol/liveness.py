@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -186,3 +186,16 @@ def first_alive(devices: Iterable[FollowedT]) -> FollowedT | None:
     known = list(devices)
     alive = (one for one in known if one.liveness.state is not LinkState.LOST)
     return next(alive, known[0] if known else None)
+
+
+KeyT = TypeVar("KeyT")
+
+
+def longest_lost(devices: Mapping[KeyT, Followed]) -> KeyT | None:
+    """The key of the device that was lost the longest ago; None: none is lost."""
+    lost = {
+        key: one.liveness.last_heard
+        for key, one in devices.items()
+        if one.liveness.state is LinkState.LOST
+    }
+    return min(lost, key=lambda key: lost[key], default=None)

@@ -16,7 +16,7 @@ from chute_ros.links.mavlink.protocol.kill import kill_plan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.protocol.events import EventLog, ParachuteChanged, Severity, VehicleChanged
-from chute_ros.protocol.liveness import first_alive
+from chute_ros.protocol.liveness import first_alive, longest_lost
 from chute_ros.protocol.mavlink.dialect import dialect
 
 DeviceT = TypeVar("DeviceT", ParachuteTracker, AutopilotTracker)
@@ -57,6 +57,10 @@ class DeviceFilter(Generic[DeviceT]):
                 self._other_systems.add(system_id)
             return False
         full = len(self._ours) >= MOST_DEVICES and (system_id, component_id) not in self._ours
+        if full and (gone := longest_lost(self._ours)) is not None:
+            # Made-up ids must not keep the true device out for ever.
+            del self._ours[gone]
+            full = False
         self.refused_count += full
         return not full
 

@@ -82,3 +82,21 @@ def test_flood_of_made_up_ids_is_bounded_and_keeps_those_who_were_first():
         heard(device_table, system, 1)
     assert len(device_table.all()) == MOST_DEVICES
     assert device_table.doubt().count(",") <= MOST_DEVICES + 1
+
+
+def test_what_was_made_up_and_is_lost_makes_room_for_the_true_device():
+    """The longest lost first; one that is heard is never given up."""
+    device_table = DeviceFilter("parachute", 1, 0)
+    for component in range(1, MOST_DEVICES + 1):
+        assert heard(device_table, 1, component)
+        device_table.get(1, component).liveness.heard(float(component))
+    assert not heard(device_table, 1, 161)
+    device_table.get(1, 3).liveness.heard(100.0)
+    for thing in device_table.all():
+        thing.liveness.update(100.5)
+        thing.liveness.update(101.0)
+    for newcomer in range(200, 200 + MOST_DEVICES - 1):
+        assert heard(device_table, 1, newcomer)
+        device_table.get(1, newcomer).liveness.heard(101.0)
+    assert not heard(device_table, 1, 161)
+    assert next(one.device for one in device_table.all()) == "1/3"

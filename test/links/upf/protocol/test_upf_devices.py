@@ -309,3 +309,13 @@ def test_bus_that_was_closed_leaves_what_is_known(bench):
     story = bench("").status("READY")
     story.link.stream_ended(None)
     assert story.picture().healthy
+
+
+def test_made_up_node_ids_that_fell_silent_make_room_for_the_true_device(bench):
+    story = bench("")
+    for node_id in range(40, 40 + MOST_DEVICES):
+        story.status("READY", node_id)
+    assert 33 not in story.status("READY", 33).link.devices.controllers
+    story.after(60.0).status("READY", 33)
+    assert 33 in story.link.devices.controllers
+    assert len(story.link.devices.controllers) == MOST_DEVICES
