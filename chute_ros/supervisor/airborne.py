@@ -82,6 +82,9 @@ def note_down(turn: Turn) -> None:
     still = flight.is_still(turn.config, turn.state, turn.now)
     if still == math.isnan(turn.heard.still_since):
         turn.heard = replace(turn.heard, still_since=turn.now if still else math.nan)
+    rests = flight.says_rests(turn.config, turn.state, turn.now)
+    if rests == math.isnan(turn.heard.rests_since):
+        turn.heard = replace(turn.heard, rests_since=turn.now if rests else math.nan)
 
 
 def _disarm_parachutes(turn: Turn) -> None:

@@ -49,6 +49,8 @@ _CALM_SPEED, _CALM_TILT = 8.0, 60.0
 _SINKS_FOR_SURE = 4.0
 #: What ends a flight, after which a person may reset one that has been still for so long, s.
 _ENDED, STILL_FOR = (Stage.KILLING, Stage.DEPLOYED, Stage.FAULT), 10.0
+#: No vehicle falls for so long at a steady speed, s.
+RESTS_FOR = 60.0
 #: Where no height is known, a vehicle is taken to be high enough so long after its take-off, s.
 HIGH_AFTER = 5.0
 
@@ -159,9 +161,19 @@ def at_ground(config: SupervisorConfig, state: State, by_pressure: float, now: f
 
 def says_air_in_vain(config: SupervisorConfig, state: State, now: float) -> bool:
     """After a kill or a deploy, or with its motors off, it has not moved for a while: the
-    autopilot of a vehicle that has crashed may say for ever that it is in the air."""
+    autopilot of a vehicle that has crashed may say for ever that it is in the air. Or it says for
+    longer than a fall lasts that it stands with its motors off: its estimator may drift for ever.
+    """
     off = armed(config, state, now) is Armed.DISARMED
-    return (off or state.stage in _ENDED) and now >= state.heard.still_since + STILL_FOR
+    still = (off or state.stage in _ENDED) and now >= state.heard.still_since + STILL_FOR
+    return still or now >= state.heard.rests_since + RESTS_FOR
+
+
+def says_rests(config: SupervisorConfig, state: State, now: float) -> bool:
+    """It says that it stands, with its motors off, and feels its weight."""
+    off = armed(config, state, now) is Armed.DISARMED
+    feels = measured(config, state, ACCELERATION, now) >= FREE_FALL
+    return off and feels and says_down(config, state, now) is True
 
 
 def is_still(config: SupervisorConfig, state: State, now: float) -> bool:
@@ -242,13 +254,11 @@ def _falls_against_its_word(
     sinks = measured(config, state, "vertical_speed", now) < -config.profile.moving_speed
     height = measured(config, state, "height", now) - state.flight.armed_height
     high = height > max(config.takeoff_height, config.profile.minimum_height)
-    both = (
-        VERTICAL_SPEED not in state.heard.denied
-        and max(measured(config, state, VERTICAL_SPEED, now), pressure_rate(config, state, now))
-        < -_SINKS_FOR_SURE
-    )
+    speeds = measured(config, state, VERTICAL_SPEED, now), pressure_rate(config, state, now)
+    # One that is not known is no second sign.
+    agree = all(speed < -_SINKS_FOR_SURE for speed in speeds)
     flew = now < state.flight.landed_at + FLIGHT_JUST_BEFORE
-    if flew and both:
+    if flew and agree and VERTICAL_SPEED not in state.heard.denied:
         return True
     return falls and sinks and high and flew if stands_off else falls and (sinks or high)
 

@@ -122,6 +122,9 @@ def reset_request(turn: Turn, one: i.ResetRequest) -> None:
         if in_air is None or flight.is_still(turn.config, turn.state, turn.now):
             text += "; if it lies still: safety/kill (kill_only), and this again after "
             text += f"{flight.STILL_FOR:g} s"
+        elif flight.says_rests(turn.config, turn.state, turn.now):
+            text += "; it says that it stands with its motors off, and moves by its estimator: "
+            text += f"this again after {flight.RESTS_FOR:g} s of that"
         turn.finish(one.token, False, False, text)
     elif in_air is None and turn.deploying.deploy_rule:
         text = "refused: a deploy is under way and nothing fresh says that it is on the ground"

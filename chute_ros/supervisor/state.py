@@ -138,6 +138,8 @@ class HeardHere:
     at_ground_since: float = math.nan
     #: Nothing has moved since, whatever the autopilot says of being in the air, monotonic s.
     still_since: float = math.nan
+    #: Since when it says that it stands with its motors off, and feels its weight.
+    rests_since: float = math.nan
     #: Why the vehicle must not fly, as last raised as an alarm in flight.
     faults_told: tuple[str, ...] = ()
 

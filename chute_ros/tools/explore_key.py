@@ -123,6 +123,7 @@ def canonical(config: SupervisorConfig, state: State, now: float) -> Hashable:
         (state.alarming.canopy_fails, state.killing.kill_only),
         round(state.flight.up_for, 3),
         _since(state.heard.still_since, now, flight.STILL_FOR),
+        _since(state.heard.rests_since, now, flight.RESTS_FOR),
     )
 
 

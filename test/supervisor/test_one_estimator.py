@@ -569,3 +569,23 @@ def test_a_force_of_which_no_speed_follows_is_denied_in_time_at_each_rate(every:
         }
         story.at(story.t + every, story.heartbeat(), story.told(height=80.0, tilt=52.0, **told))
     assert story.fired() == []
+
+
+@pytest.mark.parametrize("drifts", [-3.0, 3.5])
+def test_a_person_may_reset_one_that_stands_although_its_estimator_drifts(drifts: float) -> None:
+    """Given no barometer, a landing, motors off: no fall lasts for a minute at one speed."""
+    teller = told_to("multirotor")
+    teller.stand(1.0)
+    teller.hover(5.0, 20.0)
+    for height in [20.0 - 0.2 * k for k in range(100)]:
+        teller.tell(height=height, vertical_speed=-2.0, tilt=3.0, force=9.8)
+    drifting = {"vertical_speed": drifts, "tilt": 1.0, "force": 9.81}
+    for k in range(620):
+        teller.tell(**DOWN, **drifting, height=EVERY * drifts * k)
+        if k == 300:
+            teller.story.at(teller.story.t, i.ResetRequest(9))
+    assert not teller.story.answer(9).success
+    assert "this again after 60 s of that" in teller.story.answer(9).message
+    teller.story.at(teller.story.t, i.ResetRequest(10))
+    assert teller.story.answer(10).success
+    assert not deployed(teller)
