@@ -87,7 +87,7 @@ class MavlinkConfig(Commanded, Settings):
     needed_message_rate: float = parameter(
         5.0,
         "take-off is forbidden if GLOBAL_POSITION_INT, ATTITUDE or SCALED_IMU comes at a lower "
-        "rate; 0: not checked",
+        "rate, or never; 0: not checked",
         0.0,
         100.0,
         "Hz",
