@@ -238,9 +238,11 @@ def test_how_near_each_rule_came_is_told(fallen, tmp_path):
 
 
 def test_what_was_missing_to_decide_is_told(landed, tmp_path):
-    """Given a radio link over which no attitude came."""
+    """Given a radio link over which no attitude came: its flight took place, and is judged."""
     fewer = [one for one in landed if one.message.get_type() != "ATTITUDE"]
     one = judged(FORMATS["flight.tlog"](fewer, tmp_path / "flight.tlog"))
+    assert "ATTITUDE has never come" not in "".join(text for _, text in one.said)
+    assert one.flew > 40.0
     told = {part.name: part for part in unknown(one)}
     assert (told["tilt_deg"].share, told["tilt_deg"].why) == (1.0, "never received")
     tilt = next(rating for rating in ratings(one) if rating.told.name == "excess tilt")

@@ -26,6 +26,7 @@ _COMMAND_LONG, _DO_PARACHUTE = b"\x4c\0\0", 208
 #: FC and OFFBOARD.
 _ARMED_TRIGGERS = 12
 _PARACHUTE = "parachute"
+_STANDARD = MavlinkConfig()
 
 
 class MavlinkPart:
@@ -60,10 +61,17 @@ class MavlinkPart:
 class VirtualMavlink(VirtualNode):
     """mavlink_parachute. expect_parachute: false where the parachute is on another link."""
 
-    def __init__(self, bus: Bus, process: Process, ros: Ros, expect_parachute: bool) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        process: Process,
+        ros: Ros,
+        expect_parachute: bool,
+        config: MavlinkConfig = _STANDARD,
+    ) -> None:
         settings = MavlinkSettings(expect_parachute=expect_parachute)
         runtime = partial(MavlinkRuntime, process.name, settings)
-        super().__init__(bus, process, ros, lambda: MavlinkLink(MavlinkConfig()), runtime)
+        super().__init__(bus, process, ros, lambda: MavlinkLink(config), runtime)
 
     def is_release(self, data: bytes) -> bool:
         payload = data[10:]

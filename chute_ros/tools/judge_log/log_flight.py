@@ -18,6 +18,7 @@ from chute_ros.campaign.ros import Process, Ros
 from chute_ros.campaign.supervisor_host import SupervisorHost
 from chute_ros.campaign.world import World
 from chute_ros.links.api import AUTOPILOT_LINK
+from chute_ros.links.mavlink.protocol.config import MavlinkConfig
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.links.mavlink.virtual import VirtualMavlink
 from chute_ros.model import FIRES, Action, Decision, TriggerFlags, VehicleState
@@ -111,7 +112,9 @@ def fly(
     world.add(Plug(bus, "autopilot", autopilot, is_for_devices))
     armed = ParachuteSettings(armed_triggers=TriggerFlags.FC | TriggerFlags.OFFBOARD)
     world.add(Plug(bus, "parachute", ParachuteDevice(armed, []), is_for_devices))
-    node = VirtualMavlink(bus, Process(AUTOPILOT_LINK), ros, expect_parachute=True)
+    # What a log lacks was not written; of the take-off it tells that there was one.
+    link = MavlinkConfig(needed_message_rate=0.0)
+    node = VirtualMavlink(bus, Process(AUTOPILOT_LINK), ros, expect_parachute=True, config=link)
     world.add(node)
     ros.subscribe(i.VehicleReport, Process("listener"), partial(_hear, judged))
     over = _Over(judged, host, autopilot, progress)
