@@ -15,7 +15,7 @@ def at_ctrl_c(end: Callable[..., Any] | signal.Handlers) -> Iterator[None]:
     """A Ctrl-C goes to end meanwhile: Python's own way would tell where in an import it was. Where
     who started us wants something else of it, that stays."""
     before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler:
+    if before is not signal.default_int_handler and not isinstance(before, CtrlC):
         yield
         return
     signal.signal(signal.SIGINT, end)

@@ -24,6 +24,7 @@ from chute_ros.conformance.clause import Clause, Result, Risk, Verdict
 from chute_ros.conformance.kit import Kit
 from chute_ros.conformance.session import Allowed, Bench, Ended, Found, Session, Trying
 from chute_ros.errors import ChuteError
+from chute_ros.interrupts import at_ctrl_c
 from chute_ros.links.api import LinkKind, load
 from chute_ros.links.registered import links
 from chute_ros.plain_text import plain
@@ -196,36 +197,35 @@ def _tried(session: Session[Bench], wire: Any) -> tuple[list[Result], str, str]:
         ends_at = time.monotonic() + _ENDS_WITHIN
         loop.call(lambda link, now: link.abort(why, now))
 
-    loop.start()
-    try:
-        while time.monotonic() < ends_at:
-            try:
+    # It comes like any other event: in the middle of a line it would leave the device armed.
+    with at_ctrl_c(lambda *_: events.put(KeyboardInterrupt())):
+        loop.start()
+        try:
+            while time.monotonic() < ends_at:
                 event = _next(events)
-            except KeyboardInterrupt:
-                abort("aborted by Ctrl-C")
-                continue
-            if isinstance(event, Found):
-                found = plain(event.text)
-                print(f"found {found}", flush=True)
-            elif isinstance(event, Trying):
-                _tell_risk(event)
-            elif isinstance(event, Result):
-                results.append(event)
-                print(
-                    f"  {_MARKS[event.verdict]:14s} {event.clause.name:20s} {plain(event.why)}",
-                    flush=True,
-                )
-            elif isinstance(event, Ended):
-                return results, found, event.problem
-            elif isinstance(event, LoopFault):
-                problem = f"a mistake of the kit: {event.text}"
-                abort(problem)
-            elif isinstance(event, WireChange) and not event.is_open:
-                abort(event.text)
-            elif isinstance(event, WireTrouble) and event.text:
-                print(f"conformance: {plain(event.text)}", file=sys.stderr)
-    finally:
-        loop.stop()
+                if isinstance(event, KeyboardInterrupt):
+                    if ends_at == float("inf"):
+                        abort("aborted by Ctrl-C")
+                elif isinstance(event, Found):
+                    found = plain(event.text)
+                    print(f"found {found}", flush=True)
+                elif isinstance(event, Trying):
+                    _tell_risk(event)
+                elif isinstance(event, Result):
+                    results.append(event)
+                    mark, name = _MARKS[event.verdict], event.clause.name
+                    print(f"  {mark:14s} {name:20s} {plain(event.why)}", flush=True)
+                elif isinstance(event, Ended):
+                    return results, found, event.problem
+                elif isinstance(event, LoopFault):
+                    problem = f"a mistake of the kit: {event.text}"
+                    abort(problem)
+                elif isinstance(event, WireChange) and not event.is_open:
+                    abort(event.text)
+                elif isinstance(event, WireTrouble) and event.text:
+                    print(f"conformance: {plain(event.text)}", file=sys.stderr)
+        finally:
+            loop.stop()
     return results, found, problem or "the device was NOT left disarmed: no answer in time"
 
 
