@@ -100,6 +100,12 @@ class ErrorFlags(enum.IntFlag, boundary=enum.KEEP):
     IMU_CALIBRATION_ERROR = 1048576
 
 
+def name_of(kind: type[enum.IntEnum], number: int) -> str:
+    """The name of a member; a number that has none is shown as it is."""
+    member = kind._value2member_map_.get(number)
+    return str(member.name) if isinstance(member, enum.IntEnum) else f"number {number}"
+
+
 def flag_names(flags: enum.IntFlag) -> list[str]:
     """Names of the set bits, lowest first; a bit without a name reads "bit N"."""
     kind = type(flags)

@@ -26,6 +26,11 @@ class Risk(enum.IntEnum):
     ARMS = 1
     FIRES = 2
 
+    @property
+    def option(self) -> str:
+        """What of the command line allows it; empty: nothing has to."""
+        return ("", "--arm", "--fire")[self]
+
 
 @dataclass(frozen=True)
 class Packet:
@@ -73,6 +78,8 @@ class Wait:
     ready: Callable[[], Any] = lambda: False
 
 
+#: The option that clauses need which look on for long.
+SOAK = "--soak"
 #: A trial waits by yielding, and returns why it passed.
 Trial = Generator[Wait, bool, str]
 BenchT = TypeVar("BenchT")

@@ -7,24 +7,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from chute_ros.conformance.clause import Clause, Risk
-from chute_ros.conformance.session import Bench, Session
-from chute_ros.conformance.virtual import Device
-
-
-@dataclass(frozen=True)
-class Simulated:
-    """All that the clauses need is there and allowed."""
-
-    device: Device
-    session: Session[Any]
+from chute_ros.conformance.clause import SOAK, Clause, Risk
+from chute_ros.conformance.session import Allowed, Bench, Session
+from chute_ros.conformance.virtual import Device, VirtualLine
 
 
 @dataclass(frozen=True)
 class Kit:
     """add_options: those of this device; the bench and the wire (transport/wire.py) are made of
     what was chosen. fires: what a person must have made safe before it may fire. simulated: a
-    simulated device that breaks this clause (empty: none), in virtual time, and what tries it."""
+    simulated device that breaks this clause (empty: none) where this option of a clause is given,
+    and the bench that may do all."""
 
     document: str
     clauses: tuple[Clause[Any], ...]
@@ -34,4 +27,11 @@ class Kit:
     bench: Callable[[Namespace, Risk], Bench]
     wire: Callable[[Namespace], Any]
     fires: str
-    simulated: Callable[[str], Simulated]
+    simulated: Callable[[str, str], tuple[Device, Bench]]
+
+    def virtual(self, broken: str) -> VirtualLine:
+        """A simulated device that breaks this clause (empty: none), and what tries it, in virtual
+        time: all that the clause needs is there and allowed."""
+        needs = {one.name: one.needs for one in self.clauses}.get(broken, SOAK)
+        device, bench = self.simulated(broken, needs)
+        return VirtualLine(Session(bench, self.clauses, Allowed(Risk.FIRES, (needs,))), device)

@@ -185,8 +185,7 @@ class Session(Generic[BenchT]):
         self, clause: Clause[BenchT]
     ) -> Generator[Wait, bool, tuple[Verdict, str, tuple[Packet, ...]]]:
         if clause.risk > self._allowed.risk:
-            option = "--arm" if clause.risk is Risk.ARMS else "--fire"
-            return Verdict.NOT_TRIED, f"it takes {option}", ()
+            return Verdict.NOT_TRIED, f"it takes {clause.risk.option}", ()
         if clause.needs and clause.needs not in self._allowed.options:
             return Verdict.NOT_TRIED, f"it takes {clause.needs}", ()
         try:

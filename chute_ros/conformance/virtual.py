@@ -35,27 +35,27 @@ class VirtualLine:
         self.now = _BEGINS
         self.sent: list[bytes] = []
         self.events: list[Any] = []
-        self._session, self._device = session, device
+        self.session, self.device = session, device
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """To the session's end, or until this holds."""
-        while not self._session.ended and not until():
+        while not self.session.ended and not until():
             self._step()
 
     def _step(self) -> None:
         """To whatever happens next."""
-        due = min(self._session.next_deadline(), self._device.next_deadline())
+        due = min(self.session.next_deadline(), self.device.next_deadline())
         self.now = max(self.now, due)
-        self._device.update(self.now)
-        self._session.update(self.now)
+        self.device.update(self.now)
+        self.session.update(self.now)
         moved = True
         while moved:
-            told, asked = self._device.take_output(), self._session.take_output()
+            told, asked = self.device.take_output(), self.session.take_output()
             self.sent += asked
             self.now += _ON_THE_LINE
             for data in told:
-                self._session.receive(data, self.now)
+                self.session.receive(data, self.now)
             for data in asked:
-                self._device.receive(data, self.now)
+                self.device.receive(data, self.now)
             moved = bool(told or asked)
-        self.events += self._session.take_events()
+        self.events += self.session.take_events()

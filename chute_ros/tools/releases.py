@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bisect
 
-from chute_ros.model import DeploymentTrigger, LinkState, VehicleState
+from chute_ros.model import DeploymentTrigger, LinkState, VehicleState, name_of
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.release_orders import (
     MotionThen,
@@ -106,15 +106,9 @@ class _Own:
 
 def _step(turned: TurnedDeployed, after: float) -> ReleaseStep:
     number = turned.status.deployment_trigger
-    trigger = f"trigger {trigger_name(number)}" if number else "no trigger named"
+    trigger = f"trigger {name_of(DeploymentTrigger, number)}" if number else "no trigger named"
     text = f"{turned.status.device}, {trigger}; not deployed {turned.silent:.1f} s before"
     return ReleaseStep(after, "own status", "deployed", "act", text)
-
-
-def trigger_name(number: int) -> str:
-    """What released a parachute by its own report (ParachuteStatus.deployment_trigger)."""
-    known = number in DeploymentTrigger._value2member_map_
-    return DeploymentTrigger(number).name if known else f"number {number}"
 
 
 def _newest(orders: list[ReleaseOrder], turned: TurnedDeployed) -> ReleaseOrder | None:

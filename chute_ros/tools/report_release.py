@@ -6,10 +6,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from chute_ros.model import ParachuteStatus
+from chute_ros.model import DeploymentTrigger, ParachuteStatus, name_of
 from chute_ros.tools.flight_story import FlightStory
 from chute_ros.tools.release_orders import MotionThen, Release
-from chute_ros.tools.releases import trigger_name
 from chute_ros.tools.report_parts import answer_of, cell, listing, number, table, words
 from chute_ros.tools.timeline import escaped
 
@@ -94,7 +93,7 @@ def _deployed(status: ParachuteStatus) -> str:
     if not status.deployed:
         return "no, or not known"
     number = status.deployment_trigger
-    trigger = f"trigger {trigger_name(number)}" if number else "no trigger named"
+    trigger = f"trigger {name_of(DeploymentTrigger, number)}" if number else "no trigger named"
     return f'<b class="act">deployed</b>, {trigger}'
 
 

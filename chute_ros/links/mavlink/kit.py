@@ -5,12 +5,11 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from chute_ros.conformance.clause import Risk
-from chute_ros.conformance.kit import Kit, Simulated
-from chute_ros.conformance.session import Allowed, Session
+from chute_ros.conformance.kit import Kit
 from chute_ros.links.mavlink.conformance import CLAUSES
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench
-from chute_ros.links.mavlink.conformance.commands import KEY, SOAK
-from chute_ros.links.mavlink.simulator.broken import BrokenParachute
+from chute_ros.links.mavlink.conformance.commands import KEY
+from chute_ros.links.mavlink.simulator.broken import simulated_parachute
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
 from chute_ros.transport.address import FORMS, parse_address
@@ -50,18 +49,15 @@ def _signing() -> tuple[Signer, Verifier]:
     return Signer(_SIMULATED_KEY, clock), Verifier(_SIMULATED_KEY, clock)
 
 
-def _simulated(broken: str) -> Simulated:
-    """Near the ground, with a key, or looked at for long where the clause needs that."""
+def _simulated(broken: str, needs: str) -> tuple[ParachuteDevice, MavlinkBench]:
+    """Near the ground, or with a key, where the clause needs that."""
     cleared = "no" if broken == "release-near-ground" else "auto"
-    settings = ParachuteSettings(ground_cleared=cleared)
-    device = BrokenParachute(settings, [], broken) if broken else ParachuteDevice(settings, [])
-    needs = {one.name: one.needs for one in CLAUSES}.get(broken, SOAK)
+    device = simulated_parachute(ParachuteSettings(ground_cleared=cleared), [], broken)
     key = None
     if needs == KEY:
         device.sign(*_signing())
         key = _signing()
-    bench = MavlinkBench(Risk.FIRES, None, key, _SOAK)
-    return Simulated(device, Session(bench, CLAUSES, Allowed(Risk.FIRES, (needs,))))
+    return device, MavlinkBench(Risk.FIRES, None, key, _SOAK)
 
 
 KIT = Kit(

@@ -5,15 +5,14 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 
 from chute_ros.conformance.clause import Risk
-from chute_ros.conformance.kit import Kit, Simulated
-from chute_ros.conformance.session import Allowed, Session
+from chute_ros.conformance.kit import Kit
 from chute_ros.links.upf.conformance import CLAUSES
 from chute_ros.links.upf.conformance.bench import VEHICLE, UpfBench
-from chute_ros.links.upf.conformance.standard import DOCUMENT, SOAK
+from chute_ros.links.upf.conformance.standard import DOCUMENT
 from chute_ros.links.upf.protocol.definitions import Definitions
-from chute_ros.links.upf.simulator.broken import BrokenController
+from chute_ros.links.upf.simulator.broken import simulated_controller
 from chute_ros.links.upf.simulator.bus import UpfBus
-from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
+from chute_ros.links.upf.simulator.controller import ControllerSettings
 from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
@@ -57,19 +56,12 @@ def _wire(chosen: Namespace) -> Wire:
     return make_can_wire(parse_can_address(chosen.connection, chosen.bitrate))
 
 
-def _simulated(broken: str) -> Simulated:
-    """With a trigger, at rest on a bench; looked at for long where the clause needs that."""
+def _simulated(broken: str, _: str) -> tuple[UpfBus, UpfBench]:
+    """With a trigger, at rest on a bench."""
     definitions = Definitions(load_data_types("", ""))
-    settings = ControllerSettings()
-    controller = (
-        BrokenController(definitions, settings, broken)
-        if broken
-        else UpfController(definitions, settings)
-    )
-    needs = {one.name: one.needs for one in CLAUSES}.get(broken, SOAK)
-    bench = UpfBench(definitions, Risk.FIRES, soak=_SOAK)
-    session = Session(bench, CLAUSES, Allowed(Risk.FIRES, (needs,)))
-    return Simulated(UpfBus([controller, UpfTrigger(definitions)]), session)
+    controller = simulated_controller(definitions, ControllerSettings(), broken)
+    bus = UpfBus([controller, UpfTrigger(definitions)])
+    return bus, UpfBench(definitions, Risk.FIRES, soak=_SOAK)
 
 
 KIT = Kit(

@@ -15,6 +15,7 @@ from chute_ros.model import (
     Outcome,
     ParachuteState,
     TriggerFlags,
+    name_of,
 )
 from chute_ros.plain_text import span_text
 from chute_ros.supervisor.gate import OPERATOR
@@ -22,7 +23,7 @@ from chute_ros.supervisor.inputs import Mode
 from chute_ros.supervisor.machine import Stage
 from chute_ros.supervisor.state_text import MODES, UNGUARDED
 from chute_ros.tools.chute.hearing import Heard, Picture
-from chute_ros.tools.chute.words import NEVER, is_old, name_of
+from chute_ros.tools.chute.words import NEVER, is_old
 
 #: States in which nothing is wrong, if there is no alarm.
 WELL = ("READY", "ARMED", "IN_FLIGHT", "LANDED")

@@ -1,8 +1,7 @@
-"""Numbers, ages and names of enumerations as a person reads them."""
+"""Numbers and ages as a person reads them."""
 
 from __future__ import annotations
 
-import enum
 import math
 
 from chute_ros.plain_text import span_text
@@ -10,12 +9,6 @@ from chute_ros.plain_text import span_text
 #: What is older than this is not shown as if it were now, s.
 OLD_AFTER = 2.0
 NEVER = "never received"
-
-
-def name_of(kind: type[enum.IntEnum], number: int) -> str:
-    """The name of a member; a number that has none is shown as it is."""
-    member = kind._value2member_map_.get(number)
-    return str(member.name) if isinstance(member, enum.IntEnum) else f"number {number}"
 
 
 def is_old(age: float) -> bool:

@@ -12,7 +12,6 @@ from typing import Any
 
 from chute_ros.conformance.clause import Clause, Result, Verdict
 from chute_ros.conformance.kit import Kit
-from chute_ros.conformance.virtual import VirtualLine
 from chute_ros.links.api import load
 from chute_ros.links.registered import links
 from chute_ros.tools.pages import table
@@ -41,8 +40,7 @@ def main() -> None:
 
 def tried(kit: Kit, broken: str) -> list[Result]:
     """The results on a device that breaks this clause; empty: none."""
-    one = kit.simulated(broken)
-    line = VirtualLine(one.session, one.device)
+    line = kit.virtual(broken)
     line.run()
     return [event for event in line.events if isinstance(event, Result)]
 

@@ -8,11 +8,12 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
+from chute_ros.model import name_of
 from chute_ros.supervisor.inputs import Mode
 from chute_ros.tools.chute.hearing import Heard, stamp_seconds
 from chute_ros.tools.chute.status_text import state_tone, state_words
 from chute_ros.tools.chute.view import is_unguarded, reason_in
-from chute_ros.tools.chute.words import age_text, is_old, name_of
+from chute_ros.tools.chute.words import age_text, is_old
 from chute_ros.tools.panel.tones import TONES
 
 #: The states, the one first that a person must see first.

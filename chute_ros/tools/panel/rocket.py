@@ -8,8 +8,9 @@ from html import escape
 from typing import Any
 
 from chute_ros.links.umbilical.protocol.modes import FlightMode
+from chute_ros.model import name_of
 from chute_ros.tools.chute.diagnostic_tasks import Task
-from chute_ros.tools.chute.words import age_text, is_old, name_of, value_text
+from chute_ros.tools.chute.words import age_text, is_old, value_text
 from chute_ros.tools.panel.sections import broken
 
 _AIR_BRAKE = {0: "idle", 1: "deployed", 2: "retracted"}

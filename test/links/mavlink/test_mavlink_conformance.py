@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import cycle
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import Result, Risk, Verdict
@@ -70,8 +73,8 @@ def sound(**settings: object) -> ParachuteDevice:
 
 def simulated(broken: str) -> Run:
     """As the kit has it for its evidence."""
-    one = KIT.simulated(broken)
-    return Run(one.device, session=one.session).to()  # type: ignore[arg-type]
+    line = KIT.virtual(broken)
+    return Run(line.device, session=line.session).to()  # type: ignore[arg-type]
 
 
 # -- what it finds ------------------------------------------------------------------------------
@@ -89,10 +92,10 @@ def test_a_sound_device_passes_all_that_can_be_tried() -> None:
 
 
 def test_what_needs_a_key_or_the_ground_passes_with_it() -> None:
-    one = KIT.simulated("signed-answers")
     device = sound()
     device.sign(*key())
-    signed = Run(device, session=one.session).to()
+    session = KIT.virtual("signed-answers").session
+    signed = Run(device, session=session).to()  # type: ignore[arg-type]
     assert signed.of(Verdict.FAILED) == []
     assert {"unsigned-refused", "signed-answers"} <= {*signed.of(Verdict.PASSED)}
     low = Run(sound(ground_cleared="no")).to()
@@ -126,6 +129,63 @@ def test_a_device_that_leaves_out_what_it_may_is_not_blamed() -> None:
     lacks += ["interval-default", "automatic-release", "release"]
     assert run.of(Verdict.NOT_SUPPORTED) == lacks
     assert run.of(Verdict.FAILED) == []
+
+
+# -- whatever it is told -------------------------------------------------------------------------
+
+STREAMS = [*sound().streams]
+COMMANDS = [*sound().commands]
+
+
+@pytest.mark.parametrize("stream", STREAMS)
+def test_a_device_that_sends_one_message_never_is_tried_to_the_end(stream: int) -> None:
+    device = sound()
+    del device.streams[stream]
+    device.default_intervals.pop(stream, None)
+    assert [*Run(device).to().results] == NAMES
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("result", [None, *range(7), 200])
+def test_a_device_that_answers_one_command_with_anything_is_tried_to_the_end(
+    command: int, result: int | None
+) -> None:
+    device = sound()
+    if result is None:
+        del device.commands[command]
+    else:
+        device.commands[command] = lambda _: result
+    assert [*Run(device).to().results] == NAMES
+
+
+RANGES = {"uint8_t": 2**8, "uint16_t": 2**16, "uint32_t": 2**32, "uint64_t": 2**64}
+
+
+@settings(max_examples=60)
+@given(data=st.data())
+def test_a_device_with_any_value_in_a_field_is_tried_to_the_end(data: st.DataObject) -> None:
+    device = sound()
+    stream = data.draw(st.sampled_from(STREAMS))
+    kind = dialect.mavlink_map[stream]
+    field = data.draw(st.sampled_from(kind.fieldnames))
+    place = kind.fieldnames.index(field)
+    if kind.fieldtypes[place] == "char":
+        values: st.SearchStrategy[object] = st.binary(max_size=kind.array_lengths[0] or 1)
+        field = f"_{field}_raw"
+    else:
+        values = st.integers(0, RANGES[kind.fieldtypes[place]] - 1)
+    told = cycle(data.draw(st.lists(values, min_size=1, max_size=4)))
+    make = device.streams[stream]
+
+    def changed() -> object:
+        message = make()
+        setattr(message, field, next(told))
+        return message
+
+    device.streams[stream] = changed
+    run = Run(device).to()
+    # What says that it is no parachute may not be found.
+    assert [*run.results] in (NAMES, [])
 
 
 # -- what it must not do ------------------------------------------------------------------------

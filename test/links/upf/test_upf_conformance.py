@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import cycle
+
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from chute_ros.conformance.bench import NotAllowedError
 from chute_ros.conformance.clause import Result, Risk, Verdict
@@ -19,8 +25,10 @@ from chute_ros.links.upf.simulator.broken import BREAKS
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import UpfController
 from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
+from chute_ros.links.upf.simulator.node import NODE_STATUS
 from chute_ros.links.upf.simulator.trigger import UpfTrigger
 from chute_ros.model import ParachuteState
+from chute_ros.protocol.dronecan.endpoint import Heard
 from chute_ros.transport.data_types import load_data_types
 
 NAMES = [one.name for one in CLAUSES]
@@ -53,8 +61,7 @@ def problem(line: VirtualLine) -> str:
 
 def simulated(broken: str) -> VirtualLine:
     """As the kit has it for its evidence."""
-    one = KIT.simulated(broken)
-    line = VirtualLine(one.session, one.device)
+    line = KIT.virtual(broken)
     line.run()
     return line
 
@@ -74,6 +81,97 @@ def test_a_controller_that_breaks_a_clause_fails_exactly_that(name: str) -> None
     line = simulated(name)
     assert of(line, Verdict.FAILED) == [name]
     assert results(line)[name].why
+
+
+# -- whatever it is told -------------------------------------------------------------------------
+
+
+def whole(line: VirtualLine) -> None:
+    """Each clause has its verdict: whatever a device says, or does not, is no mistake of ours."""
+    line.run()
+    assert [*results(line)] == NAMES
+    assert of(line, Verdict.FAILED)
+
+
+@pytest.mark.parametrize("service", [*UpfController(DEFINITIONS).services])
+def test_a_controller_that_answers_one_service_never_is_tried_to_the_end(service: str) -> None:
+    run = Run(Risk.FIRES)
+    del run.controller.services[service]
+    whole(run.line)
+
+
+def test_a_controller_without_node_status_is_tried_to_the_end() -> None:
+    run = Run(Risk.FIRES)
+    del run.controller.broadcasts[NODE_STATUS]
+    whole(run.line)
+
+
+def test_a_touchdown_of_a_launch_that_nobody_saw_proves_nothing() -> None:
+    """Given a controller that is TOUCHDOWN already as the kit comes."""
+    run = Run(Risk.FIRES)
+    run.line.run(lambda: run.controller.state is ParachuteState.TOUCHDOWN)
+    touchdown = [one for one in CLAUSES if one.name == "touchdown"]
+    bench = UpfBench(DEFINITIONS, Risk.FIRES)
+    late = VirtualLine(Session(bench, touchdown, Allowed(Risk.FIRES)), run.line.device)  # type: ignore[arg-type]
+    late.now = run.line.now
+    late.run()
+    assert of(late, Verdict.NOT_TRIED) == ["touchdown"]
+
+
+VALUES: st.SearchStrategy[p.Value | None] = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-(2**31), 2**31),
+    st.floats(width=32, allow_nan=False, allow_infinity=False),
+    st.text(max_size=9),
+)
+
+
+@settings(max_examples=10)
+@given(told=st.dictionaries(st.sampled_from([one.name for one in p.PARAMETERS]), VALUES))
+def test_a_controller_with_any_values_is_tried_to_the_end(told: dict[str, p.Value | None]) -> None:
+    run = Run(Risk.NONE)
+    right = run.controller.services[bus_requests.GET_SET]
+
+    def answer(request: Heard) -> dict[str, object] | None:
+        name = bytes(request.values["name"]).decode()
+        if name not in told:
+            return right(request)
+        value = {"empty": {}} if told[name] is None else p.union_of(told[name])
+        return {"value": value, "default_value": value, "name": name.encode()}
+
+    run.controller.services[bus_requests.GET_SET] = answer
+    run.line.run()
+    assert [*results(run.line)] == NAMES
+
+
+@settings(max_examples=10)
+@given(
+    states=st.lists(st.integers(0, 7), min_size=1),
+    uptimes=st.lists(st.integers(0, 2**32 - 1), min_size=1),
+)
+def test_a_controller_with_any_states_is_tried_to_the_end(
+    states: list[int], uptimes: list[int]
+) -> None:
+    run = Run(Risk.FIRES)
+    for message, field, every in (
+        (names.PARACHUTE_STATUS, "state", cycle(states)),
+        (NODE_STATUS, "uptime_sec", cycle(uptimes)),
+    ):
+        interval, make = run.controller.broadcasts[message]
+        told = partial(_changed, make, field, every)
+        run.controller.broadcasts[message] = (interval, told)
+    run.line.run()
+    assert [*results(run.line)] == NAMES
+
+
+def _changed(
+    make: Callable[[], dict[str, object]], field: str, every: Iterator[int]
+) -> dict[str, object]:
+    return {**make(), field: next(every)}
+
+
+# -- what it must not do -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("risk", list(Risk))

@@ -1,17 +1,15 @@
-"""MAV_CMD_SET_PARACHUTE_ARM, and the automatic release of MAV_CMD_DO_PARACHUTE."""
+"""MAV_CMD_SET_PARACHUTEARM, and the automatic release of MAV_CMD_DO_PARACHUTE."""
 
 from __future__ import annotations
 
 import math
 
 from chute_ros.conformance.clause import Risk, Trial, failed, not_supported
-from chute_ros.links.mavlink.conformance.bench import MavlinkBench, result_of
+from chute_ros.links.mavlink.conformance.bench import ARM, EVERY, MavlinkBench, refused
 from chute_ros.links.mavlink.conformance.document import PARACHUTE, of
 from chute_ros.model import TriggerFlags
 from chute_ros.protocol.mavlink.dialect import dialect
 
-_ARM = dialect.MAV_CMD_SET_PARACHUTE_ARM
-_EVERY = int(sum(TriggerFlags))
 _UNKNOWN_SOURCE = 256
 _DOES = "it arms and disarms trigger sources, also those that fire by themselves"
 
@@ -25,7 +23,7 @@ def _sources(bench: MavlinkBench) -> Trial:
     """The sources that it has, as a text that is a mask: those that can be armed."""
     mask = 0
     for source in TriggerFlags:
-        answer = yield from bench.command(_ARM, int(source), int(source))
+        answer = yield from bench.command(ARM, int(source), int(source))
         if answer is None:
             raise failed(f"to arm {source.name} is not answered")
         if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
@@ -36,7 +34,7 @@ def _sources(bench: MavlinkBench) -> Trial:
 
 
 def _set(bench: MavlinkBench, arm: int, select: int, expected: int, what: str) -> Trial:
-    yield from bench.accepted(_ARM, arm, select)
+    yield from bench.accepted(ARM, arm, select)
     armed = int((yield from _armed(bench)))
     if armed != expected:
         raise failed(f"{what}: arm_status is {armed:#010b} (need {expected:#010b})")
@@ -75,7 +73,7 @@ def _nothing(bench: MavlinkBench) -> Trial:
     has = int((yield from _sources(bench)))
     before = int((yield from _armed(bench)))
     for arm in (0, has):
-        answer = yield from bench.command(_ARM, arm, 0)
+        answer = yield from bench.command(ARM, arm, 0)
         if answer is None:
             raise failed("a command that selects no source is not answered")
         if (now := int((yield from _armed(bench)))) != before:
@@ -87,14 +85,10 @@ def _nothing(bench: MavlinkBench) -> Trial:
 def _refused(bench: MavlinkBench, arm: float, select: float, what: str) -> Trial:
     yield from bench.disarm_each()
     before = int((yield from _armed(bench)))
-    answer = yield from bench.command(_ARM, arm, select)
-    if answer is None:
-        raise failed(f"{what} is not answered")
-    if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
-        raise failed(f"{what} is ACCEPTED")
+    told = refused((yield from bench.command(ARM, arm, select)), what)
     if (now := int((yield from _armed(bench)))) != before:
         raise failed(f"{what} is refused, and arm_status went {before} -> {now}")
-    return f"answered with {result_of(answer)}, nothing changes"
+    return f"{told}, nothing changes"
 
 
 def _unknown_source(bench: MavlinkBench) -> Trial:
@@ -108,7 +102,7 @@ def _no_number(bench: MavlinkBench) -> Trial:
 
 def _disarm(bench: MavlinkBench) -> Trial:
     yield from _sources(bench)
-    yield from _set(bench, 0, _EVERY, 0, "all are disarmed at once")
+    yield from _set(bench, 0, EVERY, 0, "all are disarmed at once")
     return "arm_status is 0"
 
 

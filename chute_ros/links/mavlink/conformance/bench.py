@@ -27,6 +27,9 @@ _STATUS_WITHIN = 3.0
 #: Whose commands these are: an onboard computer.
 US = 191
 _ACTIONS = (dialect.PARACHUTE_DISABLE, dialect.PARACHUTE_ENABLE)
+ARM = dialect.MAV_CMD_SET_PARACHUTE_ARM
+#: Each trigger source.
+EVERY = int(sum(TriggerFlags))
 
 
 @dataclass(frozen=True)
@@ -208,10 +211,9 @@ class MavlinkBench(RecordingBench[Heard]):
 
     def leave(self) -> Trial:
         """Each trigger is disarmed, and its status says so."""
-        every = int(sum(TriggerFlags))
         if self._risk is Risk.NONE or not self.component:
             return "nothing was armed"
-        yield from self.command(dialect.MAV_CMD_SET_PARACHUTE_ARM, 0, every)
+        yield from self.command(ARM, 0, EVERY)
         status = yield from self.status()
         if status.message.arm_status:
             yield from self.disarm_each()
@@ -223,7 +225,7 @@ class MavlinkBench(RecordingBench[Heard]):
     def disarm_each(self) -> Trial:
         """Each source by a command of its own: not every device takes several at once."""
         for source in TriggerFlags:
-            yield from self.command(dialect.MAV_CMD_SET_PARACHUTE_ARM, 0, int(source))
+            yield from self.command(ARM, 0, int(source))
         return ""
 
     def command(
@@ -249,9 +251,10 @@ class MavlinkBench(RecordingBench[Heard]):
         """The same; it must be accepted."""
         answer = yield from self.command(command, *params)
         if answer is None:
-            raise failed(f"{name_of(command)} is not answered, {TRIES} times")
+            raise failed(f"{entry_name('MAV_CMD', command)} is not answered, {TRIES} times")
         if answer.message.result != dialect.MAV_RESULT_ACCEPTED:
-            raise failed(f"{name_of(command)} is answered with {result_of(answer)}")
+            name = entry_name("MAV_CMD", command)
+            raise failed(f"{name} is answered with {result_of(answer)}")
         return answer
 
     def status(self) -> Any:
@@ -270,16 +273,24 @@ def _risk_of(message: Any) -> Risk:
         return Risk.NONE
     if message.command == dialect.MAV_CMD_DO_PARACHUTE:
         return Risk.ARMS if message.param1 in _ACTIONS else Risk.FIRES
-    return Risk.ARMS if message.command == dialect.MAV_CMD_SET_PARACHUTE_ARM else Risk.NONE
+    return Risk.ARMS if message.command == ARM else Risk.NONE
 
 
-def name_of(command: int) -> str:
-    """A command by its name."""
-    known = dialect.enums["MAV_CMD"].get(command)
-    return known.name if known else f"command {command}"
+def entry_name(enumeration: str, number: int) -> str:
+    """An entry of an enumeration of MAVLink by its name."""
+    known = dialect.enums[enumeration].get(number)
+    return known.name if known else f"{enumeration} {number}"
 
 
 def result_of(answer: Heard) -> str:
     """The result of an answer by its name."""
-    known = dialect.enums["MAV_RESULT"].get(answer.message.result)
-    return known.name if known else f"result {answer.message.result}"
+    return entry_name("MAV_RESULT", answer.message.result)
+
+
+def refused(answer: Heard | None, what: str, besides: str = "") -> str:
+    """How what must not be accepted is answered. besides: told of one that is accepted."""
+    if answer is None:
+        raise failed(f"{what} is not answered")
+    if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
+        raise failed(f"{what} is ACCEPTED{besides}")
+    return f"answered with {result_of(answer)}"

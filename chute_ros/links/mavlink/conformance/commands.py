@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
-from chute_ros.conformance.clause import Trial, Wait, failed, not_supported, not_tried
+from chute_ros.conformance.clause import SOAK, Trial, Wait, failed, not_supported, not_tried
 from chute_ros.links.mavlink.conformance.bench import US, MavlinkBench, result_of
 from chute_ros.links.mavlink.conformance.connection import nominal
 from chute_ros.links.mavlink.conformance.document import (
@@ -27,7 +27,6 @@ _SILENCE = 0.6
 _OTHER_SENDER, _NOBODY = 190, 77
 #: Bytes without a start of a frame.
 _NOISE = bytes(byte for byte in range(256) if byte not in (0xFD, 0xFE)) * 4
-SOAK = "--soak"
 KEY = "--signing-key-file"
 
 
@@ -40,11 +39,16 @@ def _unknown_command(bench: MavlinkBench) -> Trial:
     return "MAV_RESULT_UNSUPPORTED"
 
 
+def _silence(bench: MavlinkBench, otherwise: str) -> Trial:
+    """It does not answer what was just sent."""
+    if (yield from bench.answer(_REQUEST, _SILENCE)) is not None:
+        raise failed(otherwise)
+    return "not answered"
+
+
 def _not_meant(bench: MavlinkBench, target: tuple[int, int]) -> Trial:
     bench.send(bench.command_long(_REQUEST, _STATUS, target=target))
-    if (yield from bench.answer(_REQUEST, _SILENCE)) is not None:
-        raise failed(f"a command to {target[0]}/{target[1]} is answered")
-    return "no answer"
+    return (yield from _silence(bench, f"a command to {target[0]}/{target[1]} is answered"))
 
 
 def _other_component(bench: MavlinkBench) -> Trial:
@@ -151,9 +155,7 @@ def _damaged(bench: MavlinkBench) -> Trial:
         return (frame[:12] + bytes([frame[12] ^ 0x55]) + frame[13:],)
 
     bench.send(bench.command_long(_REQUEST, _STATUS), change=damage)
-    if (yield from bench.answer(_REQUEST, _SILENCE)) is not None:
-        raise failed("a command with a wrong checksum is carried out")
-    return "not answered"
+    return (yield from _silence(bench, "a command with a wrong checksum is carried out"))
 
 
 def _cut(bench: MavlinkBench) -> Trial:
@@ -198,9 +200,7 @@ def _sequence(bench: MavlinkBench) -> Trial:
 
 def _unsigned(bench: MavlinkBench) -> Trial:
     bench.send(bench.command_long(_REQUEST, _STATUS), signed=False)
-    if (yield from bench.answer(_REQUEST, _SILENCE)) is not None:
-        raise failed("an unsigned command is carried out although it has a key")
-    return "not answered"
+    return (yield from _silence(bench, "an unsigned command is carried out although it has a key"))
 
 
 def _signed(bench: MavlinkBench) -> Trial:
@@ -215,10 +215,9 @@ def _signed(bench: MavlinkBench) -> Trial:
 
 def _soak(bench: MavlinkBench) -> Trial:
     yield from bench.watch(bench.soak)
-    before = bench.watched
     for kind in ("HEARTBEAT", "PARACHUTE_STATUS"):
         nominal(bench, kind)
-    clocks = [one for one in before if one.kind == "PARACHUTE_STATUS"]
+    clocks = [one for one in bench.watched if one.kind == "PARACHUTE_STATUS"]
     for earlier, later in pairwise(clocks):
         if later.message.time_boot_ms < earlier.message.time_boot_ms:
             raise failed("it started anew meanwhile", [earlier.packet, later.packet])

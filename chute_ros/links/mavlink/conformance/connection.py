@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from chute_ros.conformance.clause import Trial, failed, not_supported
-from chute_ros.links.mavlink.conformance.bench import MavlinkBench, result_of
+from chute_ros.links.mavlink.conformance.bench import MavlinkBench, entry_name, refused, result_of
 from chute_ros.links.mavlink.conformance.document import HEARTBEAT, PARACHUTE, READS, of
 from chute_ros.protocol.mavlink.dialect import dialect
 
@@ -40,14 +40,10 @@ def _heartbeat_type(bench: MavlinkBench) -> Trial:
     beats = [one for one in bench.watched if one.kind == "HEARTBEAT"]
     kinds = {one.message.type for one in beats}
     if kinds != {dialect.MAV_TYPE_PARACHUTE}:
-        told = ", ".join(map(_type_name, sorted(kinds))) or "no heartbeat"
+        names = [entry_name("MAV_TYPE", kind) for kind in sorted(kinds)]
+        told = ", ".join(names) or "no heartbeat"
         raise failed(f"type is {told}", bench.packets("HEARTBEAT"))
     return "MAV_TYPE_PARACHUTE"
-
-
-def _type_name(number: int) -> str:
-    known = dialect.enums["MAV_TYPE"].get(number)
-    return known.name if known else str(number)
 
 
 def _heartbeat_fields(bench: MavlinkBench) -> Trial:
@@ -122,11 +118,7 @@ def _information_texts(bench: MavlinkBench) -> Trial:
 
 def _request_unknown(bench: MavlinkBench) -> Trial:
     answer = yield from bench.command(dialect.MAV_CMD_REQUEST_MESSAGE, FOREIGN_MESSAGE)
-    if answer is None:
-        raise failed("a request for a message that it does not have is not answered")
-    if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
-        raise failed("a request for a message that it does not have is answered with ACCEPTED")
-    return f"answered with {result_of(answer)}"
+    return refused(answer, "a request for a message that it does not have")
 
 
 _beats = of(HEARTBEAT, "Heartbeats")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from chute_ros.conformance.clause import Trial, failed, not_supported
-from chute_ros.links.mavlink.conformance.bench import Heard, MavlinkBench, result_of
+from chute_ros.links.mavlink.conformance.bench import Heard, MavlinkBench, refused, result_of
 from chute_ros.links.mavlink.conformance.connection import FOREIGN_MESSAGE, nominal
 from chute_ros.links.mavlink.conformance.document import ASKS, PARACHUTE, READS, of
 from chute_ros.links.mavlink.protocol.parachute import packed_date
@@ -92,11 +92,7 @@ def _interval_default(bench: MavlinkBench) -> Trial:
 def _interval_unknown(bench: MavlinkBench) -> Trial:
     command = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
     answer = yield from bench.command(command, FOREIGN_MESSAGE, _FASTER)
-    if answer is None:
-        raise failed("an interval of a message that it does not have is not answered")
-    if answer.message.result == dialect.MAV_RESULT_ACCEPTED:
-        raise failed("an interval of a message that it does not have is ACCEPTED")
-    return f"answered with {result_of(answer)}"
+    return refused(answer, "an interval of a message that it does not have")
 
 
 def _boot_time(bench: MavlinkBench) -> Trial:

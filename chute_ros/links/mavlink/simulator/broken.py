@@ -145,6 +145,15 @@ class BrokenParachute(ParachuteDevice):
             self.verifier = checks
 
 
+def simulated_parachute(
+    settings: ParachuteSettings, script: list[tuple[float, str]], breaks: str
+) -> ParachuteDevice:
+    """A simulated parachute. breaks: a name of BREAKS; empty: it is sound."""
+    if breaks:
+        return BrokenParachute(settings, script, breaks)
+    return ParachuteDevice(settings, script)
+
+
 # -- the ways -------------------------------------------------------------------------------------
 
 

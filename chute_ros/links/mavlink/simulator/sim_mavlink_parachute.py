@@ -10,11 +10,8 @@ from chute_ros.sim.command_line import main_of, number, parser, real, run, scrip
 
 def _run() -> None:
     # Here, so that a dialect that is not built ends in one line and not in a traceback.
-    from chute_ros.links.mavlink.simulator.broken import BREAKS, BrokenParachute
-    from chute_ros.links.mavlink.simulator.parachute_device import (
-        ParachuteDevice,
-        ParachuteSettings,
-    )
+    from chute_ros.links.mavlink.simulator.broken import BREAKS, simulated_parachute
+    from chute_ros.links.mavlink.simulator.parachute_device import ParachuteSettings
 
     start = ParachuteSettings()
     options = parser(
@@ -73,6 +70,7 @@ def _run() -> None:
         "--break",
         dest="breaks",
         choices=[*BREAKS],
+        default="",
         metavar="CLAUSE",
         help="be wrong in this clause of `conformance mavlink` (its --list names them)",
     )
@@ -89,11 +87,7 @@ def _run() -> None:
         packed_date=chosen.packed_date,
         system_status=chosen.system_status,
     )
-    script = script_of(chosen.at)
-    if chosen.breaks:
-        run(BrokenParachute(settings, script, chosen.breaks), chosen)
-    else:
-        run(ParachuteDevice(settings, script), chosen)
+    run(simulated_parachute(settings, script_of(chosen.at), chosen.breaks), chosen)
 
 
 def _date(text: str) -> str:

@@ -215,9 +215,8 @@ class UpfBench(RecordingBench[HeardTransfer]):
                 yield from self.ask(name)
         left = []
         for name, value in [*self.changed.items()]:
-            if (yield from self.set(name, value)) != value:
+            if not (yield from self.put_back(name)):
                 left.append(f"{name} is not {p.words(value)} again")
-            self.changed.pop(name, None)
         state = yield from self.state()
         if state is ParachuteState.ARMED:
             left.append("it is LEFT ARMED")
@@ -236,17 +235,29 @@ class UpfBench(RecordingBench[HeardTransfer]):
         values = {"index": index, "value": {"empty": {}}, "name": name.encode()}
         return (yield from self.call(bus_requests.GET_SET, values))
 
+    def value(self, name: str, which: str = "value") -> Any:
+        """The value of a parameter, or its default_value; None: not answered, or it has none."""
+        answer = yield from self.get(name)
+        return None if answer is None else p.value_of(answer[which])
+
     def set(self, name: str, value: p.Value) -> Any:
         """The value that a parameter has afterwards; None: not answered, or none of this name."""
         if name not in self.changed:
-            before = yield from self.get(name)
-            known = None if before is None else p.value_of(before["value"])
+            known = yield from self.value(name)
             if known is not None:
                 self.changed[name] = known
         values = {"index": 0, "value": p.union_of(value), "name": name.encode()}
         answer = yield from self.call(bus_requests.GET_SET, values)
         told = None if answer is None else p.value_of(answer["value"])
         return bool(told) if isinstance(value, bool) and told is not None else told
+
+    def put_back(self, name: str) -> Any:
+        """Whether a parameter is as it was before it was set."""
+        if name in self.changed:
+            if (yield from self.set(name, self.changed[name])) != self.changed[name]:
+                return False
+            del self.changed[name]
+        return True
 
     def state(self) -> Any:
         """The state (ParachuteState) that it tells next; None: a number without a name."""

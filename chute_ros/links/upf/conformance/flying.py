@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from chute_ros.conformance.clause import Risk, Trial, Wait, failed, not_tried
-from chute_ros.links.upf.conformance.bench import UpfBench
+from chute_ros.links.upf.conformance.bench import HeardTransfer, UpfBench
 from chute_ros.links.upf.conformance.standard import UpfClause, clause
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -59,7 +61,7 @@ def _excludes(type_name: str) -> UpfClause:
         return "REJECTED"
 
     return clause(
-        "Global working state",
+        _STATES,
         f"exclude-{word}",
         f"with {parameter} on {type_name} is rejected",
         trial,
@@ -106,27 +108,16 @@ def _reached(bench: UpfBench, *requests: str) -> Trial:
 _AFTER = {"TYPE_TAKEOFF": _S.TAKEOFF, "TYPE_ARM": _S.ARMED}
 
 
-def _takeoff(bench: UpfBench) -> Trial:
-    yield from _by_hand(bench)
-    return (yield from _moved(bench, "TYPE_TAKEOFF", _S.TAKEOFF))
+def _moves(request: str, to: ParachuteState, *before: str) -> UpfClause:
+    """After these requests, this one moves it to that state."""
 
+    def trial(bench: UpfBench) -> Trial:
+        yield from _by_hand(bench)
+        yield from _reached(bench, *before)
+        return (yield from _moved(bench, request, to))
 
-def _arm(bench: UpfBench) -> Trial:
-    yield from _by_hand(bench)
-    yield from _reached(bench, "TYPE_TAKEOFF")
-    return (yield from _moved(bench, "TYPE_ARM", _S.ARMED))
-
-
-def _disarm(bench: UpfBench) -> Trial:
-    yield from _by_hand(bench)
-    yield from _reached(bench, "TYPE_TAKEOFF", "TYPE_ARM")
-    return (yield from _moved(bench, "TYPE_DISARM", _S.TAKEOFF))
-
-
-def _land(bench: UpfBench) -> Trial:
-    yield from _by_hand(bench)
-    yield from _reached(bench, "TYPE_TAKEOFF")
-    return (yield from _moved(bench, "TYPE_LAND", _S.READY))
+    word = request.removeprefix("TYPE_").lower()
+    return clause(_STATES, word, f"{request}: {to.name}", trial, _MOVES, Risk.ARMS)
 
 
 def _order(bench: UpfBench) -> Trial:
@@ -166,6 +157,13 @@ def _launches(bench: UpfBench, since: int) -> list[float]:
     return [one.at for one in bench.every[since:] if one.kind in kinds]
 
 
+def _tells_launched(bench: UpfBench, one: HeardTransfer) -> bool:
+    """Of the controller, that it is LAUNCHED."""
+    if one.kind != names.PARACHUTE_STATUS or one.transfer.source != bench.node:
+        return False
+    return bench.definitions.state(one.values["state"]) is _S.LAUNCHED
+
+
 def _deploy(bench: UpfBench) -> Trial:
     """In the air and armed."""
     yield from _by_hand(bench)
@@ -176,14 +174,9 @@ def _deploy(bench: UpfBench) -> Trial:
     result = yield from bench.ask("TYPE_DEPLOY")
     if result != "SUCCESS":
         raise failed(f"ARMED, and TYPE_DEPLOY: {result or 'not answered'}")
-    launched = bench.definitions.state_number(_S.LAUNCHED)
 
     def out() -> bool:
-        return any(
-            one.values["state"] == launched
-            for one in bench.every[bench.deployed_from :]
-            if one.kind == names.PARACHUTE_STATUS and one.transfer.source == bench.node
-        )
+        return any(_tells_launched(bench, one) for one in bench.every[bench.deployed_from :])
 
     yield Wait(began + _FIRES_WITHIN, out)
     if not out():
@@ -196,14 +189,11 @@ def _kill_first(bench: UpfBench) -> Trial:
     yield from ()
     if bench.deployed_from < 0:
         raise not_tried("it was not deployed")
-    shown = bench.every[bench.deployed_from :]
-    launched = bench.definitions.state_number(_S.LAUNCHED)
-    for one in shown:
+    for one in bench.every[bench.deployed_from :]:
         asks = one.kind == names.VEHICLE_SERVICE
         if asks and bench.definitions.type_name(one.kind, one.values) == "TYPE_KILLSWITCH":
             return "asked before"
-        told = one.kind == names.PARACHUTE_STATUS and one.values["state"] == launched
-        if told or one.kind == names.TRIGGER_LAUNCH:
+        if _tells_launched(bench, one) or one.kind == names.TRIGGER_LAUNCH:
             raise failed("it fired before it asked for TYPE_KILLSWITCH", [one.packet])
     raise failed("it never asked for TYPE_KILLSWITCH")
 
@@ -213,12 +203,9 @@ def _touchdown(bench: UpfBench) -> Trial:
         raise not_tried("it was not deployed")
     if not (yield from bench.reaches(_S.TOUCHDOWN, _RESTS[1])):
         raise failed(f"at rest, and it is not TOUCHDOWN after {_RESTS[1]:g} s")
-    launched = bench.definitions.state_number(_S.LAUNCHED)
-    first = next(
-        one.at
-        for one in bench.heard
-        if one.kind == names.PARACHUTE_STATUS and one.values["state"] == launched
-    )
+    first = next((one.at for one in bench.heard if _tells_launched(bench, one)), math.nan)
+    if math.isnan(first):
+        raise not_tried("it was LAUNCHED before it was looked at")
     if (passed := bench.now - first) < _RESTS[0]:
         raise failed(f"TOUCHDOWN {passed:.1f} s after LAUNCHED (need 5 s at rest)")
     return f"{passed:.1f} s after LAUNCHED"
@@ -248,10 +235,10 @@ CLAUSES: tuple[UpfClause, ...] = (
         Risk.ARMS,
     ),
     clause(_STATES, "arm-order", "it is armed only after a take-off", _order, _MOVES, Risk.ARMS),
-    clause(_STATES, "takeoff", "TYPE_TAKEOFF: TAKEOFF", _takeoff, _MOVES, Risk.ARMS),
-    clause(_STATES, "arm", "TYPE_ARM: ARMED", _arm, _MOVES, Risk.ARMS),
-    clause(_STATES, "disarm", "TYPE_DISARM: TAKEOFF", _disarm, _MOVES, Risk.ARMS),
-    clause(_STATES, "land", "TYPE_LAND: READY", _land, _MOVES, Risk.ARMS),
+    _moves("TYPE_TAKEOFF", _S.TAKEOFF),
+    _moves("TYPE_ARM", _S.ARMED, "TYPE_TAKEOFF"),
+    _moves("TYPE_DISARM", _S.TAKEOFF, "TYPE_TAKEOFF", "TYPE_ARM"),
+    _moves("TYPE_LAND", _S.READY, "TYPE_TAKEOFF"),
     clause(
         _PARAMETERS,
         "disabled",

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
+from typing import Any
 
 from chute_ros.conformance.clause import (
+    SOAK,
     Clause,
     DecidedError,
     Risk,
@@ -13,7 +16,7 @@ from chute_ros.conformance.clause import (
     not_supported,
     not_tried,
 )
-from chute_ros.links.upf.conformance.bench import NODE_STATUS, Try, UpfBench
+from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, Try, UpfBench
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -33,7 +36,6 @@ _NODE_INTERVAL, _STATUS_INTERVAL = 400, 250
 _UNKNOWN = "No Such Parameter"
 #: It is ready so long after a restart at the latest, s.
 READY_WITHIN = 15.0
-SOAK = "--soak"
 
 UpfClause = Clause[UpfBench]
 
@@ -46,10 +48,26 @@ def _mean(bench: UpfBench, kind: str) -> float:
     return (times[-1] - times[0]) / (len(times) - 1)
 
 
+def _node_statuses(bench: UpfBench) -> list[HeardTransfer]:
+    """Of what was watched."""
+    return [one for one in bench.watched if one.kind == NODE_STATUS]
+
+
+def _longest_pause(bench: UpfBench, watched: float) -> float:
+    """Between two NodeStatus of what was watched for so long, s."""
+    gaps = (later.at - earlier.at for earlier, later in pairwise(_node_statuses(bench)))
+    return max(gaps, default=watched)
+
+
+def _begins_anew(statuses: Iterable[HeardTransfer]) -> bool:
+    """The time since its start goes back in one of these NodeStatus."""
+    uptimes = [one.values["uptime_sec"] for one in statuses]
+    return any(later < earlier for earlier, later in pairwise(uptimes))
+
+
 def _node_status(bench: UpfBench) -> Trial:
     yield from bench.watch(WATCHED)
-    times = [one.at for one in bench.watched if one.kind == NODE_STATUS]
-    longest = max((b - a for a, b in pairwise(times)), default=WATCHED)
+    longest = _longest_pause(bench, WATCHED)
     if longest > _LONGEST_STATUS * (1.0 + _SHARE):
         raise failed(
             f"NodeStatus pauses for {longest:.2f} s (need at most 1)", bench.packets(NODE_STATUS)
@@ -58,8 +76,7 @@ def _node_status(bench: UpfBench) -> Trial:
 
 
 def _node_id(bench: UpfBench) -> Trial:
-    answer = yield from bench.get(p.STATIC_NODE_ID)
-    default = None if answer is None else p.value_of(answer["default_value"])
+    default = yield from bench.value(p.STATIC_NODE_ID, "default_value")
     if default != CONTROLLER_NODE_ID:
         raise failed(f"its static node id as delivered is {p.words(default) or 'not told'}")
     return f"as delivered {CONTROLLER_NODE_ID}; it is {bench.node}"
@@ -84,7 +101,9 @@ def _statistics(bench: UpfBench) -> Trial:
 
 def _uptime(bench: UpfBench) -> Trial:
     yield from ()
-    told = [one for one in bench.watched if one.kind == NODE_STATUS]
+    told = _node_statuses(bench)
+    if len(told) < 2:
+        raise not_tried("NodeStatus came too seldom")
     first, last = told[0], told[-1]
     passed = last.at - first.at
     went = last.values["uptime_sec"] - first.values["uptime_sec"]
@@ -95,8 +114,7 @@ def _uptime(bench: UpfBench) -> Trial:
 
 
 def _status_interval(bench: UpfBench) -> Trial:
-    answer = yield from bench.get(p.PARACHUTE_STATUS_INTERVAL)
-    told = None if answer is None else p.value_of(answer["value"])
+    told = yield from bench.value(p.PARACHUTE_STATUS_INTERVAL)
     if not isinstance(told, (int, float)) or isinstance(told, bool):
         raise failed(f"{p.PARACHUTE_STATUS_INTERVAL} is {p.words(told) or 'not told'}")
     mean = _mean(bench, names.PARACHUTE_STATUS)
@@ -165,8 +183,7 @@ def _unknown(bench: UpfBench) -> Trial:
 
 
 def _resistor(bench: UpfBench) -> Trial:
-    answer = yield from bench.get(p.CANBUS_RESISTER)
-    default = None if answer is None else p.value_of(answer["default_value"])
+    default = yield from bench.value(p.CANBUS_RESISTER, "default_value")
     if default is None or p.as_switch(default):
         raise failed(f"as delivered it is {p.words(default) or 'not told'} (need off)")
     return "off"
@@ -182,13 +199,11 @@ def _set_status_interval(bench: UpfBench) -> Trial:
 
 
 def _set_interval(bench: UpfBench, name: str, wanted: int, kind: str) -> Trial:
-    before = p.value_of((yield from bench.get(name))["value"])
     if (told := (yield from bench.set(name, wanted))) != wanted:
         raise failed(f"{name} was set to {wanted}, and is {p.words(told) or 'not told'}")
     yield from bench.watch(8.0 * wanted / 1000.0)
     mean = _mean(bench, kind)
-    if before is not None:
-        yield from bench.set(name, before)
+    yield from bench.put_back(name)
     if abs(mean - wanted / 1000.0) > max(_SHARE * wanted / 1000.0, _LEAST):
         raise failed(f"{wanted} ms were set, and it comes each {mean:.3f} s", bench.packets(kind))
     return f"{wanted} ms were set, it comes each {mean:.3f} s"
@@ -196,11 +211,12 @@ def _set_interval(bench: UpfBench, name: str, wanted: int, kind: str) -> Trial:
 
 def _range(bench: UpfBench) -> Trial:
     name = p.NODE_STATUS_INTERVAL
-    before = p.value_of((yield from bench.get(name))["value"])
+    before = yield from bench.value(name)
+    if before is None:
+        raise failed(f"{name} is not told")
     for wrong in (-5, 10**9):
         if (told := (yield from bench.set(name, wrong))) == wrong:
-            if before is not None:
-                yield from bench.set(name, before)
+            yield from bench.put_back(name)
             raise failed(f"{name} takes {wrong}")
         if told != before:
             raise failed(f"{name} {wrong} is refused, and {before} became {p.words(told)}")
@@ -221,25 +237,29 @@ def _restart_refused(bench: UpfBench) -> Trial:
     before = [one for one in bench.heard if one.kind == NODE_STATUS][-1:]
     yield from bench.call(bus_requests.RESTART_NODE, {"magic_number": 1})
     yield from bench.watch(2.5)
-    told = [*before, *(one for one in bench.watched if one.kind == NODE_STATUS)]
-    uptimes = [one.values["uptime_sec"] for one in told]
-    if any(later < earlier for earlier, later in pairwise(uptimes)):
+    if _begins_anew([*before, *_node_statuses(bench)]):
         raise failed("it restarts by a wrong magic number", bench.packets(NODE_STATUS))
     return "it goes on"
 
 
-def _restart(bench: UpfBench) -> Trial:
-    """What it does then is watched."""
+def _restarts(bench: UpfBench) -> Any:
+    """It is told to. False: it says no; it may be gone before it has answered."""
     magic = {"magic_number": bus_requests.RESTART_MAGIC}
     answer = yield from bench.call(bus_requests.RESTART_NODE, magic, 1)
+    return answer is None or bool(answer["ok"])
+
+
+def _restart(bench: UpfBench) -> Trial:
+    """What it does then is watched."""
+    obeys = yield from _restarts(bench)
     since = len(bench.heard)
-    if answer is not None and not answer["ok"]:
+    if not obeys:
         raise failed("RestartNode is not ok")
     yield from bench.reaches(ParachuteState.NOT_READY, 5.0)
     ready = yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
     yield from bench.watch_on(0.5)
     bench.watched = bench.heard[since:]
-    uptimes = [one for one in bench.watched if one.kind == NODE_STATUS]
+    uptimes = _node_statuses(bench)
     if not uptimes or uptimes[0].values["uptime_sec"] > READY_WITHIN:
         raise failed("uptime_sec does not begin anew", [one.packet for one in uptimes[:2]])
     if not ready:
@@ -278,24 +298,22 @@ def _asked(bench: UpfBench, what: str, state: ParachuteState) -> str:
 def _kept_by_opcode(bench: UpfBench) -> Trial:
     """With Auto-Save off only what was saved is left after a restart."""
     name, auto = p.NODE_STATUS_INTERVAL, p.AUTO_SAVE
-    before = p.value_of((yield from bench.get(name))["value"])
+    before = yield from bench.value(name)
     if (yield from bench.set(auto, False)) is not False:
         raise not_supported(f"{auto} cannot be switched off")
     yield from bench.set(name, _NODE_INTERVAL)
     try:
         forgotten = yield from _after_restart(bench, name)
     except DecidedError:
-        yield from bench.set(auto, True)
-        if before is not None:
-            yield from bench.set(name, before)
+        yield from bench.put_back(auto)
+        yield from bench.put_back(name)
         raise
     yield from bench.set(name, _NODE_INTERVAL)
     save = {"opcode": bus_requests.OPCODE_SAVE, "argument": 0}
     yield from bench.call(bus_requests.EXECUTE_OPCODE, save)
     kept = yield from _after_restart(bench, name)
-    yield from bench.set(auto, True)
-    if before is not None:
-        yield from bench.set(name, before)
+    yield from bench.put_back(auto)
+    yield from bench.put_back(name)
     if forgotten != p.words(before):
         raise failed(f"{auto} is off, and {name} is {forgotten} after a restart (was {before})")
     if kept != str(_NODE_INTERVAL):
@@ -304,22 +322,18 @@ def _kept_by_opcode(bench: UpfBench) -> Trial:
 
 
 def _after_restart(bench: UpfBench, name: str) -> Trial:
-    magic = {"magic_number": bus_requests.RESTART_MAGIC}
-    answer = yield from bench.call(bus_requests.RESTART_NODE, magic, 1)
-    if answer is not None and not answer["ok"]:
+    if not (yield from _restarts(bench)):
         raise not_tried("it does not restart")
     yield from bench.reaches(ParachuteState.READY, READY_WITHIN)
-    return p.words(p.value_of((yield from bench.get(name))["value"]))
+    return p.words((yield from bench.value(name)))
 
 
 def _soak(bench: UpfBench) -> Trial:
     yield from bench.watch(bench.soak)
-    times = [one.at for one in bench.watched if one.kind == NODE_STATUS]
-    longest = max((b - a for a, b in pairwise(times)), default=bench.soak)
+    longest = _longest_pause(bench, bench.soak)
     if longest > _LONGEST_STATUS * (1.0 + _SHARE):
         raise failed(f"NodeStatus paused for {longest:.1f} s", bench.packets(NODE_STATUS)[-5:])
-    uptimes = [one.values["uptime_sec"] for one in bench.watched if one.kind == NODE_STATUS]
-    if any(later < earlier for earlier, later in pairwise(uptimes)):
+    if _begins_anew(_node_statuses(bench)):
         raise failed("it started anew meanwhile", bench.packets(NODE_STATUS)[-5:])
     return f"{bench.soak:g} s"
 

@@ -102,6 +102,15 @@ class BrokenController(UpfController):
         return super()._ask_vehicle(type_name)
 
 
+def simulated_controller(
+    definitions: Definitions, settings: ControllerSettings, breaks: str
+) -> UpfController:
+    """A simulated controller. breaks: a name of BREAKS; empty: it is sound."""
+    if breaks:
+        return BrokenController(definitions, settings, breaks)
+    return UpfController(definitions, settings)
+
+
 Answer = dict[str, Any] | None
 
 

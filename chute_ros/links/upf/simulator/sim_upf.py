@@ -68,9 +68,9 @@ def _run() -> None:
     chosen = options.parse_args()
 
     from chute_ros.links.upf.protocol.definitions import PARACHUTE_STATUS, Definitions
-    from chute_ros.links.upf.simulator.broken import BREAKS, BrokenController
+    from chute_ros.links.upf.simulator.broken import BREAKS, simulated_controller
     from chute_ros.links.upf.simulator.bus import UpfBus
-    from chute_ros.links.upf.simulator.controller import ControllerSettings, UpfController
+    from chute_ros.links.upf.simulator.controller import ControllerSettings
     from chute_ros.links.upf.simulator.errors import error_places
     from chute_ros.links.upf.simulator.memory import CONTROLLER_PARAMETERS
     from chute_ros.links.upf.simulator.node import NodeSettings, UpfNode
@@ -92,11 +92,7 @@ def _run() -> None:
     )
     if chosen.breaks and chosen.breaks not in BREAKS:
         raise ParameterError(f"--break {chosen.breaks!r}: need one of {', '.join(BREAKS)}")
-    controller = (
-        BrokenController(definitions, settings, chosen.breaks)
-        if chosen.breaks
-        else UpfController(definitions, settings)
-    )
+    controller = simulated_controller(definitions, settings, chosen.breaks)
     of_trigger = {**TRIGGER_PARAMETERS, p.STATIC_NODE_ID: chosen.trigger_node_id}
     trigger = UpfTrigger(definitions, NodeSettings(f"{chosen.name}.trigger", of_trigger))
     nodes: list[UpfNode] = [] if chosen.no_controller else [controller]
