@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, MutableMapping
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
@@ -191,11 +191,16 @@ def first_alive(devices: Iterable[FollowedT]) -> FollowedT | None:
 KeyT = TypeVar("KeyT")
 
 
-def longest_lost(devices: Mapping[KeyT, Followed]) -> KeyT | None:
-    """The key of the device that was lost the longest ago; None: none is lost."""
+def has_room(devices: MutableMapping[KeyT, FollowedT], most: int) -> bool:
+    """One more can be followed: there are fewer than so many, or the one that was lost the longest
+    ago is given up for it. Made-up ids must not keep the true device out for ever."""
+    if len(devices) < most:
+        return True
     lost = {
         key: one.liveness.last_heard
         for key, one in devices.items()
         if one.liveness.state is LinkState.LOST
     }
-    return min(lost, key=lambda key: lost[key], default=None)
+    if lost:
+        del devices[min(lost, key=lambda key: lost[key])]
+    return bool(lost)

@@ -251,12 +251,13 @@ def _falls_against_its_word(
     under some thrust is carried.
     """
     falls = measured(config, state, "acceleration", now) < FREE_FALL
-    sinks = measured(config, state, "vertical_speed", now) < -config.profile.moving_speed
+    speed = measured(config, state, VERTICAL_SPEED, now)
+    sinks = speed < -config.profile.moving_speed
     height = measured(config, state, "height", now) - state.flight.armed_height
     high = height > max(config.takeoff_height, config.profile.minimum_height)
-    speeds = measured(config, state, VERTICAL_SPEED, now), pressure_rate(config, state, now)
     # One that is not known is no second sign.
-    agree = all(speed < -_SINKS_FOR_SURE for speed in speeds)
+    both = speed, pressure_rate(config, state, now)
+    agree = all(one < -_SINKS_FOR_SURE for one in both)
     flew = now < state.flight.landed_at + FLIGHT_JUST_BEFORE
     if flew and agree and VERTICAL_SPEED not in state.heard.denied:
         return True

@@ -84,19 +84,14 @@ def rule_problem(rule: Rule, limits: Mapping[str, Limits]) -> str:
         return f"{NEVER}: {most:g} at most of needed {rule.needed:g} can be true at once"
     if least >= needed:
         return f"{ALWAYS}: its limits leave no value out"
-    hovers = sum(
-        one.weight
+    measured = [
+        (one, _HOVERS[one.measurement])
         for one in rule.conditions
-        if isinstance(one, MeasurementCondition)
-        and one.measurement in _HOVERS
-        and one.holds_at(_HOVERS[one.measurement])
-    )
+        if isinstance(one, MeasurementCondition) and one.measurement in _HOVERS
+    ]
+    hovers = sum(one.weight for one, value in measured if one.holds_at(value))
     if rule.action in FIRES and hovers >= needed:
-        told = ", ".join(
-            f"{one.measurement} {_HOVERS[one.measurement]:g}"
-            for one in rule.conditions
-            if isinstance(one, MeasurementCondition) and one.measurement in _HOVERS
-        )
+        told = ", ".join(f"{one.measurement} {value:g}" for one, value in measured)
         return f"ends a flight in which nothing is wrong: it holds in a hover ({told})"
     return ""
 

@@ -21,7 +21,6 @@ _COMPARED = 20
 #: Links, devices and supervisors that are remembered: a stranger on the network may invent many.
 MOST_NAMES = 32
 MOST_DECISIONS = 8
-#: Kills and deploys are remembered apart, so that no flight blocks push them out.
 
 
 def stamp_seconds(message: Any) -> float:
@@ -52,7 +51,7 @@ class Picture:
     parachutes: dict[tuple[str, str], Heard] = field(default_factory=dict)
     vehicle: Heard | None = None
     #: (epoch, id) -> each decision once, though it is resent; of kills and deploys, and of flight
-    #: blocks, the newest.
+    #: blocks, the newest: apart, so that no blocks push a kill out.
     fired: dict[tuple[int, int], Heard] = field(default_factory=dict)
     blocks: dict[tuple[int, int], Heard] = field(default_factory=dict)
     #: (epoch, id, link) -> the newest report of that link on that decision.

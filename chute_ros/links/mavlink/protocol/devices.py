@@ -16,7 +16,7 @@ from chute_ros.links.mavlink.protocol.kill import kill_plan
 from chute_ros.links.mavlink.protocol.parachute import ParachuteTracker
 from chute_ros.model import Armed, LinkState, VehicleState
 from chute_ros.protocol.events import EventLog, ParachuteChanged, Severity, VehicleChanged
-from chute_ros.protocol.liveness import first_alive, longest_lost
+from chute_ros.protocol.liveness import first_alive, has_room
 from chute_ros.protocol.mavlink.dialect import dialect
 
 DeviceT = TypeVar("DeviceT", ParachuteTracker, AutopilotTracker)
@@ -56,13 +56,9 @@ class DeviceFilter(Generic[DeviceT]):
             if len(self._other_systems) < MOST_DEVICES:
                 self._other_systems.add(system_id)
             return False
-        full = len(self._ours) >= MOST_DEVICES and (system_id, component_id) not in self._ours
-        if full and (gone := longest_lost(self._ours)) is not None:
-            # Made-up ids must not keep the true device out for ever.
-            del self._ours[gone]
-            full = False
-        self.refused_count += full
-        return not full
+        followed = (system_id, component_id) in self._ours or has_room(self._ours, MOST_DEVICES)
+        self.refused_count += not followed
+        return followed
 
     def _possible(self, system_id: int, component_id: int) -> bool:
         # A command to system 0 would go to every vehicle.

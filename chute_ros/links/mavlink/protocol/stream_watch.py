@@ -68,14 +68,12 @@ _STREAM_CURE = (
     "another program sets its rate, or the line is full: end the ground station or "
     "program that requests it, or remove its stream rates in the autopilot's settings"
 )
-
-
 _NEVER_CURE = (
     "the rules are blind without it: switch its stream on in the autopilot's settings, or fly "
     "without (needed_message_rate 0)"
 )
 #: A message that the autopilot is asked for, and that does not come for so long, never does, s.
-MISSING_AFTER = 8.0
+NEVER_AFTER = 8.0
 
 
 @dataclass(frozen=True)
@@ -155,7 +153,7 @@ class StreamWatch:
         """Messages that the rules need and that have never come, once they had their time."""
         if math.isnan(self._begun):
             self._begun = now
-        if not self._needed or now - self._begun < MISSING_AFTER:
+        if not self._needed or now - self._begun < NEVER_AFTER:
             return []
         return [name for part, name in _JUDGED.items() if self._rates[part].newest == -math.inf]
 

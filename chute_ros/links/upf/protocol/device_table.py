@@ -23,7 +23,7 @@ from chute_ros.links.upf.protocol.devices import (
 from chute_ros.links.upf.protocol.events import TriggerChanged
 from chute_ros.model import LinkState, ParachuteStatus
 from chute_ros.protocol.events import EventLog, ParachuteChanged, Severity
-from chute_ros.protocol.liveness import LinkChange, first_alive, longest_lost
+from chute_ros.protocol.liveness import LinkChange, first_alive, has_room
 
 DeviceT = TypeVar("DeviceT", bound=Device)
 #: More devices of one kind than this are not followed: made-up node ids must not grow us.
@@ -203,12 +203,8 @@ class DeviceTable(EventLog):
         found = known.get(node_id)
         if found is not None or node_id == 0:
             return found
-        ours, full = wanted in (0, node_id), len(known) >= MOST_DEVICES
-        if ours and full and (gone := longest_lost(known)) is not None:
-            # Made-up node ids must not keep the true device out for ever.
-            del known[gone]
-            full = False
-        if not ours or full:
+        if wanted not in (0, node_id) or not has_room(known, MOST_DEVICES):
+            # Not ours by a parameter, or too many.
             self.counts["status of devices not followed"] += 1
             return None
         made = known[node_id] = kind(node_id, self._config, self.definitions)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from chute_ros.links.mavlink.protocol.stream_watch import (
     ASK_AGAIN,
     ASKED_FOR,
-    MISSING_AFTER,
+    NEVER_AFTER,
     STORE,
     STORE_FILLS,
     StreamWatch,
@@ -211,8 +211,8 @@ def test_what_never_comes_is_said_once_it_had_its_time():
     assert watch.faults(100.0) == []
     for step in range(100):
         watch.heard("tilt", 100.0 + step / 10)
-    assert watch.faults(100.0 + MISSING_AFTER - 0.1) == []
-    told = watch.faults(100.0 + MISSING_AFTER)
+    assert watch.faults(100.0 + NEVER_AFTER - 0.1) == []
+    told = watch.faults(100.0 + NEVER_AFTER)
     assert [text.partition(" has never come: ")[0] for text in told] == [
         "GLOBAL_POSITION_INT",
         "SCALED_IMU",
