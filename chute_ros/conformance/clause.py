@@ -85,18 +85,22 @@ Trial = Generator[Wait, bool, str]
 BenchT = TypeVar("BenchT")
 
 
+#: What a device may do that is only read, or asked for what it knows.
+READS, ASKS = "nothing: it is only listened to", "nothing: it is only asked for what it knows"
+
+
 @dataclass(frozen=True)
 class Clause(Generic[BenchT]):
-    """name: without spaces, for command lines; document, section: where text stands, in the words
-    of the document; does: what the device may do meanwhile; needs: an option without which it is
-    not tried."""
+    """In the order in which a document is read. document, section: where text stands, in the words
+    of the document; name: without spaces, for command lines; does: what the device may do
+    meanwhile; needs: an option without which it is not tried."""
 
-    name: str
     document: str
     section: str
+    name: str
     text: str
-    does: str
     trial: Callable[[BenchT], Trial]
+    does: str = ASKS
     risk: Risk = Risk.NONE
     needs: str = ""
 

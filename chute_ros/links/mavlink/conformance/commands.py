@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
-from chute_ros.conformance.clause import SOAK, Trial, Wait, failed, not_supported, not_tried
+from chute_ros.conformance.clause import READS, SOAK, Trial, Wait, failed, not_supported, not_tried
 from chute_ros.links.mavlink.conformance.bench import US, MavlinkBench, result_of
 from chute_ros.links.mavlink.conformance.connection import nominal
 from chute_ros.links.mavlink.conformance.document import (
     COMMAND,
     FRAMES,
-    READS,
     SIGNING,
     MavlinkClause,
     of,

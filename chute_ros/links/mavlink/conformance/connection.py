@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from chute_ros.conformance.clause import Trial, failed, not_supported
+from chute_ros.conformance.clause import READS, Trial, failed, not_supported
 from chute_ros.links.mavlink.conformance.bench import MavlinkBench, entry_name, refused, result_of
-from chute_ros.links.mavlink.conformance.document import HEARTBEAT, PARACHUTE, READS, of
+from chute_ros.links.mavlink.conformance.document import HEARTBEAT, PARACHUTE, of
 from chute_ros.protocol.mavlink.dialect import dialect
 
 #: So long the device is looked at, s: some periods of 1 Hz.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from chute_ros.conformance.clause import Trial, failed, not_supported
+from chute_ros.conformance.clause import ASKS, READS, Trial, failed, not_supported
 from chute_ros.links.mavlink.conformance.bench import Heard, MavlinkBench, refused, result_of
 from chute_ros.links.mavlink.conformance.connection import FOREIGN_MESSAGE, nominal
-from chute_ros.links.mavlink.conformance.document import ASKS, PARACHUTE, READS, of
+from chute_ros.links.mavlink.conformance.document import PARACHUTE, of
 from chute_ros.links.mavlink.protocol.parachute import packed_date
 from chute_ros.model import DeploymentTrigger, ErrorFlags, SafetyFlags
 from chute_ros.protocol.mavlink.dialect import dialect

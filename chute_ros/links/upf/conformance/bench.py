@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -278,6 +278,3 @@ class UpfBench(RecordingBench[HeardTransfer]):
         """What it has asked of the vehicle, from this place of heard on, by name."""
         every = (one.values for one in self.heard[since:] if one.kind == names.VEHICLE_SERVICE)
         return [self.definitions.type_name(names.VEHICLE_SERVICE, one) for one in every]
-
-
-Try = Callable[[UpfBench], Trial]

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 from chute_ros.conformance.clause import (
+    READS,
     SOAK,
     Clause,
     DecidedError,
-    Risk,
     Trial,
     failed,
     not_supported,
     not_tried,
 )
-from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, Try, UpfBench
+from chute_ros.links.upf.conformance.bench import NODE_STATUS, HeardTransfer, UpfBench
 from chute_ros.links.upf.protocol import bus_requests
 from chute_ros.links.upf.protocol import definitions as names
 from chute_ros.links.upf.protocol import parameters as p
@@ -25,7 +26,6 @@ from chute_ros.model import ParachuteState
 
 DOCUMENT = "Flyfire UPF UAVCAN protocol V1.0"
 WATCHED = 5.0
-_READS, _ASKS = "nothing: it is only listened to", "nothing: it is only asked for what it knows"
 _SETS, _RESTARTS = "a parameter is changed, and set back", "it restarts"
 #: DroneCAN: a node tells its status at least so often, s.
 _LONGEST_STATUS = 1.0
@@ -38,6 +38,7 @@ _UNKNOWN = "No Such Parameter"
 READY_WITHIN = 15.0
 
 UpfClause = Clause[UpfBench]
+clause: Callable[..., UpfClause] = partial(Clause, DOCUMENT)
 
 
 def _mean(bench: UpfBench, kind: str) -> float:
@@ -338,31 +339,18 @@ def _soak(bench: UpfBench) -> Trial:
     return f"{bench.soak:g} s"
 
 
-def clause(
-    section: str,
-    name: str,
-    text: str,
-    trial: Try,
-    does: str = _ASKS,
-    risk: Risk = Risk.NONE,
-    needs: str = "",
-) -> UpfClause:
-    """In the order in which they are tried."""
-    return Clause(name, DOCUMENT, section, text, does, trial, risk, needs)
-
-
 _NODE, _STANDARD = "Node discovery", "Standard UAVCAN protocols"
 _PARAMETERS, _STATES = "Parameters", "Global working state"
 CLAUSES: tuple[UpfClause, ...] = (
-    clause(_STANDARD, "node-status", "NodeStatus is broadcast", _node_status, _READS),
-    clause(_STANDARD, "uptime", "NodeStatus tells the time since its start", _uptime, _READS),
+    clause(_STANDARD, "node-status", "NodeStatus is broadcast", _node_status, READS),
+    clause(_STANDARD, "uptime", "NodeStatus tells the time since its start", _uptime, READS),
     clause(
         "UPF protocols",
         "status-interval",
         "ParachuteStatus is broadcast, as often as its parameter says",
         _status_interval,
     ),
-    clause(_STATES, "state-known", "its state is one of the seven", _state_known, _READS),
+    clause(_STATES, "state-known", "its state is one of the seven", _state_known, READS),
     clause(_NODE, "node-id", "the static node id as delivered is 33", _node_id),
     clause(_STANDARD, "node-info", "GetNodeInfo tells who it is", _information),
     clause(_STANDARD, "transport-stats", "GetTransportStats is answered", _statistics),
@@ -400,14 +388,14 @@ CLAUSES: tuple[UpfClause, ...] = (
         "block-at-start",
         "as it becomes NOT_READY it asks the vehicle for TYPE_FLIGHT_BLOCK",
         _blocks_at_start,
-        _READS,
+        READS,
     ),
     clause(
         _STATES,
         "release-when-ready",
         "as it becomes READY it asks for TYPE_FLIGHT_BLOCK_RELEASE",
         _releases_when_ready,
-        _READS,
+        READS,
     ),
     clause(
         _PARAMETERS,
@@ -421,7 +409,7 @@ CLAUSES: tuple[UpfClause, ...] = (
         "soak",
         "NodeStatus goes on without a pause or a restart",
         _soak,
-        _READS,
+        READS,
         needs=SOAK,
     ),
 )
