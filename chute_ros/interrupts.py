@@ -4,25 +4,33 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
 
 @contextmanager
-def at_ctrl_c(end: Callable[..., Any] | signal.Handlers) -> Iterator[None]:
-    """A Ctrl-C goes to end meanwhile: Python's own way would tell where in an import it was. Where
-    who started us wants something else of it, that stays."""
-    before = signal.getsignal(signal.SIGINT)
-    if before is not signal.default_int_handler and not isinstance(before, CtrlC):
-        yield
-        return
-    signal.signal(signal.SIGINT, end)
+def at_ctrl_c(
+    end: Callable[..., Any] | signal.Handlers, also: Iterable[signal.Signals] = ()
+) -> Iterator[None]:
+    """A Ctrl-C goes to end meanwhile: Python's own way would tell where in an import it was. also:
+    what else ends us, and goes there as well. Where who started us wants something else of one,
+    that stays."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, *also)}
+    ours = {number for number, handler in before.items() if _is_usual(number, handler)}
+    for number in ours:
+        signal.signal(number, end)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number in ours:
+            signal.signal(number, before[number])
+
+
+def _is_usual(number: signal.Signals, handler: object) -> bool:
+    usual = signal.default_int_handler if number is signal.SIGINT else signal.SIG_DFL
+    return handler is usual or isinstance(handler, CtrlC)
 
 
 class CtrlC:

@@ -138,6 +138,44 @@ def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
     assert out.endswith("mavlink 1/161: nothing was tried\n")
 
 
+@pytest.mark.parametrize(
+    ("number", "by"),
+    [(signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "the end of its terminal")],
+)
+def test_whoever_ends_it_has_the_device_left_disarmed(number: signal.Signals, by: str) -> None:
+    with Bench().trying("--arm", "--soak", "600", "--only", "soak") as kit:
+        assert kit.stdin is not None
+        assert kit.stdout is not None
+        kit.stdin.write("ARM\n")
+        kit.stdin.flush()
+        for line in kit.stdout:
+            if line.endswith("found 1/161\n"):
+                break
+        kit.send_signal(number)
+        _, errors = kit.communicate(timeout=60.0)
+    assert (kit.returncode, errors) == (3, f"conformance: aborted by {by}\n")
+
+
+def test_where_nobody_reads_on_the_device_is_left_disarmed(tmp_path: Path) -> None:
+    """Given `conformance ... | head -1`."""
+    report = tmp_path / "report.xml"
+    options = ("--arm", "--only", "arm-sources", "arm-mask", "--junit", str(report))
+    with Bench().trying(*options) as kit:
+        assert kit.stdin is not None
+        assert kit.stdout is not None
+        kit.stdin.write("ARM\n")
+        kit.stdin.flush()
+        for line in kit.stdout:
+            if line.endswith("found 1/161\n"):
+                break
+        kit.stdout.close()
+        kit.wait(60.0)
+        assert kit.stderr is not None
+        errors = kit.stderr.read()
+    assert (kit.returncode, errors) == (3, "conformance: nobody reads what it tells\n")
+    assert report.exists()
+
+
 def test_a_wire_that_is_not_there_is_told_at_once() -> None:
     with started(*COMMAND, "mavlink", "--connection", "serial:/dev/not_there") as kit:
         _, errors = kit.communicate(timeout=60.0)

@@ -10,15 +10,17 @@ device, aborted, or the device could not be left disarmed).
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 import queue
+import signal
 import socket
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from chute_ros.conformance.clause import Clause, Result, Risk, Verdict
 from chute_ros.conformance.kit import Kit
@@ -35,6 +37,9 @@ from chute_ros.tools.conformance.traffic import write_mcap
 from chute_ros.transport.loop import WireLoop
 from chute_ros.transport.wire_events import LoopFault, WireChange, WireTrouble
 
+#: What ends a process besides a Ctrl-C: somebody, or a terminal that is closed.
+_ENDS = {signal.SIGTERM: "SIGTERM", signal.SIGHUP: "the end of its terminal"}
+_UNREAD = "nobody reads what it tells"
 DONE, FAILED, MISTAKE, NOT_WHOLE = 0, 1, 2, 3
 #: After a Ctrl-C the device is disarmed, which takes this long at most, s.
 _ENDS_WITHIN = 40.0
@@ -135,9 +140,9 @@ def _run(device: str, kit: Kit, chosen: argparse.Namespace) -> int:
     report = Report(
         kit.document, f"{device} {found}".strip(), about, results, problem, bench.traffic, began
     )
-    print(report.summary)
+    _say(report.summary)
     if problem:
-        print(f"conformance: {plain(problem)}", file=sys.stderr)
+        _say(f"conformance: {plain(problem)}", sys.stderr)
     _write(chosen, report)
     return NOT_WHOLE if problem else FAILED if report.of(Verdict.FAILED) else DONE
 
@@ -173,8 +178,9 @@ def _junit() -> Callable[[Report], str]:
 def _ask(kit: Kit, risk: Risk) -> None:
     """The word, typed again; another one sends nothing."""
     word = _WORDS[risk]
-    print(f"The device may {'FIRE' if risk is Risk.FIRES else 'be ARMED'}: {kit.fires}.")
-    print(f"Type {word} to go on: ", end="", flush=True)
+    may = "FIRE" if risk is Risk.FIRES else "be ARMED"
+    if not _say(f"The device may {may}: {kit.fires}.\nType {word} to go on: ", end=""):
+        raise ChuteError(f"{_UNREAD}: nothing was sent")
     if sys.stdin.readline().strip() != word:
         raise ChuteError(f"{word} was not typed: nothing was sent")
 
@@ -194,39 +200,47 @@ def _tried(session: Session[Bench], wire: Any) -> tuple[list[Result], str, str]:
 
     def abort(why: str) -> None:
         nonlocal ends_at
-        ends_at = time.monotonic() + _ENDS_WITHIN
+        ends_at = min(ends_at, time.monotonic() + _ENDS_WITHIN)
         loop.call(lambda link, now: link.abort(why, now))
 
-    # It comes like any other event: in the middle of a line it would leave the device armed.
-    with at_ctrl_c(lambda *_: events.put(KeyboardInterrupt())):
+    # They come like any other event: in the middle of a line one would leave the device armed.
+    with at_ctrl_c(lambda number, _: events.put(signal.Signals(number)), _ENDS):
         loop.start()
         try:
             while time.monotonic() < ends_at:
                 event = _next(events)
-                if isinstance(event, KeyboardInterrupt):
-                    if ends_at == float("inf"):
-                        abort("aborted by Ctrl-C")
-                elif isinstance(event, Found):
+                if isinstance(event, Ended):
+                    return results, found, event.problem
+                if isinstance(event, Found):
                     found = plain(event.text)
-                    print(f"found {found}", flush=True)
-                elif isinstance(event, Trying):
-                    _tell_risk(event)
                 elif isinstance(event, Result):
                     results.append(event)
-                    mark, name = _MARKS[event.verdict], event.clause.name
-                    print(f"  {mark:14s} {name:20s} {plain(event.why)}", flush=True)
-                elif isinstance(event, Ended):
-                    return results, found, event.problem
+                elif isinstance(event, signal.Signals):
+                    abort(f"aborted by {_ENDS.get(event, 'Ctrl-C')}")
                 elif isinstance(event, LoopFault):
                     problem = f"a mistake of the kit: {event.text}"
                     abort(problem)
                 elif isinstance(event, WireChange) and not event.is_open:
                     abort(event.text)
                 elif isinstance(event, WireTrouble) and event.text:
-                    print(f"conformance: {plain(event.text)}", file=sys.stderr)
+                    _say(f"conformance: {plain(event.text)}", sys.stderr)
+                if (line := _line(event)) and not _say(line):
+                    abort(_UNREAD)
         finally:
             loop.stop()
     return results, found, problem or "the device was NOT left disarmed: no answer in time"
+
+
+def _say(text: str, stream: TextIO | None = None, end: str = "\n") -> bool:
+    """Whether it could be told: who reads may have gone, and what is tried is left as it should be
+    all the same."""
+    stream = stream or sys.stdout
+    try:
+        print(text, file=stream, end=end, flush=True)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return False
+    return True
 
 
 def _next(events: queue.SimpleQueue[Any]) -> Any:
@@ -237,10 +251,16 @@ def _next(events: queue.SimpleQueue[Any]) -> Any:
         return None
 
 
-def _tell_risk(event: Trying) -> None:
-    one = event.clause
-    if one.risk is not Risk.NONE:
-        print(f"  [{event.number}/{event.of}] {one.name}: {one.does}", flush=True)
+def _line(event: Any) -> str:
+    """What is told of it; empty: nothing."""
+    if isinstance(event, Found):
+        return f"found {plain(event.text)}"
+    if isinstance(event, Trying) and event.clause.risk is not Risk.NONE:
+        return f"  [{event.number}/{event.of}] {event.clause.name}: {event.clause.does}"
+    if isinstance(event, Result):
+        name, why = event.clause.name, plain(event.why)
+        return f"  {_MARKS[event.verdict]:14s} {name:20s} {why}"
+    return ""
 
 
 def _write(chosen: argparse.Namespace, report: Report) -> None:
@@ -252,4 +272,4 @@ def _write(chosen: argparse.Namespace, report: Report) -> None:
     for path, write in writers:
         if path is not None:
             write(path)
-            print(path)
+            _say(str(path))
