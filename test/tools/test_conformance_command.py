@@ -121,8 +121,10 @@ def test_with_the_word_it_fires() -> None:
     assert "passed         release              DRONE, told after" in out
 
 
-def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
-    with Bench().trying("--arm") as kit:
+@contextmanager
+def allowed_to_arm(*options: str) -> Iterator[subprocess.Popen[str]]:
+    """The kit, as soon as it has found the device."""
+    with Bench().trying("--arm", *options) as kit:
         assert kit.stdin is not None
         assert kit.stdout is not None
         kit.stdin.write("ARM\n")
@@ -130,6 +132,11 @@ def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
         for line in kit.stdout:
             if line.endswith("found 1/161\n"):
                 break
+        yield kit
+
+
+def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
+    with allowed_to_arm() as kit:
         # Whatever it is doing at that moment, and however often.
         for _ in range(20):
             kit.send_signal(signal.SIGINT)
@@ -143,14 +150,7 @@ def test_a_ctrl_c_tells_that_the_run_is_not_whole() -> None:
     [(signal.SIGTERM, "SIGTERM"), (signal.SIGHUP, "the end of its terminal")],
 )
 def test_whoever_ends_it_has_the_device_left_disarmed(number: signal.Signals, by: str) -> None:
-    with Bench().trying("--arm", "--soak", "600", "--only", "soak") as kit:
-        assert kit.stdin is not None
-        assert kit.stdout is not None
-        kit.stdin.write("ARM\n")
-        kit.stdin.flush()
-        for line in kit.stdout:
-            if line.endswith("found 1/161\n"):
-                break
+    with allowed_to_arm("--soak", "600", "--only", "soak") as kit:
         kit.send_signal(number)
         _, errors = kit.communicate(timeout=60.0)
     assert (kit.returncode, errors) == (3, f"conformance: aborted by {by}\n")
@@ -159,15 +159,9 @@ def test_whoever_ends_it_has_the_device_left_disarmed(number: signal.Signals, by
 def test_where_nobody_reads_on_the_device_is_left_disarmed(tmp_path: Path) -> None:
     """Given `conformance ... | head -1`."""
     report = tmp_path / "report.xml"
-    options = ("--arm", "--only", "arm-sources", "arm-mask", "--junit", str(report))
-    with Bench().trying(*options) as kit:
-        assert kit.stdin is not None
+    options = ("--only", "arm-sources", "arm-mask", "--junit", str(report))
+    with allowed_to_arm(*options) as kit:
         assert kit.stdout is not None
-        kit.stdin.write("ARM\n")
-        kit.stdin.flush()
-        for line in kit.stdout:
-            if line.endswith("found 1/161\n"):
-                break
         kit.stdout.close()
         kit.wait(60.0)
         assert kit.stderr is not None
