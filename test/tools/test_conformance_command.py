@@ -192,3 +192,22 @@ def test_a_mistake_in_the_command_line_ends_with_2(arguments: list[str], told: s
         out, errors = kit.communicate(timeout=60.0)
     assert (kit.returncode, out) == (2, "")
     assert f"conformance: {told}" in errors
+
+
+@pytest.mark.parametrize(
+    ("device", "option", "value", "told"),
+    [
+        ("mavlink", "--soak", "nan", "seconds 'nan': need 1 to 1e+06"),
+        ("mavlink", "--soak", "-5", "seconds '-5': need 1 to 1e+06"),
+        ("mavlink", "--component", "0", "component id '0': need 1 to 255"),
+        ("upf", "--node", "300", "node id '300': need 1 to 125"),
+        ("upf", "--bitrate", "-1", "bit/s '-1': need 0 to 8000000"),
+    ],
+)
+def test_a_number_that_cannot_be_is_refused_with_what_can(
+    device: str, option: str, value: str, told: str
+) -> None:
+    with started(*COMMAND, device, option, value) as kit:
+        _, errors = kit.communicate(timeout=60.0)
+    assert kit.returncode == 2
+    assert errors.endswith(f"conformance {device}: error: argument {option}: {told}\n")

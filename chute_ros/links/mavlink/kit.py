@@ -12,6 +12,7 @@ from chute_ros.links.mavlink.conformance.commands import KEY
 from chute_ros.links.mavlink.simulator.broken import simulated_parachute
 from chute_ros.links.mavlink.simulator.parachute_device import ParachuteDevice, ParachuteSettings
 from chute_ros.protocol.mavlink.signing import Signer, SigningClock, Verifier
+from chute_ros.sim.command_line import number
 from chute_ros.transport.address import FORMS, parse_address
 from chute_ros.transport.signing_key import signing_from_file
 from chute_ros.transport.wire import Wire, make_wire
@@ -20,8 +21,7 @@ from chute_ros.transport.wire import Wire, make_wire
 def _add_options(options: ArgumentParser) -> None:
     options.add_argument(
         "--component",
-        type=int,
-        choices=range(1, 256),
+        type=number("component id", 1, 255),
         metavar="ID",
         help="component id of the device (default: the first that is a parachute)",
     )

@@ -14,12 +14,13 @@ from chute_ros.links.upf.simulator.broken import simulated_controller
 from chute_ros.links.upf.simulator.bus import UpfBus
 from chute_ros.links.upf.simulator.controller import ControllerSettings
 from chute_ros.links.upf.simulator.trigger import UpfTrigger
+from chute_ros.sim.command_line import number
 from chute_ros.transport.can_address import CAN_FORMS, parse_can_address
 from chute_ros.transport.can_wire import make_can_wire
 from chute_ros.transport.data_types import load_data_types
 from chute_ros.transport.wire import Wire
 
-_NODES = range(1, 126)
+_NODE_ID = number("node id", 1, 125)
 #: Of what is simulated, s.
 _SOAK = 20.0
 
@@ -27,21 +28,25 @@ _SOAK = 20.0
 def _add_options(options: ArgumentParser) -> None:
     options.add_argument(
         "--node",
-        type=int,
-        choices=_NODES,
+        type=_NODE_ID,
         default=0,
         metavar="ID",
         help="node id of the controller (default: whoever tells the state of a parachute)",
     )
     options.add_argument(
         "--vehicle-node",
-        type=int,
-        choices=_NODES,
+        type=_NODE_ID,
         default=VEHICLE,
         metavar="ID",
         help=f"node id of the vehicle that is simulated here (default: {VEHICLE})",
     )
-    options.add_argument("--bitrate", type=int, default=0, metavar="BIT/S", help="of the bus")
+    options.add_argument(
+        "--bitrate",
+        type=number("bit/s", 0, 8_000_000),
+        default=0,
+        metavar="BIT/S",
+        help="of the bus",
+    )
     options.add_argument(
         "--dsdl-path", default="", metavar="FOLDER", help="the vendor's data types (flyfire)"
     )

@@ -31,6 +31,7 @@ from chute_ros.links.api import LinkKind, load
 from chute_ros.links.registered import links
 from chute_ros.plain_text import plain
 from chute_ros.ros.own_version import own_version
+from chute_ros.sim.command_line import real
 from chute_ros.tools.conformance.page import page
 from chute_ros.tools.conformance.report import Report
 from chute_ros.tools.conformance.traffic import write_mcap
@@ -98,7 +99,10 @@ def _options(kinds: Mapping[str, LinkKind], device: str, kit: Kit) -> argparse.A
         "--only", nargs="+", default=[], metavar="CLAUSE", help="these clauses alone (--list)"
     )
     options.add_argument(
-        "--soak", type=float, metavar="SECONDS", help="look on for so long in the end"
+        "--soak",
+        type=real("seconds", 1.0, 1e6),
+        metavar="SECONDS",
+        help="look on for so long in the end",
     )
     options.add_argument("--html", type=Path, metavar="FILE", help="write the report for people")
     options.add_argument("--junit", type=Path, metavar="FILE", help="write it as JUnit")
