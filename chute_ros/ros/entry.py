@@ -19,6 +19,9 @@ from chute_ros.ros.middleware import set_up_middleware
 #: A thread that waits for the interpreter gets it after so long, s: the link's thread and the
 #: executor hand a kill to each other, and Python's own 5 ms would be most of its way.
 _SWITCH_INTERVAL = 0.0002
+#: A node that is to end is gone after this at the latest, s (Fast DDS issue 6513: as it takes its
+#: participant down it may wait for a callback for ever).
+_ENDS_WITHIN = 10
 #: What no vehicle needs for its flight (requirements/extra.in).
 _EXTRA = ("nicegui",)
 _NOT_BUILT = (
@@ -76,6 +79,9 @@ def run(name: str, place: str, actions: bool = False) -> None:
     finally:
         # A second Ctrl-C must not cut the ending short: the link's thread is being joined.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        # The middleware may never come to its end, and holds the interpreter meanwhile.
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(_ENDS_WITHIN)
         if node is not None:
             node.destroy_node()
         elif executor is not None:

@@ -346,6 +346,33 @@ def test_ctrl_c_as_the_link_has_just_begun_ends_the_node(namespace):
     assert "Traceback" not in done.stderr
 
 
+HANGS_AT_ITS_END = """
+import ctypes
+from chute_ros.ros.entry import run
+from chute_ros.links.mavlink.node import MavlinkParachuteNode
+
+# As a middleware that never comes to its end: no other thread of Python runs meanwhile.
+MavlinkParachuteNode.destroy_node = lambda self: ctypes.PyDLL(None).sleep(1000)
+run("mavlink_parachute", "chute_ros.links.mavlink.node:MavlinkParachuteNode")
+"""
+
+
+def test_a_node_whose_middleware_hangs_at_the_end_is_gone_all_the_same(namespace):
+    ros = ["--ros-args", "-r", f"__ns:={namespace}", "-p", "connection:=udpin:127.0.0.1:0"]
+    node = subprocess.Popen(
+        [sys.executable, "-c", HANGS_AT_ITS_END, *ros], stderr=subprocess.PIPE, text=True
+    )
+    with node:
+        try:
+            for line in node.stderr:
+                if "is open" in line:
+                    break
+            node.send_signal(signal.SIGINT)
+            assert node.wait(60.0) == -signal.SIGALRM
+        finally:
+            node.kill()
+
+
 # Arguments that are not for ROS
 
 
