@@ -1,7 +1,7 @@
 """Memory limit of a node: a node that is made to take more ends, not the computer.
 
-Fast DDS before 2.6.11, 2.14.6, 3.2.4, 3.3.1 and 3.4.1 takes all that there is for one packet of 68
-bytes (CVE-2025-64438, docs/guide/security.md). Ended by its limit, the process is started again by
+Fast DDS before 2.6.11, 2.14.6, 3.2.4, 3.3.1 and 3.4.1 takes all memory for one packet of 68 bytes
+(CVE-2025-64438, docs/guide/security.md). Ended by its limit, the process is started again by
 its launch file, and its flight goes on.
 """
 

@@ -25,15 +25,15 @@ def middleware_task(node: str) -> DiagnosticStatus:
     }
     if version is None:
         return _status(node, DiagnosticStatus.OK, "no Fast DDS", values)
-    values |= {"Fast DDS": _text(version), "CVE-2025-64438 is fixed in": cured}
+    values |= {"Fast DDS": _text(version), "published holes are fixed in": cured}
     name = f"Fast DDS {_text(version)}"
     if is_cured(version):
         return _status(node, DiagnosticStatus.OK, name, values)
     if local:
         return _status(node, DiagnosticStatus.OK, f"{name}, kept to this host", values)
     text = (
-        f"{name}: one packet from anybody on the network can end this process (CVE-2025-64438, "
-        f"fixed in {cured}): set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if no other computer "
+        f"{name}: one packet from anybody on the network can end this process (fixed in "
+        f"{cured}): set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if no other computer "
         "must receive this node (docs/guide/security.md)"
     )
     return _status(node, DiagnosticStatus.WARN, text, values)

@@ -5,9 +5,12 @@ import signal
 import pytest
 from chute_msgs.msg import SafetyState
 
-from chute_ros.ros.middleware import fast_dds, is_cured
+from chute_ros.ros.middleware import fast_dds
 from chute_ros.tools.processes import ProcessEndedError
 from faults.gap_packet import Stranger, gap_packet
+
+#: Of each line the first version that does not take all memory for it.
+GAP_IS_FIXED = {(2, 6): (2, 6, 11), (2, 14): (2, 14, 6), (3, 2): (3, 2, 4)}
 
 
 @pytest.fixture
@@ -58,7 +61,8 @@ def test_a_supervisor_that_one_packet_ended_goes_on_with_its_flight(pair, strang
     crafted = gap_packet(other, victim)
     epoch = pair.epoch("a")
     stranger.send(crafted, "127.0.0.1")
-    if is_cured(fast_dds()):
+    version = fast_dds()
+    if version >= GAP_IS_FIXED.get(version[:2], (3, 4, 1)):
         pair.bench.turns(3.0)
         assert not ended(pair)
         assert pair.states[-1].state == SafetyState.IN_FLIGHT

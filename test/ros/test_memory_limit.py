@@ -90,18 +90,17 @@ def test_a_node_says_so_in_one_line_and_ends_with_code_2():
 @pytest.mark.parametrize(
     ("version", "cured"),
     [
-        ((2, 6, 10), False),
-        ((2, 6, 11), True),
+        ((2, 6, 11), False),
+        ((2, 6, 12), True),
         ((2, 10, 99), False),
-        ((2, 14, 5), False),
-        ((2, 14, 6), True),
-        ((3, 2, 3), False),
-        ((3, 2, 4), True),
-        ((3, 3, 0), False),
-        ((3, 3, 1), True),
-        ((3, 4, 0), False),
-        ((3, 4, 1), True),
-        ((3, 5, 0), True),
+        # Without the packet that takes all memory, but with others.
+        ((2, 14, 6), False),
+        ((2, 14, 7), True),
+        ((3, 2, 4), False),
+        ((3, 2, 5), True),
+        ((3, 3, 1), False),
+        ((3, 6, 2), False),
+        ((3, 7, 0), True),
         ((4, 0, 0), True),
     ],
 )
@@ -132,7 +131,8 @@ def test_the_version_is_that_of_the_library_that_is_loaded(file, beside, version
     [
         ((2, 14, 5), False, b"\x01", "Fast DDS 2.14.5: one packet from anybody on the network"),
         ((2, 14, 5), True, b"\x00", "Fast DDS 2.14.5, kept to this host"),
-        ((2, 14, 6), False, b"\x00", "Fast DDS 2.14.6"),
+        ((2, 14, 6), False, b"\x01", "Fast DDS 2.14.6: one packet from anybody on the network"),
+        ((2, 14, 7), False, b"\x00", "Fast DDS 2.14.7"),
         (None, False, b"\x00", "no Fast DDS"),
     ],
 )
