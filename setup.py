@@ -56,6 +56,7 @@ setup(
             "demo = chute_ros.tools.demo:main",
             "replay = chute_ros.tools.replay:main",
             "report = chute_ros.tools.report:main",
+            "test_card = chute_ros.tools.test_card:main",
             "to_rosbag2 = chute_ros.tools.to_rosbag2:main",
             "judge_log = chute_ros.tools.judge_log.__main__:main",
             "conformance = chute_ros.tools.conformance:main",

@@ -44,6 +44,7 @@ td.words { overflow-wrap: anywhere; min-width: 14em; }
 th { color: var(--dim); font-weight: 600; font-size: 12px; }
 td.number { font-variant-numeric: tabular-nums; white-space: nowrap; text-align: right; }
 td.motion { white-space: nowrap; }
+td.blank { width: 60%; height: 2.4em; }
 td ul { margin: 0; padding-left: 16px; }
 b.good { color: var(--good); } b.warn { color: var(--warn); } b.bad { color: var(--bad); }
 b.quiet { color: var(--quiet); } b.plain { color: var(--plain); } b.act { color: var(--act); }

@@ -1,0 +1,52 @@
+"""Writes the card of a deployment that was tried: an HTML page to be printed and signed.
+
+It has the files and their hashes, the settings and their hash, the versions of the nodes, what was
+measured of each release and of the descent, and lines for what a person must fill in by hand.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from pathlib import Path
+
+from chute_msgs.msg import PersonRequest, SafetyDecision
+from diagnostic_msgs.msg import DiagnosticArray
+
+from chute_ros.tools.flight_story import DECISION, PERSON, tell
+from chute_ros.tools.recording import read
+from chute_ros.tools.recording_options import make_each, recording_options, write
+from chute_ros.tools.releases import releases
+from chute_ros.tools.test_card_page import DIAGNOSTICS, card
+
+
+def main() -> None:
+    """Exit code 0: written; 2: a recording cannot be read, or a page cannot be written."""
+    options = recording_options("test_card", __doc__)
+    options.add_argument(
+        "--output", type=Path, metavar="HTML", help="output file (default: FILE.card.html)"
+    )
+    given = options.parse_args()
+    made = make_each(
+        "test_card",
+        given,
+        "one card",
+        lambda files, output: print(_written(files, output), flush=True),
+    )
+    sys.exit(0 if made else 2)
+
+
+def _written(files: list[Path], output: Path | None) -> Path:
+    path = output or files[0].with_name(f"{files[0].name}.card.html")
+    write(path, test_card(files))
+    return path
+
+
+def test_card(files: list[Path]) -> str:
+    """The card of these files; RecordError if they cannot be read."""
+    kinds = {DECISION: SafetyDecision, PERSON: PersonRequest, DIAGNOSTICS: DiagnosticArray}
+    recording = read(files, kinds)
+    story = tell(recording)
+    hashes = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
+    end = recording.seconds(recording.turns[-1].wall)
+    return card(recording, story, releases(story, end), hashes)
