@@ -65,7 +65,7 @@ FOR_PYPY := export PYPY_GC_NURSERY=32M PYTHONPATH="$$PWD:$$PYTHONPATH:$$(python3
     'import sys; print(*(p for p in sys.path if p.endswith("-packages")), sep=":")')"
 PYPY_JIT := --jit threshold=400,function_threshold=600,trace_eagerness=80,trace_limit=3000
 
-.PHONY: help demo sim test test-long pictures newcomer bench campaign compare conformance without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
+.PHONY: help demo sim test test-long pictures newcomer bench campaign compare conformance case without hosts soak sitl build lint docs explore mutate fuzz tapes site lock clean distclean
 
 help: ## say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 18
@@ -78,7 +78,7 @@ sim: build ## play with a simulated vehicle until Ctrl-C (VEHICLE=rocket; PARACH
 	@$(OVERLAY) && $(LOCAL) && exec python3 -m chute_ros.tools.sim --vehicle $(VEHICLE) \
 	    --parachute $(PARACHUTE) --port $(PORT) $(SIM_ARGS)
 
-test: build ## lint, test both packages, print the totals (DISTRO=kilted for Kilted)
+test: build .venv-case/done ## lint, trace the requirements, test both packages, print the totals (DISTRO=kilted for Kilted)
 	@$(OVERLAY) && $(LOCAL) && exec scripts/test.sh
 
 test-long: build ## run the tests that are long by nature, write docs/evidence/long_tests.md
@@ -122,6 +122,14 @@ without: build ## fly the campaign without a rule or heuristic, to see what need
 	@$(OVERLAY) && $(if $(PYPY),$(FOR_PYPY) && exec $(PYPY) $(PYPY_JIT),PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3) \
 	    scripts/without.py --flights $(FLIGHTS) --seed $(SEED) \
 	    $(if $(PYPY),--python "$(PYPY) $(PYPY_JIT)") $(WITHOUT_ARGS)
+
+case: build .venv-case/done ## input to a safety case: pages in case/html, for print in case/pdf, bill of materials
+	@$(OVERLAY) && scripts/browser.sh chromium-driver && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m safety_case
+
+.venv-case/done: requirements/case.lock
+	@rm -rf .venv-case && "$(PYTHON)" -m venv .venv-case \
+	    && .venv-case/bin/pip install --quiet --disable-pip-version-check --only-binary :all: \
+	        --require-hashes -r requirements/case.lock && touch $@
 
 hosts: build ## vehicles, supervisors, ground stations on spoilt networks, write docs/evidence/hosts.md (PARTS=...)
 	@$(OVERLAY) && PYTHONPATH="$$PWD:$$PYTHONPATH" exec python3 -m faults $(PARTS)

@@ -25,3 +25,4 @@ pin mutate.lock mutate.in
 pin fuzz.lock fuzz.in
 pin docs.lock docs.in
 pin bodies.lock bodies.in
+pin case.lock case.in

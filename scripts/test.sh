@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Lint, run the tests of both packages through colcon, print the totals. Needs env.sh sourced
-# after a build.
+# Lint, trace the requirements, run the tests of both packages through colcon, print the totals.
+# Needs env.sh sourced after a build.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 name=$CHUTE_ROS_ENV
@@ -14,6 +14,8 @@ flock 9
 failed=()
 scripts/browser.sh 9>&- || failed+=("browser")
 scripts/lint.sh 9>&- || failed+=("linters")
+# A requirement without a test, and a test without a requirement.
+PYTHONPATH="$PWD:$PYTHONPATH" python3 -m safety_case --check 9>&- || failed+=("safety case")
 
 # Most tests wait for something that another process, a wire or the middleware does: two at a time
 # for each core. Each worker has a ROS domain of its own (chute_ros/tools/isolation.py).

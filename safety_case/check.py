@@ -1,0 +1,121 @@
+"""Each requirement is traced to code, tests and pages, each test to a requirement, each part to
+its failures; and what is named exists."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import re
+from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
+
+from chute_ros.campaign.scenario import Failure
+from chute_ros.links.registered import links
+from safety_case.documents import Node, files_of, of_kind, parents_of
+
+#: How a part may fail, and how a control action may be unsafe.
+MODES = ("late", "lost", "wrong", "twice", "restarted", "forged")
+KINDS = ("not given", "given wrongly", "too early", "too late", "stopped too soon")
+
+_NAMED = re.compile(r"``([\w./-]+)(?:::(\w+))?``")
+
+
+def problems(nodes: Sequence[Node], root: Path) -> list[str]:
+    """What is not traced, each in a line; root: of the repository."""
+    requirements = of_kind(nodes, "REQUIREMENT")
+    failures, actions = of_kind(nodes, "FAILURE_MODE"), of_kind(nodes, "UNSAFE_ACTION")
+    rows = [*failures, *actions]
+    return [
+        *(one for requirement in requirements for one in _of_requirement(requirement, root)),
+        *_tests_of_nobody(requirements, root),
+        *_incomplete(failures, MODES, "failure"),
+        *_incomplete(actions, KINDS, "unsafe action"),
+        *_links_without_failures(failures),
+        *(one for row in failures for one in _of_failure(row)),
+        *(one for row in rows for one in _without_parents(row)),
+        *(one for row in [*rows, *of_kind(nodes, "CRITERION")] for one in _not_there(row, root)),
+        *(one for row in [*requirements, *failures] for one in _campaign(row)),
+    ]
+
+
+def _of_requirement(node: Node, root: Path) -> Iterable[str]:
+    files = files_of(node)
+    if not any(one.startswith("test/") for one in files):
+        yield f"{node['UID']} is an orphan: no test shows it; name one in its RELATIONS"
+    if all(one.startswith("test/") for one in files):
+        yield f"{node['UID']} is an orphan: no code fulfils it; name a file in its RELATIONS"
+    for name in files:
+        if not (root / name).is_file():
+            yield f"{node['UID']}: there is no {name}"
+    for page in _words(node, "PAGES"):
+        if not (root / "docs" / page).is_file():
+            yield f"{node['UID']}: there is no page docs/{page}"
+
+
+def _tests_of_nobody(requirements: Iterable[Node], root: Path) -> Iterable[str]:
+    named = {one for requirement in requirements for one in files_of(requirement)}
+    for path in sorted((root / "test").rglob("test_*.py")):
+        if (name := path.relative_to(root).as_posix()) not in named:
+            yield (
+                f"{name} is an orphan: it shows no requirement; name it in the RELATIONS of one "
+                "in safety_case/requirements.sdoc"
+            )
+
+
+def _incomplete(rows: Iterable[Node], words: Collection[str], what: str) -> Iterable[str]:
+    """In each section a row of each word."""
+    titles: dict[str, list[str]] = {}
+    for row in rows:
+        titles.setdefault(row["SECTION"], []).append(row["TITLE"])
+    for section, has in titles.items():
+        for word in words:
+            if has.count(word) != 1:
+                yield f"{section}: {has.count(word)} rows for the {what} '{word}', need 1"
+        for word in sorted({*has} - {*words}):
+            yield f"{section}: the {what} '{word}' is none of {', '.join(words)}"
+
+
+def _links_without_failures(failures: Iterable[Node]) -> Iterable[str]:
+    parts = {row["SECTION"] for row in failures}
+    for name in links():
+        if not any(part.startswith(f"{name}: ") for part in parts):
+            yield f"the link {name} has no section in safety_case/fmea.sdoc"
+
+
+def _of_failure(row: Node) -> Iterable[str]:
+    if ("NONE" in _words(row, "SINGLE")) == bool(row.get("STAYS")):
+        yield f"{row['UID']}: STAYS says why a single failure stays; without one it is left out"
+
+
+def _without_parents(row: Node) -> Iterable[str]:
+    if not parents_of(row):
+        yield f"{row['UID']}: no requirement answers it; name one in its RELATIONS"
+
+
+def _not_there(row: Node, root: Path) -> Iterable[str]:
+    """Each file and test that SHOWN_BY names exists."""
+    text = row.get("SHOWN_BY", "")
+    named = _NAMED.findall(text)
+    for path, test in named:
+        if not (root / path).is_file():
+            yield f"{row['UID']}: there is no {path}"
+        elif test and test not in _functions(root / path):
+            yield f"{row['UID']}: {path} has no {test}"
+    if len(named) != len(text.splitlines()) or (not named and row["_NODE_TYPE"] != "CRITERION"):
+        yield f"{row['UID']}: SHOWN_BY is a list of ``path`` or ``path::test``"
+
+
+@functools.cache
+def _functions(path: Path) -> frozenset[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return frozenset(one.name for one in ast.walk(tree) if isinstance(one, ast.FunctionDef))
+
+
+def _campaign(row: Node) -> Iterable[str]:
+    for name in _words(row, "CAMPAIGN"):
+        if name not in Failure.__members__:
+            yield f"{row['UID']}: the campaign has no failure {name}"
+
+
+def _words(node: Node, field: str) -> list[str]:
+    return [one.strip() for one in node.get(field, "").split(",") if one.strip()]

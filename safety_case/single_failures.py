@@ -1,0 +1,37 @@
+"""The page of the failures that alone lead to a missed or a false deploy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from safety_case.documents import Node, list_table, of_kind, write_made
+
+_INTRODUCTION = """
+Each single failure that, with the shipped settings, can lead to a missed or to a false deploy
+although everything else works. All other rows of the `FMEA <fmea.html>`_ are cured by what the row
+says. The last column says why the failure stays, and what the integrator must do.
+"""
+_LEADS = {"MISSED": "missed deploy", "FALSE": "false deploy"}
+
+
+def write(nodes: Sequence[Node]) -> None:
+    """From the rows of the FMEA."""
+    failures = of_kind(nodes, "FAILURE_MODE")
+    stay = [one for one in failures if one.get("STAYS")]
+    rows = [
+        (
+            f"{one['SECTION']}: **{one['TITLE']}**\n\n[LINK: {one['UID']}]",
+            "\n\n".join(_LEADS[word.strip()] for word in one["SINGLE"].split(",")),
+            _line(one["STATEMENT"]),
+            _line(one["STAYS"]),
+        )
+        for one in stay
+    ]
+    head = ("what fails", "leads to", "what happens", "why it stays, and what you must do")
+    counted = f"{len(stay)} of {len(failures)} failure modes stay."
+    parts = [("", f"{_INTRODUCTION}\n{counted}\n\n{list_table(head, rows, (20, 14, 26, 40))}")]
+    write_made("single_failures", "Single failures", parts)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,101 @@
+"""The page of every threshold of every shipped profile."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import yaml
+
+from safety_case.documents import ROOT, list_table, plain, write_made
+
+_PROFILES = ROOT / "config" / "profiles"
+_COMPARE = ROOT / "docs" / "evidence" / "compare.md"
+_CURVE = "\n## False against missed\n"
+_INTRODUCTION = """
+From the shipped profiles themselves. WHY AND FROM WHERE is the text that stands beside the value
+in the profile; "ours" means that no public source gives it. How a rule counts:
+``docs/reference/rules.md``.
+"""
+_MOVED = """
+What changes when limits move, by ``make compare`` (docs/evidence/compare.md): each guard with its
+limits scaled by these factors. Of this product the time of every rule (``for``) is scaled, of a
+peer its own limits. A cell has the flights missed or late, in percent of those that only a
+parachute could save, and the flights ended although they went well, in percent of all.
+"""
+#: How long a rule must hold and the like, as a profile names them.
+_COUNTS = ("for", "leak", "samples", "needed", "doubted", "clears")
+
+
+def write() -> None:
+    """From config/profiles."""
+    parts = [("", _INTRODUCTION), ("What changes when limits move", _moved())]
+    for path in sorted(_PROFILES.glob("*.yaml")):
+        text = path.read_text(encoding="utf-8")
+        parts.append((f"{path.stem}", _profile(yaml.safe_load(text), text)))
+    write_made("thresholds", "Thresholds", parts)
+
+
+def _profile(profile: Mapping[str, Any], text: str) -> str:
+    comments = dict(_comments(text))
+    values = [
+        (f"``{key}``", str(value), plain(comments.get(key, "")))
+        for key, value in profile.items()
+        if key not in ("profile", "rules", "measurements")
+    ]
+    for name, limits in profile.get("measurements", {}).items():
+        told = ", ".join(f"{key} {value}" for key, value in limits.items())
+        values.append((f"``measurements: {name}``", plain(told), plain(comments.get(name, ""))))
+    rules = [
+        (
+            f"**{plain(name)}**\n\n{plain(rule.get('says', ''))}",
+            _limits(rule),
+            plain(rule.get("source", "")),
+        )
+        for name, rule in profile["rules"].items()
+    ]
+    tables = []
+    if values:
+        tables.append(list_table(("value", "is", "why and from where"), values, (20, 16, 64)))
+    head = ("rule", "holds while, and how long", "why and from where")
+    tables.append(list_table(head, rules, (20, 36, 44)))
+    return "\n\n".join(tables)
+
+
+def _limits(rule: Mapping[str, Any]) -> str:
+    lines = [f"- {plain(_condition(one))}" for one in rule["conditions"]]
+    counts = ", ".join(f"{key} {rule[key]}" for key in _COUNTS if key in rule)
+    return "\n".join([*lines, "", f"{plain(rule['action'])}{'; ' if counts else ''}{counts}"])
+
+
+def _condition(condition: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {_word(value)}" for key, value in condition.items())
+
+
+def _word(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return " or ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _comments(text: str) -> Iterator[tuple[str, str]]:
+    """Of the keys before the rules: the comment above each."""
+    said: list[str] = []
+    for line in text.split("\nrules:")[0].splitlines():
+        if line.lstrip().startswith("#"):
+            said.append(line.strip().removeprefix("#").strip())
+        elif found := re.match(r"\s*([\w_]+):", line):
+            yield found[1], " ".join(said)
+            said = []
+        elif not line.strip():
+            said = []
+
+
+def _moved() -> str:
+    """The table of the curve in docs/evidence/compare.md."""
+    section = _COMPARE.read_text(encoding="utf-8").split(_CURVE, 1)[1].split("\n## ", 1)[0]
+    lines = [line for line in section.splitlines() if line.startswith("| ")]
+    head, *body = ([cell.strip() for cell in line.strip("| ").split("|")] for line in lines)
+    widths = [28, *([72 // (len(head) - 1)] * (len(head) - 1))]
+    return f"{_MOVED}\n{list_table(head, body, widths)}"

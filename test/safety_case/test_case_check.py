@@ -1,0 +1,172 @@
+"""What the safety case traces: an orphan on either side is told, and so is what does not exist."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from chute_ros.links.registered import links
+from safety_case import single_failures, thresholds
+from safety_case.check import KINDS, MODES, problems
+
+SHOWN = "- ``test/test_deploy.py::test_it_opens``"
+
+
+def requirement(uid="R-1", **other):
+    files = ["chute_ros/deploy.py", "test/test_deploy.py"]
+    relations = [{"TYPE": "File", "VALUE": one} for one in files]
+    node = {"_NODE_TYPE": "REQUIREMENT", "UID": uid, "SECTION": "deploy", "PAGES": "deploy.md"}
+    return {**node, "RELATIONS": relations, **other}
+
+
+def row(kind, section, title, **other):
+    node = {"_NODE_TYPE": kind, "SECTION": section, "TITLE": title, "UID": f"{section} {title}"}
+    relations = [{"TYPE": "Parent", "VALUE": "R-1"}]
+    return {**node, "RELATIONS": relations, "SHOWN_BY": SHOWN, **other}
+
+
+def failures():
+    parts = [f"{name}: the device" for name in links()]
+    return [
+        row("FAILURE_MODE", part, mode, SINGLE="NONE", STATEMENT="")
+        for part in parts
+        for mode in MODES
+    ]
+
+
+def actions():
+    return [row("UNSAFE_ACTION", "Deploy", kind) for kind in KINDS]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    for name, text in {
+        "chute_ros/deploy.py": "",
+        "docs/deploy.md": "",
+        "test/test_deploy.py": "def test_it_opens(): ...",
+    }.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return tmp_path
+
+
+def test_a_whole_case_has_no_problem(root):
+    assert problems([requirement(), *failures(), *actions()], root) == []
+
+
+def test_a_requirement_without_a_test_is_an_orphan(root):
+    relations = [{"TYPE": "File", "VALUE": "chute_ros/deploy.py"}]
+    orphan = requirement("R-2", RELATIONS=relations)
+    told = problems([requirement(), orphan, *failures(), *actions()], root)
+    assert told == ["R-2 is an orphan: no test shows it; name one in its RELATIONS"]
+
+
+def test_a_requirement_without_code_is_an_orphan(root):
+    relations = [{"TYPE": "File", "VALUE": "test/test_deploy.py"}]
+    orphan = requirement("R-2", RELATIONS=relations)
+    (told,) = problems([requirement(), orphan, *failures(), *actions()], root)
+    assert told.startswith("R-2 is an orphan: no code fulfils it")
+
+
+def test_a_test_that_shows_no_requirement_is_an_orphan(root):
+    (root / "test" / "tools").mkdir()
+    (root / "test" / "tools" / "test_orphan.py").write_text("")
+    (told,) = problems([requirement(), *failures(), *actions()], root)
+    assert told.startswith("test/tools/test_orphan.py is an orphan: it shows no requirement")
+
+
+def test_a_file_that_is_not_there_is_told(root):
+    relations = [*requirement()["RELATIONS"], {"TYPE": "File", "VALUE": "chute_ros/gone.py"}]
+    told = problems([requirement(RELATIONS=relations), *failures(), *actions()], root)
+    assert told == ["R-1: there is no chute_ros/gone.py"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"PAGES": "none.md"}, "R-1: there is no page docs/none.md"),
+        ({"CAMPAIGN": "MOTOR, WINGS"}, "R-1: the campaign has no failure WINGS"),
+    ],
+)
+def test_a_page_or_a_failure_of_the_campaign_that_is_not_there_is_told(root, changed, told):
+    assert problems([requirement(**changed), *failures(), *actions()], root) == [told]
+
+
+@pytest.mark.parametrize(
+    ("shown", "told"),
+    [
+        ("- ``test/test_gone.py::test_it``", "there is no test/test_gone.py"),
+        ("- ``test/test_deploy.py::test_it``", "test/test_deploy.py has no test_it"),
+        ("- test/test_deploy.py", "SHOWN_BY is a list of ``path`` or ``path::test``"),
+        ("", "SHOWN_BY is a list of ``path`` or ``path::test``"),
+    ],
+)
+def test_a_row_that_names_no_test_that_exists_is_told(root, shown, told):
+    rows = [*failures(), *actions()]
+    rows[0] = {**rows[0], "SHOWN_BY": shown}
+    assert problems([requirement(), *rows], root) == [f"{rows[0]['UID']}: {told}"]
+
+
+def test_a_part_without_one_of_its_failures_is_told(root):
+    told = problems([requirement(), *failures()[1:], *actions()[:-1]], root)
+    first = failures()[0]["SECTION"]
+    assert told == [
+        f"{first}: 0 rows for the failure 'late', need 1",
+        "Deploy: 0 rows for the unsafe action 'stopped too soon', need 1",
+    ]
+
+
+def test_a_failure_that_is_none_of_the_six_is_told(root):
+    odd = row("FAILURE_MODE", failures()[0]["SECTION"], "blue", SINGLE="NONE")
+    (told,) = problems([requirement(), *failures(), odd, *actions()], root)
+    assert told.endswith(
+        "the failure 'blue' is none of late, lost, wrong, twice, restarted, forged"
+    )
+
+
+def test_a_link_without_failures_is_told(root):
+    name = next(iter(links()))
+    rows = [one for one in failures() if not one["SECTION"].startswith(name)]
+    told = problems([requirement(), *rows, *actions()], root)
+    assert told == [f"the link {name} has no section in safety_case/fmea.sdoc"]
+
+
+@pytest.mark.parametrize(("single", "stays"), [("MISSED", ""), ("NONE", "it is rare")])
+def test_a_single_failure_stays_with_its_reason_or_is_cured(root, single, stays):
+    rows = failures()
+    rows[0] = {**rows[0], "SINGLE": single, "STAYS": stays}
+    (told,) = problems([requirement(), *rows, *actions()], root)
+    assert "STAYS says why a single failure stays" in told
+
+
+def test_a_row_that_no_requirement_answers_is_told(root):
+    rows = [*failures(), *actions()]
+    rows[-1] = {**rows[-1], "RELATIONS": []}
+    (told,) = problems([requirement(), *rows], root)
+    assert told.startswith("Deploy stopped too soon: no requirement answers it")
+
+
+def test_the_page_of_single_failures_has_those_that_stay(tmp_path, monkeypatch):
+    monkeypatch.setattr("safety_case.documents.FOLDER", tmp_path)
+    rows = failures()
+    rows[0] = {**rows[0], "SINGLE": "MISSED, FALSE", "STAYS": "One wire\nis one chance."}
+    single_failures.write(rows)
+    text = (tmp_path / "made_single_failures.sdoc").read_text()
+    assert f"1 of {len(rows)} failure modes stay." in text
+    assert "One wire is one chance." in text
+    assert "missed deploy" in text
+    assert "false deploy" in text
+    assert text.count("[LINK: ") == 1
+
+
+def test_the_page_of_thresholds_has_each_rule_of_each_profile(tmp_path, monkeypatch):
+    monkeypatch.setattr("safety_case.documents.FOLDER", tmp_path)
+    thresholds.write()
+    text = (tmp_path / "made_thresholds.sdoc").read_text()
+    for profile in ("by_hand", "fixed_wing", "multirotor", "rocket"):
+        assert f"TITLE: {profile}" in text
+    assert "**uncommanded sink**" in text
+    # What stands above a value in the profile is why it is so.
+    assert "AP\\_PARACHUTE\\_ALT\\_MIN\\_DEFAULT" in text
