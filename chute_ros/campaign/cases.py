@@ -15,22 +15,9 @@ from chute_ros.sim.autopilot_kinds import ARDUPLANE, PX4
 from chute_ros.sim.flight import Descent
 from chute_ros.sim.home import Homing
 
-#: What fails, in short: of each kind of vehicle.
-_FAILURES = {
-    "multirotor": {
-        Failure.MOTOR: "motor lost, tumbles",
-        Failure.SINK: "thrust partly lost",
-        Failure.REBOOT: "autopilot restarts",
-        Failure.POWER: "power lost",
-    },
-    "fixed_wing": {
-        Failure.MOTOR: "breaks, tumbles",
-        Failure.REBOOT: "autopilot restarts",
-        Failure.POWER: "power lost",
-    },
-}
 #: When it fails, s after it is up; a descent begins then, and is steady so much later.
-_FAILS, _DESCENT_BEGINS, _STEADY = (1.0, 1.6), 0.2, 1.0
+FLOWN_BEFORE = 1.0
+_FAILS, _DESCENT_BEGINS, _STEADY = (FLOWN_BEFORE, 1.6), 0.2, 1.0
 #: A descent takes half a second's way less than it would at full speed from the start (Manoeuvre).
 _SLOWER_FOR = 0.5
 _DESCENT_LASTS = 10.0
@@ -40,11 +27,12 @@ _HOMING = {PX4.name: Homing.FOLLOWS, ARDUPLANE.name: Homing.ZEROED}
 
 @dataclass(frozen=True)
 class Case:
-    """name: what fails, in words. end: name of the Descent of an aeroplane out of control; empty:
-    as the failure has it. descends: it fails in a descent; otherwise in level flight. faults: one
-    to so many of the campaign's faults come around it."""
+    """name: what fails, in short; about: what becomes of the vehicle. end: name of the Descent of
+    an aeroplane out of control; empty: as the failure has it. descends: it fails in a descent;
+    otherwise in level flight. faults: one to so many of the campaign's faults come around it."""
 
     name: str
+    about: str
     failure: Failure
     end: str = ""
     descends: bool = False
@@ -56,13 +44,51 @@ class Case:
         return "descent" if self.descends else "level"
 
 
+_FALLS = "it falls and tumbles"
+_UNHELD = "nothing holds the vehicle: a multirotor tumbles, an aeroplane ends in a spiral dive"
+_OF_BOTH = (
+    Case("autopilot restarts", f"its motors stop with it; {_UNHELD}", Failure.REBOOT),
+    Case(
+        "power lost",
+        "motors and autopilot stop, and the autopilot is silent: only another source of "
+        f"`vehicle_sources` can still tell of the fall; {_UNHELD}",
+        Failure.POWER,
+    ),
+)
+_CASES = {
+    "multirotor": (
+        Case("motor lost", f"the other motors do not carry it; {_FALLS}", Failure.MOTOR),
+        Case(
+            "thrust partly lost",
+            "it stays upright, and sinks faster and faster: 7 to 12 m/s in the end, if the "
+            "description says nothing else",
+            Failure.SINK,
+        ),
+        *_OF_BOTH,
+    ),
+    "fixed_wing": (
+        Case("breaks", f"no wing carries it any more; {_FALLS}", Failure.MOTOR),
+        *_OF_BOTH,
+        *(
+            Case(
+                name,
+                f"out of control: about {sink:g} m/s in the end, if the description says nothing "
+                f"else, {tilt:g} degrees from upright; it settles with a time constant of about "
+                f"{settles:g} s",
+                Failure.STALL,
+                name,
+            )
+            for name, (sink, settles, tilt, _) in ENDS.items()
+        ),
+    ),
+}
+
+
 def cases(vehicle: DescribedVehicle, faults: int = 0) -> list[Case]:
     """Every failure of the world that only a parachute helps, level and then in a descent."""
-    failures = [Case(name, one, faults=faults) for one, name in _FAILURES[vehicle.kind].items()]
-    if vehicle.kind == "fixed_wing":
-        failures += [Case(name, Failure.STALL, name, faults=faults) for name in ENDS]
-    descents = [replace(one, descends=True) for one in failures] if vehicle.descent_speed else []
-    return [*failures, *descents]
+    level = [replace(one, faults=faults) for one in _CASES[vehicle.kind]]
+    descents = [replace(one, descends=True) for one in level] if vehicle.descent_speed else []
+    return [*level, *descents]
 
 
 def flight_of(vehicle: DescribedVehicle, case: Case, seed: int, height: float = 0.0) -> Scenario:

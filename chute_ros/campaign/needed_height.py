@@ -55,6 +55,11 @@ class Fall:
         return not math.isnan(self.released.after)
 
     @property
+    def noticed(self) -> Stage:
+        """The supervisor's order, or a release that came before any."""
+        return self.decided if self.decided.after <= self.released.after else self.released
+
+    @property
     def lost(self) -> float:
         """From the failure to the canopy that carries; all, if it touched down before, m."""
         return self.height if math.isnan(self.carried.lost) else self.carried.lost
@@ -108,10 +113,12 @@ class ObservedFlight(Flight):
             raise CampaignError(f"seed {self.scenario.seed} never took off: {flown.grounded}")
         if flown.released < self._failed_at:
             return Fall(math.nan, Stage(), Stage(), Stage(), math.nan, ended_before=True)
-        kills = [at for at, one in flown.decided if one.action is Action.KILL]
+        decided = [
+            at for at, one in flown.decided if one.action is Action.KILL and at >= self._failed_at
+        ]
         return Fall(
             self._heights[0],
-            self._stage(kills[0] if kills else math.nan),
+            self._stage(decided[0] if decided else math.nan),
             self._stage(flown.released),
             self._stage(self._carried),
             self._touchdown(flown),
